@@ -10,6 +10,7 @@ import zipfile
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -203,6 +204,31 @@ def test_the_loop_leaves_as_csv_(client, bench, joint):
     ask = {"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012}
     table = client.post(f"{bench}/dampers/{key}/csv", json=ask)
     assert table.text.splitlines()[0].startswith("time_s,displacement_m,velocity_m_s,current_A,force_N")
+
+
+def test_the_table_of_a_loop_is_in_the_units_asked_for(client, bench, joint):
+    key = put_on(client, bench, joint)
+    texts = [
+        client.post(
+            f"{bench}/dampers/{key}/csv",
+            json={"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012, "units": units},
+        ).text
+        for units in ({}, {"force": "lbf", "length": "in"}, {"force": "kN", "length": "mm"})
+    ]
+    si, imperial, mixed = (pl.read_csv(text.encode()) for text in texts)
+    assert imperial.columns == ["time_s", "displacement_in", "velocity_in_s", "current_A", "force_lbf", "extrapolation"]
+    assert mixed.columns == ["time_s", "displacement_mm", "velocity_m_s", "current_A", "force_kN", "extrapolation"]
+    factors = {"displacement_in": ("displacement_m", 0.0254), "velocity_in_s": ("velocity_m_s", 0.0254)}
+    for name, (own, size) in {**factors, "force_lbf": ("force_N", 0.45359237 * 9.80665)}.items():
+        assert np.allclose(imperial[name] * size, si[own], rtol=1e-12, atol=0)
+    assert np.allclose(1e3 * mixed["force_kN"], si["force_N"], rtol=1e-12, atol=0)
+    assert (
+        client.post(
+            f"{bench}/dampers/{key}/csv",
+            json={"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012, "units": {"force": "in"}},
+        ).status_code
+        == 422
+    )
 
 
 @pytest.mark.parametrize("form", ["c", "latex"])

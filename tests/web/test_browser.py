@@ -2,6 +2,7 @@
 
 import base64
 import json
+import re
 import zipfile
 from dataclasses import replace
 
@@ -135,7 +136,7 @@ def test_from_drop_to_report(page, small_rig, tmp_path, shoot):
     page.get_by_role("button", name="Compare", exact=True).click()
     page.locator("#compare-run").wait_for()
     page.locator("section[aria-label='Force over velocity'] .js-line").first.wait_for(state="attached")
-    assert page.locator("tbody tr").count() == 2
+    assert page.locator("#view tbody tr").count() == 2
     shoot(page, "4-compared")
     page.get_by_role("button", name="Explore Bingham", exact=True).click()  # how sure it is is worked out now
     page.get_by_text("% prediction interval").wait_for()
@@ -493,9 +494,86 @@ def test_the_keyboard_reaches_everything(on_model):
 
 def test_every_view_passes_axe(on_model):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
-    for tab in ("Model", "Data", "Identify", "Compare", "Export"):
+    for tab in ("Model", "Data", "Identify", "Compare", "Ride", "Export"):
         open_tab(on_model, tab)
+        if tab == "Ride":
+            on_model.locator(".ride-bar").wait_for()
         assert axe.run(on_model).response["violations"] == [], tab
+    on_model.get_by_text("Units", exact=True).click()
+    assert axe.run(on_model).response["violations"] == [], "units"
+    on_model.get_by_text("Units", exact=True).click()
+
+
+def test_the_main_action_of_every_view_is_a_few_tab_stops_away(on_model):
+    page = on_model
+    actions = {
+        "Data": ".matrix .cell", "Identify": "Start", "Model": "#damper", "Compare": "Compare", "Ride": "#ride-damper",
+        "Export": "Create the report",
+    }  # fmt: skip
+    for tab, action in actions.items():
+        open_tab(page, tab)
+        wanted = (
+            page.locator(action).first if action[0] in "#." else page.get_by_role("button", name=action, exact=True)
+        )
+        wanted.wait_for()
+        page.evaluate("document.activeElement.blur(); document.body.tabIndex = -1; document.body.focus()")
+        page.keyboard.press("Tab")
+        assert page.locator(":focus").inner_text() == "Skip to the view"
+        page.keyboard.press("Enter")
+        stops = 1
+        while not wanted.evaluate("(it) => it === document.activeElement || document.activeElement.matches('.cell')"):
+            page.keyboard.press("Tab")
+            stops += 1
+            assert stops <= 8, (tab, page.evaluate("document.activeElement.outerHTML"))
+        page.evaluate("document.body.removeAttribute('tabindex')")
+
+
+def test_every_number_and_axis_follows_the_units_chosen(on_model, shoot):
+    page = on_model
+    axes = lambda: page.locator("#view .xtitle, #view .ytitle").all_text_contents()  # noqa: E731
+    chart = page.locator("section[aria-label='Force over displacement']")
+    verdict = page.locator(".message").filter(has_text="Predicted: peak force")
+    peak = lambda unit: float(re.search(rf"peak force ([\d.]+) {unit}", verdict.inner_text())[1])  # noqa: E731
+    before, shape = (peak("N"), number(page, "amplitude_m")), curve(page, "Force over displacement")
+    page.get_by_text("Units", exact=True).click()
+    page.get_by_label("Force", exact=True).select_option("lbf")
+    page.get_by_label("Length", exact=True).select_option("in")
+    page.keyboard.press("Escape")
+    comes_to(page, lambda: any("lbf" in text for text in axes()), True)
+    at_rest(page)
+    assert set(axes()) == {"Displacement (in)", "Force (lbf)", "Velocity (in/s)", "Time (s)", "Current (A)",
+                           "Half peak-to-peak (lbf)", "Energy (in·lbf)"}  # fmt: skip
+    assert peak("lbf") == pytest.approx(before[0] / 4.4482216, rel=2e-3)
+    assert number(page, "amplitude_m") == pytest.approx(before[1] / 25.4, rel=1e-3)
+    comes_to(page, lambda: curve(page, "Force over displacement") == shape, True)  # the same picture on other axes
+    assert page.locator(".slider[data-name=k] .unit, .slider[data-name=k1] .unit").first.inner_text() in (
+        "lbf/in",
+        "lbf/in/A",
+    )
+    type_number(page, "amplitude_m", "0.5")
+    assert number(page, "amplitude_m") == 0.5
+    shoot(page, "20-imperial")
+    for tab, texts in {"Data": (" in", "lbf"), "Ride": ("lbf", "in/s²"), "Export": (" in.",)}.items():
+        open_tab(page, tab)
+        if tab == "Ride":
+            page.locator(".ride-bar").wait_for()
+        for text in texts:
+            page.locator("#view").get_by_text(text).first.wait_for()
+    with page.expect_download() as waiting:
+        page.get_by_role("button", name="Loop as CSV").click()
+    assert waiting.value.path().read_text().startswith("time_s,displacement_in,velocity_in_s,current_A,force_lbf")
+    page.reload()
+    page.locator("html[data-ready]").wait_for()
+    open_tab(page, "Model")
+    at_rest(page)
+    assert "Force (lbf)" in axes()
+    for _ in range(3):  # the amplitude, the length, the force
+        page.keyboard.press("Control+z")
+    page.get_by_text("Units", exact=True).click()
+    page.get_by_label("Force", exact=True).select_option("N")
+    page.get_by_label("Length", exact=True).select_option("mm")
+    page.get_by_text("Units", exact=True).click()
+    assert chart.locator(".ytitle").text_content() == "Force (N)"
 
 
 def test_opening_says_at_once_what_is_being_done(page, shoot):
@@ -575,6 +653,41 @@ def test_a_browser_that_blocks_storage_gets_a_sentence_and_the_app(profile, addr
     page.get_by_role("button", name="Open the bundled tests", exact=True).click()
     page.locator(".matrix").wait_for()
     page.close()
+
+
+def test_a_browser_without_webassembly_gets_the_app(profile, address):
+    page = profile.new_page()
+    page.add_init_script(
+        "delete window.WebAssembly; delete window.CompressionStream; delete window.DecompressionStream"
+    )
+    page.goto(f"{address}#s=eJw")  # a link that cannot be unpacked here
+    page.locator("html[data-ready]").wait_for()
+    page.get_by_text("This browser cannot pack the state into a link").first.wait_for()
+    page.get_by_role("button", name="Open the bundled tests", exact=True).click()
+    page.locator(".matrix").wait_for()
+    open_tab(page, "Model")
+    page.locator("section[aria-label='Force over displacement'] .js-line").first.wait_for(state="attached")
+    page.close()
+
+
+def test_a_head_that_is_too_much_is_answered_by_a_sentence(page, shoot):
+    page.get_by_role("button", name="Open the bundled tests", exact=True).click()
+    page.locator(".matrix").wait_for()
+    open_tab(page, "Export")
+    page.get_by_text("Head of the report").click()
+    page.get_by_label("Logo").set_input_files(
+        {"name": "huge.png", "mimeType": "image/png", "buffer": bytes(50_000_000)}
+    )
+    page.get_by_text("huge.png is over 500 kB: give a smaller picture.").wait_for()
+    page.get_by_label("Logo").set_input_files({"name": "no.png", "mimeType": "image/png", "buffer": b"no picture"})
+    page.get_by_label("Customer").fill("x" * 5000)
+    page.get_by_role("button", name="Create the report").click()
+    page.locator(".message.bad").filter(has_text="E_ABOUT").wait_for()
+    expect_refusal(page)
+    page.get_by_label("Customer").fill("مختبر المخمدات")
+    page.get_by_label("Customer").press("Tab")
+    assert page.get_by_label("Customer").input_value() == "مختبر المخمدات"
+    shoot(page, "21-head")
 
 
 def test_the_audit_of_pictures_sees_what_is_wrong(page):

@@ -37,6 +37,23 @@ def frame(head: Mapping[str, Any], arrays: Mapping[str, Floats]) -> Response:
     return Response(struct.pack("<I", len(text)) + text + body, media_type="application/octet-stream")
 
 
+_FACTORS = {"N": 1.0, "kN": 1e-3, "lbf": 1 / 4.4482216152605, "m": 1.0, "mm": 1e3, "in": 1 / 0.0254}  # from SI
+
+
+def in_units(rows: Sequence[Mapping[str, Any]], force: str, length: str) -> list[dict[str, Any]]:
+    """Rows of a prediction with forces and lengths in other units, said in their columns; in mm, velocities in m/s."""
+    speed = "m" if length == "mm" else length
+    columns = {
+        "displacement_m": (f"displacement_{length}", _FACTORS[length]),
+        "velocity_m_s": (f"velocity_{speed}_s", _FACTORS[speed]),
+        "force_N": (f"force_{force}", _FACTORS[force]),
+    }
+    return [
+        {columns[k][0] if k in columns else k: columns[k][1] * v if k in columns else v for k, v in row.items()}
+        for row in rows
+    ]
+
+
 def number(value: float | None) -> float | None:
     """A number JSON can hold: what is not finite becomes nothing."""
     return float(value) if value is not None and math.isfinite(value) else None

@@ -219,7 +219,10 @@ def _joint(scored: RecipeResult | str) -> dict[str, Any]:
     assert isinstance(scored, RecipeResult)
     return {
         "values": {n: number(v) for n, v in fit.damper.model.values().items()},
-        "written": {row["name"]: row["written"] for row in intervals(scored.damper)},
+        "intervals": {
+            row["name"]: {"low": number(row["low"]), "high": number(row["high"]), "state": row["state"]}
+            for row in intervals(scored.damper)
+        },
         "at_bounds": fit.at_bounds,
         "runs": [
             {"id": run.run_id, "nrmse_pp": number(error)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from fastapi import APIRouter
 from fastapi.responses import FileResponse, Response
@@ -14,7 +14,7 @@ from mrdamper.data.encoding import csv_text
 from mrdamper.errors import InputError
 from mrdamper.export import all_exporters
 from mrdamper.report.tables import prediction_rows
-from mrdamper.web.answers import archive, download, zipped
+from mrdamper.web.answers import archive, download, in_units, zipped
 from mrdamper.web.api.model import PredictionRequest
 from mrdamper.web.bench_model import as_damper, predict_held
 from mrdamper.web.kept import Kept, keep, open_kept
@@ -77,11 +77,24 @@ def document(key: str, held: Held, session: Current) -> dict[str, str]:
     return {"text": dump_model(as_damper(session.damper(key).damper, held.held))}
 
 
+class Units(BaseModel, extra="forbid"):
+    """Units of forces and lengths in a table."""
+
+    force: Literal["N", "kN", "lbf"] = "N"
+    length: Literal["m", "mm", "in"] = "m"
+
+
+class TableRequest(PredictionRequest):
+    """A condition, and the units of the table."""
+
+    units: Units = Units()
+
+
 @router.post("/dampers/{key}/csv")
-def table(key: str, ask: PredictionRequest, session: Current) -> Response:
+def table(key: str, ask: TableRequest, session: Current) -> Response:
     """The loop at a condition as CSV."""
     prediction = predict_held(session.damper(key).damper, ask.condition, ask.held)
-    text = csv_text(prediction_rows(prediction))
+    text = csv_text(in_units(prediction_rows(prediction), ask.units.force, ask.units.length))
     return download(text.encode(), "prediction.csv", "text/csv; charset=utf-8")
 
 

@@ -1,6 +1,6 @@
 // The state of the page in its address, so that a link, a bookmark or loading it again brings it back.
 
-import { fromFragment, imported, portable, toFragment } from "./state.js";
+import { fromFragment, imported, packs, portable, toFragment } from "./state.js";
 import { tabStorage } from "./storage.js";
 
 const LAST = "mrdamper.last"; // state and damper of this page as it was left, for loading it again
@@ -22,6 +22,7 @@ export class Address {
    * whether the address holds what is shown.
    */
   follow() {
+    if (!packs) return;
     this.behind = true;
     this.tell();
     if (!this.writing) this.write().catch((error) => this.bench.fail(error));

@@ -2,7 +2,9 @@
 
 import { paint } from "./colours.js";
 import { h, renew } from "./dom.js";
+import { heading } from "./format.js";
 import { legend } from "./legend.js";
+import { onScreen } from "./units.js";
 
 const LOOK = { margin: { l: 64, r: 38, t: 10, b: 50 }, pad: 0.04, growth: 0.25 };
 let loading = null;
@@ -28,7 +30,7 @@ export function library() {
 
 /** One chart in a card. */
 export class Chart {
-  /** `title`, axis titles `x` and `y` with units, `name` of an image file; `zero` lets x begin there. */
+  /** `title`, axes `x` and `y` as [name, unit of what is drawn] or a title, `name` of an image file; `zero` lets x begin there. */
   constructor({ title, x, y, name, keys = false, zero = false, layout = () => ({}) }) {
     Object.assign(this, { title, x, y, name, zero, more: layout, ranges: null, revision: 0 });
     this.held = false; // while something is dragged: the axes stay, and grow where they must
@@ -42,14 +44,20 @@ export class Chart {
     this.traces = [];
     this.shown = ""; // the keys that stand beside the title
     new ResizeObserver(() => this.drawn && this.plot.offsetWidth && window.Plotly.Plots.resize(this.plot)).observe(this.plot);
+    document.addEventListener("bench:units", () => {
+      this.reset();
+      if (this.drawn) this.draw(this.given).catch(console.warn);
+    });
     document.addEventListener("themechange", () => this.drawn && this.redraw());
   }
 
   /** Show curves: [{x, y, name, color, width, dash, mode, ...}]. `summary` is what a screen reader says. */
   draw(traces, summary = "") {
     const before = this.traces;
-    this.traces = traces;
-    if (this.held && this.drawn && alike(before, traces) && this.fits(traces)) return this.move(before);
+    this.given = traces;
+    const [x, y] = [this.x, this.y].map((axis) => (Array.isArray(axis) ? onScreen(axis[1]).factor : 1));
+    this.traces = traces.map((t) => ({ ...t, x: scaled(t.x, x), y: scaled(t.y, y) }));
+    if (this.held && this.drawn && alike(before, this.traces) && this.fits(this.traces)) return this.move(before);
     this.plot.setAttribute("aria-label", `${this.title}. ${summary}`);
     return this.redraw();
   }
@@ -62,7 +70,7 @@ export class Chart {
 
   /** Whether curves stay inside the axes shown, and marks have something drawn to be moved. */
   fits(traces) {
-    const enough = traces.every((t, i) => t.mode !== "markers" || t.x.length <= this.marks[i]);
+    const enough = this.ranges && traces.every((t, i) => t.mode !== "markers" || t.x.length <= this.marks[i]);
     if (!enough) return false;
     const wanted = spans(traces, this.ranges, this.zero);
     return wanted.x === this.ranges.x && wanted.y === this.ranges.y;
@@ -140,7 +148,7 @@ export class Chart {
 
   layout() {
     const axis = (title, range) => ({
-      title: { text: title, standoff: 8 }, range, gridcolor: paint("grid"), zerolinecolor: paint("line-strong"),
+      title: { text: Array.isArray(title) ? heading(title[0], onScreen(title[1]).unit) : title, standoff: 8 }, range, gridcolor: paint("grid"), zerolinecolor: paint("line-strong"),
       linecolor: paint("line-strong"), ticks: "outside", ticklen: 4, tickcolor: paint("line-strong"),
       // No powers: the library writes them as styled markup, which the content security policy refuses.
       automargin: false, hoverformat: ".4~g", exponentformat: "none", separatethousands: false,
@@ -199,6 +207,15 @@ function path(t, sx, x0, sy, y0, height) {
     qy = y;
   }
   return `${text}L${Math.round(10 * qx) / 10},${Math.round(10 * qy) / 10}`;
+}
+
+const scales = new WeakMap(); // arrays in the unit of the screen: what is drawn again is the same array
+
+/** Values times a factor. */
+function scaled(values, factor) {
+  if (factor === 1) return values;
+  if (scales.get(values)?.factor !== factor) scales.set(values, { factor, scaled: values.map((value) => factor * value) });
+  return scales.get(values).scaled;
 }
 
 /** Whether two lists of curves differ in their points only, so that what is drawn can be moved. */

@@ -1,5 +1,7 @@
 // Numbers as text: four figures at most, engineers' signs.
 
+import { onScreen } from "./units.js";
+
 const SUPERSCRIPT = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
 
 /** A number with so many significant figures, without trailing noise. */
@@ -50,14 +52,15 @@ export function unit(text) {
   return text.replace(/\^(-?\d+)/g, (_, power) => superscript(Number(power))).replace(/\^-n/, "⁻ⁿ");
 }
 
-/** The unit a quantity has on the screen, and what makes its number of the SI one: lengths are in mm. */
-export function onScreen(itsUnit) {
-  return itsUnit === "m" ? { unit: "mm", factor: 1000 } : { unit: itsUnit, factor: 1 };
+/** A quantity in the unit of the screen: `quantity(0.01, "m")`. */
+export function quantity(value, itsUnit, digits = 4) {
+  const screen = onScreen(itsUnit);
+  return `${figures(screen.factor * value, digits)} ${unit(screen.unit)}`.trim();
 }
 
 /** A condition: current, frequency, amplitude. */
 export function condition(c) {
-  return c ? `${figures(c.current_A, 3)} A, ${figures(c.frequency_Hz, 3)} Hz, ${figures(c.amplitude_mm, 3)} mm` : "no motion";
+  return c ? `${figures(c.current_A, 3)} A, ${figures(c.frequency_Hz, 3)} Hz, ${quantity(c.amplitude_mm, "mm", 3)}` : "no motion";
 }
 
 /** Bytes. */

@@ -4,10 +4,12 @@ import { Address } from "./address.js";
 import { BenchError } from "./api.js";
 import { Bench } from "./bench.js";
 import { library } from "./chart.js";
-import { h, note, problem, put } from "./dom.js";
+import { capital, h, note, problem, put } from "./dom.js";
 import { openSession } from "./session.js";
-import { tabStorage } from "./storage.js";
+import { packs } from "./state.js";
+import { browserStorage, tabStorage } from "./storage.js";
 import { theme } from "./theme.js";
+import { knownUnits, setUnits, UNITS } from "./units.js";
 import * as data from "./views/data.js";
 import * as identify from "./views/identify.js";
 import * as model from "./views/model.js";
@@ -17,18 +19,30 @@ import * as takeaway from "./views/takeaway.js";
 
 const VIEWS = [data, identify, model, compare, ride, takeaway];
 const BEAT = 60_000;
+const UNITS_KEY = "mrdamper.units";
 
 async function start() {
   theme();
   const { api, limits, there } = await openSession();
   const bench = new Bench(api, limits);
+  bench.store.settle({ units: savedUnits() });
+  setUnits(bench.state.units);
   const views = VIEWS.map((v) => Object.assign(v.create(bench), { id: v.id, label: v.label }));
   const tabs = makeTabs(bench, views);
   const address = new Address(bench);
   const tools = makeTools(bench, address);
+  document.querySelector(".skip").addEventListener("click", (event) => {
+    event.preventDefault(); // the address holds the state
+    document.getElementById("view").focus();
+  });
   bench.store.onChange((state, before) => {
     if (state.view !== before.view) show(views, tabs, state.view);
     tools.update();
+    if (state.units !== before.units) {
+      setUnits(state.units);
+      browserStorage.setItem(UNITS_KEY, JSON.stringify(state.units));
+      bench.announce("units");
+    }
     for (const view of views) view.update?.(state, before);
     address.follow();
   });
@@ -50,6 +64,7 @@ async function start() {
   }
   tools.update();
   if (tabStorage.blocked) bench.say(note("warn", "This browser blocks storage: loading the page again starts a new session. Save the project on the Export page to keep it."), 15000);
+  if (!packs) bench.say(note("warn", NO_LINKS), 15000);
   document.documentElement.dataset.ready = "yes";
   setInterval(() => api.get("").catch((error) => bench.fail(error)), BEAT);
   (window.requestIdleCallback ?? setTimeout)(() => library().catch((error) => bench.fail(error)));
@@ -89,7 +104,8 @@ function makeTools(bench, address) {
   const redo = h("button", { class: "quiet", title: "Redo (Ctrl+Y)", "aria-label": "Redo", onclick: () => bench.store.redo() }, "↷", h("span", { class: "word" }, "Redo"));
   const link = h("button", { class: "quiet", title: "Copy a link that brings this state back", onclick: () => copyLink(bench, address) }, "Copy link");
   const name = h("span", { class: "data-name" });
-  put(document.getElementById("tools"), name, undo, redo, link, theme.button());
+  const units = unitChooser(bench);
+  put(document.getElementById("tools"), name, undo, redo, units.element, link, theme.button());
   document.addEventListener("keydown", (event) => {
     if (!(event.ctrlKey || event.metaKey) || event.target.matches("textarea, input[type=text]")) return;
     const key = event.key.toLowerCase();
@@ -102,13 +118,39 @@ function makeTools(bench, address) {
     update() {
       undo.disabled = !bench.store.past.length;
       redo.disabled = !bench.store.future.length;
+      units.update();
       const text = bench.overview ? bench.overview.name : "no data yet";
       if (name.textContent !== text) name.textContent = name.title = text;
     },
   };
 }
 
+/** The units chosen in this browser before. */
+function savedUnits() {
+  try {
+    return knownUnits(JSON.parse(browserStorage.getItem(UNITS_KEY)));
+  } catch {
+    return knownUnits();
+  }
+}
+
+/** The table of the units in which the page shows quantities. */
+function unitChooser(bench) {
+  const lists = Object.entries(UNITS).map(([name, units]) => {
+    const change = () => bench.store.commit({ units: { ...bench.state.units, [name]: list.value } });
+    const list = h("select", { id: `units-${name}`, onchange: change }, Object.keys(units).map((unit) => h("option", { value: unit }, unit)));
+    return [name, list];
+  });
+  const rows = lists.map(([name, list]) => h("tr", {}, h("th", { scope: "row" }, h("label", { for: list.id }, capital(name))), h("td", {}, list)));
+  const element = h("details", { class: "units" }, h("summary", {}, "Units"), h("table", {}, h("tbody", {}, rows)));
+  element.addEventListener("keydown", (event) => event.key === "Escape" && (element.open = false));
+  return { element, update: () => lists.forEach(([name, list]) => (list.value = bench.state.units[name])) };
+}
+
+const NO_LINKS = "This browser cannot pack the state into a link. Save the project on the Export page to keep it.";
+
 async function copyLink(bench, kept) {
+  if (!packs) return bench.say(note("warn", NO_LINKS), 5000);
   const address = `${location.origin}/#${await kept.fragment()}`;
   try {
     await navigator.clipboard.writeText(address);

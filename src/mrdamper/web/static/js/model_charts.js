@@ -2,17 +2,17 @@
 
 import { Chart } from "./chart.js";
 import { h } from "./dom.js";
-import { condition, figures } from "./format.js";
+import { condition, figures, quantity } from "./format.js";
 
 export class ModelCharts {
   constructor(bench) {
     this.bench = bench;
     this.turn = 0; // of the answers drawn
-    this.x = new Chart({ title: "Force over displacement", x: "Displacement (mm)", y: "Force (N)", name: "model-force-displacement", keys: true });
-    this.v = new Chart({ title: "Force over velocity", x: "Velocity (m/s)", y: "Force (N)", name: "model-force-velocity" });
-    this.t = new Chart({ title: "Force over time", x: "Time (s)", y: "Force (N)", name: "model-force-time" });
-    this.peak = new Chart({ title: "Peak force over current", x: "Current (A)", y: "Half peak-to-peak (N)", name: "model-peak-force", zero: true, keys: true });
-    this.energy = new Chart({ title: "Energy per cycle over current", x: "Current (A)", y: "Energy (J)", name: "model-energy", zero: true });
+    this.x = new Chart({ title: "Force over displacement", x: ["Displacement", "mm"], y: ["Force", "N"], name: "model-force-displacement", keys: true });
+    this.v = new Chart({ title: "Force over velocity", x: ["Velocity", "m/s"], y: ["Force", "N"], name: "model-force-velocity" });
+    this.t = new Chart({ title: "Force over time", x: ["Time", "s"], y: ["Force", "N"], name: "model-force-time" });
+    this.peak = new Chart({ title: "Peak force over current", x: ["Current", "A"], y: ["Half peak-to-peak", "N"], name: "model-peak-force", zero: true, keys: true });
+    this.energy = new Chart({ title: "Energy per cycle over current", x: ["Current", "A"], y: ["Energy", "J"], name: "model-energy", zero: true });
     this.all = [this.x, this.v, this.t, this.peak, this.energy];
     this.element = h("div", { class: "figures model" }, this.all.map((chart) => chart.element));
   }
@@ -43,7 +43,7 @@ export class ModelCharts {
     const under = family.length ? tested : near;
     const curves = (a, b) => [...band(head, arrays, a, b), ...under.map((n) => n.curve(a, b)), ...predicted.map((p) => p(a, b))];
     const [now] = head.loops;
-    const said = `Predicted peak force ${figures(now.peak_N)} newtons, energy ${figures(now.energy_J)} joules a cycle${near.length ? `; measured nearest: ${near.map((n) => n.name).join("; ")}` : ""}.`;
+    const said = `Predicted peak force ${quantity(now.peak_N, "N")}, energy ${quantity(now.energy_J, "J")} per cycle${near.length ? `; measured nearest: ${near.map((n) => n.name).join("; ")}` : ""}.`;
     await Promise.all([
       this.x.draw(curves("x", "F"), said),
       this.v.draw(curves("v", "F"), said),

@@ -1,15 +1,15 @@
 // The panel of the Model view: which damper, its condition, and its parameters under sliders.
 
 import { h, put } from "./dom.js";
-import { onScreen } from "./format.js";
 import { slider } from "./slider.js";
+import { onScreen } from "./units.js";
 
 const MM = 1000;
 const ORIGIN = { study: "from the study", bundled: "identified by a study of the bundled tests", identification: "identified here", comparison: "from the comparison", file: "from a file" };
 const CONDITION = [
   { name: "current_A", symbol: "I", meaning: "current", unit: "A", least: "the magnitude of the current is used, 0 A or more", bounds: ([, high]) => [0, 100 * high] },
   { name: "frequency_Hz", symbol: "f", meaning: "frequency", unit: "Hz", scale: "log", least: "a motion has a frequency above 0 Hz", bounds: ([low, high]) => [low / 100, high * 100] },
-  { name: "amplitude_m", symbol: "X", meaning: "amplitude", unit: "mm", factor: MM, least: "a motion has an amplitude above 0 mm", bounds: ([low, high]) => [low / 100, high * 100] },
+  { name: "amplitude_m", symbol: "X", meaning: "amplitude", unit: "m", least: "a motion has an amplitude above 0", bounds: ([low, high]) => [low / 100, high * 100] },
 ];
 
 export class ModelPanel {
@@ -108,7 +108,7 @@ export class ModelPanel {
 
   conditionSlider(spec) {
     const [low, high] = this.damper.reach[spec.name];
-    const full = { ...spec, low, high, value: this.damper.start[spec.name], tested: this.damper.envelope[spec.name], bounds: spec.bounds([low, high]) };
+    const full = { ...spec, ...onScreen(spec.unit), low, high, value: this.damper.start[spec.name], tested: this.damper.envelope[spec.name], bounds: spec.bounds([low, high]) };
     return this.listen(spec.name, full, (value) => ({ condition: { ...(this.bench.state.condition ?? this.damper.start), [spec.name]: value } }));
   }
 

@@ -1,7 +1,7 @@
 // What is known of a run, and what was found in it.
 
 import { capital, h, note, put } from "./dom.js";
-import { figures, percent } from "./format.js";
+import { figures, percent, quantity } from "./format.js";
 
 export class RunFacts {
   constructor() {
@@ -31,11 +31,11 @@ function facts(run) {
     fact("Set", run.split === "validate" ? "validation" : "identification"),
     c ? fact("Current", `${figures(c.current_A, 3)} A`) : null,
     c ? fact("Frequency", `${figures(c.frequency_Hz, 3)} Hz`) : null,
-    c ? fact("Amplitude", `${figures(c.amplitude_mm, 3)} mm`) : null,
-    run.peak_N === null ? null : fact("Half peak-to-peak", `${figures(run.peak_N)} N`),
-    run.energy_J === null ? null : fact("Energy per cycle", `${figures(run.energy_J)} J`),
-    run.damping_Ns_m === null ? null : fact("Equiv. damping", `${figures(run.damping_Ns_m)} N s/m`),
-    run.mean_N === null ? null : fact("Mean force", `${figures(run.mean_N, 3)} N`),
+    c ? fact("Amplitude", quantity(c.amplitude_mm, "mm", 3)) : null,
+    run.peak_N === null ? null : fact("Half peak-to-peak", quantity(run.peak_N, "N")),
+    run.energy_J === null ? null : fact("Energy per cycle", quantity(run.energy_J, "J")),
+    run.damping_Ns_m === null ? null : fact("Equiv. damping", quantity(run.damping_Ns_m, "N s/m")),
+    run.mean_N === null ? null : fact("Mean force", quantity(run.mean_N, "N", 3)),
     run.cycles === null ? null : fact("Cycles", figures(run.cycles, 3)),
     run.repeatability === null ? null : fact("Cycle scatter", percent(run.repeatability)),
     fact("Length", `${figures(run.duration_s, 3)} s`),

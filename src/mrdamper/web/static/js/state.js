@@ -1,10 +1,14 @@
 // What the page shows, as plain data: it can be undone, put into a link, and saved as a file.
 
+import { knownUnits } from "./units.js";
+
+/** True where the browser can pack a state into a link. */
+export const packs = "CompressionStream" in globalThis;
 const VERSION = 1;
 const MOST = 200; // steps that can be undone
 const BLANK = Object.freeze({
   view: "data", source: null, dataName: "", rig: 0, run: null,
-  damper: null, document: null, condition: null, held: {}, family: false, compareRun: null, about: {},
+  damper: null, document: null, condition: null, held: {}, family: false, units: knownUnits(), compareRun: null, about: {},
 });
 const SESSION_ONLY = ["damper"]; // keys of this session mean nothing in another
 
@@ -94,6 +98,7 @@ export function imported(raw) {
   }
   state.held = Object.fromEntries(Object.entries(raw.held ?? {}).filter(([, value]) => Number.isFinite(value)));
   state.family = raw.family === true;
+  state.units = knownUnits(raw.units);
   state.about = Object.fromEntries(Object.entries(raw.about ?? {}).filter(([, value]) => typeof value === "string").slice(0, 20));
   return state;
 }

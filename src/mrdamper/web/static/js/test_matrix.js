@@ -1,7 +1,7 @@
 // The test matrix of a rig: one button a run, in a grid the arrow keys walk.
 
 import { h } from "./dom.js";
-import { condition, figures } from "./format.js";
+import { condition, figures, quantity } from "./format.js";
 
 const STEPS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] };
 
@@ -47,7 +47,7 @@ export class TestMatrix {
     const rows = motions.map((m) =>
       h("tr", {},
         h("th", { scope: "row" }, `${figures(m.frequency_Hz, 3)} Hz`),
-        h("th", { scope: "row" }, `${figures(m.amplitude_mm, 3)} mm`),
+        h("th", { scope: "row" }, quantity(m.amplitude_mm, "mm", 3)),
         m.cells.map((keys) => h("td", {}, keys.map((key) => this.cell(key))))),
     );
     if (!rows.length) return h("p", { class: "faint small none" }, "No run is a steady sine at one current: there is no matrix to show.");
@@ -67,7 +67,7 @@ export class TestMatrix {
         class: `cell ${run.split}`, "data-run": key,
         onclick: () => this.pick(key), title: title(run), "aria-label": spoken(run),
       },
-      `${figures(run.peak_N, 3)} N`,
+      quantity(run.peak_N, "N", 3),
     );
   }
 
@@ -112,6 +112,6 @@ function title(run) {
 }
 
 function spoken(run) {
-  const force = run.peak_N === null ? "" : `, peak force ${figures(run.peak_N, 3)} N`;
+  const force = run.peak_N === null ? "" : `, peak force ${quantity(run.peak_N, "N", 3)}`;
   return `${run.id}: ${condition(run.condition)}${force}${run.split === "validate" ? ", validation" : ""}`;
 }

@@ -31,8 +31,8 @@ class CompareView {
     this.button = h("button", { class: "primary", onclick: () => this.start() }, "Compare");
     this.strip = new Chart({ title: "Error of the validation runs, one mark per run", x: "Error (% of the peak-to-peak force)", y: "", name: "validation-errors", zero: true, layout: () => this.rows() });
     this.loops = {
-      v: new Chart({ title: "Force over velocity", x: "Velocity (m/s)", y: "Force (N)", name: "compared-force-velocity" }),
-      x: new Chart({ title: "Force over displacement", x: "Displacement (mm)", y: "Force (N)", name: "compared-force-displacement" }),
+      v: new Chart({ title: "Force over velocity", x: ["Velocity", "m/s"], y: ["Force", "N"], name: "compared-force-velocity" }),
+      x: new Chart({ title: "Force over displacement", x: ["Displacement", "mm"], y: ["Force", "N"], name: "compared-force-displacement" }),
     };
     this.runs = h("select", { id: "compare-run", onchange: () => bench.store.commit({ compareRun: this.runs.value }) });
     this.legend = h("div", { class: "row small" });
@@ -43,6 +43,7 @@ class CompareView {
       this.rig, this.button, this.list), this.work.element);
     this.element = h("div", { class: "view" }, side, this.stage);
     document.addEventListener("bench:data", () => this.forget());
+    document.addEventListener("bench:units", () => this.answer && this.show());
     this.forget();
   }
 

@@ -3,7 +3,7 @@
 import { Chart } from "../chart.js";
 import { busy, empty, h, put, renew } from "../dom.js";
 import { DropZone } from "../drop_zone.js";
-import { figures, count } from "../format.js";
+import { count, quantity } from "../format.js";
 import { fileList, profilePanel } from "../intake_panels.js";
 import { rigChooser } from "../rig_chooser.js";
 import { RunFacts } from "../run_facts.js";
@@ -28,16 +28,20 @@ class DataView {
     this.matrix = null; // of the table shown
     this.turn = 0; // of several refreshes on their way, the newest counts
     this.charts = {
-      x: new Chart({ title: "Force over displacement", x: "Displacement (mm)", y: "Force (N)", name: "force-displacement", keys: true }),
-      v: new Chart({ title: "Force over velocity", x: "Velocity (m/s)", y: "Force (N)", name: "force-velocity" }),
-      t: new Chart({ title: "Force over time", x: "Time (s)", y: "Force (N)", name: "force-time" }),
-      d: new Chart({ title: "Displacement over time", x: "Time (s)", y: "Displacement (mm)", name: "displacement-time" }),
+      x: new Chart({ title: "Force over displacement", x: ["Displacement", "mm"], y: ["Force", "N"], name: "force-displacement", keys: true }),
+      v: new Chart({ title: "Force over velocity", x: ["Velocity", "m/s"], y: ["Force", "N"], name: "force-velocity" }),
+      t: new Chart({ title: "Force over time", x: ["Time", "s"], y: ["Force", "N"], name: "force-time" }),
+      d: new Chart({ title: "Displacement over time", x: ["Time", "s"], y: ["Displacement", "mm"], name: "displacement-time" }),
     };
     this.figures = h("div", { class: "figures" }, Object.values(this.charts).map((c) => c.element));
     this.element = h("div", { class: "view" }, h("div", { class: "side" }, this.drop.element, Object.values(this.parts)), this.stage);
     document.addEventListener("bench:data", () => {
       this.matrix = null;
       this.showIntake(bench.overview);
+      this.shown();
+    });
+    document.addEventListener("bench:units", () => {
+      this.matrix = null;
       this.shown();
     });
     document.addEventListener("bench:busy", () => this.shown());
@@ -87,7 +91,7 @@ class DataView {
     if (!current()) return; // another was chosen meanwhile
     const all = { color: "line-strong", width: 1, name: "steady window", quiet: true };
     const last = run.peak_N === null ? { color: "measured", width: 0.8, name: "record" } : { color: "measured", width: 2, name: "last cycle" };
-    const said = run.peak_N === null ? run.refused : `Peak force ${figures(run.peak_N)} newtons, energy ${figures(run.energy_J)} joules a cycle.`;
+    const said = run.peak_N === null ? run.refused : `Peak force ${quantity(run.peak_N, "N")}, energy ${quantity(run.energy_J, "J")} per cycle.`;
     const two = (a, b) => [{ ...all, x: window.arrays[a], y: window.arrays[b] }, { ...last, x: cycle.arrays[a], y: cycle.arrays[b] }];
     const one = (b) => [{ ...last, width: Math.min(last.width, 1.5), x: window.arrays.t, y: window.arrays[b] }];
     const { x, v, t, d } = this.charts;

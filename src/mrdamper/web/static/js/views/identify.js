@@ -2,8 +2,9 @@
 
 import { Chart } from "../chart.js";
 import { busy, card, empty, h, note, put, table } from "../dom.js";
-import { column, condition, count, figures, heading, onScreen, percent, seconds, unit } from "../format.js";
+import { column, condition, count, figures, heading, percent, seconds, unit } from "../format.js";
 import { IdentifyForm } from "../identify_form.js";
+import { onScreen } from "../units.js";
 import { workBox } from "../work.js";
 
 export const id = "identify";
@@ -21,15 +22,16 @@ class IdentifyView {
     this.form = new IdentifyForm(bench, (choice) => this.start(choice));
     this.stage = h("div", { class: "stage" });
     this.charts = {
-      v: new Chart({ title: "Force over velocity", x: "Velocity (m/s)", y: "Force (N)", name: "identified-force-velocity", keys: true }),
-      x: new Chart({ title: "Force over displacement", x: "Displacement (mm)", y: "Force (N)", name: "identified-force-displacement" }),
-      r: new Chart({ title: "Residual over time", x: "Time (s)", y: "Residual (N)", name: "residual" }),
+      v: new Chart({ title: "Force over velocity", x: ["Velocity", "m/s"], y: ["Force", "N"], name: "identified-force-velocity", keys: true }),
+      x: new Chart({ title: "Force over displacement", x: ["Displacement", "mm"], y: ["Force", "N"], name: "identified-force-displacement" }),
+      r: new Chart({ title: "Residual over time", x: ["Time", "s"], y: ["Residual", "N"], name: "residual" }),
     };
     this.charts.r.element.classList.add("wide");
     this.caption = h("h2", {});
     this.lines = []; // of the table of runs
     this.element = h("div", { class: "view" }, h("div", { class: "side" }, this.form.element, this.work.element), this.stage);
     document.addEventListener("bench:data", () => this.forget());
+    document.addEventListener("bench:units", () => this.answer && this.show(...this.answer));
     this.forget();
   }
 
@@ -47,6 +49,7 @@ class IdentifyView {
 
   forget() {
     const { overview } = this.bench;
+    this.answer = null;
     this.shown();
     put(this.stage, overview
       ? empty("No identification yet", "A study identifies all candidates and selects one by cross-validation. Alternatively identify one model by one method and examine its residuals.")
@@ -86,6 +89,7 @@ class IdentifyView {
   }
 
   show(whole, answer) {
+    this.answer = [whole, answer];
     put(this.stage, whole ? this.studied(answer) : this.identified(answer));
   }
 
@@ -194,10 +198,16 @@ function spread(value, ends, scale) {
 }
 
 function jointCard(answer) {
-  const { values, written, at_bounds: bounds } = answer.joint;
+  const { values, intervals, at_bounds: bounds } = answer.joint;
+  const said = (p) => {
+    const { factor, unit: shown } = onScreen(p.unit);
+    const [value, found] = [factor * values[p.name], intervals[p.name]];
+    const ends = found && found.low !== null ? spread(value, [factor * found.low, factor * found.high], 1) : "";
+    return `${figures(value)}${ends} ${unit(shown)}${found && !ends ? ` (${found.state})` : ""}`;
+  };
   const columns = [
     { title: "Parameter", value: (p) => p.name },
-    { title: "Value and 95 % interval", value: (p) => written[p.name] ?? `${figures(onScreen(p.unit).factor * values[p.name])} ${unit(onScreen(p.unit).unit)}` },
+    { title: "Value and 95 % interval", value: said },
     { title: "Meaning", value: (p) => p.meaning },
     { title: "", value: (p) => (bounds.includes(p.name) ? h("span", { class: "badge warn" }, "at bound") : "") },
   ];

@@ -2,14 +2,14 @@
 
 import { Latest } from "../api.js";
 import { capital, empty, h, note, put } from "../dom.js";
-import { condition, figures } from "../format.js";
+import { condition, figures, quantity } from "../format.js";
 import { ModelCharts } from "../model_charts.js";
 import { ModelPanel } from "../model_panel.js";
+import { onScreen } from "../units.js";
 
 export const id = "model";
 export const label = "Model";
 
-const MM = 1000;
 const SETTLE = 300; // milliseconds after a drag until the axes fit again
 const LATE = 250; // milliseconds after which a picture that is not answered yet is dimmed
 const SLOW = 60; // milliseconds a loop, from which on the curves over current come point by point, and no band
@@ -44,6 +44,10 @@ class ModelView {
         this.rest();
       },
     );
+    document.addEventListener("bench:units", () => {
+      this.damper = null;
+      this.shown();
+    });
     document.addEventListener("bench:dampers", () => {
       if (bench.dampers.some((d) => d.key === this.damper?.key)) return this.panel.list(); // what is moved stays
       this.damper = null;
@@ -190,19 +194,19 @@ class ModelView {
   judge(head, ask) {
     const e = this.damper.envelope;
     const tested = {
-      current: ["current", `${figures(ask.current_A, 3)} A, tested ${span(e.current_A, 1)} A`],
-      frequency: ["frequency", `${figures(ask.frequency_Hz, 3)} Hz, tested ${span(e.frequency_Hz, 1)} Hz`],
-      amplitude: ["amplitude", `${figures(MM * ask.amplitude_m, 3)} mm, tested ${span(e.amplitude_m, MM)} mm`],
-      velocity: ["peak velocity", `${figures(head.peak_velocity_m_s, 3)} m/s, tested ${span(e.peak_velocity_m_s, 1)} m/s`],
+      current: ["current", `${figures(ask.current_A, 3)} A, tested ${span(e.current_A, "A")}`],
+      frequency: ["frequency", `${figures(ask.frequency_Hz, 3)} Hz, tested ${span(e.frequency_Hz, "Hz")}`],
+      amplitude: ["amplitude", `${quantity(ask.amplitude_m, "m", 3)}, tested ${span(e.amplitude_m, "m")}`],
+      velocity: ["peak velocity", `${quantity(head.peak_velocity_m_s, "m/s", 3)}, tested ${span(e.peak_velocity_m_s, "m/s")}`],
     };
     const flags = head.extrapolation.map((flag) => tested[flag] ?? [flag, ""]);
     const [now] = head.loops;
     const said = flags.length ? `Extrapolation in ${flags.map(([name]) => name).join(", ")}` : "Inside the tested conditions";
     if (this.spoken !== said) this.bench.speak(said); // when it changes, not at every move
     this.spoken = said;
-    const between = now.level ? ` (${Math.round(100 * now.level)} % prediction interval ${now.scope}: ${figures(now.peak_from_N, 3)} to ${figures(now.peak_to_N, 3)} N)` : "";
+    const between = now.level ? ` (${Math.round(100 * now.level)} % prediction interval ${now.scope}: ${quantity(now.peak_from_N, "N", 3)} to ${quantity(now.peak_to_N, "N", 3)})` : "";
     const none = now.level ? "" : ` ${capital(now.no_band ?? (this.pace > SLOW ? "no prediction interval: this model is too slow for one" : "the prediction interval is calculated when the slider rests"))}.`;
-    const amounts = `Predicted: peak force ${figures(now.peak_N)} N${between}, energy ${figures(now.energy_J)} J per cycle.${none} ${nearest(head.nearest[0])}`;
+    const amounts = `Predicted: peak force ${quantity(now.peak_N, "N")}${between}, energy ${quantity(now.energy_J, "J")} per cycle.${none} ${nearest(head.nearest[0])}`;
     put(this.verdict, flags.length
       ? note("warn", h("div", {}, h("b", {}, "Extrapolation: "), `${flags.map((f) => f.join(" ")).join("; ")}. The loop is dashed.`), h("div", {}, amounts))
       : note("", h("div", {}, h("b", {}, "Inside the tested conditions.")), h("div", {}, amounts)));
@@ -214,15 +218,16 @@ function measure(moved) {
   requestAnimationFrame(() => setTimeout(() => performance.measure("slider-to-picture", { start: moved, end: performance.now() })));
 }
 
-function span([low, high], factor) {
+function span([low, high], itsUnit) {
+  const { factor, unit } = onScreen(itsUnit);
   const [from, to] = [figures(factor * low, 3), figures(factor * high, 3)];
-  return from === to ? `at ${from}` : `${from}–${to}`;
+  return `${from === to ? `at ${from}` : `${from}–${to}`} ${unit}`;
 }
 
 /** What was measured nearest, to hold the prediction against. */
 function nearest(run) {
   if (!run) return "No run was measured near this condition.";
-  return `Measured nearest, ${condition(run.condition)}: ${figures(run.peak_N)} N, ${figures(run.energy_J)} J.`;
+  return `Measured nearest, ${condition(run.condition)}: ${quantity(run.peak_N, "N")}, ${quantity(run.energy_J, "J")}.`;
 }
 
 function nothing(bench) {

@@ -3,7 +3,7 @@
 import { Latest } from "../api.js";
 import { Chart } from "../chart.js";
 import { busy, empty, h, note, problem, put } from "../dom.js";
-import { figures, percent } from "../format.js";
+import { figures, percent, quantity } from "../format.js";
 import { scene } from "../ride_scene.js";
 
 export const id = "ride";
@@ -38,9 +38,9 @@ class RideView {
     this.pace = h("select", { id: "ride-pace", "aria-label": "Speed" }, [["1", "real time"], ["0.25", "a quarter"], ["0.1", "a tenth"]].map(([value, text]) => h("option", { value }, text)));
     this.clock = h("span", { class: "faint" });
     this.charts = {
-      a: new Chart({ title: "Acceleration", x: "Time (s)", y: "Acceleration (m/s²)", name: "ride-acceleration", keys: true }),
-      loop: new Chart({ title: "The damper's loop", x: "Stroke (mm)", y: "Force (N)", name: "ride-loop" }),
-      current: new Chart({ title: "Current", x: "Time (s)", y: "Current (A)", name: "ride-current" }),
+      a: new Chart({ title: "Acceleration", x: ["Time", "s"], y: ["Acceleration", "m/s^2"], name: "ride-acceleration", keys: true }),
+      loop: new Chart({ title: "The damper's loop", x: ["Stroke", "m"], y: ["Force", "N"], name: "ride-loop" }),
+      current: new Chart({ title: "Current", x: ["Time", "s"], y: ["Current", "A"], name: "ride-current" }),
     };
     this.stage = h("div", { class: "stage" });
     this.verdict = h("div", { role: "status" });
@@ -52,6 +52,7 @@ class RideView {
     this.element = h("div", { class: "view" }, side, this.stage);
     this.latest = new Latest((ask) => bench.api.frame("/ride", ask), (found, ask) => this.draw(found, ask), (error) => put(this.stage, problem(error)));
     document.addEventListener("bench:dampers", () => this.shown());
+    document.addEventListener("bench:units", () => this.done && put(this.verdict, this.judged(this.done.head, this.done.arrays)));
   }
 
   shown() {
@@ -130,11 +131,11 @@ class RideView {
   judged(head, arrays) {
     const peak = (values) => values.reduce((most, value) => Math.max(most, Math.abs(value)), 0);
     const [a, f] = [peak(arrays[`a.${head.calm}`]), peak(arrays[`force.${head.dampers[0]}`])];
-    const scale = head.scale === 1 ? "" : ` Masses and springs of the vehicle are multiplied by ${figures(head.scale, 2)}, so that the damper force at the highest tested current, ${figures(head.capacity_N, 2)} N, is 8 % of the weight of the body.`;
+    const scale = head.scale === 1 ? "" : ` Masses and springs of the vehicle are multiplied by ${figures(head.scale, 2)}, so that the damper force at the highest tested current, ${quantity(head.capacity_N, "N", 2)}, is 8 % of the weight of the body.`;
     const better = head.gain === null ? "" : ` RMS of the objective ${head.gain > 0 ? "−" : "+"}${percent(Math.abs(head.gain))} against passive at 0 A.`;
     const outside = Object.entries(head.outside).flatMap(([name, shares]) => Object.entries(shares).map(([what, share]) => `${name}: ${what} ${percent(share)} of the time`));
     return note(outside.length || !head.settled ? "warn" : "", h("b", {}, `${head.title}.`, better),
-      h("div", {}, `Peak acceleration of the ${head.calm} ${figures(a, 3)} m/s², peak damper force ${figures(f, 3)} N; time step ${figures(MM * head.step_s, 2)} ms, peak values change by ${percent(head.halving)} when it is halved.${scale}`),
+      h("div", {}, `Peak acceleration of the ${head.calm} ${quantity(a, "m/s^2", 3)}, peak damper force ${quantity(f, "N", 3)}; time step ${figures(MM * head.step_s, 2)} ms, peak values change by ${percent(head.halving)} when it is halved.${scale}`),
       head.settled ? null : h("div", {}, "The peak values have not converged with the step size; the motion is sensitive to small changes."),
       outside.length ? h("div", {}, `Outside the tested range, bump-stop contact or wheel lift-off: ${outside.join("; ")}.`) : null);
   }
@@ -144,9 +145,7 @@ class RideView {
     const { head, arrays } = this.done;
     const k = this.at;
     const [name] = head.dampers;
-    this.mm ??= new WeakMap();
-    if (!this.mm.has(arrays)) this.mm.set(arrays, arrays[`stroke.${name}`].map((x) => MM * x));
-    const stroke = this.mm.get(arrays);
+    const stroke = arrays[`stroke.${name}`];
     const mark = (x, y) => ({ x: [x[k]], y: [y[k]], mode: "markers", color: "accent", size: 9, quiet: true });
     const [a, force, current] = [arrays[`a.${head.calm}`], arrays[`force.${name}`], arrays[`current.${name}`]];
     return Promise.all([

@@ -27,7 +27,7 @@ class TakeAwayView {
     this.about = new AboutForm(bench);
     this.element = h("div", { class: "stage" }, h("div", { class: "cards" },
       card("Report and tables", this.about.element, this.report), card("Model", this.model), card("Project", this.stateBody())));
-    for (const what of ["dampers", "data"]) document.addEventListener(`bench:${what}`, () => this.shown());
+    for (const what of ["dampers", "data", "units"]) document.addEventListener(`bench:${what}`, () => this.shown());
   }
 
   shown() {
@@ -116,7 +116,7 @@ class TakeAwayView {
   async csv() {
     const key = this.chooser.value;
     const at = this.bench.state.condition ?? (await this.bench.api.get(`/dampers/${key}`)).start;
-    const { blob, name } = await this.bench.api.file(`/dampers/${key}/csv`, { ...at, held: this.bench.state.held });
+    const { blob, name } = await this.bench.api.file(`/dampers/${key}/csv`, { ...at, held: this.bench.state.held, units: this.bench.state.units });
     save(blob, name);
   }
 
