@@ -1,19 +1,16 @@
-"""How fast the live bench is, measured in a browser: `python -m benchmarks.web`.
+"""How fast the app is, measured in a browser: `python -m benchmarks.web`.
 
-First page, first picture, slider to picture while ten loops of a thousand points are dragged, and twenty
-sessions predicting at once. Needs the web extra, playwright and Chromium.
+First page, first picture, and slider to picture while ten loops of a thousand points are dragged. Needs the
+web extra, playwright and Chromium. Many sessions at once: `python -m benchmarks.web_soak`.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import subprocess
 import sys
-import threading
 import time
-import urllib.request
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +21,7 @@ from mrdamper.rig_files.dataset_folder import load_dataset
 
 CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
 DRAG_SECONDS = 5.0
-SESSIONS, ASKING_SECONDS = 20, 5.0
-GOALS = "goals: first page 1 s; slider to picture 60 ms median, 20 updates a second; sessions p95 500 ms, no errors"
+GOALS = "goals: first page 1 s; first picture 2 s; slider to picture 50 ms median"
 
 
 def main() -> None:
@@ -38,7 +34,7 @@ def main() -> None:
     )
     try:
         address = server.stdout.readline().split()[2]  # type: ignore[union-attr]
-        for line in (*in_browser(address, document), sessions(address, document)):
+        for line in in_browser(address, document):
             print(line, flush=True)
     finally:
         server.terminate()
@@ -125,44 +121,6 @@ def drag(page, name: str) -> str:
         f"drag {name}, 10 loops x 1000 points: slider to picture median {np.median(times):.0f} ms, "
         f"p95 {np.percentile(times, 95):.0f} ms, {len(times) / DRAG_SECONDS:.0f} pictures a second"
     )
-
-
-def sessions(address: str, document: str) -> str:
-    """Twenty sessions, each asking as fast as it is answered."""
-    taken: list[float] = []
-    errors: list[str] = []
-    threads = [threading.Thread(target=_asking, args=(address, document, taken, errors)) for _ in range(SESSIONS)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    return (
-        f"{SESSIONS} sessions at once: {len(taken)} answers, p50 {1e3 * np.median(taken):.0f} ms, "
-        f"p95 {1e3 * np.percentile(taken, 95):.0f} ms, {len(errors)} errors"
-    )
-
-
-def _asking(address: str, document: str, taken: list[float], errors: list[str]) -> None:
-    base, _, token = address.partition("?token=")
-
-    def post(path: str, body: object) -> bytes:
-        headers = {"Origin": base.rstrip("/"), "Content-Type": "application/json", "X-Bench-Token": token}
-        request = urllib.request.Request(f"{base}api/sessions{path}", json.dumps(body).encode(), headers)
-        with urllib.request.urlopen(request, timeout=30) as answer:
-            return answer.read()
-
-    try:
-        name = json.loads(post("", {}))["session"]
-        key = json.loads(post(f"/{name}/dampers", {"text": document}))["damper"]
-        begin, k = time.perf_counter(), 0
-        while time.perf_counter() - begin < ASKING_SECONDS:
-            k += 1
-            ask = {"current_A": 0.5 + 0.4 * math.sin(k / 9), "frequency_Hz": 1.0, "amplitude_m": 0.012, "currents": 9}
-            sent = time.perf_counter()
-            post(f"/{name}/dampers/{key}/predict", {**ask, "family": True})
-            taken.append(time.perf_counter() - sent)
-    except OSError as error:
-        errors.append(str(error))
 
 
 if __name__ == "__main__":

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import typer
 
+_NOTES, _ROWS = 3, 12  # lines of notes, and of the tables of all rigs together, without --verbose
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -29,6 +31,7 @@ def register(app: typer.Typer) -> None:
         ),
         jobs: int | None = typer.Option(None, "--jobs", min=1, help="Number of processes; default: one per core."),
         png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
+        verbose: bool = typer.Option(False, "--verbose", help="Print every model, and why one was not determined."),
         as_json: bool = typer.Option(False, "--json", help="Print the table as JSON."),
     ) -> None:
         """Compare models identified from the same data.
@@ -36,7 +39,7 @@ def register(app: typer.Typer) -> None:
         Reported per model: cross-validated and validation error, number of parameters, number of
         runs needed, computing time.
         """
-        from mrdamper.cli.output import parse_gas, parse_pairs
+        from mrdamper.cli.output import parse_gas, parse_pairs, shortened
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.data.atomic import require_writable
         from mrdamper.report.comparison import summary_rows, text_table, write_comparison
@@ -59,15 +62,15 @@ def register(app: typer.Typer) -> None:
             )
             written = write_comparison(result, out, lambda what, share: progress(what, 0.9 + 0.1 * share), png=png)
         rows = summary_rows(result)
-        for rig in result.rigs:
-            for name, why in rig.not_identified.items():
-                typer.echo(f"not identified: {name}: {why}", err=True)
+        notes = [f"not identified: {name}: {why}" for rig in result.rigs for name, why in rig.not_identified.items()]
+        notes += [f"not determined: {name}: {why}" for rig in result.rigs for name, why in rig.refused.items()]
+        for note in shortened(notes, _NOTES, verbose):
+            typer.echo(note, err=True)
         if as_json:
             print(json.dumps({"rows": rows, "files": [str(p) for p in written], "seconds": result.seconds}, indent=1))
             return
         for rig in result.rigs:
             print(f"{rig.rig or dataset.name}: nrmse_pp [%], median and largest; ranked by cross-validation error")
-            print(text_table([row for row in rows if row["rig"] == rig.rig]))
-            for name, why in rig.refused.items():
-                typer.echo(f"not determined: {name}: {why}", err=True)
+            head, *models = text_table([row for row in rows if row["rig"] == rig.rig]).splitlines()
+            print("\n".join([head, *shortened(models, _ROWS // len(result.rigs), verbose)]))
         print(f"report: {written[0]}")

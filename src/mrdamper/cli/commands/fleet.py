@@ -37,6 +37,7 @@ def register(app: typer.Typer) -> None:
         cold: bool = typer.Option(
             False, "--cold", help="Start every search without a previous result (slower, for checking)."
         ),
+        verbose: bool = typer.Option(False, "--verbose", help="Print every damper that was not identified."),
         as_json: bool = typer.Option(False, "--json", help="Print the summary as JSON."),
     ) -> None:
         """Identify many dampers and write one table.
@@ -45,6 +46,7 @@ def register(app: typer.Typer) -> None:
         """
         import signal
 
+        from mrdamper.cli.output import shortened
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.fleet.line import run_fleet
         from mrdamper.fleet.profile import load_fleet_profile, load_limits
@@ -72,13 +74,13 @@ def register(app: typer.Typer) -> None:
         except KeyboardInterrupt:
             typer.echo("stopped; finished dampers are saved: run the same command again to continue", err=True)
             raise typer.Exit(130) from None
-        for name, status, reason in outcome.troubled:
-            typer.echo(f"{status}: {name}: {reason}", err=True)
+        for line in shortened([f"{status}: {name}: {reason}" for name, status, reason in outcome.troubled], 8, verbose):
+            typer.echo(line, err=True)
         if as_json:
             print(json.dumps({**_summary(outcome), "page": str(page), "messages": text}, indent=1, ensure_ascii=False))
         else:
             print(f"{outcome.done} of {outcome.dampers} dampers identified ({outcome.already} in an earlier run)")
-            print("\n".join(text), end="\n" if text else "")
+            print("".join(f"{line}\n" for line in shortened(text, 8, verbose)), end="")
             print(f"table: {outcome.table}\npage: {page}")
         if not outcome.done:
             raise typer.Exit(2)

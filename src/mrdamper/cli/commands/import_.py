@@ -48,7 +48,7 @@ def register(app: typer.Typer) -> None:
         ask: bool | None = typer.Option(
             None, "--ask/--no-ask", help="Ask for information missing in the files; default: on a terminal."
         ),
-        verbose: bool = typer.Option(False, "--verbose", help="Print all findings of all files."),
+        verbose: bool = typer.Option(False, "--verbose", help="Print every test and all findings."),
         quiet: bool = typer.Option(False, "--quiet", help="No progress."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON a program can read."),
     ) -> None:
@@ -245,21 +245,22 @@ def _asked(
 
 
 def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = False, verbose: bool = False) -> None:
+    from mrdamper.cli.output import shortened
+
     columns = {record.provenance["columns"] for record in result.records}
     if dry and result.records:
         print("Taken for tests:")
     if len(columns) == 1 and len(result.records) > 1:
         print(f"columns: {columns.pop()}")
+    lines = []
     for record in result.records:
         valid = record.time[~(record.time != record.time)]
         seconds = float(valid[-1] - valid[0])
         current = "" if record.current is None else f", {_current(record)}"
         more = f", {record.provenance['columns']}" if columns else ""
-        print(f"{record.id}: {record.time.size} samples, {seconds:.4g} s{current}{more}")
-    for line in _finding_lines(result, verbose):
-        print(line)
-    for line in _refused_lines(result):
-        print(line)
+        lines.append(f"{record.id}: {record.time.size} samples, {seconds:.4g} s{current}{more}")
+    for some, most in ((lines, 7), (_finding_lines(result, verbose), 4), (_refused_lines(result), 4)):
+        print("".join(f"{line}\n" for line in shortened(some, most, verbose)), end="")
     if result.left_out:
         shown = ", ".join(result.left_out[:5]) + (
             f" and {len(result.left_out) - 5} more" if result.left_out[5:] else ""

@@ -55,10 +55,11 @@ def register(app: typer.Typer) -> None:
         out: Path | None = typer.Option(None, "--out", help="Folder for simulation.html, time histories and results."),
         law_out: Path | None = typer.Option(None, "--c", help="Folder for the controller as C99 source."),
         law_fmu: Path | None = typer.Option(None, "--fmu", help="File for the controller as FMU."),
+        verbose: bool = typer.Option(False, "--verbose", help="Print every file written."),
         as_json: bool = typer.Option(False, "--json", help="Print JSON, SI units."),
     ) -> None:
         """Simulate a vehicle or building with dampers and a controller."""
-        from mrdamper.cli.output import parse_named
+        from mrdamper.cli.output import parse_named, shortened
         from mrdamper.cli.progress import progress_soon
         from mrdamper.dampers.model_file import load_model
         from mrdamper.data.atomic import require_writable
@@ -114,8 +115,8 @@ def register(app: typer.Typer) -> None:
                 table = contest(loaded.system, shaken_by, dampers, others, done.step, highest, tell) if others else None
                 tell("writing", 1.0)
                 paths = write_simulation(done, out, table, bands)
-        for path in paths:
-            typer.echo(f"{path}", err=True)
+        for line in shortened([f"{path}" for path in paths], 2, verbose):
+            typer.echo(line, err=True)
         if as_json:
             print(json.dumps(_figures(done, dampers) | _banded(bands), indent=1))
         else:
@@ -269,9 +270,9 @@ def _print(done: Simulation) -> None:
             err=True,
         )
     for name, shares in done.outside.items():
-        for quantity, share in shares.items():
-            what = f"{quantity} outside the tested range" if quantity in FLAGS else quantity
-            typer.echo(f"warning: {name}: {what} {100 * share:.3g} % of the time", err=True)
+        told = ", ".join(f"{quantity} {100 * share:.3g} %" for quantity, share in shares.items())
+        beyond = " outside the tested range" if set(shares) <= set(FLAGS) else ""
+        typer.echo(f"warning: {name}{beyond}: {told} of the time", err=True)
     for name, share in done.unreachable.items():
         typer.echo(f"{name}: the force command could not be reached {100 * share:.3g} % of the time")
     if type(done.controller).calms:

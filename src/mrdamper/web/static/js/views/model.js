@@ -14,7 +14,7 @@ const SETTLE = 300; // milliseconds after a drag until the axes fit again
 const LATE = 250; // milliseconds after which a picture that is not answered yet is dimmed
 const SLOW = 60; // milliseconds a loop, from which on the curves over current come point by point, and no band
 const QUICK = 6; // milliseconds a loop, up to which the band comes while a slider is dragged: it takes six loops or so
-const [COARSE, FINE] = [11, 21]; // points of the curves over current, while dragged and at rest; one lies where tests end
+const [COARSE, FINE] = [11, 15]; // points of the curves over current, while dragged and at rest; one lies where tests end
 const NO_CURVE = { current: [], peak: [], energy: [] };
 
 export function create(bench) {
