@@ -95,8 +95,8 @@ class Job:
         try:
             if self._stop.is_set():
                 self._end("cancelled")
-            elif (known := self.recall()) is not None:
-                self._conclude(known)
+            elif (result := self.recall()) is not None:
+                self._conclude(result)
             else:
                 self._run()
         except Exception:

@@ -270,9 +270,9 @@ def _print(done: Simulation) -> None:
             err=True,
         )
     for name, shares in done.outside.items():
-        told = ", ".join(f"{quantity} {100 * share:.3g} %" for quantity, share in shares.items())
+        parts = ", ".join(f"{quantity} {100 * share:.3g} %" for quantity, share in shares.items())
         beyond = " outside the tested range" if set(shares) <= set(FLAGS) else ""
-        typer.echo(f"warning: {name}{beyond}: {told} of the time", err=True)
+        typer.echo(f"warning: {name}{beyond}: {parts} of the time", err=True)
     for name, share in done.unreachable.items():
         typer.echo(f"{name}: the force command could not be reached {100 * share:.3g} % of the time")
     if type(done.controller).calms:
