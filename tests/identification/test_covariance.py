@@ -173,7 +173,7 @@ def test_an_interval_over_three_decades_is_none():
 def test_what_is_known_is_computed_when_asked_and_travels_without_the_run(monkeypatch):
     run = synthetic_run(CONDITION, 5.0, model=TRUTH)
     asked = []
-    monkeypatch.setattr(identification, "certainty_of_run", lambda *a: asked.append(1) or uncertainty_of_run(*a))
+    monkeypatch.setattr(identification, "uncertainty_of_run", lambda *a: asked.append(1) or uncertainty_of_run(*a))
     found = identify(run)
     assert not asked
     there = pickle.loads(pickle.dumps(found))

@@ -29,15 +29,15 @@ class Plan:
 
     start: tuple[float, ...]  # median of the free search axes
     held: dict[str, float]  # parameters that the line's tests do not determine, at the line's value
-    # median, and 1.48 times the median deviation from it, of the median nrmse_pp and of the distance of the measured
-    # loops from the line's
-    error: float
-    error_spread: float
-    deviation: float
-    deviation_spread: float
     matrix: tuple[Test, ...]  # the line's tests
     loops: tuple[tuple[float, ...], ...]  # median measured loop of each [N]
     speeds: tuple[float, ...]  # velocity ladder [m/s]
+    # median, and 1.48 times the median deviation from it, of the median nrmse_pp and of the distance of the measured
+    # loops from the line's
+    error: float = 0.0
+    error_spread: float = 0.0
+    deviation: float = 0.0
+    deviation_spread: float = 0.0
     rig: str = ""  # that most reference dampers were tested on; empty if there is none
     references: tuple[str, ...] = ()  # names of the dampers it was made from
     draft: bool = False  # made to try a start: nothing stands out yet
@@ -83,10 +83,6 @@ def drafts(rows: dict[str, dict[str, Any]]) -> list[Plan]:
         Plan(
             start=tuple(row["point"]),
             held={},
-            error=0.0,
-            error_spread=0.0,
-            deviation=0.0,
-            deviation_spread=0.0,
             matrix=matrix,
             loops=tuple(tuple(np.round(np.median(some, axis=0), 3).tolist()) for some in loops_by_test),
             speeds=tuple(float(f"{step * top:.2g}") for step in _SPEED_STEPS),

@@ -27,29 +27,13 @@ _UNROLLED = 6  # highest integer power written as products
 class LookupTable(Protocol):
     """Piecewise polynomials: what a traced lookup needs of them."""
 
-    @property
-    def nodes(self) -> Floats:
-        """(K,) ends of the pieces."""
-        ...
-
-    @property
-    def cells(self) -> Floats:
-        """(K − 1, 7): six coefficients, lowest first, and one over the width."""
-        ...
-
-    @property
-    def points(self) -> Floats:
-        """(K, 4): u, w, dw/du and the derivative of that with respect to w, at the nodes."""
-        ...
-
-    @property
-    def backwards(self) -> bool:
-        """The table reads u over w, not w over u."""
-        ...
+    nodes: Floats  # (K,) ends of the pieces
+    cells: Floats  # (K − 1, 7): six coefficients, lowest first, and one over the width
+    points: Floats  # (K, 4): u, w, dw/du and the derivative of that with respect to w, at the nodes
+    backwards: bool  # the table reads u over w, not w over u
 
     def at_float(self, x: float) -> float:
         """Evaluate the table at x; constant beyond the ends."""
-        ...
 
 
 class TracedLoop:
