@@ -75,6 +75,22 @@ class LineNumbers:
         return np.asarray(self[:], dtype=dtype)
 
 
+@dataclass(frozen=True, slots=True)
+class SteadyPart:
+    """The steady motion of a record.
+
+    Attributes
+    ----------
+    window : (float, float) or None
+        Start and end of its last whole cycles [s]; None for a motion without a period.
+    repeatability : float or None
+        Cycle-to-cycle scatter of the force over its peak-to-peak value; None under two cycles.
+    """
+
+    window: tuple[float, float] | None
+    repeatability: float | None
+
+
 @dataclass(frozen=True, eq=False)
 class Record:
     """One test as a rig's file holds it.
@@ -101,6 +117,8 @@ class Record:
         Line of every sample, where the file is text.
     window : (float, float), optional
         Steady window of a stored run [s]; of a new record it is found.
+    steady : SteadyPart, optional
+        As the checks found it; of a long record, which is judged part by part, it is found later.
     """
 
     id: str
@@ -122,6 +140,7 @@ class Record:
     segments: tuple[tuple[int, int], ...] = ()
     lines: LineNumbers | None = None
     window: tuple[float, float] | None = None
+    steady: SteadyPart | None = None
 
     @property
     def channels(self) -> dict[str, Floats]:

@@ -10,8 +10,7 @@ from mrdamper.data import Run
 from mrdamper.data.pieces import pieces, release
 from mrdamper.errors import ColumnError, RunError
 from mrdamper.rig_files.quality import check_record
-from mrdamper.rig_files.quality.loop import repeatability
-from mrdamper.rig_files.quality.motion import steady_window
+from mrdamper.rig_files.quality.loop import steady_part
 from mrdamper.rig_files.quality.view import SHORTEST, View
 from mrdamper.rig_files.record import FURTHER, Record
 
@@ -50,8 +49,7 @@ def to_run(record: Record) -> Run:
         keep = slice(None)  # nothing is copied: a long record lies in a file
     if count < 3:
         raise RunError(f"{count} samples", where=f"run {record.id}", remedy="a run needs at least 3")
-    view = View(record)
-    scatter = repeatability(view)
+    steady = record.steady or steady_part(View(record))
     codes = " ".join(dict.fromkeys(finding.code for finding in record.findings))
     further = {f"{name}_{unit}": getattr(record, name) for name, unit in FURTHER.items()} | dict(record.further)
     run = Run(
@@ -65,8 +63,8 @@ def to_run(record: Record) -> Run:
         rig=record.rig,
         excitation=record.excitation,
         split=record.split,  # type: ignore[arg-type]
-        window=steady_window(view),
-        repeatability=None if scatter is None else round(scatter[0], 6),
+        window=steady.window,
+        repeatability=steady.repeatability,
         segments=tuple(pairwise(bounds)),
         notes={**record.provenance, **({"findings": codes} if codes else {})},
     )

@@ -102,15 +102,17 @@ def _fits_uniform(signal: Floats, half: int) -> Floats:
     """
     tau = np.arange(-half, half + 1.0)
     fit = np.linalg.pinv(np.column_stack([np.ones_like(tau), tau, tau**2])).T  # (width, 3)
-    windows = np.lib.stride_tricks.sliding_window_view(signal, tau.size)
+    last = signal.size - half
+    middle = signal[half:last]
+    inside = np.zeros((3, middle.size))
+    for step, (level, slope, bend) in enumerate(fit[half + 1 :], 1):
+        after, before = signal[half + step : last + step] - middle, signal[half - step : last - step] - middle
+        both = after + before
+        inside += np.stack([level * both, slope * (after - before), bend * both])
     c = np.empty((signal.size, 3))
-    inside = c[half : signal.size - half]
-    for rows in _blocks(len(windows), tau.size):
-        middle = windows[rows, half : half + 1]
-        after, before = windows[rows, half + 1 :] - middle, windows[rows, half - 1 :: -1] - middle
-        inside[rows, 0::2] = (after + before) @ fit[half + 1 :, 0::2]
-        inside[rows, 1] = (after - before) @ fit[half + 1 :, 1]
-    for window, away in ((windows[0], slice(0, half)), (windows[-1], slice(signal.size - half, None))):
+    c[half:last] = inside.T
+    ends = (signal[: tau.size], slice(0, half)), (signal[-tau.size :], slice(last, None))
+    for window, away in ends:
         d0, d1, d2 = ((window - signal[away, None]) @ fit).T  # seen away from the middle of the window
         at = tau[:half] if away.start == 0 else tau[half + 1 :]
         c[away] = np.stack([d0 + at * (d1 + at * d2), d1 + 2 * at * d2, d2], axis=1)

@@ -11,9 +11,9 @@ from mrdamper.errors import QualityError
 from mrdamper.identification.loop_analysis import damping_share as share_of_damping
 from mrdamper.physics.motion.harmonics import fit_harmonics
 from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
-from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of
+from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, steady_window
 from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
-from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.record import Finding, SteadyPart
 
 _SLOW, _FAST = 0.1, 0.5  # of the largest velocity: samples near the reversals, and away from them
 _BELOW = 0.15  # of the range: so far below both strokes is a rectified force at the reversals
@@ -226,3 +226,9 @@ def repeatability(view: View) -> tuple[float, float] | None:
         return None
     scatter = np.sqrt(np.mean(np.var(cycles.force.values, axis=0, ddof=1)))
     return float(scatter) / cycles.force.span, view.force_noise / cycles.force.span
+
+
+def steady_part(view: View) -> SteadyPart:
+    """Steady window and repeatability of a record."""
+    scatter = repeatability(view)
+    return SteadyPart(steady_window(view), None if scatter is None else round(scatter[0], 6))

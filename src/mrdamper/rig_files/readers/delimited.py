@@ -45,12 +45,11 @@ class DelimitedText(Reader):
         stream = open_text(source, form)
         head = stream.head()
         raw = head.split(b"\n")
-        long = next((i for i, line in enumerate(raw) if len(line) > LONGEST_LINE), None)
-        if long is not None:
-            raise too_long(source, long + 1)
+        if max(map(len, raw)) > LONGEST_LINE:
+            raise too_long(source, next(i for i, line in enumerate(raw, 1) if len(line) > LONGEST_LINE))
         whole = stream.start + len(head) >= stream.stop
-        lines = [stream.decode(line).rstrip("\r") for line in (raw if whole else raw[:-1])[:_HEAD_LINES]]
-        lines = _with_whole_quotes(lines)
+        lines = stream.decode(b"\n".join((raw if whole else raw[:-1])[:_HEAD_LINES])).split("\n")
+        lines = _with_whole_quotes([line.rstrip("\r") for line in lines] if b"\r" in head else lines)
         layout = find_layout(lines, source, stated_form(lines, form) if is_labview(lines) else form)
         layout = named(layout, lines) if is_labview(lines) else layout
         start = stream.start + sum(len(line) + 1 for line in raw[: layout.data_line - 1])

@@ -85,5 +85,4 @@ def _columns(block: bytes, form: RowFormat) -> list[np.ndarray]:
         columns=list(form.wanted),
         ignore_errors=True,
     )
-    filled = table.select(pl.all().fill_null(float("nan")))
-    return [filled[f"c{i}"].to_numpy(writable=True) for i in form.wanted]
+    return [table[f"c{i}"].to_numpy(writable=True) for i in form.wanted]

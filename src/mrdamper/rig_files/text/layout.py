@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import csv
 import re
+from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import Literal
 
 from mrdamper.rig_files.column_names import split_name
@@ -27,7 +28,7 @@ _COMMENT = re.compile(r"^\s*(#(?!N/A|REF!|VALUE!|DIV/0|NAME\?|NULL!|NUM!)|%|//)+
 _LISTING = re.compile(
     r"^\s*(?:columns?|channels?|fields?|spalten|kanäle|colonnes|header|names)\s*[:=]\s*", re.IGNORECASE
 )
-_MARKS = frozenset("#%/")
+_MARKS, _DIGITS = frozenset("#%/"), frozenset("0123456789+-.")
 _FEWEST_LINES = 20  # of a text: fewer, with words among the numbers, are notes
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
@@ -100,7 +101,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         raise _mismatch(source, separator, len(names), width, first, lines)
     units = _cells(lines[unit_row], separator, width) if unit_row is not None else ("",) * width
     columns = [[row[i] for row in rows if len(row) > i] for i in range(width)]
-    written = _rows(as_written[first:], separator, width, trailing)
+    written = rows if as_written is lines else _rows(as_written[first:], separator, width, trailing)
     behind = tuple(_unit_behind([row[i] for row in written if len(row) > i]) for i in range(width))
     units = tuple(own or its for own, its in zip(behind, units, strict=True))
     kinds: tuple[Kind, ...] = tuple(
@@ -182,7 +183,7 @@ def _stated_for_all(above: Sequence[str], separator: str, width: int) -> list[st
 
 def _without_units(lines: Sequence[str]) -> Sequence[str]:
     """The lines without the units behind their numbers, where no line is a row of plain numbers."""
-    last = [line for line in lines if line.strip()][-_SAMPLE:]
+    last = list(islice((line for line in reversed(lines) if line.strip()), _SAMPLE))
     if any(_is_row(cells_of(line, mark)) for line in last for mark in _SEPARATORS):
         return lines
     return [next(filter(None, (_bare_row(line, mark) for mark in _SEPARATORS[:-1])), line) for line in lines]
@@ -198,10 +199,13 @@ def _bare_row(line: str, separator: str) -> str:
 
 def _unit_behind(cells: Sequence[str]) -> str:
     """The one unit that stands behind every number of a column, as it is written."""
-    matches = [_QUANTITY.fullmatch(cell) for cell in cells if cell]
-    units = {match[2] if match else "" for match in matches}
-    unit = units.pop() if len(units) == 1 else ""
-    return unit if unit and is_unit(unit) else ""
+    units: set[str] = set()
+    for match in (_QUANTITY.fullmatch(cell) for cell in cells if cell):
+        units.add(match[2] if match else "")
+        if len(units) > 1 or "" in units:
+            return ""
+    unit = units.pop() if units else ""
+    return unit if is_unit(unit) else ""
 
 
 def _writes(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, str], ...]:
@@ -293,7 +297,8 @@ def cells_of(line: str, separator: str) -> list[str]:
 
 
 def _content(lines: Sequence[str]) -> list[tuple[int, str]]:
-    return [(i, line) for i, line in enumerate(lines) if line.strip() and not is_comment(line)]
+    rows = enumerate(lines)
+    return [(i, line) for i, line in rows if line[:1] in _DIGITS or (line.strip() and not is_comment(line))]
 
 
 def _separator(lines: Sequence[str], content: Sequence[tuple[int, str]], source: Source) -> str:
@@ -335,14 +340,17 @@ def _is_row(cells: Sequence[str]) -> bool:
 
 def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, source: Source) -> tuple[int, int, bool]:
     """Index of the first row of data from an index on, number of columns, whether rows end with a separator."""
-    before = [entry for entry in content if entry[0] < above]
-    content = content[len(before) :]
+    start = bisect_left(content, above, key=lambda entry: entry[0])
+    before, content = content[:start], content[start:]
     sample = [cells_of(line, separator) for _, line in content[-_SAMPLE:]]
     rows = [cells for cells in sample if _is_row(cells)]
     if separator == SPACES and len(content) < _FEWEST_LINES and all(map(_is_prose, rows)):
         raise NoTableError("E_NO_DATA", "text with numbers in it, but no rows of numbers", file=source.name)
-    named = any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
-    if not rows or (len(rows) == 1 and len(content) > 1 and named and not _is_row(sample[-1])):
+    if not rows or (len(rows) == 1 and len(content) > 1 and not _is_row(sample[-1])):
+        named = any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
+    else:
+        named = False
+    if not rows or named:
         what = "names of columns, but no row of numbers below them" if named else "no row of numbers"
         kind = RigFileError if named else NoTableError
         raise kind("E_NO_DATA", what, file=source.name, remedy="export the file again, with its data")

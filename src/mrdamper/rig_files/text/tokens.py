@@ -84,7 +84,7 @@ def stamp(token: str) -> tuple[int, bool] | None:
     Integers, as doubles would round the nanoseconds of a date. A zone's offset is taken
     off, so that the change to summer time does not bend a record.
     """
-    match = _STAMP.fullmatch(token)
+    match = _STAMP.fullmatch(token) if ":" in token else None
     if match is None:
         return None
     year, _, month, day, *dotted, hour, minute, second, fraction, thousandths, half, zone = match.groups()
