@@ -13,6 +13,7 @@ import argparse
 import subprocess
 import sys
 import tempfile
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -42,20 +43,19 @@ sys.exit(bool(cpu > seconds or peak > memory or result.refusals))
 
 
 def write_csv(path: Path, size: int, current: float = 0.5, seed: int = 0) -> None:
-    """A sine test of a damper, four columns, until the file has that many bytes; a small one repeats no noise."""
-    count = 100_000
-    phase = 2 * np.pi * np.arange(count) / RATE
-    v = np.cos(phase)
-    noise = np.random.default_rng(seed).normal(0, 5, min(count, 1 + size // 20))
-    force = (400 + 1200 * current) * np.tanh(8 * v) + 200 * v + np.resize(noise, count)
-    tails = [f",{20 * x:.5f},{f:.3f},{current:.2f}\n" for x, f in zip(np.sin(phase), force, strict=True)]
+    """A sine test of a damper, four columns, cycle by cycle until the file has that many bytes."""
+    rng, period = np.random.default_rng(seed), int(RATE)
+    phase = 2 * np.pi * np.arange(period) / RATE
+    force = (400 + 1200 * current) * np.tanh(8 * np.cos(phase)) + 200 * np.cos(phase)
+    middles, tail = [f",{20 * x:.5f}," for x in np.sin(phase)], f",{current:.2f}\n"
     with path.open("w", encoding="ascii") as file:
         file.write("time_s,displacement_mm,force_N,current_A\n")
-        start = 0
-        while file.tell() < size:
-            rows = tails if size > 10**6 else tails[start : start + 2000]
-            file.write("".join(f"{(start + i) / RATE:.4f}{tail}" for i, tail in enumerate(rows)))
-            start += len(rows)
+        for start in count(0, period):
+            measured = (force + rng.normal(0, 5, period)).tolist()
+            rows = zip(range(start, start + period), middles, measured, strict=True)
+            file.write("".join(f"{i / RATE:.4f}{middle}{f:.3f}{tail}" for i, middle, f in rows))
+            if file.tell() >= size:
+                return
 
 
 def main() -> int:

@@ -45,8 +45,8 @@ _RATE = re.compile(
     r"sampl|abtast|messrate|^rate$|scan|acquisition|échantillon|muestreo|campion|^fs$|^f_s$", re.IGNORECASE
 )
 _STEP = re.compile(
-    r"^dt$|^d_t$|^delta[ _]?t|^[dΔ] ?t$|sampl|abtast|time ?step|step ?time|zeitschritt|increment|échantillon|muestreo"
-    r"|^[hx][ _]?(?:resolution|interval|increment|step)$",
+    r"^dt$|^d_t$|^delta[ _]?[tx]|^[dΔ] ?t$|sampl|abtast|time ?step|step ?time|zeitschritt|increment|échantillon"
+    r"|muestreo|^[hx][ _]?(?:resolution|interval|increment|step)$",
     re.IGNORECASE,
 )
 _SHARE = re.compile(
@@ -163,6 +163,22 @@ def stated_rate(lines: Iterable[str], numbers: Mapping[str, float], decimal: str
     if rates and max(rates) > 1.001 * min(rates):
         raise ValueError(f"{min(rates):g} Hz and {max(rates):g} Hz")
     return rates[0] if rates else None
+
+
+_WHICH = r"(?i)(?:test|excitation|motion|sine|drive|nominal|set|soll|prüf|anregungs|signal)?[ _-]*"
+_FREQUENCY_KEY = re.compile(_WHICH + r"(?:frequency|freq|frequenz|fréquence|frecuencia|frequenza|频率|周波数)")
+_AMPLITUDE_KEY = re.compile(_WHICH + r"(?:amplitude|ampl|amplitud|ampiezza|stroke|hub|course|振幅)")
+
+
+def stated_motion(lines: Iterable[str], decimal: str | None = None) -> str:
+    """Frequency and amplitude of the motion that lines state, as a name would: 2Hz 10mm; empty if none does."""
+    found = []
+    for key, value, known in (quantity for line in lines for quantity in _quantities(line, decimal)):
+        if value > 0 and known.dimension == "frequency" and _FREQUENCY_KEY.fullmatch(key):
+            found.append(f"{value:g}Hz")
+        elif value > 0 and known.dimension == "length" and _AMPLITUDE_KEY.fullmatch(key):
+            found.append(f"{1e3 * value:g}mm")
+    return " ".join(dict.fromkeys(found))
 
 
 _TURNS = re.compile(r"speed|rpm|drehzahl|crank|régime|vitesse|velocidad|giri|обороты|转速|回転", re.IGNORECASE)

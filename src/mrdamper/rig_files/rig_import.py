@@ -23,8 +23,10 @@ from mrdamper.rig_files.mapping.companions import (
     part_of,
     results_of,
     with_currents_of,
+    with_legend_of,
     with_results_of,
 )
+from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.packed_folder import unpacked
 from mrdamper.rig_files.profile import Profile, profile_of
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
@@ -175,6 +177,13 @@ class _Intake:
         self.notes: list[Refusal] = []  # texts of a folder that hold no table
         self.met: list[tuple[Path, str]] = []
         self._given: set[Path] = set()
+        self._tables_of_results: dict[Path, Results | None] = {}
+
+    def _results(self, path: Path) -> Results | None:
+        """The table of results that a file holds, read once."""
+        if path not in self._tables_of_results:
+            self._tables_of_results[path] = results_of(path)
+        return self._tables_of_results[path]
 
     @property
     def records(self) -> list[Record]:
@@ -236,7 +245,7 @@ class _Intake:
             self._check(path, record, [], several=files.count(path) > 1)
         self._refuse_names_without_point()
         for path in [path for path in others if path not in used and self._found]:
-            results = results_of(path)
+            results = self._results(path)
             refused = contradictions_with(self._tests(), results, path) if results else None
             if refused is not None:
                 self._refuse(refused)
@@ -264,8 +273,9 @@ class _Intake:
             return used | {path for _, path in joined}
         notes = [Path(note.file) for note in self.notes]
         for path in [path for path in (*others, *notes) if pending and path not in used]:
-            results = results_of(path)
+            results = self._results(path)
             stated = with_results_of(pending, results, path) if results else None
+            stated = stated or with_legend_of(pending, path)
             if stated:
                 self._pending = [(file, record) for (file, _), record in zip(pending, stated, strict=True)]
                 self.notes = [note for note in self.notes if Path(note.file) != path]

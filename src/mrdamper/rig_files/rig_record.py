@@ -15,6 +15,7 @@ from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import as_data, constant, current_of, without_gaps
 from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
+from mrdamper.rig_files.conditions import currents_in, stated_motion
 from mrdamper.rig_files.mapping.session import stretches_of_session
 from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.profile import Correction, Profile
@@ -26,6 +27,7 @@ from mrdamper.rig_files.units import Unit
 
 _KEPT = {"temperature": "C", "pressure": "Pa", "voltage": "V", "acceleration": "m_s2", "length": "m", "force": "N"}
 _SCALES = frozenset(("scale", "scaling", "gain", "factor", "sensitivity", "slope", "calibration", "lsb", "faktor"))
+_HZ = re.compile(r"(?<![\w.,])([0-9]{1,4}(?:[.,][0-9]{1,4})?) ?Hz(?![A-Za-z])")
 _SAMPLE = 10_000  # samples looked at
 _LEAST_CURRENT = 0.02  # [A] largest of a record: less is no current of a coil
 _MOST_FURTHER = 12  # channels
@@ -56,7 +58,10 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         if len(stretches) > 1:
             text = f'cut at its rests or steps of the current into {len(stretches)} tests (blocks = "join" keeps it)'
             findings.append(Finding("W_CUT", text))
-    remarks = {**_remarks(table, assigned), **({"time_from": rate} if rate else {})}
+    decimal = table.form.get("decimal")
+    motion = stated_motion(table.remarks, decimal if isinstance(decimal, str) else None)
+    remarks = {**_remarks(table, assigned), "time_from": rate, "motion_stated": motion if len(stretches) == 1 else ""}
+    remarks = {key: text for key, text in remarks.items() if text}
     for name, why in left_out(table, profile, assigned).items():
         findings.append(Finding("W_COLUMN", f"the {name} channel is left out: {why}"))
     records = []
@@ -272,6 +277,8 @@ def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> l
         return records
     names = [n for n in ("time", "displacement", "force", *OPTIONAL) if all(getattr(r, n) is not None for r in records)]
     partly: dict[str, Floats | None] = {name: None for name in OPTIONAL if name not in names}
+    if profile.file.blocks != "join" and len({_stated_conditions(table) for table in tables}) > 1:
+        return records
     time = np.concatenate([record.time for record in records])
     if profile.file.blocks != "join" and not np.all(np.diff(time[np.isfinite(time)]) > 0):
         return records
@@ -286,6 +293,16 @@ def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> l
     further = {name: np.concatenate([record.further[name] for record in records]) for name in alike}
     findings = dict.fromkeys(finding for record in records for finding in record.findings)
     return [replace(records[0], findings=tuple(findings), lines=lines, further=further, **channels, **partly)]
+
+
+def _stated_conditions(table: RawTable) -> tuple[float, ...]:
+    """Currents and frequencies in the titles of a block: of different ones, each is a test."""
+    currents = [value for line in table.remarks for value in currents_in(line)]
+    return (
+        *currents,
+        np.inf,
+        *(float(match[1].replace(",", ".")) for line in table.remarks for match in _HZ.finditer(line[:255])),
+    )
 
 
 def _run_id(table: RawTable, path: Path) -> str:

@@ -14,7 +14,7 @@ from mrdamper.data import Floats, held_current
 from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.coil_current import as_data, constant, current_of
 from mrdamper.rig_files.columns import partly_assigned
-from mrdamper.rig_files.conditions import contradicts
+from mrdamper.rig_files.conditions import amperes, contradicts
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
 from mrdamper.rig_files.profile import Profile
@@ -24,6 +24,7 @@ from mrdamper.rig_files.record import Finding, Record
 _FEWEST_ROWS = 50  # of a record
 _LARGEST_TEXT = 2**18  # bytes
 _TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log")
+_CODE = re.compile(r"\s*([A-Za-z]{1,6}[0-9]{1,3})\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
 
 
@@ -159,11 +160,34 @@ def with_results_of(pending: Sequence[tuple[Path, Record]], results: Results, pa
     currents = results.by_test(tests)
     if len(currents) < len(pending):
         return None
-    note = {"current_from": as_data(f"{path.name}, {results.title}")}
+    whence = f"{path.name}, {results.title}"
+    return [_with_stated(record, currents[i], whence) for i, (_, record) in enumerate(pending)]
+
+
+def with_legend_of(pending: Sequence[tuple[Path, Record]], path: Path) -> list[Record] | None:
+    """The records with the currents that the codes in their names stand for, by a legend: I1 = 0.3 A.
+
+    None unless the name of every file holds one of the codes, between separators.
+    """
+    if path.suffix.lower() not in _TEXTS or path.stat().st_size > _LARGEST_TEXT:
+        return None
+    matches = [match for line in _decoded(path.read_bytes()).splitlines() if (match := _CODE.match(line))]
+    codes = {match[1].casefold(): amperes(match[2], match[3]) for match in matches}
+    if len(codes) < 2 or len(codes) < len(matches):
+        return None
+    words = [re.split(r"[^0-9A-Za-z]+", file.stem.casefold()) for file, _ in pending]
+    stated = [[code for code in codes if code in parts] for parts in words]
+    if any(len(found) != 1 for found in stated):
+        return None
     return [
-        replace(record, current=constant(currents[i], record.time), provenance={**record.provenance, **note})
-        for i, (_, record) in enumerate(pending)
+        _with_stated(record, codes[found[0]], f"{path.name}, {found[0].upper()}")
+        for (_, record), found in zip(pending, stated, strict=True)
     ]
+
+
+def _with_stated(record: Record, current: float, whence: str) -> Record:
+    remarks = {**record.provenance, "current_from": as_data(whence)}
+    return replace(record, current=constant(current, record.time), provenance=remarks)
 
 
 def contradictions_with(

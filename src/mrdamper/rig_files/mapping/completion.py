@@ -6,6 +6,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from mrdamper.rig_files.column_names import (
     names_condition,
     names_weight,
@@ -48,6 +50,15 @@ _LISTED = re.compile(
     r"(?P<name>[^\d\W][^;,\t\[\](){}=]*?)\"?\s*[;,\t\[({]\s*\"?(?P<unit>[^;,\t\[\](){}\"]{1,12})\"?[\])}]?[\s;,\"]*$",
     re.IGNORECASE,
 )
+_INDEXED = re.compile(
+    r"^\s*(?P<what>desc|name|label|units?|scale)[A-Za-z]*[._ ]*(?:chan(?:nel)?|ch)[._ ]*(?P<number>[0-9]{1,3})"
+    r"\s*[=:]\s*(?P<value>.+?)\s*$",
+    re.IGNORECASE,
+)
+_FLOAT = re.compile(r"[+-]?[0-9]+(?:[.][0-9]*)?(?:[eE][+-]?[0-9]+)?")
+_AXIS_UNIT = re.compile(r"(?i)^[\s\"]*x[ _-]?axis[ _-]?unit\"?\s*[;,:=\t]\s*\"?([a-zµ]{1,12})\"?[\s;,\"]*$")
+_SENSE_NAMES = frozenset(("sense", "direction", "dir", "sign", "richtung", "vorzeichen", "sens", "sentido", "verso"))
+_SENSES = {1: ("tensi", "pull", "zug", "traction", "tracc", "rebound"), -1: ("compress", "push", "druck", "compres")}
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _LONGEST_LINE = 300
 
@@ -55,13 +66,50 @@ _LONGEST_LINE = 300
 def completed(table: RawTable) -> RawTable:
     """The table with the names, units and scales that the file states above, below or beside its row of names."""
     if not any(table.names):
-        table = _with_listed_names(table)
+        table = _with_indexed_names(_with_listed_names(table))
     if not any(table.names):
         return table
     table = _with_titles(_with_keyed_units(_with_row_of_currents(table)))
-    table = _with_stated_time_unit(_with_listed_units(table))
+    table = _with_stated_time_unit(_with_listed_units(_with_keyed_axis(table)))
     table = _with_clocks_and_weights(table)
-    return _with_scales(_with_counts(table))
+    return _with_sense(_with_scales(_with_counts(table)))
+
+
+def _with_sense(table: RawTable) -> RawTable:
+    """A force recorded as a magnitude, with the sign that a column of two words beside it states."""
+    forces = [i for i, header in enumerate(table.headers) if header.role == "force"]
+    senses = [i for i, name in enumerate(table.names) if name.strip().casefold() in _SENSE_NAMES]
+    if len(forces) != 1 or len(senses) != 1 or table.words is None:
+        return table
+    words = table.words(senses[0])
+    signs = [_sign_of(label, table.remarks) for label in words.labels]
+    inner, force = table.read, forces[0]
+    if sorted(signs) != [-1, 1]:
+        return table
+    sign = np.array(signs)[words.codes]
+
+    def read(columns: Sequence[int]) -> Content:
+        content = inner(columns)
+        if (
+            force not in content.values
+            or content.values[force].size != sign.size
+            or np.nanmin(content.values[force]) < 0
+        ):
+            return content
+        return Content({**content.values, force: sign * content.values[force]}, content.lines, content.findings)
+
+    text = f"the sign of the force is that of column {table.names[senses[0]]!r}"
+    return replace(table, read=read, findings=(*table.findings, Finding("W_SCALE", text)))
+
+
+def _sign_of(label: str, remarks: Sequence[str]) -> int:
+    """1 for tension, -1 for compression, by the word itself or by a line that explains it; 0 if neither says."""
+    said = [
+        label,
+        *(m[1] for line in remarks for m in re.finditer(rf"(?<!\w){re.escape(label)}\s*[=:]\s*([^\W\d]+)", line)),
+    ]
+    signs = {sign for sign, stems in _SENSES.items() for word in said if word.casefold().startswith(stems)}
+    return signs.pop() if len(signs) == 1 else 0
 
 
 def _with_row_of_currents(table: RawTable) -> RawTable:
@@ -107,6 +155,41 @@ def _with_listed_names(table: RawTable) -> RawTable:
         return table
     names, units = (tuple(listed[i][key].strip() for i in sorted(listed)) for key in ("name", "unit"))
     return replace(table, names=names, units=units)
+
+
+def _with_indexed_names(table: RawTable) -> RawTable:
+    """Names, units and scales of columns without any that numbered keys state: DESC.CHAN_1=..., UNITS.CHAN_1=mm."""
+    matches = [match for line in table.remarks if (match := _INDEXED.match(line[:_LONGEST_LINE]))]
+    said: dict[str, dict[int, str]] = {"desc": {}, "unit": {}, "scal": {}}
+    for match in matches:
+        said[match["what"].casefold()[:4].replace("name", "desc").replace("labe", "desc")][int(match["number"])] = (
+            match["value"]
+        )
+    width = range(1, len(table.names) + 1)
+    if any(i not in said["desc"] or not is_unit(said["unit"].get(i, "")) for i in width):
+        return table
+    steps = [
+        line.partition("=")[2] for line in table.remarks if line.startswith("DELTA_T=")
+    ]  # of the format RPC, in seconds
+    remarks = (*table.remarks, *(f"DELTA_T: {step.strip()} s" for step in steps))
+    names, units = tuple(said["desc"][i] for i in width), tuple(said["unit"][i] for i in width)
+    table = replace(table, names=names, units=units, remarks=remarks)
+    for i, scale in said["scal"].items():
+        if i in width and _FLOAT.fullmatch(scale.strip()) and float(scale) not in (0.0, 1.0):
+            text = f"column {names[i - 1]!r} is scaled by {float(scale):g} as the file states"
+            table = _scaled(table, i - 1, names[i - 1], units[i - 1], float(scale), text)
+    return table
+
+
+def _with_keyed_axis(table: RawTable) -> RawTable:
+    """The x axis as time, where rows of headings begin with what they hold and one gives the axis a unit of time."""
+    if not table.names or table.names[0].casefold() != "name" or table.units[0].casefold() != "unit":
+        return table
+    stated = {m[1] for line in table.remarks if (m := _AXIS_UNIT.match(line[:_LONGEST_LINE])) and is_unit(m[1])}
+    units = [unit for unit in stated if (known := parse_unit(unit)) and known.dimension == "time"]
+    if len(units) != 1:
+        return table
+    return replace(table, names=("time", *table.names[1:]), units=(units[0], *table.units[1:]))
 
 
 def _with_titles(table: RawTable) -> RawTable:

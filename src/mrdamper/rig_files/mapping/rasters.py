@@ -10,11 +10,12 @@ import numpy as np
 
 from mrdamper.data import Floats, held_current
 from mrdamper.errors import InputError
-from mrdamper.rig_files.column_names import Header, role_of, split_name
+from mrdamper.rig_files.column_names import Header, role_of, says_nothing, split_name
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding
 
 _FEWEST_OVERLAP = 0.5  # of the force's time that every needed channel must cover
+_BY_UNIT = {"length": "displacement", "force": "force"}
 _TINY = 1e-9  # of the record: clocks that differ by less are one
 
 
@@ -30,7 +31,7 @@ def with_one_clock(table: RawTable) -> RawTable:
     if len(groups) < 2:
         return table
     owner = {column: clock for clock, columns in groups.items() for column in columns}
-    roles = {role: [i for i in owner if _is(table.headers[i], role)] for role in (*REQUIRED[1:], *OPTIONAL)}
+    roles = {role: [i for i in owner if _role(table.headers[i]) == role] for role in (*REQUIRED[1:], *OPTIONAL)}
     if not roles["force"] or not roles["displacement"]:
         return table
     together = [c for c in groups if all(any(owner[i] == c for i in roles[r]) for r in ("displacement", "force"))]
@@ -55,7 +56,7 @@ def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
     dropped: set[int] = set()
     for label, members in groups.items():
         timed = [table for table in members if any(header.role == "time" for header in table.headers)]
-        roles = [{h.role for h in _named(table).headers} for table in timed]
+        roles = [{_role(h) for h in _named(table).headers} for table in timed]
         whole = [i for i, roles_of in enumerate(roles) if {"displacement", "force"} <= roles_of]
         every = [role for roles_of in roles for role in roles_of if role not in ("time", None)]
         needed = {"displacement", "force"} <= set(every) and len(set(every)) == len(every)
@@ -111,8 +112,10 @@ def _time_first(table: RawTable) -> list[int]:
     return [*times, *(i for i in range(len(table.names)) if i not in times)]
 
 
-def _is(header: Header, role: str) -> bool:
-    return header.role == role
+def _role(header: Header) -> str | None:
+    """The channel that a name stands for, or its unit where the name says nothing: s_Daempfer in mm."""
+    by_unit = _BY_UNIT.get(header.dimension or "")
+    return header.role or (by_unit if by_unit and says_nothing(header.name) else None)
 
 
 def _clocks(table: RawTable) -> dict[int, list[int]]:

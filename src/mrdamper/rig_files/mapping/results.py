@@ -17,7 +17,7 @@ _SEPARATORS = ("\t", ";", ",", "|")
 _NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
 _QUANTITY = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s*(m?A)")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
-_FEWEST_ROWS = 2
+_FEWEST_ROWS = _TELLING = 2
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
 _SPECIMEN = re.compile(
     r"(?i)^(?:specimen|probe|prüfkörper|test|versuch|run|sample|essai|éprouvette|ensayo|no|nr)\b[\s.:#]*"
@@ -71,11 +71,11 @@ def with_results(tables: list[RawTable]) -> list[RawTable]:
         if len(stated) != 1 or len(tables) < 2:
             return others
         results = stated[0][1]
-        tables = [table for table in tables if table is not stated[0][0]]
+        tables = [table for table in tables if table is not stated[0][0] and _names_channels(table)]
     shared = set(tables[0].remarks).intersection(*(table.remarks for table in tables[1:])) if len(tables) > 1 else set()
     tests = [[table.label, *(_last_lines(table, shared))] for table in tables]
     currents = results.by_test(tests)
-    if len(currents) < len(tables):
+    if len(currents) < len(tables) or not tables:
         return others
     note = f"table of results, {results.title}"
     return [
@@ -84,9 +84,18 @@ def with_results(tables: list[RawTable]) -> list[RawTable]:
     ]
 
 
+def _names_channels(table: RawTable) -> bool:
+    """Whether two columns or more of a table name channels: others of a workbook list parameters."""
+    return len({header.role or header.dimension for header in table.headers} - {None}) >= _TELLING or not any(
+        table.names
+    )
+
+
 def _may_be_results(table: RawTable) -> bool:
-    """Tell if a table names a current and is no record of a test."""
-    return any(map(_is_current, table.names)) and "time" not in {header.role for header in table.headers}
+    """Tell if a table names a current, or nothing, and is no record of a test."""
+    return (any(map(_is_current, table.names)) or not any(table.names)) and "time" not in {
+        header.role for header in table.headers
+    }
 
 
 def lines_of(table: RawTable) -> list[str]:
@@ -147,6 +156,8 @@ def _is_current(cell: str) -> bool:
 
 def _is_units_row(cells: Sequence[str], width: int) -> bool:
     filled = [cell.strip("[]()") for cell in cells if cell and cell not in ("-", "[-]", "(-)")]
+    if len(filled) > 1 and not is_unit(filled[0]) and not _NUMBER.fullmatch(filled[0]):
+        filled = filled[1:]  # a heading of the rows: No, A, Hz
     return 0 < len(filled) <= width and all(is_unit(cell) for cell in filled)
 
 

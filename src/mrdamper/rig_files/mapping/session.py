@@ -21,13 +21,16 @@ _ALIKE = 0.1  # relative difference of period and stroke of two tests at one con
 _ALIKE_A = 0.05  # difference of current of two tests at one condition [A]
 _LONGEST = 5_000_000  # samples
 
+_Condition = tuple[float, float, float, bool]
+
 
 def stretches_of_session(time: Floats, displacement: Floats, current: Floats | None) -> list[slice]:
     """The tests of a record that rests between them, with half of each rest; one stretch where it is one test.
 
     A record is cut only if every part between two rests is a motion of several strokes at a constant
-    current, and not all parts are of one condition: a pause within a test, and the dwell of a
-    trapezoidal motion, are no borders. Without rests it is cut where the current steps.
+    current, and not all parts are of one condition: a pause within a test, the dwell of a trapezoidal
+    motion, and a slow stretch of a random one at one current are no borders. Without rests it is cut
+    where the current steps.
 
     Raises
     ------
@@ -50,7 +53,9 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
         conditions.append(_condition(time[part], displacement[part], current[part]))
         if conditions[-1] is None:
             return whole
-    if all(_same(conditions[0], other) for other in conditions):
+    known = [condition for condition in conditions if condition is not None]
+    held = max(known[0][2], *(c[2] for c in known)) - min(known[0][2], *(c[2] for c in known)) <= _ALIKE_A
+    if all(_same(known[0], other) for other in known) or (held and not all(regular for *_, regular in known)):
         return whole
     if len(parts) > MOST_TESTS:
         raise ColumnError(
@@ -103,19 +108,17 @@ def _moves(part: Floats, x: Floats) -> bool:
     return part.size > 0 and float(np.ptp(part)) > 2 * _REST * float(np.ptp(x))
 
 
-def _condition(time: Floats, x: Floats, current: Floats) -> tuple[float, float, float] | None:
-    """Period [s], stroke [m] and current [A] of a part; None if it is no test at a constant current."""
+def _condition(time: Floats, x: Floats, current: Floats) -> _Condition | None:
+    """Period [s], stroke [m] and current [A] of a part, and if its strokes are regular; None at no constant current."""
     strokes = find_strokes(time, x)
     if strokes.reversals.size < _FEWEST_REVERSALS or strokes.period is None:
         return None
     inside = slice(int(strokes.reversals[0]), int(strokes.reversals[-1]) + 1)
     finite = current[inside][np.isfinite(current[inside])]
     mean, change = held_current(finite) if finite.size >= 3 else (0.0, "no samples")
-    return None if change else (strokes.period, float(np.median(strokes.lengths)), mean)
+    return None if change else (strokes.period, float(np.median(strokes.lengths)), mean, strokes.steady is not None)
 
 
-def _same(one: tuple[float, float, float] | None, other: tuple[float, float, float] | None) -> bool:
-    assert one is not None
-    assert other is not None
+def _same(one: _Condition, other: _Condition) -> bool:
     near = all(abs(a - b) <= _ALIKE * max(a, b) for a, b in zip(one[:2], other[:2], strict=True))
     return near and abs(one[2] - other[2]) <= _ALIKE_A

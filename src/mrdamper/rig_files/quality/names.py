@@ -1,4 +1,4 @@
-"""Frequency and amplitude that a name states, against the motion that was measured."""
+"""Frequency and amplitude that a name or a heading states, against the motion that was measured."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ _AMPLITUDES = (0.25, 1.6)
 
 
 def agrees_with_its_name(view: View) -> Iterator[Finding]:
-    """Report a motion of another frequency or amplitude than the name of its file or test states."""
+    """Report a motion of another frequency or amplitude than the name of its file or test, or a heading, states."""
     motion = view.motion
     if motion is None:
         return
-    name = f"{view.record.provenance.get('file', '')} {view.record.id}"
+    notes = view.record.provenance
+    name = f"{notes.get('file', '')} {view.record.id} {notes.get('motion_stated', '')}"
     measured = motion.condition
     frequency, amplitude = _stated(_FREQUENCY, name), _stated(_AMPLITUDE, name)
     if frequency is not None and abs(measured.frequency_Hz / frequency - 1) > _SAME_FREQUENCY:
@@ -35,7 +36,7 @@ def agrees_with_its_name(view: View) -> Iterator[Finding]:
 def _contradiction(stated: str, measured: str, channel: str) -> Finding:
     return Finding(
         "W_NAME",
-        f"the name states {stated} and the record has {measured}: check the unit of {channel}, or the name",
+        f"the name or heading states {stated} and the record has {measured}: check the unit of {channel}, or the name",
     )
 
 

@@ -30,6 +30,9 @@ from mrdamper.rig_files.units import is_unit
 
 _MOST_ACROSS = 50  # channels of a matrix that has its samples in rows
 _PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value")
+_FORMULA = re.compile(
+    r"(?:raw|counts?|adc|digits?|data)\s*[*·×]\s*(gain|scale|factor|slope)(?:\s*\+\s*(offset|bias))?", re.IGNORECASE
+)
 _TELLING = 2  # words that name channels make a list of names
 _NO_NUMBERS = {"b": "truth values", "c": "complex numbers", "V": "bytes"}
 _EARLY_END = (
@@ -147,7 +150,12 @@ def titles_of(width: int, texts: Iterable[Sequence[str]]) -> tuple[Sequence[str]
 
 def unpacked(says: Mapping[str, Any], values: np.ndarray) -> np.ndarray:
     """Numbers as netCDF and others pack them: scale_factor, add_offset, and a code for missing ones."""
-    if values.dtype.kind not in "iuf" or not any(name in says for name in _PACKING):
+    if values.dtype.kind not in "iuf":
+        return values
+    formula = _formula_of(says) if values.dtype.kind in "iu" else None
+    if formula is not None:
+        return formula[0] * values.astype(np.float64) + formula[1]
+    if not any(name in says for name in _PACKING):
         return values
     numbers = values.astype(np.float64)
     for name in ("_FillValue", "missing_value"):
@@ -155,6 +163,38 @@ def unpacked(says: Mapping[str, Any], values: np.ndarray) -> np.ndarray:
             numbers[np.isin(values, np.asarray(says[name]))] = np.nan
     factor, offset = (float(np.reshape(says.get(n, d), -1)[0]) for n, d in (("scale_factor", 1), ("add_offset", 0)))
     return factor * numbers + offset
+
+
+def _formula_of(says: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Factor and offset of whole numbers whose conversion a text states: physical = raw * gain + offset."""
+    texts = [
+        _word(np.reshape(value, -1)[0])
+        for value in says.values()
+        if np.asarray(value).dtype.kind in "SUO" and np.size(value) == 1
+    ]
+    match = next(filter(None, map(_FORMULA.search, texts)), None)
+    known = {name.casefold(): value for name, value in says.items()}
+    names = [name.casefold() for name in match.groups() if name] if match else []
+    if not names or any(name not in known for name in names):
+        return None
+    factor, offset = (float(np.reshape(known[name], -1)[0]) for name in (*names, names[0])[:2])
+    return factor, offset if len(names) > 1 else 0.0
+
+
+def tests_across(shapes: Mapping[str, tuple[int, ...]]) -> tuple[str, ...]:
+    """Names of the tables whose rows are tests and whose columns are the samples of one clock; empty if there are none.
+
+    Two tables of K rows and N samples or more, N samples of a time, and else only N or K numbers each.
+    """
+    tables = [name for name, shape in shapes.items() if len(shape) == 2]
+    sizes = {shapes[name] for name in tables}
+    if len(tables) < 2 or len(sizes) != 1:
+        return ()
+    count, samples = sizes.pop()
+    rest = {name: shape for name, shape in shapes.items() if name not in tables}
+    clocks = [name for name, shape in rest.items() if shape == (samples,) and split_name(name).role == "time"]
+    whole = clocks and count != samples and all(shape in ((samples,), (count,)) for shape in rest.values())
+    return tuple(tables) if whole else ()
 
 
 def check_unpacked(source: Source, size: int) -> None:

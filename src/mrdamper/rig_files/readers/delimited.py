@@ -15,11 +15,12 @@ from mrdamper.rig_files.record import Finding, LineNumbers
 from mrdamper.rig_files.text.blocks import Block, find_blocks
 from mrdamper.rig_files.text.bulk import read_bulk
 from mrdamper.rig_files.text.cells import RowFormat, field_count, read_cells, split_rows
-from mrdamper.rig_files.text.labview import is_labview, named, stated_form
+from mrdamper.rig_files.text.labview import is_labview, named, stated_form, with_step
 from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
 from mrdamper.rig_files.text.spool import Spool
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, open_text, too_long
 from mrdamper.rig_files.text.tokens import looks_numeric
+from mrdamper.rig_files.text.turned import turned_table
 
 _ODD = re.compile("[\udc80-\udcff\ufffd\x80-\x9fÿþðÞÐ¤¦¬¸¨÷×]")  # bytes of another encoding, as they come out
 _HEADER_LINES, _BREAKS = 200, 12  # lines in which a quoted name may be broken, and into how many
@@ -50,6 +51,9 @@ class DelimitedText(Reader):
         whole = stream.start + len(head) >= stream.stop
         lines = stream.decode(b"\n".join((raw if whole else raw[:-1])[:_HEAD_LINES])).split("\n")
         lines = _with_whole_quotes([line.rstrip("\r") for line in lines] if b"\r" in head else lines)
+        turned = turned_table(source, lines) if whole and form == FileForm() else None
+        if turned is not None:
+            return [turned]
         layout = find_layout(lines, source, stated_form(lines, form) if is_labview(lines) else form)
         layout = named(layout, lines) if is_labview(lines) else layout
         start = stream.start + sum(len(line) + 1 for line in raw[: layout.data_line - 1])
@@ -67,7 +71,7 @@ class DelimitedText(Reader):
             f"block {index + 1}" if count > 1 else "",
             _form(stream, layout),
             odd=layout.odd,
-            remarks=block.remarks or layout.remarks,
+            remarks=with_step(block.remarks or layout.remarks),
             over=layout.over,
             words=lambda column: _words(stream, layout, block, column),
         )

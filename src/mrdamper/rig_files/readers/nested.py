@@ -63,6 +63,7 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[R
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
+    tree = _spread(tree)
     node.units = {**node.units, **_stated_units(tree)}
     for key, value in _paired(tree, node.units).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
@@ -88,6 +89,30 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     for key, value in inner if depth < DEEPEST else ():
         label = f"{node.label}/{key}" if node.label and key else node.label or key
         yield from _walk(value, _Node(label, [], [], dict(node.constants), list(node.remarks), node.units), depth + 1)
+
+
+def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A list of matrices as a node each, with its own of the numbers that vectors beside them hold, one a matrix."""
+    lists = {
+        key: value
+        for key, value in tree.items()
+        if isinstance(value, list)
+        and len(value) > 1
+        and all(isinstance(i, np.ndarray) and i.ndim == 2 and min(i.shape) > 1 for i in value)
+    }
+    if len(lists) != 1:
+        return tree
+    key, matrices = next(iter(lists.items()))
+    count = len(matrices)
+    vectors = {
+        k: v.reshape(-1)
+        for k, v in tree.items()
+        if isinstance(v, np.ndarray) and v.size == count and v.dtype.kind in "iuf"
+    }
+    words = {k: v for k, v in tree.items() if isinstance(v, list) and k != key and all(isinstance(i, str) for i in v)}
+    rest = {k: v for k, v in tree.items() if k != key and k not in vectors and k not in words}
+    own = [{key: matrices[i], **words, **{k: float(v[i]) for k, v in vectors.items()}} for i in range(count)]
+    return {**rest, **{f"{key}_{i}": node for i, node in enumerate(own, 1)}}
 
 
 def _stated_units(tree: Mapping[str, Any]) -> dict[str, str]:
@@ -157,6 +182,12 @@ def _records(items: list[Mapping[str, Any]]) -> dict[str, Any]:
 def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
     """The columns of a mapping that is one channel: its data, and its own x before it; empty if it is none."""
     lower = {name.casefold(): value for name, value in says.items()}
+    timed = any(name in lower for name in _TIME_UNITS)
+    for name in ("points", *_DATA):  # [time, value] each
+        points = lower.get(name)
+        if isinstance(points, np.ndarray) and points.ndim == 2 and points.shape[1] == 2 and (timed or name == "points"):
+            lower |= {name: None, "time": points[:, 0], "data": points[:, 1]}
+            break
     data = next((lower[name] for name in _DATA if isinstance(lower.get(name), np.ndarray)), None)
     if data is None or data.size < 2:
         data = next((v["values"] for v in (lower.get("signals"),) if isinstance(v, Mapping) and "values" in v), None)

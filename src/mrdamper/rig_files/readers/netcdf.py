@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, refusing_damage, unpacked
+from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, refusing_damage, tests_across, unpacked
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 
 
@@ -45,9 +45,35 @@ class NetCdf(Reader):
             variable = variables[column]
             return unpacked(variable._attributes, np.array(variable[:]).astype(variable[:].dtype.newbyteorder("=")))
 
-        return [
-            array_table(source, list(arrays), units, column_of, title=self.title, constants=single, remarks=remarks)
-        ]
+        across = tests_across({name: tuple(variable.shape) for name, variable in arrays.items()})
+        if not across:
+            return [
+                array_table(source, list(arrays), units, column_of, title=self.title, constants=single, remarks=remarks)
+            ]
+        count, samples = arrays[across[0]].shape
+        kept = [i for i, variable in enumerate(variables) if samples in variable.shape]
+        names = list(arrays)
+        tables = []
+        for test in range(count):
+            stated = {f"{names[i]} [{units[i]}]": float(column_of(i)[test]) for i in range(len(names)) if i not in kept}
+
+            def row_of(column: int, test: int = test) -> np.ndarray:
+                array = column_of(kept[column])
+                return array[test] if array.ndim == 2 else array
+
+            tables.append(
+                array_table(
+                    source,
+                    [names[i] for i in kept],
+                    [units[i] for i in kept],
+                    row_of,
+                    title=self.title,
+                    label=f"test_{test + 1}",
+                    constants={**single, **stated},
+                    remarks=remarks,
+                )
+            )
+        return tables
 
 
 def _text(value: object) -> str:

@@ -47,23 +47,29 @@ class Uff(Reader):
         marks = [i for i, line in enumerate(lines) if line.strip() == _DELIMITER]
         if len(marks) % 2:
             raise damaged(source, self.title, "truncated: a data set is not closed")
-        tree: dict[str, object] = {}
+        trees: list[dict[str, object]] = [{}]
         with refusing_damage(source, self.title):
             for start, stop in zip(marks[::2], marks[1::2], strict=True):
                 kind = lines[start + 1].split()[0]
                 if kind.startswith("58b"):
                     raise source.refuse("E_FORMAT", "a binary data set", "export it as text (ASCII)")
                 if kind == "58":
-                    tree |= _function(lines[start + 2 : stop], len(tree))
-        tables = nested_tables(source, tree, self.title)
+                    texts, channel = _function(lines[start + 2 : stop])
+                    if channel["name"] in trees[-1]:  # the next test begins
+                        trees.append({})
+                    above = {f"{channel['name']} {key}": text for key, text in texts.items()}
+                    trees[-1] |= {**above, str(channel["name"]): channel}
+        inner = {f"test {i}": tree for i, tree in enumerate(trees, 1)} if len(trees) > 1 else trees[0]
+        tables = nested_tables(source, inner, self.title)
         if not tables:
             raise source.refuse("E_NO_DATA", "no functions of time (data sets 58)", "export the time histories")
         return tables
 
 
-def _function(lines: list[str], number: int) -> dict[str, object]:
-    texts = {
-        f"text {number} {i}": line.strip() for i, line in enumerate(lines[:5], 1) if line.strip() not in ("", "NONE")
+def _function(lines: list[str]) -> tuple[dict[str, object], dict[str, object]]:
+    """The texts above a function, and the function as a channel."""
+    texts: dict[str, object] = {
+        f"text {i}": line.strip() for i, line in enumerate(lines[:5], 1) if line.strip() not in ("", "NONE")
     }
     kind, count, even = (int(lines[6][at : at + 10]) for at in (0, 10, 20))
     begin, step = float(lines[6][30:43]), float(lines[6][43:56])
@@ -73,8 +79,7 @@ def _function(lines: list[str], number: int) -> dict[str, object]:
         raise ValueError("truncated: fewer values than it says, or complex ones")
     values = numbers[:count] if even else numbers[1 : 2 * count : 2]
     time = begin + step * np.arange(count) if even else numbers[: 2 * count : 2]
-    channel = {"name": y.name, "unit": y.unit, "data": values, "time": time, "xunit": x.unit or "s"}
-    return {**texts, f"function {number + 1}": channel}
+    return texts, {"name": y.name, "unit": y.unit, "data": values, "time": time, "xunit": x.unit or "s"}
 
 
 def _axis(line: str) -> _Axis:

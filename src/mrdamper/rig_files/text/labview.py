@@ -39,14 +39,25 @@ def named(layout: Layout, lines: Sequence[str]) -> Layout:
         return layout
     stated = [unit.strip() for unit in units] + [""] * layout.width
     clocks = [name == _NAMES for name in layout.names]
+    clock_name = "" if _entries(lines).get("X_Columns", "").casefold() == "no" else "Time"  # empty cells, or stamps
     return replace(
         layout,
-        names=tuple("Time" if clock else name for name, clock in zip(layout.names, clocks, strict=True)),
+        names=tuple(clock_name if clock else name for name, clock in zip(layout.names, clocks, strict=True)),
         units=tuple(
-            "s" if clock else (stated[i] if i else "") or own
+            ("s" if clock_name else "") if clock else (stated[i] if i else "") or own
             for i, (clock, own) in enumerate(zip(clocks, layout.units, strict=True))
         ),
     )
+
+
+def with_step(remarks: Sequence[str]) -> tuple[str, ...]:
+    """Lines above a section with the one step of time [s] that its header states for all channels."""
+    for line in remarks:
+        key, *cells = [cell.strip() for cell in line.split("\t")]
+        stated = {cell.replace(",", ".") for cell in cells if cell}
+        if key == "Delta_X" and len(stated) == 1 and any(other.startswith("X_Dimension\tTime") for other in remarks):
+            return (*remarks, f"Delta_X: {stated.pop()} s")
+    return tuple(remarks)
 
 
 def _entries(lines: Sequence[str]) -> dict[str, str]:

@@ -430,6 +430,9 @@ def _header_lines(
                 raise source.refuse("E_PROFILE", f"there is no line {index + 1}", "correct [file] of the profile")
         return header, units
     plain = [i for i, line in enumerate(lines[:first]) if line.strip() and not is_comment(line)]
+    keyed = {_cells(lines[i], separator, width)[0].casefold(): i for i in plain} if width > 1 else {}
+    if {"name", "unit"} <= set(keyed) and len(_fields(lines[keyed["name"]], separator, width)) == width:
+        return keyed["name"], keyed["unit"]  # rows that begin with what they hold
     marked = [i for i, line in enumerate(lines[:first]) if is_comment(line)]
     for candidates in (plain, marked):
         fitting = [i for i in candidates if len(_fields(lines[i], separator, width)) == width]

@@ -33,11 +33,20 @@ MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", 
 _INFINITE = re.compile(r"[+-]?(?:inf(?:inity)?|1\.#inf|∞)", re.IGNORECASE)
 _STAMP = re.compile(
     r"(?:(?:([0-9]{4})([-/])([0-9]{2})\2([0-9]{2})|([0-9]{2})\.([0-9]{2})\.([0-9]{4})"
-    r"|[0-9]{1,2}/[0-9]{1,2}/[0-9]{4})(?:T| +))?"
+    r"|([0-9]{1,2})[- ]([a-zä]{3})[- ]([0-9]{4})|[0-9]{1,2}/[0-9]{1,2}/[0-9]{4})(?:T| +))?"
     r"(?:([0-9]{1,2}):)?([0-9]{2}):([0-9]{2})(?:[.,]([0-9]{1,9})|:([0-9]{3}))?"
     r"(?: ?([AP]M))?(Z|[+-][0-9]{2}:?[0-9]{2})?",
     re.IGNORECASE,
 )
+_MONTHS = {
+    name: i
+    for names in (
+        "jan feb mar apr may jun jul aug sep oct nov dec",
+        "jan feb mär apr mai jun jul aug sep okt nov dez",
+        "ene feb mrz avr maj jun jul ago set out nov dic",
+    )
+    for i, name in enumerate(names.split(), 1)
+}
 FORTRAN = re.compile(r"[+-]?[0-9]*[.,]?[0-9]+[dD][+-]?[0-9]{1,3}")  # 1.25D-03; taken where a file writes so throughout
 
 
@@ -79,7 +88,7 @@ def looks_numeric(token: str) -> bool:
 def stamp(token: str) -> tuple[int, bool] | None:
     """Nanoseconds of an ISO-8601 time stamp or a clock time, and whether it states its zone.
 
-    Dates also as 2024/03/31 and 31.03.2024, which mean one thing everywhere. 03/04/2024 does not: it is
+    Dates also as 2024/03/31, 31.03.2024 and 31-Mar-2024, which mean one thing everywhere. 03/04/2024 does not: it is
     not looked at, and a record that passes midnight runs backwards. Minutes and seconds need a fraction.
     Integers, as doubles would round the nanoseconds of a date. A zone's offset is taken
     off, so that the change to summer time does not bend a record.
@@ -89,7 +98,9 @@ def stamp(token: str) -> tuple[int, bool] | None:
         return None
     year, _, month, day, *dotted, hour, minute, second, fraction, thousandths, half, zone = match.groups()
     if dotted[0]:
-        day, month, year = dotted
+        day, month, year = dotted[:3]
+    if dotted[3]:
+        day, month, year = dotted[3], str(_MONTHS.get(dotted[4].lower(), 0)), dotted[5]
     if hour is None:
         if fraction is None or year is not None:
             return None  # 12:30 may be hours and minutes

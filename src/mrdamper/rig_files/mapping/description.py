@@ -1,0 +1,59 @@
+"""An XML file beside a record that describes it: names and units of its columns, its sampling rate, its current."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+from mrdamper.rig_files.readers.base import RawTable
+from mrdamper.rig_files.units import is_unit
+
+_LARGEST = 2**16  # bytes
+_PLACES = ("column", "number", "index", "no", "position", "channel")
+_MOST = 200  # elements
+
+
+def with_description(table: RawTable, path: Path) -> RawTable:
+    """The table with what the XML file of its name, or the only other file of its folder, states."""
+    elements = _elements(path)
+    if not elements:
+        return table
+    says = [(e, {key.casefold(): value.strip() for key, value in e.attrib.items()}) for e in elements]
+    leaves = [(e, a) for e, a in says if e.text and e.text.strip() and not len(e)]
+    lines = [f"{e.tag.rpartition('}')[2]}: {(e.text or '').strip()} {_unit(a)}".strip() for e, a in leaves]
+    table = replace(table, remarks=(*table.remarks, *lines))
+    channels = [a for _, a in says if a.get("name") and is_unit(_unit(a))]
+    if any(table.names) or len(channels) != len(table.names):
+        return table
+    places = [next((a[key] for key in _PLACES if a.get(key, "").isdigit()), "") for a in channels]
+    if sorted(places) == sorted(map(str, range(1, len(channels) + 1))):
+        channels = [channel for _, channel in sorted(zip(map(int, places), channels, strict=True), key=lambda e: e[0])]
+    elif any(places):
+        return table
+    units = tuple(map(_unit, channels))
+    return replace(table, names=tuple(a["name"] for a in channels), units=units)
+
+
+def _unit(attributes: dict[str, str]) -> str:
+    return attributes.get("unit", attributes.get("units", ""))
+
+
+def _elements(path: Path) -> list[ElementTree.Element]:
+    """The elements of the description of a file; empty if it has none, or one that could be hostile."""
+    beside = path.with_suffix(".xml")
+    if not beside.is_file():
+        try:
+            others = [file for file in path.parent.iterdir() if file != path and not file.name.startswith(".")]
+        except OSError:
+            return []
+        beside = others[0] if len(others) == 1 and others[0].suffix.lower() == ".xml" and others[0].is_file() else path
+    if beside == path or beside.stat().st_size > _LARGEST:
+        return []
+    content = beside.read_bytes()
+    if b"<!" in content.replace(b"<!--", b""):  # definitions of entities grow without end
+        return []
+    try:
+        return list(ElementTree.fromstring(content).iter())[:_MOST]
+    except (ElementTree.ParseError, ValueError, LookupError):
+        return []

@@ -1,0 +1,47 @@
+"""Texts whose channels stand in rows: each begins with its name and unit, the samples run to the right."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.readers.arrays import array_table
+from mrdamper.rig_files.readers.base import RawTable, Source
+from mrdamper.rig_files.text.layout import cells_of
+from mrdamper.rig_files.text.tokens import looks_numeric, number
+
+_MOST_LINES, _FEWEST_SAMPLES = 60, 30
+_TELLING = 2  # rows whose names tell what they are
+
+
+def turned_table(source: Source, lines: Sequence[str]) -> RawTable | None:
+    """The table of a text with its channels in rows; None if it is none.
+
+    Raises `RigFileError`, its code E_NUMBER, if a cell of such a row is no number.
+    """
+    filled = [line for line in lines if line.strip()]
+    for separator in ("\t", ";", ",") if 1 < len(filled) <= _MOST_LINES else ():
+        cells = [[cell.strip('"') for cell in cells_of(line.rstrip(separator), separator)] for line in filled]
+        width = max(map(len, cells))
+        rows = [row for row in cells if len(row) == width and not looks_numeric(row[0]) and looks_numeric(row[-1])]
+        roles = {split_name(row[0]).role for row in rows} - {None}
+        if width <= _FEWEST_SAMPLES or len(roles) < _TELLING:
+            continue
+        commas = separator != "," and any("," in cell for row in rows for cell in row[1:])
+        mark = "," if commas and not any("." in cell for row in rows for cell in row[1:]) else "."
+        headers = [split_name(row[0]) for row in rows]
+
+        def load(column: int, rows: list[list[str]] = rows, mark: str = mark) -> np.ndarray:
+            values = [number(cell, mark) for cell in rows[column][1:]]
+            if None in values:
+                at = values.index(None)
+                found = f"{rows[column][at + 1][:40]!a} in row {rows[column][0]!r} is no number"
+                raise source.refuse("E_NUMBER", found, "correct the cell", column=at + 2)
+            return np.array(values, dtype=float)
+
+        remarks = [line for line, row in zip(filled, cells, strict=True) if row not in rows]
+        names, units = [header.name for header in headers], [header.unit for header in headers]
+        return array_table(source, names, units, load, remarks=remarks)
+    return None
