@@ -78,7 +78,8 @@ def reader_of(source: Source) -> Reader:
     reader = next((r for r in readers.values() if r.binary and r().recognises(source)), None)
     foreign = next((title for magic, title in _FOREIGN.items() if head.lstrip().startswith(magic)), None)
     if reader is None and foreign is None and (named is None or not named.binary):
-        return readers["text"]()
+        listed = [r for r in readers.values() if not r.binary and r.name != "text"]  # formats of laboratories
+        return next((r() for r in listed if r().recognises(source)), readers["text"]())
     if reader is None or (named is not None and source.suffix not in reader.suffixes):
         text = reader is None and foreign is None and b"\0" not in head
         is_now = reader.title if reader is not None else foreign or ("text" if text else "something else")

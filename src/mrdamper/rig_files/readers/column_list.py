@@ -1,0 +1,63 @@
+"""A laboratory's delimited text as a list of columns."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import ClassVar
+
+from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.readers.base import RawTable, Source
+from mrdamper.rig_files.readers.delimited import DelimitedText
+
+_STATED = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\s*")
+
+
+class ColumnList(DelimitedText):
+    """A format of text whose columns are listed; what the list leaves open is found as in any text.
+
+    Attributes
+    ----------
+    mark : str
+        Regular expression that the first 4 KiB of such a file match, and no other file's.
+    columns : tuple of (str, str)
+        Channel and heading, in every version there is. The asterisk in "Force (*)" is the unit that the
+        file states; "Force (N)" states it here. A heading may end a path: Model/Load cell.
+    form : FileForm
+        Separator, decimal mark, sampling rate, ... that the files always have; a profile overrules it.
+    """
+
+    suffixes = ()
+    mark: ClassVar[str]
+    columns: ClassVar[tuple[tuple[str, str], ...]] = ()
+    form: ClassVar[FileForm] = FileForm()
+
+    def recognises(self, source: Source) -> bool:
+        """By the mark in the first lines."""
+        return re.search(self.mark, source.head().replace(b"\0", b"").decode("latin-1"), re.MULTILINE) is not None
+
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
+        """The tables of the text with the listed columns named by their channels."""
+        stated = {**self.form.model_dump(exclude_defaults=True), **form.model_dump(exclude_defaults=True)}
+        return [self.special(self._named(table)) for table in super().tables(source, FileForm(**stated))]
+
+    def special(self, table: RawTable) -> RawTable:
+        """Return the table with what else is special about the format; to be overridden."""
+        return table
+
+    def _named(self, table: RawTable) -> RawTable:
+        wanted: dict[str, tuple[str, str]] = {}
+        for role, heading in self.columns:
+            match = _STATED.fullmatch(heading)
+            name, unit = (match["name"], match["unit"]) if match else (heading, "*")
+            wanted[name.casefold()] = role, "" if unit == "*" else unit
+        names, units = list(table.names), list(table.units)
+        for i, name in enumerate(table.names):
+            header = split_name(name, table.units[i])
+            bare = {text.casefold() for text in (name, header.name, header.name.rpartition("/")[2])}
+            role, unit = next((wanted[text] for text in bare if text in wanted), ("", ""))
+            if role:
+                names[i] = name if header.role == role and not unit else f"{header.name} {role}"
+                units[i] = table.units[i] if names[i] == name else unit or header.unit
+        return replace(table, names=tuple(names), units=tuple(units))
