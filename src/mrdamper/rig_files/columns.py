@@ -282,7 +282,7 @@ def _convert(table: RawTable, role: str, column: int, channel: Channel) -> Assig
     unit = channel.unit or header.unit
     uncalibrated = channel.scale is None and header.dimension == "voltage"  # no unit makes newtons of volts
     for text in (unit, header.unit) if uncalibrated else (unit,):
-        problem = _unit_problem(table, role, column, text)
+        problem = _unit_problem(table, "velocity" if channel.integrate else role, column, text)
         if problem is not None:
             if role in REQUIRED:
                 raise problem
@@ -299,7 +299,7 @@ def _convert(table: RawTable, role: str, column: int, channel: Channel) -> Assig
             "E_SIGN_CONVENTION",
         )
     si = parse_unit(unit) or Unit("", 1.0)
-    shift = channel.sign * (si.factor * channel.offset + si.offset)
+    shift = 0.0 if channel.integrate else channel.sign * (si.factor * channel.offset + si.offset)
     factor = channel.sign * (channel.scale or 1.0) * si.factor
     return Assigned(column, header.name, unit, factor, shift + 0.0, 1e-3 * channel.delay_ms)
 

@@ -45,6 +45,11 @@ class Channel(Table):
         of force and displacement is data.
     delay_ms : float
         How late the channel is, where it is known [ms].
+    file : str, optional
+        Name of the files that hold the channel, where each file holds other channels of a test, with
+        {run} where the test's name or number stands and * for anything: `C1--*--{run}.csv`.
+    integrate : bool
+        The displacement's column holds the velocity, of which the displacement is the integral, from zero on.
     """
 
     column: NAME | Annotated[int, Field(ge=1, le=1000)] | None = None
@@ -53,6 +58,15 @@ class Channel(Table):
     scale: float | None = Field(default=None, allow_inf_nan=False)
     offset: float = Field(default=0.0, allow_inf_nan=False)
     delay_ms: float = Field(default=0.0, ge=-1e4, le=1e4, allow_inf_nan=False)
+    file: NAME | None = None
+    integrate: bool = False
+
+    @field_validator("file")
+    @classmethod
+    def _file_names_the_test(cls, file: str | None) -> str | None:
+        if file is not None and (file.count("{run}") != 1 or file.count("*") > 3):
+            raise ValueError("file needs {run} once, and at most three *")
+        return file
 
     @field_validator("scale")
     @classmethod
@@ -147,10 +161,22 @@ class Profile(Table):
         for name, channel in channels.items():
             if name not in roles:
                 raise ValueError(f"no channel is called {name!r}; known: {', '.join(roles)}")
-            unit = parse_unit(channel.unit or "")
-            if channel.unit and (unit is None or unit.dimension != DIMENSION[name]):
-                raise ValueError(f"{channel.unit!r} is no unit of {DIMENSION[name]} ({name})")
+            if channel.integrate and name != "displacement":
+                raise ValueError(f"only the displacement is integrated, not the {name}")
+            unit, dimension = parse_unit(channel.unit or ""), "velocity" if channel.integrate else DIMENSION[name]
+            if channel.unit and (unit is None or unit.dimension != dimension):
+                raise ValueError(f"{channel.unit!r} is no unit of {dimension} ({name})")
         return channels
+
+    def of_file(self, name: str) -> tuple[str, Profile] | None:
+        """The test that a file belongs to, and the profile of its channels; None if no channel names such files."""
+        stated = {role: channel for role, channel in self.channels.items() if channel.file is not None}
+        matches = {role: re.fullmatch(_as_expression(c.file or ""), name[:255]) for role, c in stated.items()}
+        runs = {match["run"] for match in matches.values() if match}
+        if len(runs) != 1:
+            return None
+        channels = {role: c for role, c in self.channels.items() if role not in stated or matches[role]}
+        return runs.pop(), self.model_copy(update={"channels": channels})
 
     def channel(self, name: str) -> Channel:
         """Return the settings of a channel."""
@@ -259,7 +285,7 @@ def _as_expression(pattern: str) -> str:
     parts = re.split(r"(\{(?:current|run|frequency|amplitude)\}|\*)", pattern)
     number = r"(?P<current>[+-]?[0-9]{1,4}(?:[.,xp][0-9]{1,4})?)"
     other = r"[+-]?[0-9]{1,6}(?:[.,xp][0-9]{1,4})?"
-    meant = {"{current}": number, "*": ".*?", "{run}": ".+?", "{frequency}": other, "{amplitude}": other}
+    meant = {"{current}": number, "*": ".*?", "{run}": "(?P<run>.+?)", "{frequency}": other, "{amplitude}": other}
     inner = "".join(meant.get(part, re.escape(part)) for part in parts)
     return inner if re.search(r"\.[A-Za-z0-9]{1,5}$|\*$", pattern) else inner + r"(?:\..*)?"
 

@@ -36,7 +36,15 @@ from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests
 
 _PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")
 _TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
-_MAY_BE_PARTS = ("E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER")
+_MAY_BE_PARTS = (
+    "E_COLUMN",
+    "E_UNITS_MISSING",
+    "E_UNITS_DIMENSION",
+    "E_AMBIGUOUS",
+    "E_NO_DATA",
+    "E_NUMBER",
+    "E_FIELD_COUNT",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +185,7 @@ class _Intake:
         self.notes: list[Refusal] = []  # texts of a folder that hold no table
         self.met: list[tuple[Path, str]] = []
         self._given: set[Path] = set()
+        self._shares: dict[Path, tuple[str, Profile]] = {}  # files of some channels each, by the profile
         self._tables_of_results: dict[Path, Results | None] = {}
 
     def _results(self, path: Path) -> Results | None:
@@ -194,6 +203,10 @@ class _Intake:
         """Read a file, and check the tests in it whose current is known."""
         self._order[str(path)] = len(self._order)
         self._given |= {path} if given else set()
+        share = self._profile.of_file(path.name)
+        if share is not None:
+            self._shares[path] = share
+            return
         try:
             with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused
                 records, problems = records_of_file(path, self._profile)
@@ -259,6 +272,7 @@ class _Intake:
     def _join_channels(self, others: list[Path]) -> set[Path]:
         """Join displacements and forces of two files, and currents that other files state; the files that were used."""
         parts = [part for path in others if (part := part_of(path, self._profile))]
+        parts += [part for path, (run, own) in self._shares.items() if (part := part_of(path, own, run))]
         used: set[Path] = set()
         for record, paths in joined_parts(parts, self._profile):
             used |= set(paths)
@@ -266,6 +280,10 @@ class _Intake:
                 self._pending.append((paths[0], record))
             else:
                 self._check(paths[0], record, [], several=False)
+        for path in [path for path in self._shares if path not in used]:
+            found = f"no other file of test {self._shares[path][0]!r} has the rest of its channels on the same clock"
+            error = ColumnError(found, where=path.name, remedy="correct file = ... of the channels in the profile")
+            self.refusals.append(Refusal(str(path), error))
         pending = self._pending
         joined = with_currents_of(pending, parts) if pending and parts else None
         if joined:

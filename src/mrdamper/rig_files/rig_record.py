@@ -51,6 +51,9 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     _refuse_tiny_currents(table, assigned, channels)
     if "time" not in channels:
         channels["time"], rate = _counted_time(table, profile, size)
+    if profile.channel("displacement").integrate:
+        channels["displacement"] = _integrated(channels["time"], channels["displacement"])
+        findings.append(Finding("W_SCALE", "the displacement is the integral of the velocity"))
     further = _further(table, assigned, size)
     stretches = [slice(0, size)] if profile.file.blocks == "join" else stretches_of_time(channels["time"])
     if len(stretches) == 1 and profile.file.blocks != "join":
@@ -153,6 +156,15 @@ def _refuse_tiny_currents(table: RawTable, assigned: dict[str, Assigned], channe
             'set [channels.current] unit = "A" or unit = "mA" in a profile',
             column=assigned["current"].column + 1,
         )
+
+
+def _integrated(time: Floats, velocity: Floats) -> Floats:
+    """Integral of a velocity [m/s] over time [s] by the trapezoidal rule [m]; missing samples stay missing."""
+    there = np.isfinite(time) & np.isfinite(velocity)
+    found = np.full(velocity.shape, np.nan)
+    t, v = time[there], velocity[there]
+    found[there] = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))]) if t.size else t
+    return found
 
 
 def _counted_time(table: RawTable, profile: Profile, size: int) -> tuple[Floats, str]:

@@ -36,9 +36,15 @@ class Part:
     time: Floats  # (N,) [s]
     channels: Mapping[str, Floats]  # by name, (N,) in SI
     current: float | None = None  # [A] that the file states beside its columns
+    run: str = ""  # name of its test, where the profile says which files belong together
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """By which parts of one test belong together."""
+        return (self.run,) if self.run else number_of(self.path)
 
 
-def part_of(path: Path, profile: Profile) -> Part | None:
+def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
     """The channels with a time of a file that is no whole test; None if it has none, or several tables."""
     try:
         with raw_tables(path, profile.file) as tables:
@@ -57,7 +63,7 @@ def part_of(path: Path, profile: Profile) -> Part | None:
     there = np.isfinite(time)
     if np.count_nonzero(there) < 2 or np.any(np.diff(time[there]) <= 0):
         return None
-    return Part(path, time[there], {role: values[there] for role, values in channels.items()}, current)
+    return Part(path, time[there], {role: values[there] for role, values in channels.items()}, current, run)
 
 
 def number_of(path: Path) -> tuple[str, ...]:
@@ -97,7 +103,7 @@ def joined_parts(parts: Sequence[Part], profile: Profile) -> list[tuple[Record, 
     """Tests whose displacement and force lie in two files of one number and one clock, and these files."""
     by_number: dict[tuple[str, ...], list[Part]] = defaultdict(list)
     for part in parts:
-        by_number[number_of(part.path)].append(part)
+        by_number[part.key].append(part)
     records = []
     for group in by_number.values():
         loads = [part for part in group if "force" in part.channels]
@@ -118,7 +124,7 @@ def joined_parts(parts: Sequence[Part], profile: Profile) -> list[tuple[Record, 
         if "current" not in channels and len(stated) == 1:
             channels["current"] = constant(stated.pop() or 0.0, clock)
         files = [part.path.name for part in group]
-        stem = re.sub(r"[^\w.+=-]+", "_", loads[0].path.stem)
+        stem = re.sub(r"[^\w.+=-]+", "_", loads[0].run or loads[0].path.stem)
         remarks = {"file": as_data(files[0]), "files": as_data(", ".join(files)), "columns": ", ".join(names)}
         note = Finding("W_RASTER", f"joined from {' and '.join(files)}, on the force's clock")
         record = Record(

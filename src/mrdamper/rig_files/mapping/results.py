@@ -13,7 +13,7 @@ from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of
 from mrdamper.rig_files.units import is_unit, parse_unit
 
-_SEPARATORS = ("\t", ";", ",", "|")
+_SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
 _NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
 _QUANTITY = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s*(m?A)")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
@@ -122,7 +122,11 @@ def _last_lines(table: RawTable, shared: set[str]) -> list[str]:
 
 
 def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
-    rows = [[cell.strip('"').strip() for cell in cells_of(line[:_LONGEST_LINE], separator)] for line in lines]
+    wide = separator == "  "
+    split = [
+        re.split(r" {2,}", t.strip()) if wide else cells_of(t, separator) for t in (x[:_LONGEST_LINE] for x in lines)
+    ]
+    rows = [[cell.strip('"').strip() for cell in cells] for cells in split]
     for at, row in enumerate(rows):
         columns = [i for i, cell in enumerate(row) if cell and _is_current(cell)]
         if len(row) < 2 or not columns or sum(map(bool, row)) < 2:
