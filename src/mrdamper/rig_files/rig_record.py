@@ -289,7 +289,7 @@ def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> l
         return records
     names = [n for n in ("time", "displacement", "force", *OPTIONAL) if all(getattr(r, n) is not None for r in records)]
     partly: dict[str, Floats | None] = {name: None for name in OPTIONAL if name not in names}
-    if profile.file.blocks != "join" and len({_stated_conditions(table) for table in tables}) > 1:
+    if profile.file.blocks != "join" and _state_different_conditions(tables):
         return records
     time = np.concatenate([record.time for record in records])
     if profile.file.blocks != "join" and not np.all(np.diff(time[np.isfinite(time)]) > 0):
@@ -307,14 +307,13 @@ def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> l
     return [replace(records[0], findings=tuple(findings), lines=lines, further=further, **channels, **partly)]
 
 
-def _stated_conditions(table: RawTable) -> tuple[float, ...]:
-    """Currents and frequencies in the titles of a block: of different ones, each is a test."""
-    currents = [value for line in table.remarks for value in currents_in(line)]
-    return (
-        *currents,
-        np.inf,
-        *(float(match[1].replace(",", ".")) for line in table.remarks for match in _HZ.finditer(line[:255])),
-    )
+def _state_different_conditions(tables: list[RawTable]) -> bool:
+    """Return whether the titles of blocks state different currents or frequencies: each is a test."""
+    for found in (currents_in, lambda line: tuple(_HZ.findall(line[:255]))):
+        stated = {tuple(value for line in table.remarks for value in found(line)) for table in tables} - {()}
+        if len(stated) > 1:
+            return True
+    return False
 
 
 def _run_id(table: RawTable, path: Path) -> str:
