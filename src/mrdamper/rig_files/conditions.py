@@ -172,13 +172,13 @@ _AMPLITUDE_KEY = re.compile(_WHICH + r"(?:amplitude|ampl|amplitud|ampiezza|strok
 
 def stated_motion(lines: Iterable[str], decimal: str | None = None) -> str:
     """Frequency and amplitude of the motion that lines state, as a name would: 2Hz 10mm; empty if none does."""
-    found = []
-    for key, value, known in (quantity for line in lines for quantity in _quantities(line, decimal)):
-        if value > 0 and known.dimension == "frequency" and _FREQUENCY_KEY.fullmatch(key):
-            found.append(f"{value:g}Hz")
-        elif value > 0 and known.dimension == "length" and _AMPLITUDE_KEY.fullmatch(key):
-            found.append(f"{1e3 * value:g}mm")
-    return " ".join(dict.fromkeys(found))
+    words = []
+    for key, value, unit in (quantity for line in lines for quantity in _quantities(line, decimal)):
+        if value > 0 and unit.dimension == "frequency" and _FREQUENCY_KEY.fullmatch(key):
+            words.append(f"{value:g}Hz")
+        elif value > 0 and unit.dimension == "length" and _AMPLITUDE_KEY.fullmatch(key):
+            words.append(f"{1e3 * value:g}mm")
+    return " ".join(dict.fromkeys(words))
 
 
 _TURNS = re.compile(r"speed|rpm|drehzahl|crank|régime|vitesse|velocidad|giri|обороты|转速|回転", re.IGNORECASE)

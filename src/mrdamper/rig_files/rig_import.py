@@ -281,8 +281,8 @@ class _Intake:
             else:
                 self._check(paths[0], record, [], several=False)
         for path in [path for path in self._shares if path not in used]:
-            found = f"no other file of test {self._shares[path][0]!r} has the rest of its channels on the same clock"
-            error = ColumnError(found, where=path.name, remedy="correct file = ... of the channels in the profile")
+            problem = f"no other file of test {self._shares[path][0]!r} has the rest of its channels on the same clock"
+            error = ColumnError(problem, where=path.name, remedy="correct file = ... of the channels in the profile")
             self.refusals.append(Refusal(str(path), error))
         pending = self._pending
         joined = with_currents_of(pending, parts) if pending and parts else None

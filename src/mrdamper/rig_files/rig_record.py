@@ -161,10 +161,10 @@ def _refuse_tiny_currents(table: RawTable, assigned: dict[str, Assigned], channe
 def _integrated(time: Floats, velocity: Floats) -> Floats:
     """Integral of a velocity [m/s] over time [s] by the trapezoidal rule [m]; missing samples stay missing."""
     there = np.isfinite(time) & np.isfinite(velocity)
-    found = np.full(velocity.shape, np.nan)
+    integral = np.full(velocity.shape, np.nan)
     t, v = time[there], velocity[there]
-    found[there] = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))]) if t.size else t
-    return found
+    integral[there] = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))]) if t.size else t
+    return integral
 
 
 def _counted_time(table: RawTable, profile: Profile, size: int) -> tuple[Floats, str]:
@@ -309,8 +309,8 @@ def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> l
 
 def _state_different_conditions(tables: list[RawTable]) -> bool:
     """Return whether the titles of blocks state different currents or frequencies: each is a test."""
-    for found in (currents_in, lambda line: tuple(_HZ.findall(line[:255]))):
-        stated = {tuple(value for line in table.remarks for value in found(line)) for table in tables} - {()}
+    for values_in in (currents_in, lambda line: tuple(_HZ.findall(line[:255]))):
+        stated = {tuple(value for line in table.remarks for value in values_in(line)) for table in tables} - {()}
         if len(stated) > 1:
             return True
     return False

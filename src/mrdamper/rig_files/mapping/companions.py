@@ -183,11 +183,11 @@ def with_legend_of(pending: Sequence[tuple[Path, Record]], path: Path) -> list[R
         return None
     words = [re.split(r"[^0-9A-Za-z]+", file.stem.casefold()) for file, _ in pending]
     stated = [[code for code in codes if code in parts] for parts in words]
-    if any(len(found) != 1 for found in stated):
+    if any(len(own) != 1 for own in stated):
         return None
     return [
-        _with_stated(record, codes[found[0]], f"{path.name}, {found[0].upper()}")
-        for (_, record), found in zip(pending, stated, strict=True)
+        _with_stated(record, codes[own[0]], f"{path.name}, {own[0].upper()}")
+        for (_, record), own in zip(pending, stated, strict=True)
     ]
 
 

@@ -104,11 +104,11 @@ def _with_sense(table: RawTable) -> RawTable:
 
 def _sign_of(label: str, remarks: Sequence[str]) -> int:
     """1 for tension, -1 for compression, by the word itself or by a line that explains it; 0 if neither says."""
-    said = [
+    words = [
         label,
         *(m[1] for line in remarks for m in re.finditer(rf"(?<!\w){re.escape(label)}\s*[=:]\s*([^\W\d]+)", line)),
     ]
-    signs = {sign for sign, stems in _SENSES.items() for word in said if word.casefold().startswith(stems)}
+    signs = {sign for sign, stems in _SENSES.items() for word in words if word.casefold().startswith(stems)}
     return signs.pop() if len(signs) == 1 else 0
 
 
@@ -160,21 +160,21 @@ def _with_listed_names(table: RawTable) -> RawTable:
 def _with_indexed_names(table: RawTable) -> RawTable:
     """Names, units and scales of columns without any that numbered keys state: DESC.CHAN_1=..., UNITS.CHAN_1=mm."""
     matches = [match for line in table.remarks if (match := _INDEXED.match(line[:_LONGEST_LINE]))]
-    said: dict[str, dict[int, str]] = {"desc": {}, "unit": {}, "scal": {}}
+    texts: dict[str, dict[int, str]] = {"desc": {}, "unit": {}, "scal": {}}
     for match in matches:
-        said[match["what"].casefold()[:4].replace("name", "desc").replace("labe", "desc")][int(match["number"])] = (
+        texts[match["what"].casefold()[:4].replace("name", "desc").replace("labe", "desc")][int(match["number"])] = (
             match["value"]
         )
     width = range(1, len(table.names) + 1)
-    if any(i not in said["desc"] or not is_unit(said["unit"].get(i, "")) for i in width):
+    if any(i not in texts["desc"] or not is_unit(texts["unit"].get(i, "")) for i in width):
         return table
     steps = [
         line.partition("=")[2] for line in table.remarks if line.startswith("DELTA_T=")
     ]  # of the format RPC, in seconds
     remarks = (*table.remarks, *(f"DELTA_T: {step.strip()} s" for step in steps))
-    names, units = tuple(said["desc"][i] for i in width), tuple(said["unit"][i] for i in width)
+    names, units = tuple(texts["desc"][i] for i in width), tuple(texts["unit"][i] for i in width)
     table = replace(table, names=names, units=units, remarks=remarks)
-    for i, scale in said["scal"].items():
+    for i, scale in texts["scal"].items():
         if i in width and _FLOAT.fullmatch(scale.strip()) and float(scale) not in (0.0, 1.0):
             text = f"column {names[i - 1]!r} is scaled by {float(scale):g} as the file states"
             table = _scaled(table, i - 1, names[i - 1], units[i - 1], float(scale), text)
@@ -186,7 +186,7 @@ def _with_keyed_axis(table: RawTable) -> RawTable:
     if not table.names or table.names[0].casefold() != "name" or table.units[0].casefold() != "unit":
         return table
     stated = {m[1] for line in table.remarks if (m := _AXIS_UNIT.match(line[:_LONGEST_LINE])) and is_unit(m[1])}
-    units = [unit for unit in stated if (known := parse_unit(unit)) and known.dimension == "time"]
+    units = [unit for unit in stated if (parsed := parse_unit(unit)) and parsed.dimension == "time"]
     if len(units) != 1:
         return table
     return replace(table, names=("time", *table.names[1:]), units=(units[0], *table.units[1:]))

@@ -85,7 +85,7 @@ def with_results(tables: list[RawTable]) -> list[RawTable]:
 
 
 def _names_channels(table: RawTable) -> bool:
-    """Whether two columns or more of a table name channels: others of a workbook list parameters."""
+    """Tell if two columns or more of a table name channels: others of a workbook list parameters."""
     return len({header.role or header.dimension for header in table.headers} - {None}) >= _TELLING or not any(
         table.names
     )

@@ -53,9 +53,9 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
         conditions.append(_condition(time[part], displacement[part], current[part]))
         if conditions[-1] is None:
             return whole
-    known = [condition for condition in conditions if condition is not None]
-    held = max(known[0][2], *(c[2] for c in known)) - min(known[0][2], *(c[2] for c in known)) <= _ALIKE_A
-    if all(_same(known[0], other) for other in known) or (held and not all(regular for *_, regular in known)):
+    motions = [condition for condition in conditions if condition is not None]
+    held = max(motions[0][2], *(c[2] for c in motions)) - min(motions[0][2], *(c[2] for c in motions)) <= _ALIKE_A
+    if all(_same(motions[0], other) for other in motions) or (held and not all(regular for *_, regular in motions)):
         return whole
     if len(parts) > MOST_TESTS:
         raise ColumnError(

@@ -116,5 +116,5 @@ def check_record(record: Record, without: Collection[Check] = ()) -> Record:
     view = View(record)
     for check in (*CHECKS, *_dropped_in()):
         view.found.extend((check(view) if check not in without else None) or ())
-    found = (*record.findings, *view.found)
-    return replace(record, findings=found, segments=view.segments, steady=loop.steady_part(view))
+    findings = (*record.findings, *view.found)
+    return replace(record, findings=findings, segments=view.segments, steady=loop.steady_part(view))

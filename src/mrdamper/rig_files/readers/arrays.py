@@ -173,11 +173,11 @@ def _formula_of(says: Mapping[str, Any]) -> tuple[float, float] | None:
         if np.asarray(value).dtype.kind in "SUO" and np.size(value) == 1
     ]
     match = next(filter(None, map(_FORMULA.search, texts)), None)
-    known = {name.casefold(): value for name, value in says.items()}
+    lower = {name.casefold(): value for name, value in says.items()}
     names = [name.casefold() for name in match.groups() if name] if match else []
-    if not names or any(name not in known for name in names):
+    if not names or any(name not in lower for name in names):
         return None
-    factor, offset = (float(np.reshape(known[name], -1)[0]) for name in (*names, names[0])[:2])
+    factor, offset = (float(np.reshape(lower[name], -1)[0]) for name in (*names, names[0])[:2])
     return factor, offset if len(names) > 1 else 0.0
 
 

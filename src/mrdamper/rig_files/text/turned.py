@@ -37,8 +37,8 @@ def turned_table(source: Source, lines: Sequence[str]) -> RawTable | None:
             values = [number(cell, mark) for cell in rows[column][1:]]
             if None in values:
                 at = values.index(None)
-                found = f"{rows[column][at + 1][:40]!a} in row {rows[column][0]!r} is no number"
-                raise source.refuse("E_NUMBER", found, "correct the cell", column=at + 2)
+                problem = f"{rows[column][at + 1][:40]!a} in row {rows[column][0]!r} is no number"
+                raise source.refuse("E_NUMBER", problem, "correct the cell", column=at + 2)
             return np.array(values, dtype=float)
 
         remarks = [line for line, row in zip(filled, cells, strict=True) if row not in rows]
