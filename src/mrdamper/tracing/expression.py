@@ -30,12 +30,15 @@ class Recorder(Protocol):
 
     def settle(self, question: Expression, /) -> bool:
         """Answer a question about parameters while tracing."""
+        ...
 
     def apply(self, op: str, /, *args: Any) -> Any:
         """Write down an operation and return its result."""
+        ...
 
     def select(self, condition: Any, then: Any, otherwise: Any, /) -> Any:
         """Write down a choice and return its result."""
+        ...
 
 
 class Traced:

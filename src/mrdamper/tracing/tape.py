@@ -34,6 +34,7 @@ class LookupTable(Protocol):
 
     def at_float(self, x: float) -> float:
         """Evaluate the table at x; constant beyond the ends."""
+        ...
 
 
 class TracedLoop:
