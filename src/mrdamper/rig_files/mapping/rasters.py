@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding
 
 _FEWEST_OVERLAP = 0.5  # of the force's time that every needed channel must cover
 _BY_UNIT = {"length": "displacement", "force": "force"}
-_TINY = 1e-9  # of the record: clocks that differ by less are one
+_SAME = 1e-9  # [s]: clocks that differ by less are one
+_TWO_STARTS = 1.0  # [s] between two clocks of all channels: more is a clock with another zero, as the time of day
 
 
 def with_one_clock(table: RawTable) -> RawTable:
@@ -29,7 +30,7 @@ def with_one_clock(table: RawTable) -> RawTable:
     """
     groups = _clocks(table)
     if len(groups) < 2:
-        return table
+        return _with_clocks_compared(table)
     owner = {column: clock for clock, columns in groups.items() for column in columns}
     roles = {role: [i for i in owner if _role(table.headers[i]) == role] for role in (*REQUIRED[1:], *OPTIONAL)}
     if not roles["force"] or not roles["displacement"]:
@@ -135,19 +136,32 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
     read = lru_cache(maxsize=4)(lambda column: table.read([column]).values[column])
     factor = {i: header.known.factor if header.known else 1.0 for i, header in enumerate(table.headers)}
 
+    @cache
+    def common() -> tuple[slice, Floats]:
+        """Rows of the force that lie within the displacement's time, if most do, and their times."""
+        target = _filled(read(clock)) * factor[clock]
+        moved = next((i for i in owner if _role(table.headers[i]) == "displacement"), clock)
+        other = _filled(read(owner.get(moved, moved)) * factor[owner.get(moved, moved)])
+        inside = np.flatnonzero(_covered(target, other[np.isfinite(other)]))
+        rows = slice(inside[0], inside[-1] + 1) if inside.size >= _FEWEST_OVERLAP * target.size else slice(target.size)
+        return rows, target[rows]
+
     def on_clock(column: int) -> Floats:
         own = owner.get(column, column)
-        target = _filled(read(clock)) * factor[clock]
+        rows, target = common()
         if own == clock:
-            return _filled(read(column))[: target.size]
+            return read(column)[rows]
         return _interpolated(table, column, target, read(own) * factor[own], read(column))
 
     def columns_of(columns: Sequence[int]) -> Content:
         return Content({i: on_clock(kept[i]) for i in columns})
 
     moved = sorted({table.headers[i].name for i in kept if owner.get(i, i) != clock})
-    text = f"on clocks of their own, interpolated onto the force's: {', '.join(moved[:6])}"
-    findings = (*table.findings, Finding("W_RASTER", text)) if _differ(table, clock, owner, factor) else table.findings
+    own, text = "on clocks of their own", f"interpolated onto the force's: {', '.join(moved[:6])}"
+    apart = _apart(table, clock, {*owner.values()} - {clock})
+    if apart is not None and apart > _SAME:
+        own += f", up to {1e3 * apart:.4g} ms apart"
+    same = apart is not None and apart <= _SAME
     return replace(
         table,
         names=tuple("time" if i == clock else table.names[i] for i in kept),
@@ -156,17 +170,34 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
         over=(),
         words=None,
         read=columns_of,
-        findings=findings,
+        findings=table.findings if same else (*table.findings, Finding("W_RASTER", f"{own}, {text}")),
     )
 
 
-def _differ(table: RawTable, clock: int, owner: dict[int, int], factor: dict[int, float]) -> bool:
+def _apart(table: RawTable, clock: int, others: Iterable[int]) -> float | None:
+    """Largest difference of the stamps of a row between a clock and others [s]; None where they have no common rows."""
+    factor = {i: known.factor if (known := table.headers[i].known) else 1.0 for i in (clock, *others)}
     try:
-        first = _filled(table.read([clock]).values[clock]) * factor[clock]
-        others = (_filled(table.read([c]).values[c]) * factor[c] for c in sorted({*owner.values()} - {clock}))
-        return any(other.size != first.size or not np.allclose(other, first, rtol=0, atol=1e-9) for other in others)
+        first, *rest = (_filled(table.read([i]).values[i]) * factor[i] for i in factor)
     except InputError:
-        return True
+        return None
+    if any(other.size != first.size for other in rest):
+        return None
+    return max((float(np.nanmax(np.abs(other - first))) for other in rest), default=0.0)
+
+
+def _with_clocks_compared(table: RawTable) -> RawTable:
+    """Note a second clock of a table that starts a little earlier or later than the one that all channels follow."""
+    clocks = [i for i, header in enumerate(table.headers) if header.role == header.dimension == "time"]
+    apart = _apart(table, clocks[0], clocks[1:2]) if len(clocks) == 2 else None
+    if apart is None or not _SAME < apart < _TWO_STARTS:
+        return table
+    one, two = (table.headers[i].name for i in clocks)
+    text = (
+        f"the clocks {one!r} and {two!r} are up to {1e3 * apart:.4g} ms apart and all channels are taken by one "
+        "of them: if the force follows the other, set delay_ms in [channels.force] of a profile"
+    )
+    return replace(table, findings=(*table.findings, Finding("W_RASTER", text)))
 
 
 def _filled(values: Floats) -> Floats:
@@ -185,6 +216,12 @@ def _interpolated(table: RawTable, column: int, target: Floats, time: Floats, va
     return resampled(table, name, target, time, values)
 
 
+def _covered(target: Floats, time: Floats) -> np.ndarray:
+    """(N,) mask of the times that lie within another clock, or within one and a half of its steps of its ends."""
+    near = 1.5 * float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    return (target >= time[0] - near) & (target <= time[-1] + near) if time.size else np.zeros(target.size, dtype=bool)
+
+
 def resampled(table: RawTable, name: str, target: Floats, time: Floats, values: Floats) -> Floats:
     """A channel on another clock [s], by linear interpolation; its ends are held for one of its own steps.
 
@@ -196,8 +233,7 @@ def resampled(table: RawTable, name: str, target: Floats, time: Floats, values: 
     if np.any(np.diff(time) <= 0):
         raise table.source.refuse("E_TIME_ORDER", f"the clock of {name!r} stands or runs backwards", "export it again")
     begin, end = float(np.nanmin(target)), float(np.nanmax(target))
-    step = float(np.median(np.diff(time)))
-    inside = (target >= time[0] - 1.5 * step) & (target <= time[-1] + 1.5 * step)
+    inside = _covered(target, time)
     if np.mean(inside) < _FEWEST_OVERLAP:
         raise table.source.refuse(
             "E_RASTER",
