@@ -68,12 +68,15 @@ def attack_one(kind: str, share: float, seconds: float, of: list[str]) -> int:
         print(count, flush=True)
     if counting.CLOCK.stopped:
         print(f"    {kind}: the time was up before all were tried", flush=True)
-    return 1 if any(count.broke for count in counts) else 0
+    for count in counts:
+        if not count.tried:
+            print(f"    broke: {count.kind}: nothing was tried", flush=True)
+    return 1 if any(count.broke or not count.tried for count in counts) else 0
 
 
 def attack_all(share: float) -> int:
     """Each in a process of its own: one kind's threads and memory are not the next one's."""
-    aside = [kind for kind in sorted(KINDS, key=lambda kind: kind not in SHARES) if kind != TIMED]
+    aside = [kind for kind in sorted(KINDS, key=lambda kind: kind in SHARES) if kind != TIMED]  # the short ones first
     until = time.monotonic() + _ALL_S - SECONDS * SHARES[TIMED] * share
 
     def attack(kind: str) -> int:
