@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from support.dampers import joint_damper
 from support.sessions import session_runs
@@ -42,6 +43,33 @@ def test_an_uncertainty_that_is_no_number_of_a_damper_is_refused(tmp_path, place
     got = CliRunner().invoke(application(), ["predict", str(tmp_path / "m.json"), *ask])
     assert got.exit_code == 2 or isinstance(got.exception, ModelFileError)
     assert not (tmp_path / "f.csv").exists()
+
+
+def _numbers(part, place=()):
+    """Every place of a number in a document."""
+    for key in part if isinstance(part, dict) else range(len(part)) if isinstance(part, list) else ():
+        yield from _numbers(part[key], (*place, key))
+    if isinstance(part, float):
+        yield place
+
+
+def test_a_model_with_any_coefficient_of_1e308_is_refused_or_predicts_and_never_overflows(tmp_path):
+    truth = joint_damper()
+    text = dump_model(estimate_uncertainty(truth, session_runs(truth)))
+    places = [place for place in _numbers(json.loads(text)) if not {"covariance", "envelope", "conditions"} & {*place}]
+    assert len(places) >= 5
+    for place in places:
+        document = json.loads(text)
+        inner = document
+        for key in place[:-1]:
+            inner = inner[key]
+        inner[place[-1]] = 1e308
+        path = tmp_path / "m.json"
+        path.write_text(json.dumps(document), encoding="utf-8")
+        ask = ["--current", "0.5", "--frequency", "1", "--amplitude", "10", "--out", str(tmp_path / "f.csv")]
+        with np.errstate(all="ignore"):
+            got = CliRunner().invoke(application(), ["predict", str(path), *ask])
+        assert got.exit_code in (0, 2) or isinstance(got.exception, InputError), (place, got.exception)
 
 
 def test_a_clock_that_is_no_date_ends_a_study_with_its_code():

@@ -16,8 +16,11 @@ from mrdamper.dampers.sessions import SessionCorrection
 from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import SESSIONS_NEEDED, Floats
+from mrdamper.errors import ParameterError
 from mrdamper.identification.intervals import student
 from mrdamper.statistics.metrics import peak_force
+
+_LARGEST_FORCE_N = 1e100  # whose square is a number
 
 Mask = NDArray[np.bool_]
 
@@ -71,6 +74,8 @@ def band(
     ------
     InputError
         E_LEVEL if the level is not between 0 and 1.
+    ParameterError
+        If the force is none that has a square.
     """
     student(level, 1.0)
     uncertainty: Uncertainty | None = damper.uncertainty
@@ -81,6 +86,8 @@ def band(
     slopes = force_slopes(damper, prediction, uncertainty.names)[seen_at]
     distance = prediction.distance(damper.envelope)
     half = peak_force(force)
+    if not half < _LARGEST_FORCE_N:
+        raise ParameterError(f"the predicted force reaches {half:.3g} N", remedy="check the parameters of the model")
     parameter = np.einsum("np,pq,nq->n", slopes, uncertainty.covariance, slopes)
     session = (uncertainty.gain * force) ** 2 + uncertainty.offset**2
     model = (uncertainty.run_gain * force) ** 2 + uncertainty.run_offset**2 + (uncertainty.force * half) ** 2
