@@ -31,6 +31,23 @@ def test_a_current_in_a_name_is_compared_by_magnitude(tmp_path, name, current, a
     assert bool(imported(tmp_path, f"{name}.csv", heads, columns).records) is accepted
 
 
+def test_a_current_of_either_sign_is_reported_by_magnitude_and_validates_at_either(tmp_path):
+    from mrdamper.data import Dataset
+    from mrdamper.rig_files.quality.table import quality_table, row
+    from mrdamper.rig_files.to_run import to_run
+    from mrdamper.study.split import hold_out
+
+    heads = ("time [s]", "displacement [mm]", "force [N]", "current [A]")
+    records = []
+    for name, current in (("a", -0.5), ("b", 0.5), ("c", -1.0), ("d", 0.0), ("e", 2.0)):
+        columns = (TIME, 20 * np.sin(PHASE), force(PHASE), np.full(TIME.size, current))
+        records += imported(tmp_path, f"{name}.csv", heads, columns).records
+    assert [row(quality)["current_A"] for quality in quality_table(records)] == [0.5, 0.5, 1.0, 0.0, 2.0]
+    dataset = Dataset(tuple(to_run(record) for record in records))
+    for asked in (0.5, -0.5):
+        assert set(hold_out(dataset, currents=[asked]).held_out) == {run.id for run in dataset.runs[:2]}
+
+
 @pytest.mark.parametrize(("heading", "value"), [("CURRENT [MA]", 500.0), ("CURRENT [A]", 0.5), ("CURRENT [mA]", 500.0)])
 def test_units_in_capitals_are_read(tmp_path, heading, value):
     heads = ("TIME [S]", "DISPLACEMENT [MM]", "FORCE [N]", heading)
@@ -46,14 +63,25 @@ def test_a_unit_in_capitals_against_the_size_of_the_current_is_refused(tmp_path)
     assert [refusal.error.code for refusal in result.refusals] == ["E_AMBIGUOUS"]
 
 
-@pytest.mark.parametrize("late", [0.02, -0.02])
+@pytest.mark.parametrize("late", [0.02, -0.04, 0.04])
 def test_two_clocks_are_never_paired_by_row(tmp_path, late):
-    """The force's own stamps are 20 ms off: its samples are taken at the times of the displacement, or refused."""
+    """The force's own stamps are off: its samples are taken at its times, and the difference is stated."""
     heads = ("time [s]", "displacement [mm]", "time 2 [s]", "force [N]", "current [A]")
     columns = (TIME, 20 * np.sin(PHASE), TIME + late, force(PHASE + 2 * np.pi * late), np.full(TIME.size, 0.5))
-    result = imported(tmp_path, "test.csv", heads, columns)
-    assert result.records or result.refusals
-    for record in result.records:
-        true = np.cos(2 * np.pi * record.time)
-        assert np.corrcoef(record.force, true)[0, 1] > 0.97
-        assert abs(np.corrcoef(record.force, np.sin(2 * np.pi * record.time))[0, 1]) < 0.02
+    (record,) = imported(tmp_path, "test.csv", heads, columns).records
+    assert np.corrcoef(record.force, np.cos(2 * np.pi * record.time))[0, 1] > 0.97
+    assert abs(np.corrcoef(record.force, np.sin(2 * np.pi * record.time))[0, 1]) < 0.02
+    assert TIME.size - record.time.size <= abs(late) * 200
+    (text,) = [finding.text for finding in record.findings if finding.code == "W_RASTER"]
+    assert f"up to {1e3 * abs(late):g} ms apart" in text
+
+
+@pytest.mark.parametrize(("late", "stated"), [(0.04, "40 ms"), (-0.04, "40 ms"), (0.0, None), (3600.0, None)])
+def test_a_second_clock_that_no_channel_follows_is_stated_with_its_distance(tmp_path, late, stated):
+    """An hour later is the time of day, 40 ms may be the clock of one of the channels."""
+    heads = ("time [s]", "time 2 [s]", "displacement [mm]", "force [N]", "current [A]")
+    columns = (TIME, TIME + late, 20 * np.sin(PHASE), force(PHASE), np.full(TIME.size, 0.5))
+    (record,) = imported(tmp_path, "test.csv", heads, columns).records
+    found = [finding.text for finding in record.findings if finding.code == "W_RASTER"]
+    assert len(found) == (stated is not None)
+    assert all(stated in text for text in found)

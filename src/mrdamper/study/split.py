@@ -78,10 +78,10 @@ def hold_out(
         ids = [
             run.id
             for run in dataset
-            if abs(run.mean_current - amperes) <= _CURRENT_TOLERANCE_A + _CURRENT_TOLERANCE * abs(amperes)
+            if abs(abs(run.mean_current) - abs(amperes)) <= _CURRENT_TOLERANCE_A + _CURRENT_TOLERANCE * abs(amperes)
         ]
         if not ids:
-            levels = sorted({round(run.mean_current, 2) for run in dataset})
+            levels = sorted({round(abs(run.mean_current), 2) for run in dataset})
             raise SplitError(
                 f"no run at {amperes:g} A", where=where, remedy=f"currents: {', '.join(map(str, levels))} A"
             )

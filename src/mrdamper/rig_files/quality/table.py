@@ -28,7 +28,7 @@ class Quality:
 
     record: Record  # as judged
     condition: Condition | None = None  # measured; None for a motion without a period and for a refused record
-    current: float = np.nan  # mean over the steady window [A]; NaN where it changes there
+    current: float = np.nan  # magnitude of its mean over the steady window [A]; NaN where it changes there
     cycles: float = np.nan
     sample_rate_Hz: float = np.nan
     repeatability: float = np.nan  # scatter of the cycles over the peak-to-peak force; NaN under two cycles
@@ -130,7 +130,7 @@ def _quality(record: Record) -> Quality:
     return Quality(
         check_run,
         condition=None if motion is None else motion.condition,
-        current=np.nan if change else current,
+        current=np.nan if change else abs(current),
         cycles=cycles_of(view),
         sample_rate_Hz=1 / view.step,
         repeatability=np.nan if scatter is None else scatter[0],
