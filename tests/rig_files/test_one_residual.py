@@ -18,7 +18,7 @@ from mrdamper.rig_files.record import Record
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from fuzz import operator_faults
-from fuzz.fuzz_records import codes_of, table, trials
+from fuzz.fuzz_records import codes_of, damping_and_peak, table, trials
 from fuzz.record_faults import KINDS, UNOBSERVABLE
 from fuzz.synthetic_records import FAMILIES, clean_record
 
@@ -69,14 +69,71 @@ def test_offset_gain_and_delay_of_a_cycle_are_recovered():
     assert np.max(np.abs(cycles.displacement.late)) < 1e-4
 
 
+def lag_of(record):
+    lag = force_lag(View(record))
+    assert lag is not None
+    assert lag.is_clear
+    return lag
+
+
+def with_corners(x, v):
+    return 1500 * v + 300 * np.tanh(v / 0.001)
+
+
 @pytest.mark.parametrize("share", [-0.08, -0.03, 0.03, 0.08])
 def test_the_delay_of_a_force_with_corners_is_recovered_within_its_interval(share):
-    record = sine_record(lambda x, v: 1500 * v + 300 * np.tanh(v / 0.001), cycles=8)
+    record = sine_record(with_corners)
     moved = np.interp(record.time - share, record.time, record.force)
-    lag = force_lag(View(Record("r", *(a[50:-50] for a in (record.time, record.displacement, moved)))))
-    assert lag is not None
-    assert lag.share == pytest.approx(share, abs=0.01)
-    assert lag.low - 0.0051 <= share <= lag.high + 0.0051
+    lag = lag_of(Record("r", *(a[50:-50] for a in (record.time, record.displacement, moved))))
+    assert lag.best.constant == 0
+    assert lag.best.delay == pytest.approx(share, abs=0.01)
+    low, high = lag.interval("delay")
+    assert low - 0.0051 <= share <= high + 0.0051
+
+
+def elastic_plastic_force(bend):
+    """A viscous force beside an element that yields at a share of the amplitude of 20 mm."""
+
+    def force(x, v):
+        state, states = 0.0, []
+        for step in np.diff(x, prepend=x[0]) / (0.02 * bend):
+            state = min(max(state + step, -1.0), 1.0)
+            states.append(state)
+        return 1500 * v + 400 * np.array(states)
+
+    return force
+
+
+def low_passed(record, constant):
+    force, kept = [record.force[0]], np.exp(-(record.time[1] - record.time[0]) / constant)
+    for value in record.force[1:]:
+        force.append(kept * force[-1] + (1 - kept) * value)
+    return replace(record, force=np.array(force))
+
+
+@pytest.mark.parametrize(("bend", "constant"), [(0.1, 0.02), (0.1, 0.06), (0.03, 0.04)])
+def test_the_time_constant_of_a_first_order_filter_is_recovered_within_its_interval(bend, constant):
+    lag = lag_of(low_passed(sine_record(elastic_plastic_force(bend)), constant))
+    low, high = lag.interval("constant")
+    assert low - 0.01 <= constant <= high + 0.02
+    assert lag.best.delay == 0
+
+
+def test_a_filtered_force_is_reported_with_its_effect_on_damping_and_force():
+    from mrdamper.rig_files.quality.force_lag import force_channel
+
+    record = sine_record(elastic_plastic_force(0.1))
+    (finding,) = force_channel(View(low_passed(record, 0.06)))
+    assert finding.code == "W_LAG"
+    for words in ("first-order filter of", "explain it nearly as well", "the damping by about", "the peak force by"):
+        assert words in finding.text
+    assert damping_and_peak(low_passed(record, 0.06))[0] != pytest.approx(damping_and_peak(record)[0], rel=0.05)
+
+
+@pytest.mark.parametrize("bend", np.geomspace(0.003, 0.5, 24))
+def test_a_clean_element_of_any_yield_displacement_is_not_late(bend):
+    lag = force_lag(View(sine_record(elastic_plastic_force(bend))))
+    assert lag is None or not lag.is_clear
 
 
 # Recovery: one size of every kind that moves the result
@@ -182,11 +239,7 @@ def test_noise_is_white_by_octave_until_a_filter_colours_it():
     levels, highest = noise_by_octave(View(record), "force")
     assert highest == pytest.approx(200)
     assert np.ptp(levels) < 4
-    kept = np.exp(-0.0025 / 0.05)
-    filtered = [record.force[0]]
-    for value in record.force[1:]:
-        filtered.append(kept * filtered[-1] + (1 - kept) * value)
-    falls = np.diff(noise_by_octave(View(replace(record, force=np.array(filtered))), "force")[0])[1:4]
+    falls = np.diff(noise_by_octave(View(low_passed(record, 0.05)), "force")[0])[1:4]
     assert np.all((falls > 4) & (falls < 9)), falls
     clean = replace(record, force=1500 * 0.04 * np.pi * np.cos(2 * np.pi * record.time))
     assert noise_by_octave(View(clean), "force")[0].size == 0

@@ -51,6 +51,11 @@ class Cycles:
     displacement: CycleChannel
     force: CycleChannel
 
+    def read(self, loop: Floats, time: Floats) -> Floats:
+        """(N,) values of a (P,) loop at times [s], by linear interpolation."""
+        place = (time - self.starts[0]) / self.period % 1.0 * POINTS
+        return np.interp(place, np.arange(POINTS + 1), np.append(loop, loop[0]))
+
 
 @once_per_run
 def steady_cycles(view: View) -> Cycles | None:

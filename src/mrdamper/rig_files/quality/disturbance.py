@@ -79,12 +79,13 @@ def _periodic_velocity(view: View, velocity: Floats) -> Floats:
     """The velocity of the periodic motion at the steady samples: of its harmonics, or of its mean cycle if no sine."""
     motion, cycles, time = view.motion, steady_cycles(view), view.steady.time
     assert motion is not None
-    if motion.distortion < SINE_DISTORTION_LIMIT or cycles is None or len(cycles.starts) < 3:
+    if cycles is None:
         return motion.series(time, 1)
-    place = (time - cycles.starts[0]) / cycles.period % 1.0 * POINTS
-    bins = place.astype(int) % POINTS
-    count = np.maximum(np.bincount(bins, minlength=POINTS), 1)
-    mean = np.bincount(bins, velocity, POINTS) / count
+    phases = np.arange(POINTS) / POINTS
+    if motion.distortion < SINE_DISTORTION_LIMIT or len(cycles.starts) < 3:
+        return cycles.read(motion.series(cycles.starts[0] + phases * cycles.period, 1), time)
+    bins = ((time - cycles.starts[0]) / cycles.period % 1.0 * POINTS).astype(int) % POINTS
+    mean = np.bincount(bins, velocity, POINTS) / np.maximum(np.bincount(bins, minlength=POINTS), 1)
     return mean[bins]
 
 
@@ -94,11 +95,9 @@ def force_lines(view: View) -> Iterator[Finding]:
     if cycles is None or motion is None or len(view.segments) > 1:
         return
     time, force = view.steady.time, view.steady.force
-    place = (time - cycles.starts[0]) / cycles.period % 1.0 * POINTS
-    loop = cycles.force.loop
-    lines = [strongest_line(time, force - np.interp(place, np.arange(POINTS + 1), np.append(loop, loop[0])),
-                            1.5 * motion.condition.frequency_Hz)]  # fmt: skip
-    lines.append(_odd_harmonic(loop, 1 / cycles.period))
+    rest = force - cycles.read(cycles.force.loop, time)
+    lines = [strongest_line(time, rest, 1.5 * motion.condition.frequency_Hz)]
+    lines.append(_odd_harmonic(cycles.force.loop, 1 / cycles.period))
     strong = [line for line in lines if line is not None and line.above > _ABOVE]
     half = 0.5 * cycles.force.span
     if not strong:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.rig_files.quality.cycles import Cycles
 
 NOTED, WARNED, REFUSED = 0.02, 0.05, 0.30  # effect on damping or force: no finding below, and refused from there on
 _YIELD = np.geomspace(0.004, 1.0, 14)  # yield displacements tried, of half the stroke
@@ -57,6 +58,18 @@ def damping(x: Floats, v: Floats, force: Floats) -> float:
     solution = np.linalg.solve(normal, right[..., None])[..., 0]
     explained = np.sum(right * solution, axis=1)
     return float(solution[int(np.argmax(explained)), 2]) / fastest
+
+
+def effect_on(cycles: Cycles, clean: Floats) -> tuple[float, float]:
+    """Relative change of damping and peak force by a fault, from the (P,) mean cycle of the force without it."""
+    motion, force = cycles.displacement, cycles.force
+    before, after = (damping(motion.loop, motion.slope, loop) for loop in (clean, force.loop))
+    return change(before, after), change(float(np.ptp(clean)), force.span)
+
+
+def percent_of(moved: float, peak: float) -> str:
+    """Write an effect on damping and peak force for a message."""
+    return f"the damping by {percent(moved)} and the peak force by {percent(peak)}"
 
 
 def change(before: float, after: float) -> float:

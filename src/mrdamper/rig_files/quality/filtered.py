@@ -2,8 +2,9 @@
 
 A filter rounds the corners of a loop as hysteresis does, so the loop itself does not show it. But noise that
 passed it falls octave by octave from the filter's corner on, and noise that did not is white. Noise is what a
-sample differs by from the one a period earlier. The motion itself differs from cycle to cycle, and less the
-faster: a displacement counts as filtered only if its noise falls below that of any converter.
+sample differs by from the one a period earlier, corners of the loop left out. The motion itself differs from cycle
+to cycle, and less the faster, so that a channel counts as filtered only if its noise falls below what a load cell or
+a converter has.
 """
 
 from __future__ import annotations
@@ -14,20 +15,24 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.rig_files.quality.cycles import steady_cycles
-from mrdamper.rig_files.quality.effects import percent
-from mrdamper.rig_files.quality.force_lag import effect_of_delay
-from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.quality.effects import effect_on, percent_of
+from mrdamper.rig_files.quality.view import View, beside
 from mrdamper.rig_files.record import Finding
 
 _FALLS, _FALLS_ON_AVERAGE = 3.0, 5.0  # [dB] from octave to octave; a first-order filter has 6, white noise 0
 _LEAKAGE = 15.0  # [dB] from octave to octave, on average: a slow change of a channel without noise has 18
 _OCTAVES = 2  # at least, over which the noise falls
 _CONVERTER = -106.0  # [dB] of the peak-to-peak value: noise of the steps of 16 bits over twice the range
+_LOUDEST = {"force": -80.0, "displacement": _CONVERTER}  # [dB] in the highest octave: bundled rigs have -66 at least
+_NO_NOISE = -160.0  # [dB] of the peak-to-peak value: less is rounding, of single precision too
 _CORNER = 20.0  # times the frequency of the motion; a filter above it is late by under 0.8 % of the period
 _LOWEST = 3.0  # times that frequency: below, cycles differ by more than noise
-_FEWEST = 3  # cycles
-_UNLIKE = -0.2  # correlation of a change with the one a period later: noise has -0.5, errors of interpolation more
+_FEWEST = 2  # cycles
+_CORNER_BENDS, _BESIDE = 8.0, 3  # times the median third difference: a corner, and the samples left out beside it
+_UNEVEN = 0.4  # of a step that a stamp may be off, as rounded ones are
+_TINY = 1e-30  # of the peak-to-peak value squared
 _COLOURED = ("W_LAG", "W_CLIPPED", "W_FROZEN", "W_DRIFT", "W_DISTURBED", "W_HELD", "W_UNSTEADY", "W_REPEATABILITY")
+_HARMONICS = 20  # of the mean cycle that a filter is taken off: beyond, noise
 _LINES = 12  # of a spectrum, in the lowest octave
 _SAMPLES = 64  # at least, that have one a period earlier
 
@@ -47,16 +52,16 @@ def channels_are_unfiltered(view: View) -> Iterator[Finding]:
         corner = highest / 2**count
         if count < _OCTAVES or average < _FALLS_ON_AVERAGE or levels[count] < _CONVERTER:
             continue
-        if name == "displacement" and (levels[0] > _CONVERTER or average > _LEAKAGE):
+        if levels[0] > _LOUDEST[name] or (name == "displacement" and average > _LEAKAGE):
             continue
         late = 1 / (2 * np.pi * corner * cycles.period)
-        effect = effect_of_delay(cycles, late if name == "force" else -late)
+        before = _before(cycles.force.loop, late if name == "force" else -late)
         if corner * cycles.period < _CORNER:
             yield Finding(
                 "W_FILTERED",
                 f"noise of the {name} falls by {average:.2g} dB an octave from about {corner:.3g} Hz on: a filter of "
-                f"this corner makes the {name} late by {100 * late:.2g} % of the period and moves the damping by "
-                f"{percent(effect)}; filter both channels alike, or neither",
+                f"this corner makes the {name} late by {100 * late:.2g} % of the period and moves "
+                f"{percent_of(*effect_on(cycles, before))}; filter both channels alike, or neither",
             )
 
 
@@ -70,25 +75,41 @@ def noise_by_octave(view: View, name: str) -> tuple[Floats, float]:
     highest : float
         Upper end of the first octave [Hz].
     """
-    motion, values = view.motion, getattr(view.steady, name)
+    motion, values = view.motion, _at_every_step(view, name)
     assert motion is not None
-    period = 1 / motion.condition.frequency_Hz / view.step
-    lag, nyquist = int(np.ceil(period)) + 2, 0.5 / view.step
+    nyquist = 0.5 * (values.size - 1) / float(np.ptp(view.steady.time))
+    period = 2 * nyquist / motion.condition.frequency_Hz
+    lag = int(np.ceil(period)) + 2
     if values.size - lag < _SAMPLES:
         return np.empty(0), nyquist
-    changes = values[lag:] - _between(values, np.arange(lag, values.size) - period)
-    window = np.hanning(changes.size + 2)[1:-1]
-    power = np.abs(np.fft.rfft((changes - np.mean(changes)) * window)) ** 2 / (2 * float(np.sum(window**2)))
-    power = power / float(np.ptp(values)) ** 2 + np.finfo(float).tiny
-    lowest = int(np.ceil(_LOWEST * motion.condition.frequency_Hz / nyquist * power.size))
-    later = np.cos(2 * np.pi * np.arange(lowest, power.size) * period / changes.size)
-    if float(power[lowest:] @ later) > _UNLIKE * float(np.sum(power[lowest:])):
+    place = np.arange(lag, values.size, dtype=np.float64) - period
+    changes = np.diff(values[lag:] - _between(values, place))
+    third = np.abs(values[3:] - values[:-3] - 3 * (values[2:-1] - values[1:-2]))
+    bends = beside(np.concatenate([[False], third > _CORNER_BENDS * np.median(third), [False, False]]), _BESIDE)
+    bends = bends[lag:] | bends[place.astype(int)] | bends[place.astype(int) + 1]
+    window = np.hanning(changes.size + 2)[1:-1] * ~(bends[1:] | bends[:-1])
+    weight = 4 * float(np.sum(window**2)) * float(np.ptp(values)) ** 2
+    if not weight:
         return np.empty(0), nyquist
+    power = np.abs(np.fft.rfft(changes * window)) ** 2 / weight
+    power = power / np.maximum(4 * np.sin(np.pi * np.arange(power.size) / changes.size) ** 2, _TINY) + _TINY
+    lowest = int(np.ceil(_LOWEST * motion.condition.frequency_Hz / nyquist * power.size))
     high, levels = power.size, []
     while high // 2 >= _LINES and high > lowest:
         levels.append(10 * np.log10(float(np.median(power[high // 2 : high])) / np.log(2)))
         high //= 2
-    return np.array(levels), nyquist
+    return np.array(levels if levels and levels[0] > _NO_NOISE else []), nyquist
+
+
+def _at_every_step(view: View, name: str) -> Floats:
+    """A channel's steady part, lines through missing samples; nothing where its clock is uneven."""
+    run, values = view.steady, getattr(view.steady, name)
+    steps = np.diff(run.time) / view.step
+    whole = np.round(steps)
+    if np.any(np.abs(steps - whole) > _UNEVEN) or np.min(whole) < 1:
+        return np.empty(0)
+    place = np.concatenate([[0.0], np.cumsum(whole)])
+    return values if place[-1] + 1 == values.size else np.interp(np.arange(int(place[-1]) + 1), place, values)
 
 
 def _between(values: Floats, place: Floats) -> Floats:
@@ -97,3 +118,12 @@ def _between(values: Floats, place: Floats) -> Floats:
     t = place - before
     a, b, c, d = (values[before + shift] for shift in (-1, 0, 1, 2))
     return b + 0.5 * t * (c - a + t * (2 * a - 5 * b + 4 * c - d + t * (3 * (b - c) + d - a)))
+
+
+def _before(loop: Floats, constant: float) -> Floats:
+    """(P,) cycle before a first-order low-pass of a time constant [periods]; behind one, if it is negative."""
+    change = 1 + 2j * np.pi * abs(constant) * np.arange(loop.size // 2 + 1)
+    spectrum = np.fft.rfft(loop)
+    if constant > 0:
+        return np.fft.irfft(np.where(np.arange(spectrum.size) < _HARMONICS, spectrum * change, spectrum), loop.size)
+    return np.fft.irfft(spectrum / change, loop.size)

@@ -3,53 +3,96 @@
 A viscous force that is late looks like a spring, a hysteretic one like more hysteresis; but no
 passive force goes on rising after the motion has turned, and none turns before the motion. So the mean
 cycle is explained by springs, velocity terms and elastic–plastic elements of many yield displacements
-(a Prandtl–Ishlinskii sum, which can be any hysteresis that does not depend on rate), all shifted together,
-and the delay that explains it best is the lag, with the interval of delays that explain it nearly as well.
+(a Prandtl–Ishlinskii sum, which can be any hysteresis that does not depend on rate), all delayed together
+and behind one first-order low-pass, and the delay and the time constant that explain it best are the lag,
+with the intervals of those that explain it nearly as well.
 
 What has no corner cannot be dated: a smooth force that is late is, on one sine, exactly a force with a
-spring, and a first-order filter rounds a corner as hysteresis does. A smooth force that is early has a
+spring, and friction without a yield displacement behind a first-order filter is hysteresis of another
+shape: only noise shows that filter. A smooth force that is early has a
 spring of negative stiffness, which only a moving mass has, and then in proportion to frequency squared:
-a mass no damper has is reported as a lead. The limits stand beyond what clean records of seven model
+a mass no damper has is reported as a lead. The limits stand beyond what clean records of thirteen model
 families and of the bundled rigs show; docs/rig-procedure.md has what is found from which size on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.rig_files.quality.cycles import POINTS, Cycles, steady_cycles
-from mrdamper.rig_files.quality.effects import change, damping, elastic_plastic, percent
+from mrdamper.rig_files.quality.effects import WARNED, effect_on, elastic_plastic, percent_of
 from mrdamper.rig_files.quality.flat import flagged_samples
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 from mrdamper.statistics.linear import on_one_blas_thread
 
 LIMIT = 0.01  # of the period: shorter lags are within the samples of a cycle
-_BETTER, _FAR_BETTER = 0.2, 0.12  # of the misfit without delay: a smaller improvement may be any rate dependence
-_MUCH_BETTER = 0.4  # of it, where hysteresis leaves much
-_NEARLY, _NEARLY_EARLY = 0.005, 0.025  # of the force's RMS: hysteresis, or relaxation, that leaves less explains it
+_NEARLY, _NEARLY_EARLY = 0.004, 0.025  # of the force's RMS: hysteresis, or relaxation, that leaves less explains it
 _LITTLE, _UNEXPLAINED = 0.007, 0.05  # of the force's RMS: up to here little, from here on much
-_GRID = np.round(np.arange(-0.12, 0.161, 0.02), 3)  # delays tried first, of the period
+_FAR_BETTER, _BETTER, _MUCH_BETTER = 0.1, 0.2, 0.4  # of the misfit without delay, where that is little, more and much
+_UNFILTERED, _FILTERED = 0.0015, 0.2  # of the force's RMS, and of that: the misfit without and with a filter
+_DELAYS = np.round(np.arange(-0.12, 0.161, 0.02), 3)  # tried first, of the period
 _FINE = np.array([-0.01, -0.005, -0.0025, 0.0025, 0.005, 0.01])  # and then around the best of them
-_AS_GOOD, _MODEL = 1.5, 0.1  # times the best misfit, and of that without delay: what the elements' own error may be
+_CONSTANTS = (0.01, 0.02, 0.04, 0.07, 0.12)  # time constants, of the period
+_FINER = np.array([0.7, 0.85, 1.15, 1.3])  # times the best of them
+_AS_GOOD, _MODEL = 1.5, 0.1  # times the best misfit, and of that without lag: what the elements' own error may be
 _YIELD = np.geomspace(0.0005, 1.0, 40)  # yield displacements, of half the stroke
+_BETWEEN, _LARGEST = 9, 2  # yield displacements tried between the neighbours of those that act most
 _SOFT = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.4])  # velocities in which a yield force builds up, of the peak
+_THINNING = np.array([0.3, 0.6])  # powers of the velocity: fluids that thin with shear
 _LEAD = 0.015  # share of the force that acts as a negative spring
 _MASS = 30.0  # [kg] that would explain it
 
 
-class ForceLag(NamedTuple):
-    """Delay of the force that explains it best; a misfit is RMS beyond sample noise, over the force's."""
+class Lag(NamedTuple):
+    """One way to be late, in periods."""
 
-    share: float  # of the period; negative: early
-    misfit: float  # at this delay
-    without: float  # without delay
-    low: float  # of the delays that explain the force nearly as well
-    high: float
+    delay: float = 0.0  # negative: early
+    constant: float = 0.0  # time constant of a first-order low-pass
+
+
+@dataclass(frozen=True)
+class ForceLag:
+    """Lags of the force by how well they explain it; a misfit is RMS beyond sample noise, over the force's."""
+
+    tried: dict[Lag, float]  # misfits
+    noise: float  # of the mean cycle, over the force's RMS
+    cycle: Floats  # (P,) force without the best of them [N]
+
+    def misfit(self, lag: Lag) -> float:
+        """What a lag leaves unexplained."""
+        return float(np.sqrt(max(self.tried[lag] ** 2 - self.noise**2, (0.3 * self.noise) ** 2)))
+
+    @property
+    def best(self) -> Lag:
+        """The simplest of those that explain the force nearly as well as any: a delay, a filter, or both."""
+        near = self.alike(min(self.tried.values()))
+        return min(near, key=lambda lag: ((lag.delay != 0) + 2 * (lag.constant != 0), self.tried[lag]))
+
+    def alike(self, misfit: float) -> list[Lag]:
+        """The lags that explain the force nearly as well as one of this misfit."""
+        enough = max(_AS_GOOD * misfit, _MODEL * self.tried[Lag()])
+        return [lag for lag, left in self.tried.items() if left <= enough]
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """Lowest and highest delay or constant of those that explain the force nearly as well as the best."""
+        values = [getattr(lag, name) for lag in self.alike(self.tried[self.best])]
+        return min(values), max(values)
+
+    @property
+    def is_clear(self) -> bool:
+        """True where the lag explains more than any rate dependence may."""
+        best, without, misfit = self.best, self.misfit(Lag()), self.misfit(self.best)
+        if best.constant:
+            return without > _UNFILTERED and misfit < _FILTERED * without
+        late = best.delay > 0
+        better = _MUCH_BETTER if without > _UNEXPLAINED else _BETTER if late and without > _LITTLE else _FAR_BETTER
+        return abs(best.delay) > LIMIT and without > (_NEARLY if late else _NEARLY_EARLY) and misfit < better * without
 
 
 def force_channel(view: View) -> Iterator[Finding]:
@@ -58,18 +101,16 @@ def force_channel(view: View) -> Iterator[Finding]:
     if cycles is None or motion is None or view.noticed("W_CLIPPED", "W_DRIFT") or _stands_still(view, cycles):
         return
     lag = force_lag(view)
-    if lag is not None and _is_clear(lag):
-        late = 1e3 * np.array([lag.share, lag.low, lag.high]) * cycles.period
-        word, bounds = ("later", late[1:]) if lag.share > 0 else ("earlier", -late[:0:-1])
-        yield Finding(
-            "W_LAG",
-            f"the force is {abs(late[0]):.3g} ms ({100 * abs(lag.share):.1f} % of the period; {bounds[0]:.3g} to "
-            f"{bounds[1]:.3g} ms explain it nearly as well) {word} than hysteresis explains, which moves the damping "
-            f"by {percent(effect_of_delay(cycles, lag.share))}; if the delay is known, set delay_ms in "
-            "[channels.force] of a profile",
-        )
+    if lag is not None and lag.is_clear:
+        moved = effect_on(cycles, lag.cycle)
+        if max(moved) > (WARNED if lag.best.constant else 0):
+            yield Finding(
+                "W_LAG",
+                f"{_description(lag, cycles)}, which moves {percent_of(*moved)}; filter both channels alike, and if "
+                "the delay is known, set delay_ms in [channels.force] of a profile",
+            )
         return
-    share, mass = _negative_spring(cycles)
+    share, mass = _negative_spring(view, cycles)
     if share > _LEAD and mass > _MASS:
         yield Finding(
             "W_LAG",
@@ -77,6 +118,25 @@ def force_channel(view: View) -> Iterator[Finding]:
             f"have to move with the rod: the force is early by about {100 * share / (2 * np.pi):.2g} % of the period "
             "or more, or the displacement late (filter, or a high-pass in the force)",
         )
+
+
+def _description(lag: ForceLag, cycles: Cycles) -> str:
+    """The best lag, with its intervals, in words."""
+    best, parts = lag.best, []
+    if best.delay:
+        low, high = sorted(abs(1e3 * cycles.period * end) for end in lag.interval("delay"))
+        word = "later" if best.delay > 0 else "earlier"
+        parts.append(
+            f"{1e3 * abs(best.delay) * cycles.period:.3g} ms ({100 * abs(best.delay):.1f} % of the period; {low:.3g} "
+            f"to {high:.3g} ms explain it nearly as well) {word} than hysteresis explains"
+        )
+    if best.constant:
+        low, high = (1e3 * cycles.period * end for end in lag.interval("constant"))
+        parts.append(
+            f"behind a first-order filter of {1e3 * best.constant * cycles.period:.3g} ms ({low:.3g} to {high:.3g} ms "
+            f"explain it nearly as well; corner {1 / (2 * np.pi * best.constant * cycles.period):.3g} Hz)"
+        )
+    return f"the force is {' and '.join(parts)}"
 
 
 def _stands_still(view: View, cycles: Cycles) -> bool:
@@ -87,67 +147,112 @@ def _stands_still(view: View, cycles: Cycles) -> bool:
     return bool(np.any((flagged >= cycles.starts[0]) & (flagged <= cycles.starts[-1] + cycles.period)))
 
 
-def _is_clear(lag: ForceLag) -> bool:
-    nearly = _NEARLY if lag.share > 0 else _NEARLY_EARLY
-    better = _BETTER if lag.share > 0 and lag.without > _LITTLE else _FAR_BETTER
-    better = better if lag.without < _UNEXPLAINED else _MUCH_BETTER
-    return abs(lag.share) > LIMIT and lag.without > nearly and lag.misfit < better * lag.without
-
-
-def effect_of_delay(cycles: Cycles, share: float) -> float:
-    """Relative change of the damping by a force that is late by a share of the period."""
-    motion, force = cycles.displacement, cycles.force.loop
-    shifted = _read(force, np.arange(POINTS) / POINTS + share)
-    return change(damping(motion.loop, motion.slope, shifted), damping(motion.loop, motion.slope, force))
-
-
-def _negative_spring(cycles: Cycles) -> tuple[float, float]:
+def _negative_spring(view: View, cycles: Cycles) -> tuple[float, float]:
     """Share of the force that is in phase with the displacement and against it, and the mass that explains it [kg]."""
     x, force = (np.fft.rfft(channel.loop)[1] for channel in (cycles.displacement, cycles.force))
     against = -float((force * np.conj(x)).real) / abs(x) * (2 / POINTS)  # [N]
-    amplitude = float(abs(x)) * (2 / POINTS)
-    return against / (0.5 * cycles.force.span), against / amplitude / (2 * np.pi / cycles.period) ** 2
+    amplitude, half = float(abs(x)) * (2 / POINTS), 0.5 * cycles.force.span
+    if against > _LEAD * half:  # harmonics of the velocity have a part in it, by what of the force follows the velocity
+        memoryless = _elements(*_motion(view, cycles), np.empty(0))
+        against = -float(np.linalg.lstsq(memoryless, cycles.force.loop, rcond=1e-9)[0][1])
+    return against / half, against / amplitude / (2 * np.pi / cycles.period) ** 2
+
+
+def _phases(cycles: Cycles) -> Floats:
+    """(P,) times of the first cycle [s]."""
+    return cycles.starts[0] + np.arange(POINTS) / POINTS * cycles.period
+
+
+def _motion(view: View, cycles: Cycles) -> tuple[Floats, Floats]:
+    """Displacement and velocity of one cycle, of their amplitudes: (P,) arrays."""
+    motion = view.motion
+    assert motion is not None
+    series, time = motion.series, _phases(cycles)
+    x = (series(time) - series.mean - series.drift * (time - series.origin)) / motion.condition.amplitude_m
+    return x, (series(time, 1) - series.drift) / (2 * np.pi * series.frequency * motion.condition.amplitude_m)
 
 
 @on_one_blas_thread
 def force_lag(view: View) -> ForceLag | None:
-    """Best delay of the force on a sine; None where the motion is none, or is explained without."""
-    cycles, motion = steady_cycles(view), view.motion
-    if cycles is None or motion is None:
+    """Fit a delay and a first-order filter of the force on a sine; None without a sine, or where neither is needed."""
+    cycles = steady_cycles(view)
+    if cycles is None:
         return None
-    series, phase = motion.series, np.arange(POINTS) / POINTS
-    time = cycles.starts[0] + phase * cycles.period
-    x = (series(time) - series.mean - series.drift * (time - series.origin)) / motion.condition.amplitude_m
-    v = (series(time, 1) - series.drift) / (2 * np.pi * series.frequency * motion.condition.amplitude_m)
-    force = cycles.force.loop - np.mean(cycles.force.loop)
+    motion, mean = _motion(view, cycles), float(np.mean(cycles.force.loop))
+    force = cycles.force.loop - mean
     size = float(np.linalg.norm(force))
     if size == 0:
         return None
-    elements = _Elements(x, v, _YIELD)
-    without = elements.misfit(force)
-    if without <= _NEARLY:
-        return None
-    tried = {0.0: without} | {float(d): elements.misfit(_read(force, phase + d)) for d in _GRID if d}
-    near = min(tried, key=tried.__getitem__)
-    tried |= {near + float(step): elements.misfit(_read(force, phase + near + step)) for step in _FINE}
-    best = min(tried, key=tried.__getitem__)
-    enough = max(_AS_GOOD * tried[best], _MODEL * without)
-    alike = [delay for delay, left in tried.items() if left <= enough]
+    phases = _phases(cycles)
     noise = view.force_noise * np.sqrt(POINTS / len(cycles.starts)) / size
-    left, unmoved = (float(np.sqrt(max(m**2 - noise**2, (0.3 * noise) ** 2))) for m in (tried[best], without))
-    return ForceLag(best, left, unmoved, min(alike), max(alike))
+    behind = {0.0: _Behind(*motion, _YIELD)}
+    if behind[0.0].misfit(force) ** 2 > _UNFILTERED**2 + noise**2:
+        behind[0.0] = behind[0.0].refined(force)
+    misfit = behind[0.0].misfit(force)
+    if misfit**2 <= _UNFILTERED**2 + noise**2:
+        return None
+    tried = {Lag(): misfit}
+
+    def moved(lag: Lag) -> Floats:
+        return cycles.read(force, phases + lag.delay * cycles.period)
+
+    def attempt(lags: Iterable[Lag]) -> Lag:
+        """Try lags, and return the best so far."""
+        for lag in lags:
+            if lag.constant not in behind:
+                behind[lag.constant] = behind[0.0].with_constant(lag.constant)
+            tried.setdefault(lag, behind[lag.constant].misfit(moved(lag)))
+        return min(tried, key=tried.__getitem__)
+
+    late = 0.0
+    if misfit > _NEARLY:
+        near = attempt(Lag(float(delay)) for delay in _DELAYS)
+        late = attempt(Lag(near.delay + float(step)) for step in _FINE).delay
+    attempt(Lag(delay, constant) for constant in _CONSTANTS for delay in (0.0, max(late - constant, 0.0)))
+    alone = min((lag for lag in tried if lag.constant and not lag.delay), key=tried.__getitem__)
+    if tried[alone] < _MUCH_BETTER * misfit:
+        behind[alone.constant] = behind[alone.constant].refined(force)
+        tried[alone] = behind[alone.constant].misfit(force)
+        for constant in alone.constant * _FINER:
+            behind[constant] = behind[alone.constant].with_constant(constant)
+            attempt([Lag(0.0, float(constant))])
+    found = ForceLag(tried, noise, force)
+    return replace(found, cycle=mean + behind[found.best.constant].source(moved(found.best)))
 
 
-class _Elements:
-    """Everything that may make up the force of one cycle of a motion."""
+def _elements(x: Floats, v: Floats, yields: Floats) -> Floats:
+    """(P, M) columns that may make up the force of one cycle; all but the first `_FREE` resist the motion."""
+    either = np.column_stack([np.ones(x.size), x, x**2, x**3, v**2, np.abs(v) * v, v**3])
+    loops = elastic_plastic(x, v > 0, yields * 0.5 * float(np.ptp(x)))
+    thinning = np.sign(v)[:, None] * np.abs(v[:, None]) ** _THINNING
+    return np.column_stack([either, v, np.tanh(v[:, None] / _SOFT), thinning, loops])
 
-    def __init__(self, x: Floats, v: Floats, yields: Floats):
-        either = np.column_stack([np.ones(x.size), x, x**2, x**3, v**2, np.abs(v) * v, v**3])
-        loops = elastic_plastic(x, v > 0, yields * 0.5 * float(np.ptp(x)))
-        resisting = np.column_stack([v, np.tanh(v[:, None] / _SOFT), loops])
-        self.basis, triangle = np.linalg.qr(np.column_stack([either, resisting]))
-        free = triangle[:, : either.shape[1]]
-        self.table = np.column_stack([free, -free, triangle[:, either.shape[1] :]])
+
+_FREE = 7  # columns of `_elements` that may have either sign
+
+
+class _Behind:
+    """Everything that may make up the force of one cycle, behind a first-order low-pass; its constant in periods."""
+
+    def __init__(self, x: Floats, v: Floats, yields: Floats, constant: float = 0.0):
+        self.motion, self.yields, self.constant = (x, v), yields, constant
+        self.elements = elements = _elements(x, v, yields)
+        if constant:
+            response = 1 / (1 + 2j * np.pi * constant * np.arange(POINTS // 2 + 1))
+            elements = np.fft.irfft(np.fft.rfft(elements, axis=0) * response[:, None], POINTS, axis=0)
+        self.basis, triangle = np.linalg.qr(elements)
+        self.table = np.column_stack([triangle[:, :_FREE], -triangle[:, :_FREE], triangle[:, _FREE:]])
+
+    def with_constant(self, constant: float) -> _Behind:
+        """The same elements behind another low-pass."""
+        return _Behind(*self.motion, self.yields, constant)
+
+    def refined(self, force: Floats) -> _Behind:
+        """Add yield displacements between those that act most and their neighbours: a single one is a free number."""
+        most = np.argsort(self.shares(force)[-self.yields.size :])[-_LARGEST:]
+        low, high = (self.yields[np.clip(most + step, 0, self.yields.size - 1)] for step in (-1, 1))
+        between = np.geomspace(low, high, _BETWEEN).reshape(-1)
+        return _Behind(*self.motion, np.unique(np.concatenate([_YIELD[::2], between])), self.constant)
 
     def misfit(self, force: Floats) -> float:
         """RMS of what the elements leave of a force, over its RMS; those that resist have no negative share."""
@@ -157,7 +262,13 @@ class _Elements:
         outside = max(float(force @ force - inside @ inside), 0.0)
         return float(np.sqrt((outside + nnls(self.table, inside)[1] ** 2) / (force @ force)))
 
+    def shares(self, force: Floats) -> Floats:
+        """(M,) shares of the elements."""
+        from scipy.optimize import nnls
 
-def _read(loop: Floats, phase: Floats) -> Floats:
-    """One cycle's values at phases in cycles, by linear interpolation."""
-    return np.interp(phase % 1.0, np.arange(POINTS + 1) / POINTS, np.append(loop, loop[0]))
+        found = nnls(self.table, self.basis.T @ force)[0]
+        return np.concatenate([found[:_FREE] - found[_FREE : 2 * _FREE], found[2 * _FREE :]])
+
+    def source(self, force: Floats) -> Floats:
+        """(P,) force before the low-pass."""
+        return self.elements @ self.shares(force)

@@ -192,6 +192,13 @@ def runs_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return bounds[:-1][first::2], bounds[1:][first::2]
 
 
+def beside(mask: np.ndarray, reach: int) -> np.ndarray:
+    """(N,) mask of the samples up to a number of samples from a true one."""
+    count = np.cumsum(np.concatenate([np.zeros(reach + 1, dtype=int), mask, np.zeros(reach, dtype=int)]))
+    count[reach + mask.size + 1 :] = count[reach + mask.size]
+    return count[2 * reach + 1 :] > count[: mask.size]
+
+
 UNITS = {
     "time": "s", "displacement": "m", "force": "N", "velocity": "m/s", "acceleration": "m/s²", "current": "A",
     "voltage": "V", "temperature": "°C", "pressure": "Pa",
