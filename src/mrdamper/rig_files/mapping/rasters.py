@@ -176,7 +176,7 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
 
 def _apart(table: RawTable, clock: int, others: Iterable[int]) -> float | None:
     """Largest difference of the stamps of a row between a clock and others [s]; None where they have no common rows."""
-    factor = {i: known.factor if (known := table.headers[i].known) else 1.0 for i in (clock, *others)}
+    factor = {i: unit.factor if (unit := table.headers[i].known) else 1.0 for i in (clock, *others)}
     try:
         first, *rest = (_filled(table.read([i]).values[i]) * factor[i] for i in factor)
     except InputError:

@@ -65,7 +65,7 @@ class ForceLag:
     cycle: Floats  # (P,) force without the best of them [N]
 
     def misfit(self, lag: Lag) -> float:
-        """What a lag leaves unexplained."""
+        """Misfit of a lag, less the noise."""
         return float(np.sqrt(max(self.tried[lag] ** 2 - self.noise**2, (0.3 * self.noise) ** 2)))
 
     @property
@@ -216,8 +216,8 @@ def force_lag(view: View) -> ForceLag | None:
         for constant in alone.constant * _FINER:
             behind[constant] = behind[alone.constant].with_constant(constant)
             attempt([Lag(0.0, float(constant))])
-    found = ForceLag(tried, noise, force)
-    return replace(found, cycle=mean + behind[found.best.constant].source(moved(found.best)))
+    lag = ForceLag(tried, noise, force)
+    return replace(lag, cycle=mean + behind[lag.best.constant].source(moved(lag.best)))
 
 
 def _elements(x: Floats, v: Floats, yields: Floats) -> Floats:
@@ -266,8 +266,8 @@ class _Behind:
         """(M,) shares of the elements."""
         from scipy.optimize import nnls
 
-        found = nnls(self.table, self.basis.T @ force)[0]
-        return np.concatenate([found[:_FREE] - found[_FREE : 2 * _FREE], found[2 * _FREE :]])
+        parts = nnls(self.table, self.basis.T @ force)[0]
+        return np.concatenate([parts[:_FREE] - parts[_FREE : 2 * _FREE], parts[2 * _FREE :]])
 
     def source(self, force: Floats) -> Floats:
         """(P,) force before the low-pass."""
