@@ -38,6 +38,15 @@ def certain(damper, names, sizes, gain=0.0, offset=0.0):
 DAMPERS = {"joint": (joint_damper(), ("c0", "c1")), "modified": (modified_damper(), ("c.0", "yield_force.3"))}
 
 
+def test_parameters_of_other_sizes_are_drawn_alike():
+    """Standard deviations of 2 N and 1e9 N/m, nearly a line: a covariance that rounding makes indefinite."""
+    damper = certain(joint_damper(), ("f0", "k"), [2.0, 1e9])
+    covariance = np.array([[4.0, 2e9 * (1 - 1e-9)], [2e9 * (1 - 1e-9), 1e18 * (1 - 1e-8)]])
+    damper = replace(damper, uncertainty=replace(damper.uncertainty, covariance=covariance))
+    offsets = [row["d"].numbers["f0"] - damper.model.f0 for row in draw({"d": damper}, 4000)]
+    assert np.std(offsets) == pytest.approx(2.0, rel=0.06)
+
+
 @pytest.mark.parametrize("kind", DAMPERS)
 def test_other_numbers_in_one_loop_are_other_dampers(kind):
     damper, names = DAMPERS[kind]

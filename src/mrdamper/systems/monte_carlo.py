@@ -89,7 +89,11 @@ def _numbers_drawn(damper: Damper, count: int, rng: np.random.Generator) -> list
     assert uncertainty is not None
     if not uncertainty.names:
         return [{} for _ in range(count)]
-    nudges = rng.multivariate_normal(np.zeros(len(uncertainty.names)), uncertainty.covariance, count)
+    # Of correlations, not covariances: an offset in N beside a stiffness in N/m³ is lost in the rounding of the latter.
+    scale = np.sqrt(np.diag(uncertainty.covariance))
+    size = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(uncertainty.covariance / np.outer(size, size))
+    nudges = rng.standard_normal((count, scale.size)) @ (vectors * np.sqrt(np.maximum(values, 0.0))).T * scale
     nudges *= _student(rng, float(np.min(uncertainty.dof)), count)
     columns = []
     for name, log, nudge in zip(uncertainty.names, uncertainty.logs, nudges.T, strict=True):
