@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from mrdamper.study.comparison import Comparison
 
 _NOTES, _ROWS = 3, 12  # lines of notes, and of the tables of all rigs together, without --verbose
 
@@ -39,10 +43,10 @@ def register(app: typer.Typer) -> None:
         Reported per model: cross-validated and validation error, number of parameters, number of
         runs needed, computing time.
         """
-        from mrdamper.cli.output import parse_gas, parse_pairs, shortened
+        from mrdamper.cli.output import parse_gas, parse_pairs
         from mrdamper.cli.progress import progress_on_stderr
         from mrdamper.data.atomic import require_writable
-        from mrdamper.report.comparison import summary_rows, text_table, write_comparison
+        from mrdamper.report.comparison import summary_rows, write_comparison
         from mrdamper.rig_files.dataset_folder import load_dataset
         from mrdamper.study import comparison as comparing
         from mrdamper.study.recipe import recipes, study_method
@@ -62,15 +66,22 @@ def register(app: typer.Typer) -> None:
             )
             written = write_comparison(result, out, lambda what, share: progress(what, 0.9 + 0.1 * share), png=png)
         rows = summary_rows(result)
-        notes = [f"not identified: {name}: {why}" for rig in result.rigs for name, why in rig.not_identified.items()]
-        notes += [f"not determined: {name}: {why}" for rig in result.rigs for name, why in rig.refused.items()]
-        for note in shortened(notes, _NOTES, verbose):
-            typer.echo(note, err=True)
         if as_json:
             print(json.dumps({"rows": rows, "files": [str(p) for p in written], "seconds": result.seconds}, indent=1))
             return
-        for rig in result.rigs:
-            print(f"{rig.rig or dataset.name}: nrmse_pp [%], median and largest; ranked by cross-validation error")
-            head, *models = text_table([row for row in rows if row["rig"] == rig.rig]).splitlines()
-            print("\n".join([head, *shortened(models, _ROWS // len(result.rigs), verbose)]))
+        _print(result, rows, dataset.name, verbose)
         print(f"report: {written[0]}")
+
+
+def _print(result: Comparison, rows: list[dict[str, Any]], name: str, verbose: bool) -> None:
+    from mrdamper.cli.output import shortened
+    from mrdamper.report.comparison import text_table
+
+    notes = [f"not identified: {run}: {why}" for rig in result.rigs for run, why in rig.not_identified.items()]
+    notes += [f"not determined: {model}: {why}" for rig in result.rigs for model, why in rig.refused.items()]
+    for note in shortened(notes, _NOTES, verbose):
+        typer.echo(note, err=True)
+    for rig in result.rigs:
+        print(f"{rig.rig or name}: nrmse_pp [%], median and largest; ranked by cross-validation error")
+        head, *models = text_table([row for row in rows if row["rig"] == rig.rig]).splitlines()
+        print("\n".join([head, *shortened(models, _ROWS // len(result.rigs), verbose)]))
