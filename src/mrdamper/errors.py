@@ -1,7 +1,7 @@
 """Everything a user can get wrong, one exception each, with a code that never changes.
 
 A message says what was found, where, and how to correct it, in one line.
-Anything that is not an `InputError` is our fault, not the user's.
+Anything that is not an `InputError` is an internal error, not the user's.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-Door = TypeVar("Door", bound=Callable[..., Any])
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def printable(text: str) -> str:
@@ -71,7 +71,7 @@ class InputError(ValueError):
 
 
 def require(value: object, kind: type | tuple[type, ...], wanted: str, remedy: str = "") -> None:
-    """Refuse an argument of another kind at the door of a public function.
+    """Refuse an argument of another kind in a public function.
 
     Raises
     ------
@@ -82,8 +82,8 @@ def require(value: object, kind: type | tuple[type, ...], wanted: str, remedy: s
         raise InputError(f"a {type(value).__name__} in place of {wanted}", remedy=remedy, code="E_ARGUMENT")
 
 
-def checked(*but: str) -> Callable[[Door], Door]:
-    """Refuse at the door of a public function what its annotations do not allow: E_ARGUMENT.
+def validate_arguments(*but: str) -> Callable[[Function], Function]:
+    """Refuse the arguments of a public function that its annotations do not allow: E_ARGUMENT.
 
     Numbers have to be finite; sequences and mappings hold what they say; arrays, numbers. Of a
     `Literal` only the kind is looked at.
@@ -94,7 +94,7 @@ def checked(*but: str) -> Callable[[Door], Door]:
         Arguments the function looks at itself.
     """
 
-    def guard(function: Door) -> Door:
+    def guard(function: Function) -> Function:
         signature = inspect.signature(function)
         kinds: dict[str, object] = {}
 
@@ -107,13 +107,13 @@ def checked(*but: str) -> Callable[[Door], Door]:
                     _require_fit(name, value, kinds[name])
             return function(*given, **named)
 
-        return cast("Door", call)
+        return cast("Function", call)
 
     return guard
 
 
 def check_fields(owner: object, *names: str) -> None:
-    """Refuse fields of a dataclass, all or those named, that are not what it says they are; as `checked` does."""
+    """Refuse fields of a dataclass, all or those named, of another type than declared, as `validate_arguments` does."""
     kinds = _field_kinds(type(owner))
     for name in names or kinds:
         _require_fit(name, getattr(owner, name), kinds[name])

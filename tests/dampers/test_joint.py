@@ -24,8 +24,8 @@ from mrdamper.models.play_bypass import PlayBypass, play_position
 from mrdamper.physics.motion import random_motion, sine, sweep
 from mrdamper.physics.motion.lag import first_order_lag
 from mrdamper.physics.simulation import simulate, steady_loop
-from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.levenberg_marquardt import Minimum
+from mrdamper.statistics.stop_reason import StopReason
 from mrdamper.study.validation import validate
 
 TRUTH = PlayBypass(

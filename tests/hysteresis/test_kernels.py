@@ -16,10 +16,10 @@ from mrdamper.models.spencer import Spencer
 from mrdamper.physics.hysteresis import Shape, follow
 from mrdamper.physics.hysteresis.batch import batch_cost, follow_alike, follow_quickly, follow_with_slope
 from mrdamper.physics.motion import Path, sine
-from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.statistics.linear import FixedColumns
-from mrdamper.statistics.one_number import least_squares_in_one
+from mrdamper.statistics.scalar_least_squares import least_squares_in_one
+from mrdamper.statistics.stop_reason import StopReason
 
 X = 0.02
 RHOS = (-20.0, -1.0, -0.3, -1e-7, 0.0, 1e-6, 0.5, 0.95)  # rho = 1 forgets where it is once zeta rounds to 1

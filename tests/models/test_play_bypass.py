@@ -108,6 +108,6 @@ def test_searches_follow_the_scale_of_the_data():
 
 def test_its_lengths_are_lost_motion_and_seat():
     model = PlayBypass.build({**{n: v for n, v in P.items() if n != "e"}, "seat_share": 0.25})
-    assert (model.e, model.knee) == pytest.approx((0.25 * P["d"], 2 * P["d"]))
+    assert (model.e, model.yield_length) == pytest.approx((0.25 * P["d"], 2 * P["d"]))
     assert model.seat_share == pytest.approx(0.25)
     assert PlayBypass.build(P).e == P["e"]

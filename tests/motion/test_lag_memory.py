@@ -6,7 +6,7 @@ import numpy as np
 
 from mrdamper.physics.motion import lag
 from mrdamper.physics.motion.lag import first_order_lag
-from mrdamper.physics.motion.path import lately_along
+from mrdamper.physics.motion.path import memoize_per_path
 
 
 def test_another_signal_or_constant_along_known_times_is_lagged_as_along_new_ones():
@@ -29,7 +29,7 @@ def test_long_records_are_lagged_alike(monkeypatch):
 def test_only_the_last_two_are_remembered_and_nothing_outlives_what_it_belongs_to():
     made = []
 
-    @lately_along
+    @memoize_per_path
     def scaled(time, factor):
         made.append(factor)
         return factor * time

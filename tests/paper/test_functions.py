@@ -19,7 +19,7 @@ from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.physics.hysteresis import steady_loop
 from mrdamper.physics.motion import sine
 from mrdamper.statistics import levenberg_marquardt
-from mrdamper.statistics.ending import StopReason
+from mrdamper.statistics.stop_reason import StopReason
 
 GAS = GasSpring(1.5e6, 1.5e-4, np.pi * 1e-4)
 READINGS = ("first-harmonic", "half-peak-to-peak")

@@ -9,8 +9,8 @@ from support.dampers import joint_damper
 from mrdamper.dampers.joint import JointFit, LocalMinimum
 from mrdamper.data import Condition
 from mrdamper.report.limitations import RANGE, by_group, limitations
-from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.metrics import Scores
+from mrdamper.statistics.stop_reason import StopReason
 from mrdamper.study.recipe import RecipeResult, play_and_bypass
 from mrdamper.study.validation import RunScore, Validation
 

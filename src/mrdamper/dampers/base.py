@@ -20,7 +20,7 @@ from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.distance import Distance, distance_from
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty, table
 from mrdamper.data import Condition, Displayable, Floats, Run, same_condition
-from mrdamper.errors import InputError, checked
+from mrdamper.errors import InputError, validate_arguments
 from mrdamper.models.base import Model
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.measured import measured_motion
@@ -168,10 +168,10 @@ class Envelope:
         )
 
 
-def samples_in_yield_displacement(motion: Excitation, knee: float) -> float:
-    """Samples a motion has, after the median reversal, before it has moved on by `knee` [m]."""
+def samples_in_yield_displacement(motion: Excitation, yield_length: float) -> float:
+    """Samples a motion has, after the median reversal, before it has moved on by `yield_length` [m]."""
     path = motion.path
-    inside = np.bincount(path.stroke[path.distance < knee], minlength=path.stroke[-1] + 1)
+    inside = np.bincount(path.stroke[path.distance < yield_length], minlength=path.stroke[-1] + 1)
     return float(np.median(inside[1:])) if inside.size > 1 else np.inf
 
 
@@ -384,7 +384,7 @@ class Damper(Displayable):
         raise not_held(self, values)
 
     @property
-    def knee(self) -> float | None:
+    def yield_length(self) -> float | None:
         """Motion after a reversal in which the force turns over [m], where the model has such a length."""
         return None
 
@@ -421,13 +421,13 @@ class Damper(Displayable):
         """
         raise not_held(self, values)
 
-    @checked()
+    @validate_arguments()
     def loop(self, condition: Condition) -> Response:
         """Steady loop at a condition, one closed cycle."""
         at = replace(condition, current_A=abs(condition.current_A))
         return steady_loop(self.model_at(at), at)
 
-    @checked()
+    @validate_arguments()
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
         """Force [N] along a motion about mid-stroke that amounts to a condition."""
         at = replace(condition, current_A=abs(condition.current_A))
@@ -439,13 +439,13 @@ class Damper(Displayable):
             return motion.with_current(np.abs(motion.current))
         return motion.with_current(self.coil.along(motion.time, motion.current))
 
-    @checked()
+    @validate_arguments()
     def predict(self, condition: Condition) -> Prediction:
         """Steady loop at a condition, with its flags."""
         response = self.loop(condition)
         return Prediction(response.excitation, response.force, condition, self.envelope.flags(condition), steady=True)
 
-    @checked()
+    @validate_arguments()
     def predict_run(self, run: Run) -> Prediction:
         """Force along the measured motion of a run, with its flags. The measured force is not looked at.
 
@@ -459,7 +459,10 @@ class Damper(Displayable):
             flags = self.envelope.flags(sine.condition)
         else:
             flags = (*self.envelope.motion_flags(motion), *(() if self.envelope.any_motion else (NOT_A_SINE,)))
-        if self.knee is not None and samples_in_yield_displacement(motion, self.knee) < _MIN_YIELD_SAMPLES:
+        if (
+            self.yield_length is not None
+            and samples_in_yield_displacement(motion, self.yield_length) < _MIN_YIELD_SAMPLES
+        ):
             flags = (*flags, COARSE)
         prediction = Prediction(motion, np.zeros(len(motion)), sine.condition, flags)
         return replace(prediction, force=self.force_for(prediction))

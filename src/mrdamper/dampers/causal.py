@@ -54,8 +54,10 @@ def trace(damper: Damper, free: bool = False) -> Program:
     x, v, a = (tape.input(name) for name in ("displacement", "velocity", "acceleration"))
     asked, dt = tape.input("current", middle), tape.input("dt")
     moved = x - tape.previous(x, "displacement")
-    felt = field_step(tape, dt, asked, damper.coil.rise_s, damper.coil.fall_s) if damper.coil else abs(asked)
-    motion = TracedMotion(tape, x, v, a, tape.assume(felt, middle), TracedStep(tape, dt), TracedStep(tape, moved))
+    field_current = field_step(tape, dt, asked, damper.coil.rise_s, damper.coil.fall_s) if damper.coil else abs(asked)
+    motion = TracedMotion(
+        tape, x, v, a, tape.assume(field_current, middle), TracedStep(tape, dt), TracedStep(tape, moved)
+    )
     outside: Any = 0.0
     if damper.one_model is not None:
         one = damper.one_model

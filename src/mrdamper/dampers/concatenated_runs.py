@@ -195,17 +195,20 @@ class ConcatenatedRuns:
         self.begins = np.cumsum([0, *(len(part.motion) for part in parts)])[:-1]
         self.measured = concatenate(part.motion for part in parts)
         self.measured.path  # noqa: B018  cut into strokes once, for every current that is laid along
-        self._felt: tuple[Coil | None, Excitation] = None, self.measured.with_current(np.abs(self.measured.current))
+        self._lagged_motion: tuple[Coil | None, Excitation] = (
+            None,
+            self.measured.with_current(np.abs(self.measured.current)),
+        )
 
     def with_field_current(self, coil: Coil | None) -> Excitation:
         """The motion with the current that the field feels; remembered while the coil stays."""
-        if self._felt[0] != coil:
+        if self._lagged_motion[0] != coil:
             current = np.abs(self.measured.current)
             for part, begin in zip(self.parts, self.begins, strict=True):
                 if coil is not None and part.changes:
                     current[begin : begin + len(part.motion)] = coil.along(part.motion.time, part.motion.current)
-            self._felt = coil, self.measured.with_current(current)
-        return self._felt[1]
+            self._lagged_motion = coil, self.measured.with_current(current)
+        return self._lagged_motion[1]
 
 
 class JointResiduals:
@@ -223,7 +226,7 @@ class JointResiduals:
         self.information = np.sqrt([part.information for part in parts])
         self.weights = self.information
         self._seen: tuple[Excitation, Excitation] | None = None
-        self._laid: tuple[Floats, Model, Floats, Floats] | None = None
+        self._columns_at: tuple[Floats, Model, Floats, Floats] | None = None
         self._solved: tuple[Floats, LinearSolution] | None = None
 
     def only(self, runs: Sequence[int]) -> JointResiduals:
@@ -234,9 +237,9 @@ class JointResiduals:
         table.owner = np.searchsorted(runs, self.owner[kept])
         table.information = self.information[list(runs)]
         table.weights, table._seen, table._solved = table.information, None, None
-        if self._laid is not None:
-            point, bare, base, columns = self._laid
-            table._laid = point, bare, base[kept], columns[kept]
+        if self._columns_at is not None:
+            point, reduced, base, columns = self._columns_at
+            table._columns_at = point, reduced, base[kept], columns[kept]
         return table
 
     def weigh(self, errors: Floats) -> None:
@@ -261,23 +264,23 @@ class JointResiduals:
 
         Remembered for the last point: weights do not touch it.
         """
-        if self._laid is None or not np.array_equal(self._laid[0], point):
-            bare = self.problem.without_linear(point)
-            motion, state = self._followed(bare, point)
-            self._laid = point, bare, *linear_table(bare, self.problem.linear, motion, state)
-        return self._laid[1:]
+        if self._columns_at is None or not np.array_equal(self._columns_at[0], point):
+            reduced = self.problem.without_linear(point)
+            motion, state = self._followed(reduced, point)
+            self._columns_at = point, reduced, *linear_table(reduced, self.problem.linear, motion, state)
+        return self._columns_at[1:]
 
     def solve(self, point: Floats) -> LinearSolution:
         """Linear parameters of least weighted squares at a point of the search axes; remembered for the last."""
         if self._solved is not None and np.array_equal(self._solved[0], point):
             return self._solved[1]
         linear, factor = self.problem.linear, self.factor
-        bare, base, columns = self.linear_columns(point)
+        reduced, base, columns = self.linear_columns(point)
         columns, right = columns * factor[:, None], (self.target - base) * factor
         solution, held = solve_bounded(columns, right, *bounds_of(linear))
         residual = columns @ solution - right
         errors = np.sqrt(np.bincount(self.owner, residual**2)) / self.weights
-        model = replace(bare, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
+        model = replace(reduced, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
         stopped = tuple(i.name for i, h in zip(linear, held, strict=True) if h)
         self._solved = point, LinearSolution(model, residual, errors, stopped, columns[:, ~held])
         return self._solved[1]

@@ -25,9 +25,9 @@ from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
-from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares, newton_refine
 from mrdamper.statistics.linear import on_one_blas_thread
+from mrdamper.statistics.stop_reason import StopReason
 
 RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
 _SEARCH_TOLERANCE = 1e-6  # relative gain of a step at which the search ends
@@ -38,7 +38,7 @@ _REFIT_STEPS = 15  # of such a fit
 _MAX_COST_RATIO = 0.85  # share of the first start's cost that another one must come below
 _MAX_ERROR_RATIO = 0.995  # share of the first end's error that another one must come below
 _CACHED_LINEARISATIONS = 8  # linearisations
-_MIN_YIELD_DIFFERENCE = 0.1  # relative difference from which knees are two
+_MIN_YIELD_DIFFERENCE = 0.1  # relative difference from which two yield displacements differ
 _MAX_RUNNER_UP_RATIO = 1.25  # times the error: a valley that describes the tests nearly as well
 
 
@@ -91,8 +91,8 @@ class JointDamper(Damper):
         return len(self.free) + sum(getattr(self.model, name) != 0 for name in held)
 
     @property
-    def knee(self) -> float | None:
-        return self.model.knee
+    def yield_length(self) -> float | None:
+        return self.model.yield_length
 
     @property
     def source(self) -> str:
@@ -186,30 +186,34 @@ class JointFit:
 
 @dataclass(frozen=True)
 class LocalMinimum:
-    """Another end of the search: parameters with another knee that describe the same samples nearly as well.
+    """Another local minimum of the search: another yield displacement with nearly the same error.
 
     Attributes
     ----------
-    knee, error : float
+    yield_length, error : float
         [m]; mean nrmse_pp.
-    chosen_knee, chosen_error : float
+    chosen_yield_length, chosen_error : float
         Of the end that was chosen.
     """
 
-    knee: float
+    yield_length: float
     error: float
-    chosen_knee: float
+    chosen_yield_length: float
     chosen_error: float
 
     @classmethod
     def beside(cls, chosen: JointFit, ends: Iterable[JointFit]) -> LocalMinimum | None:
         """The best of some ends of a search that differ from the chosen one, if any."""
-        own = chosen.damper.knee
+        own = chosen.damper.yield_length
         others = [
-            (e.error, k) for e in ends if (k := e.damper.knee) and own and abs(k - own) > _MIN_YIELD_DIFFERENCE * own
+            (e.error, k)
+            for e in ends
+            if (k := e.damper.yield_length) and own and abs(k - own) > _MIN_YIELD_DIFFERENCE * own
         ]
-        error, knee = min(others, default=(np.inf, 0.0))
-        return cls(knee, error, own, chosen.error) if own and error < _MAX_RUNNER_UP_RATIO * chosen.error else None
+        error, yield_length = min(others, default=(np.inf, 0.0))
+        return (
+            cls(yield_length, error, own, chosen.error) if own and error < _MAX_RUNNER_UP_RATIO * chosen.error else None
+        )
 
 
 class JointProblem:
@@ -333,7 +337,7 @@ class JointProblem:
         Returns
         -------
         JointFit
-            The best end; the next best of another knee is its `second`.
+            The best end; the next best of another yield displacement is its `second`.
         """
         starts = [*self.promising[:2], *([] if start is None else [self._downhill(start).point])]
         ends = [self.fit(start=u, rounds=rounds, most_steps=most_steps, settled=settled) for u in starts]

@@ -140,7 +140,7 @@ def condense(runs: Sequence[Run], model_type: type[Model], more: Sequence[str] =
     shape = axes[0].name if axes else ""
     linear = (*(name for name in coordinates if name != shape), *more)
     conditions = tuple(problem.analysis.condition for problem in problems)
-    ladder = _ladder([c.amplitude_m for c in conditions]) if shape else np.geomspace(1.0, 8.0, 4)
+    ladder = _length_grid([c.amplitude_m for c in conditions]) if shape else np.geomspace(1.0, 8.0, 4)
     gram = np.stack([_gram(problem, linear, shape, ladder) for problem in problems])
     return Condensed(
         model_type,
@@ -151,11 +151,11 @@ def condense(runs: Sequence[Run], model_type: type[Model], more: Sequence[str] =
         np.array([np.ptp(problem.force) for problem in problems]),
         ladder,
         gram,
-        _bend(gram),
+        _spline_curvature(gram),
     )
 
 
-def _bend(gram: Floats) -> Floats:
+def _spline_curvature(gram: Floats) -> Floats:
     """Second derivatives of the cubic spline along the second axis that goes on unbroken over its outer knots."""
     size = gram.shape[1]
     second = np.eye(size, k=-1) - 2 * np.eye(size) + np.eye(size, k=1)
@@ -165,7 +165,7 @@ def _bend(gram: Floats) -> Floats:
     return np.einsum("jk,rk...->rj...", np.linalg.solve(system, right), gram)
 
 
-def _ladder(amplitudes: Sequence[float]) -> Floats:
+def _length_grid(amplitudes: Sequence[float]) -> Floats:
     """Rungs [m] from far inside the smallest amplitude to the largest."""
     low, high = (
         np.log(v / _GRID_ORIGIN_M) / np.log(_GRID_RATIO) for v in (_MIN_LENGTH_RATIO * min(amplitudes), max(amplitudes))
@@ -179,10 +179,10 @@ def _gram(problem: Problem, linear: tuple[str, ...], shape: str, ladder: Floats)
         table, _ = _columns(problem, linear, {})
         table = np.column_stack([table, target])
         return np.stack([table.T @ table / target.size] * ladder.size)
-    table, bare = _columns(problem, linear, {shape: float(ladder[0])})
-    if bare.shape is not None and "yield_force" in linear:  # its column is zeta, the only one the ladder changes
+    table, reduced = _columns(problem, linear, {shape: float(ladder[0])})
+    if reduced.shape is not None and "yield_force" in linear:  # its column is zeta, the only one the ladder changes
         table = np.column_stack([table, target])
-        return _gram_of_shapes(problem, table, linear.index("yield_force"), bare.shape, ladder)
+        return _gram_of_shapes(problem, table, linear.index("yield_force"), reduced.shape, ladder)
     tables = [np.column_stack([_columns(problem, linear, {shape: float(v)})[0], target]) for v in ladder]
     return np.stack([table.T @ table / target.size for table in tables])
 
@@ -190,11 +190,11 @@ def _gram(problem: Problem, linear: tuple[str, ...], shape: str, ladder: Floats)
 def _columns(problem: Problem, linear: tuple[str, ...], shape: Mapping[str, float]) -> tuple[Floats, Model]:
     """(N, L) force per unit of every linear coordinate, and the model without them."""
     point = {**problem.fixed, **shape, **dict.fromkeys(linear, 0.0)}
-    bare = problem.model_type.build(point)
-    state = bare.state(problem.motion)[problem.scored]
-    base = bare.force(problem.seen, state)
+    reduced = problem.model_type.build(point)
+    state = reduced.state(problem.motion)[problem.scored]
+    base = reduced.force(problem.seen, state)
     columns = [problem.model_type.build({**point, name: 1.0}).force(problem.seen, state) - base for name in linear]
-    return np.column_stack(columns), bare
+    return np.column_stack(columns), reduced
 
 
 def _gram_of_shapes(problem: Problem, table: Floats, moving: int, shape: Shape, ladder: Floats) -> Floats:

@@ -2,9 +2,9 @@
 
 from mrdamper.data.conditions import Condition, current_levels, same_condition, same_motion
 from mrdamper.data.datasets import Dataset
+from mrdamper.data.displayable import Displayable
 from mrdamper.data.runs import Floats, Run, Split, held_current, once_per_run, require_name
 from mrdamper.data.sessions import SESSIONS_NEEDED, hour_of, session_of
-from mrdamper.data.shown import Displayable
 
 __all__ = [
     "SESSIONS_NEEDED",

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.data.displayable import Displayable
 from mrdamper.data.runs import Run, Split
-from mrdamper.data.shown import Displayable
-from mrdamper.errors import RunError, UnknownNameError, check_fields, checked
+from mrdamper.errors import RunError, UnknownNameError, check_fields, validate_arguments
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,7 +83,7 @@ class Dataset(Displayable):
     def __len__(self) -> int:
         return len(self.runs)
 
-    @checked()
+    @validate_arguments()
     def __getitem__(self, run_id: str) -> Run:
         for run in self.runs:
             if run.id == run_id:
@@ -95,19 +95,19 @@ class Dataset(Displayable):
         """Names of the rigs, in order of appearance."""
         return tuple(dict.fromkeys(run.rig for run in self.runs))
 
-    @checked()
+    @validate_arguments()
     def rig(self, name: str) -> Dataset:
         """Return the runs of one rig."""
         if name not in self.rigs:
             raise UnknownNameError.of("rig", name, self.rigs)
         return self.only([run for run in self.runs if run.rig == name], name=name or self.name)
 
-    @checked()
+    @validate_arguments()
     def split(self, split: Split) -> tuple[Run, ...]:
         """Return the runs of one split."""
         return tuple(run for run in self.runs if run.split == split)
 
-    @checked()
+    @validate_arguments()
     def only(self, runs: Iterable[Run], name: str | None = None) -> Dataset:
         """Return the same dataset with these runs only."""
         return Dataset(tuple(runs), name or self.name)

@@ -17,18 +17,18 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mrdamper.data.chunks import chunks, take
 from mrdamper.data.conditions import Condition
-from mrdamper.data.pieces import pieces, taken
-from mrdamper.data.shown import Displayable
+from mrdamper.data.displayable import Displayable
 from mrdamper.errors import (
     NonFiniteError,
     RunError,
     TimeOrderError,
     check_fields,
-    checked,
     printable,
     require,
     shown,
+    validate_arguments,
 )
 
 Floats = NDArray[np.float64]
@@ -112,7 +112,7 @@ class Run(Displayable):
         size = time.size
         if size < 3:
             raise RunError(f"{size} samples", where=self._where, remedy="a run needs at least 3")
-        for at, piece in pieces(time, overlap=1):
+        for at, piece in chunks(time, overlap=1):
             backwards = np.flatnonzero(np.diff(piece) <= 0)
             if not backwards.size:
                 continue
@@ -219,7 +219,7 @@ class Run(Displayable):
             )
         return self.part(int(inside[0]), int(inside[-1]) + 1)
 
-    @checked()
+    @validate_arguments()
     def part(self, start: int, stop: int) -> Run:
         """Return the samples start..stop-1 as a run of their own."""
         inner = [(max(a, start) - start, min(b, stop) - start) for a, b in self.segments]
@@ -256,7 +256,7 @@ class Run(Displayable):
                 where=self._where,
                 remedy="trim or resample the run",
             )
-        bad = [at + i for at, piece in pieces(array) for i in np.flatnonzero(~np.isfinite(piece))]
+        bad = [at + i for at, piece in chunks(array) for i in np.flatnonzero(~np.isfinite(piece))]
         if bad:
             raise NonFiniteError(
                 f"{name} has {len(bad)} values that are not finite, the first at sample {bad[0]}",
@@ -323,7 +323,7 @@ def _held_current(run: Run) -> tuple[float, str]:
     first, last = run.window or (-math.inf, math.inf)
     start, stop = int(np.searchsorted(run.time, first)), int(np.searchsorted(run.time, last, "right"))
     start, stop = (start, stop) if stop - start >= 3 else (0, run.time.size)
-    return held_current(taken(run.current, np.arange(start, stop, 1 + (stop - start) // _MAX_CURRENT_SAMPLES)))
+    return held_current(take(run.current, np.arange(start, stop, 1 + (stop - start) // _MAX_CURRENT_SAMPLES)))
 
 
 def as_written(current: float) -> float:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mrdamper.dampers.base import Damper
 from mrdamper.discovery import Registry
-from mrdamper.errors import checked
+from mrdamper.errors import validate_arguments
 from mrdamper.export.base import Exporter, Written, identifier, write_export
 
 __all__ = ["Exporter", "Written", "all_exporters", "export_model", "exporter"]
@@ -17,7 +17,7 @@ all_exporters = _registry.all
 exporter = _registry.type_named
 
 
-@checked()
+@validate_arguments()
 def export_model(damper: Damper, to: str, out: str | Path, name: str = "") -> list[Path]:
     """Write a damper in an export format, whole or not at all.
 

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from mrdamper.data import Run
-from mrdamper.errors import IdentificationError, checked
+from mrdamper.errors import IdentificationError, validate_arguments
 from mrdamper.identification.methods import all_methods, method_named
 from mrdamper.identification.problem import Identification, Method, Problem, Solution
 from mrdamper.identification.uncertainty import uncertainty_of_run
@@ -21,7 +21,7 @@ __all__ = ["Identification", "Method", "Problem", "Solution", "all_methods", "id
 
 
 @on_one_blas_thread
-@checked("run")
+@validate_arguments("run")
 def identify(
     run: Run,
     model: str | type[Model] = "bouc-wen",

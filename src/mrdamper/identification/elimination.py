@@ -48,12 +48,12 @@ class Elimination:
         return cls(problem, columns, problem.force - base, kind)
 
     @cached_property
-    def projector(self) -> Projector | None:
+    def projector(self) -> FixedColumnSolver | None:
         """The columns factored; None where they depend on each other."""
         fixed = FixedColumns.of(self.columns, self.right)
         if not fixed.independent:
             return None
-        return Projector(fixed, *bounds_of(self.kind.others), self.kind.state.bounds)
+        return FixedColumnSolver(fixed, *bounds_of(self.kind.others), self.kind.state.bounds)
 
     def residual(self, point: Mapping[str, float]) -> Floats | None:
         """Residual at a point of the search; None where it takes the general way."""
@@ -161,7 +161,7 @@ def _other(axis: SearchAxis) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Projector:
+class FixedColumnSolver:
     """Least squares on columns that stay and one that moves: the ones that stay are solved once."""
 
     fixed: FixedColumns  # the columns that stay

@@ -12,15 +12,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.data import Condition, Displayable, Floats, Run
-from mrdamper.errors import IdentificationError, UnknownNameError, checked
+from mrdamper.errors import IdentificationError, UnknownNameError, validate_arguments
 from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, written
 from mrdamper.models.base import Model
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.measured import measured_motion
 from mrdamper.physics.motion.sines import MotionAnalysis, analyse_motion
-from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.metrics import Scores
+from mrdamper.statistics.stop_reason import StopReason
 
 DELAY = "delay"  # name of the search coordinate
 DELAY_LIMIT = 3e-3  # a free delay between the channels runs away beyond this [s]
@@ -261,7 +261,7 @@ class Identification(Displayable):
             return "at a bound: one-sided"
         return "determined" if self.interval(name) else NOT_IDENTIFIABLE
 
-    @checked()
+    @validate_arguments()
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float] | None:
         """Return the ends of a parameter's interval within the form of the model; None where there is none.
 

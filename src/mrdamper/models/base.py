@@ -140,7 +140,7 @@ class Model(ABC):
         return None
 
     @property
-    def knee(self) -> float | None:
+    def yield_length(self) -> float | None:
         """Motion after a reversal in which the force turns over [m]; None without such a length."""
         return None
 

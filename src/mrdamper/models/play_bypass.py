@@ -20,7 +20,7 @@ from mrdamper.models.base import Model, Scale, SearchAxis
 from mrdamper.models.recorded import recorded
 from mrdamper.physics.motion import Excitation, Path
 from mrdamper.physics.motion.lag import first_order_lag, leaking_load
-from mrdamper.physics.motion.path import lately_along
+from mrdamper.physics.motion.path import memoize_per_path
 from mrdamper.tracing import Tape, streamed
 
 RISE_CURRENT = 0.12  # A; where nothing else is known, the yield force starts with zero slope over this current
@@ -109,7 +109,7 @@ class PlayBypass(Model):
     si: float = param("1/A", "saturation of the yield force with current", bounds=(0, 1e3), preset=True, default=0.0)
 
     @property
-    def knee(self) -> float:
+    def yield_length(self) -> float:
         """Free play and spring travel, 2 d [m]."""
         return 2 * self.d
 
@@ -184,50 +184,50 @@ class PlayBypass(Model):
 # What of the state and the force one parameter leads to is remembered while the search moves another.
 
 
-@lately_along
+@memoize_per_path
 def _speed(velocity: Floats) -> Floats:
     return np.abs(velocity)
 
 
-@lately_along
+@memoize_per_path
 def _sign(velocity: Floats) -> Floats:
     return np.sign(velocity)
 
 
-@lately_along
+@memoize_per_path
 def _level_law(current: Floats, fy0: float, fy1: float, Ic: float, si: float) -> Floats:
     """fy(I) [N]."""
     size = np.abs(current)
     return fy0 + fy1 * current * (1 - np.exp(-size / Ic)) / (1 + si * size)
 
 
-@lately_along
+@memoize_per_path
 def _loaded(path: Path, d: float, seat: float) -> Floats:
     """φ, how far the seat is loaded."""
     play = play_position(path, d)
     return np.sign(play) * np.maximum(0.0, np.abs(play) - (d - seat)) / seat
 
 
-@lately_along
+@memoize_per_path
 def _along(velocity: Floats, loaded: Floats) -> Floats:
     """η, the loading along the motion."""
     return np.maximum(0.0, loaded * _sign(velocity))
 
 
-@lately_along
+@memoize_per_path
 def _bypass(velocity: Floats, cb: float, qb: float, yield_force: Floats) -> Floats:
     """b, what the bypass carries of the yield force."""
     ratio = (cb * (1 + qb * _sign(velocity))) * _speed(velocity) / yield_force
     return ratio / np.sqrt(1 + ratio**2)
 
 
-@lately_along
+@memoize_per_path
 def _fading(current: Floats, h0: float, h1: float) -> Floats:
     """Share h that fades, within 0 and 1."""
     return np.clip(h0 + h1 * current, 0.0, 1.0)
 
 
-@lately_along
+@memoize_per_path
 def _seated(velocity: Floats, vh: float, fading: Floats, along: Floats) -> Floats:
     """Calculate the part of the series force that builds up with velocity, h |v|/(|v| + vh) η."""
     speed = _speed(velocity)
@@ -255,7 +255,7 @@ def play_position(path: Path, limit: float, start: float = 0.0) -> Floats:
     return _stopped(path, limit, start)
 
 
-@lately_along
+@memoize_per_path
 def _stopped(path: Path, limit: float, start: float) -> Floats:
     turned = path.first_direction * np.where(np.arange(len(path.lengths)) % 2, -1.0, 1.0) * path.lengths
     at_start = np.concatenate([[start], _clipped_sums(turned, limit, start)])

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.physics.motion import Excitation
-from mrdamper.physics.motion.path import lately_along
+from mrdamper.physics.motion.path import memoize_per_path
 from mrdamper.physics.motion.traced import TracedMotion, TracedStep
 from mrdamper.tracing import Tape, program
 from mrdamper.tracing.compiled import RecordProgram
@@ -57,7 +57,7 @@ def channels(motion: Excitation) -> tuple[Floats, ...]:
     return (*arrays, steps, *motion.path.moves)
 
 
-@lately_along
+@memoize_per_path
 def _steps(time: Floats) -> Floats:
     """(N,) steps of time to what its rounding leaves: steps that differ by it are one, and what hangs on it is kept."""
     if time.size < 2:

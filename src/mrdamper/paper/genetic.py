@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.errors import ParameterError
-from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.linear import Floats
+from mrdamper.statistics.stop_reason import StopReason
 
 GENERATIONS_OF_MANY = 60  # generations of a search that is one of dozens
 

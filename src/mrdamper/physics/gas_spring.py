@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.data import Floats
-from mrdamper.errors import ParameterError, checked, shown
+from mrdamper.errors import ParameterError, shown, validate_arguments
 
 Direction = Literal["compression", "extension"]
 AIR = 1.4  # polytropic exponent of a fast change of air or nitrogen
@@ -67,7 +67,7 @@ class GasSpring:
     def _force_area(self) -> float:
         return self.rod_area if self.force_area is None else self.force_area
 
-    @checked()
+    @validate_arguments()
     def force(self, compression: ArrayLike) -> Floats:
         """Exact gas force beyond the static one [N], for compressions [m].
 
@@ -88,7 +88,7 @@ class GasSpring:
             )
         return self.pressure * self._force_area * (left**-self.exponent - 1.0)
 
-    @checked()
+    @validate_arguments()
     def stiffnesses(self, positive: Direction = "compression") -> tuple[float, float, float]:
         """Coefficients k1 [N/m], k2 [N/m²], k3 [N/m³] of F_k ≈ k1 x + k2 x² + k3 x³.
 
@@ -102,7 +102,7 @@ class GasSpring:
         k3 = kappa * (kappa + 1) * (kappa + 2) / 6 * unit * ratio**3
         return k1, (k2 if positive == "compression" else -k2), k3
 
-    @checked()
+    @validate_arguments()
     def taylor_error(self, amplitude: float) -> float:
         """Largest error of the third-order series within ±amplitude [m], relative to the exact force."""
         exact = self.force([-amplitude, amplitude])

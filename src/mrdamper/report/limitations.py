@@ -148,8 +148,8 @@ def _joint(fit: JointFit) -> list[str]:
         sentences.append(f"The global fit did not converge: the search {fit.ending}.")
     if (other := fit.second) is not None:
         sentences.append(
-            f"Second local minimum of the fit: yield displacement {1e3 * other.knee:.2f} mm instead of "
-            f"{1e3 * other.chosen_knee:.2f} mm, mean error {100 * other.error:.2f} % instead of "
+            f"Second local minimum of the fit: yield displacement {1e3 * other.yield_length:.2f} mm instead of "
+            f"{1e3 * other.chosen_yield_length:.2f} mm, mean error {100 * other.error:.2f} % instead of "
             f"{100 * other.chosen_error:.2f} %"
             + ("; chosen by cross-validation." if other.error < other.chosen_error else ".")
         )

@@ -13,7 +13,7 @@ from mrdamper.data.encoding import csv_text
 from mrdamper.report.page import render_page
 from mrdamper.report.plots.simulation import histories, spectra
 from mrdamper.report.plots.style import save_figure
-from mrdamper.systems.contest import Contest
+from mrdamper.systems.controller_comparison import ControllerComparison
 from mrdamper.systems.measures import benchmark_ratios, measures
 from mrdamper.systems.monte_carlo import LEVELS, Bands
 from mrdamper.systems.result import Simulation
@@ -22,7 +22,7 @@ _ROWS = 20_000  # of histories.csv
 
 
 def write_simulation(
-    done: Simulation, folder: str | Path, beside: Contest | None = None, bands: Bands | None = None
+    done: Simulation, folder: str | Path, beside: ControllerComparison | None = None, bands: Bands | None = None
 ) -> list[Path]:
     """Write a simulation, whole or not at all.
 
@@ -31,7 +31,7 @@ def write_simulation(
     done : Simulation
     folder : path
         Made if missing.
-    beside : Contest, optional
+    beside : ControllerComparison, optional
         Controllers to show beside it.
     bands : Bands, optional
         Of draws of its dampers.
@@ -97,7 +97,7 @@ def history_rows(done: Simulation) -> list[dict[str, float]]:
     return [dict(zip(table, row, strict=True)) for row in zip(*lists, strict=True)]
 
 
-def _ratios(runs: Mapping[str, Simulation], beside: Contest | None) -> dict[str, dict[str, float]]:
+def _ratios(runs: Mapping[str, Simulation], beside: ControllerComparison | None) -> dict[str, dict[str, float]]:
     """J ratios of a building to no current; none for a car or a single run."""
     if beside is None or next(iter(runs.values())).system.ground is None:
         return {}

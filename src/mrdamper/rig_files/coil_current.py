@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from mrdamper.data import Floats, held_current
-from mrdamper.data.pieces import pieces
+from mrdamper.data.chunks import chunks
 from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.conditions import (
@@ -148,7 +148,7 @@ def as_data(text: str) -> str:
 
 def without_gaps(current: Floats) -> tuple[Floats, tuple[Finding, ...]]:
     """A current that is recorded at every n-th sample only, by its mean, where it is constant."""
-    count = sum(int(np.count_nonzero(np.isfinite(piece))) for _, piece in pieces(current))
+    count = sum(int(np.count_nonzero(np.isfinite(piece))) for _, piece in chunks(current))
     if count < _FEWEST_SLOW or count > 0.6 * current.size:
         return current, ()
     there = np.flatnonzero(np.isfinite(current))

@@ -16,9 +16,9 @@ import numpy as np
 
 from mrdamper.data import Condition, Dataset, Floats, Run
 from mrdamper.data.atomic import path_of, write_file, write_folder
+from mrdamper.data.chunks import chunks, drop_pages
 from mrdamper.data.encoding import csv_text, csv_value
-from mrdamper.data.pieces import pieces, release
-from mrdamper.errors import ColumnError, DatasetError, OutputError, checked, shown
+from mrdamper.errors import ColumnError, DatasetError, OutputError, shown, validate_arguments
 from mrdamper.rig_files.dataset_samples import OPTIONAL, REQUIRED, SAMPLE_FILES, Channels, missing_column, read_samples
 from mrdamper.rig_files.readers.base import MOST_COLUMNS
 
@@ -64,7 +64,7 @@ def load_dataset(folder: str | Path | None = None) -> Dataset:
     return _load(folder, folder.name or str(folder))
 
 
-@checked("dataset")
+@validate_arguments("dataset")
 def save_dataset(
     dataset: Dataset, folder: str | Path, *, extra_files: Mapping[str, str] | None = None, replace: bool = False
 ) -> None:
@@ -340,10 +340,10 @@ def _samples(dataset: Dataset) -> Iterable[pl.DataFrame]:
             size = inside.stop - inside.start
             columns = {name: np.array(values[inside]) for name, values in channels.items()}
             for values in channels.values():
-                release(values)
+                drop_pages(values)
             yield pl.DataFrame({"run_id": pl.repeat(run.id, size, eager=True), **columns})
 
 
 def _varies(current: np.ndarray) -> bool:
-    ends = [(float(np.min(piece)), float(np.max(piece))) for _, piece in pieces(current)]
+    ends = [(float(np.min(piece)), float(np.max(piece))) for _, piece in chunks(current)]
     return min(low for low, _ in ends) != max(high for _, high in ends)

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrdamper.data.pieces import release
+from mrdamper.data.chunks import drop_pages
 from mrdamper.errors import InputError
 from mrdamper.rig_files.quality.current import change_of
 from mrdamper.rig_files.record import Finding, Record
@@ -78,7 +78,7 @@ def _parts(record: Record) -> Iterator[tuple[int, Record]]:
         inside = slice(at, min(at + PART, size - 1) + 1)
         channels = {name: np.array(values[inside]) for name, values in named.items()}
         for values in named.values():
-            release(values)
+            drop_pages(values)
         lines = None if record.lines is None else record.lines.part(inside.start, inside.stop)
         yield at, replace(record, lines=lines, findings=(), segments=(), **channels)
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mrdamper.data.pieces import pieces
+from mrdamper.data.chunks import chunks
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import role_of, words_of
 from mrdamper.rig_files.conditions import currents_in, currents_in_cells
@@ -284,7 +284,7 @@ def stretches_of_time(time: np.ndarray) -> list[slice]:
 
 def _turns_back(time: np.ndarray) -> bool:
     last = -np.inf
-    for _, piece in pieces(time):
+    for _, piece in chunks(time):
         stamps = piece[np.isfinite(piece)]
         if stamps.size and (stamps[0] < last or np.any(np.diff(stamps) < 0)):
             return True

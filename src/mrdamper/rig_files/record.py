@@ -13,7 +13,7 @@ from typing import overload
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.data.pieces import pieces
+from mrdamper.data.chunks import chunks
 
 REQUIRED = ("time", "displacement", "force")
 OPTIONAL = ("velocity", "acceleration", "current", "voltage", "temperature", "pressure")
@@ -153,7 +153,7 @@ class Record:
         """(N,) mask of the samples at which time, displacement, force and current are there."""
         there = np.ones(self.time.size, dtype=bool)
         for values in (self.time, self.displacement, self.force, self.current):
-            for at, piece in () if values is None else pieces(values):
+            for at, piece in () if values is None else chunks(values):
                 there[at : at + piece.size] &= np.isfinite(piece)
         return there
 

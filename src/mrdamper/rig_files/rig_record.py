@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.data.pieces import pieces
+from mrdamper.data.chunks import chunks
 from mrdamper.errors import ColumnError, InputError
 from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import as_data, constant, current_of, without_gaps
@@ -118,7 +118,7 @@ def _read(table: RawTable, assigned: dict[str, Assigned]):
             findings.append(Finding(code, f"the {name} channel is left out: {error.found}"))
             del assigned[name]
     for name in [name for name in assigned if name in OPTIONAL]:
-        if any(np.isfinite(piece).any() for _, piece in pieces(raw[assigned[name].column])):
+        if any(np.isfinite(piece).any() for _, piece in chunks(raw[assigned[name].column])):
             continue
         findings.append(Finding("W_COLUMN", f"the {name} channel is left out: its column is empty"))
         del assigned[name]
@@ -148,7 +148,7 @@ def _refuse_tiny_currents(table: RawTable, assigned: dict[str, Assigned], channe
     if "current" not in assigned or assigned["current"].unit != "MA":
         return
     largest = max((float(np.max(np.abs(piece), initial=0.0, where=np.isfinite(piece)))
-                   for _, piece in pieces(channels["current"])), default=0.0)  # fmt: skip
+                   for _, piece in chunks(channels["current"])), default=0.0)  # fmt: skip
     if 0 < largest < _LEAST_CURRENT:
         raise table.source.refuse(
             "E_AMBIGUOUS",

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data import Run
-from mrdamper.data.pieces import pieces, release
+from mrdamper.data.chunks import chunks, drop_pages
 from mrdamper.errors import ColumnError, RunError
 from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.quality.loop import steady_part
@@ -70,13 +70,13 @@ def to_run(record: Record) -> Run:
     )
     for values in (record.time, record.displacement, record.force, record.current):
         if values is not None:
-            release(values)
+            drop_pages(values)
     return run
 
 
 def _kept(record: Record) -> np.ndarray:
     keep = record.present
-    for at, piece in () if record.velocity is None else pieces(record.velocity):
+    for at, piece in () if record.velocity is None else chunks(record.velocity):
         keep[at : at + piece.size] &= np.isfinite(piece)
     for start, stop in record.segments:
         if np.count_nonzero(keep[start:stop]) < SHORTEST:

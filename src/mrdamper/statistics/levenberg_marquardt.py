@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.linear import Floats
+from mrdamper.statistics.stop_reason import StopReason
 
 _DIFFERENCE_STEP = 1e-6  # forward difference, relative to the width of the box
 _STIFFEST = 1e12  # damping at which no step is left to try

@@ -9,7 +9,7 @@ from typing import Any, Concatenate, Literal, ParamSpec
 
 from mrdamper import identification
 from mrdamper.data import Dataset, Displayable, Run
-from mrdamper.errors import InputError, checked
+from mrdamper.errors import InputError, validate_arguments
 from mrdamper.rig_files.quality.table import check_run, with_findings
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
 from mrdamper.study.workflow import accepted_runs
@@ -81,7 +81,7 @@ class DatasetCheck(Displayable):
         return [str(one) for one in self.findings]
 
 
-@checked()
+@validate_arguments()
 def check(dataset: Dataset) -> DatasetCheck:
     """Check every run of a dataset as the import checks files, and the runs of each rig against each other.
 

@@ -13,7 +13,7 @@ from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.dampers.calibration import PredictedRun
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, GainOffset, RecordingTime, SessionCorrection, Sessions
 from mrdamper.data import Condition, Displayable, Run
-from mrdamper.errors import InputError, RunError, UnknownNameError, checked, require
+from mrdamper.errors import InputError, RunError, UnknownNameError, require, validate_arguments
 from mrdamper.statistics.metrics import Scores, dissipated_power, peak_force, score
 
 _MIN_SWING_N = 1e-100  # of a force, and its inverse the most [N]: their squares are numbers
@@ -91,12 +91,12 @@ class Validation(Displayable):
             "extrapolation": [" ".join(run.extrapolation) for run in self.runs],
         }
 
-    @checked()
+    @validate_arguments()
     def median(self, name: str = "nrmse_pp") -> float:
         """Median of a score over the runs; signed errors count by magnitude."""
         return float(np.median(self._magnitudes(name))) if self.runs else float("nan")
 
-    @checked()
+    @validate_arguments()
     def worst(self, name: str = "nrmse_pp") -> RunScore:
         """The run with the largest magnitude of a score."""
         magnitudes = self._magnitudes(name)
@@ -104,7 +104,7 @@ class Validation(Displayable):
             raise RunError("no run was scored", where=self.title, remedy="see `refused`")
         return self.runs[int(np.argmax(magnitudes))]
 
-    @checked()
+    @validate_arguments()
     def worst_error(self, name: str = "nrmse_pp") -> float:
         """Its magnitude in that run; NaN without runs."""
         return max(self._magnitudes(name), default=float("nan"))
@@ -115,13 +115,13 @@ class Validation(Displayable):
             raise UnknownNameError.of("score", name, names)
         return [abs(float(getattr(run.scores, name))) for run in self.runs]
 
-    @checked()
+    @validate_arguments()
     def only(self, run_ids: Collection[str]) -> Validation:
         """The scores of some runs."""
         return replace(self, runs=tuple(run for run in self.runs if run.run_id in run_ids))
 
 
-@checked("damper")
+@validate_arguments("damper")
 def validate(
     damper: Damper, runs: Iterable[Run], title: str | None = None, *, sessions: Sessions | None = None
 ) -> Validation:

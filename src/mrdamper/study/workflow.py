@@ -23,7 +23,7 @@ from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.sessions import Sessions, known_errors
 from mrdamper.data import Dataset, Displayable, Floats, Run
-from mrdamper.errors import IdentificationError, InputError, UnknownNameError, checked
+from mrdamper.errors import IdentificationError, InputError, UnknownNameError, validate_arguments
 from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.models import all_models
@@ -227,7 +227,7 @@ class Study(Displayable):
         return next(r for r in self.rigs if r.rig == name)
 
 
-@checked()
+@validate_arguments()
 def run_study(
     dataset: Dataset,
     progress: Progress = lambda what, share: None,

@@ -19,7 +19,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.coil import Coil, field_step
 from mrdamper.dampers.streaming import steps_of, stream
 from mrdamper.data import Floats
-from mrdamper.errors import ParameterError, checked, numbers, series
+from mrdamper.errors import ParameterError, numbers, series, validate_arguments
 from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.graft import ProgramCopy
 from mrdamper.tracing.python import python_functions
@@ -129,9 +129,9 @@ def invert_on(
     lag = tape.select(steady > field, coil.rise_s, coil.fall_s)
     ahead = steady + (steady - field) * lag / np.maximum(_FIELD_TIME_RATIO * lag, 2 * motion["dt"])
     command = np.minimum(np.maximum(ahead, 0.0), highest)
-    felt = field_step(tape, motion["dt"], command, coil.rise_s, coil.fall_s)
-    tape.update(field, felt)
-    return Demand(command, copy.settle(felt)["force"], lowest, most)
+    field_current = field_step(tape, motion["dt"], command, coil.rise_s, coil.fall_s)
+    tape.update(field, field_current)
+    return Demand(command, copy.settle(field_current)["force"], lowest, most)
 
 
 def _searched(tape: Tape, copy: ProgramCopy, ends: list[tuple[Any, Any]], target: Any) -> Any:
@@ -208,7 +208,7 @@ class Inverse:
         return table[:, 0], table[:, 1], table[:, 2], table[:, 3]
 
 
-@checked()
+@validate_arguments()
 def invert(damper: Damper, highest: float | None = None) -> Inverse:
     """Prepare the calculation of the current for a wanted force.
 

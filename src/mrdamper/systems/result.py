@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mrdamper.dampers.streaming import FLAGS
 from mrdamper.data import Floats
-from mrdamper.errors import UnknownNameError, checked
+from mrdamper.errors import UnknownNameError, validate_arguments
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.structure import Link, System
 
@@ -87,7 +87,7 @@ class Simulation:
         )
         return dict(zip(self.PEAKS, series, strict=True))
 
-    @checked()
+    @validate_arguments()
     def span(self, name: str) -> Floats:
         """(N,) relative displacement [m] of a span of the system."""
         if name not in self.system.spans:
@@ -95,7 +95,7 @@ class Simulation:
         row, road = self.system.span(*self.system.spans[name])
         return self.x @ row + self.road @ road
 
-    @checked()
+    @validate_arguments()
     def acceleration_of(self, point: str) -> Floats:
         """(N,) absolute acceleration [m/s²] of a point that moves with the coordinates."""
         return self.a @ self.system.point(point)[0]

@@ -12,7 +12,7 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
-from mrdamper.errors import ExcitationError, StepError, StructureError, checked, numbers
+from mrdamper.errors import ExcitationError, StepError, StructureError, numbers, validate_arguments
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.controllers.preview import NonCausalOptimum
@@ -34,7 +34,7 @@ _LINES_PER_STEP = 60  # of the loop itself
 _MAX_STEPS = 20_000_000
 
 
-@checked("step")
+@validate_arguments("step")
 def simulate_system(
     system: System,
     source: Input,

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import StructureError, UnknownNameError, check_fields, checked
+from mrdamper.errors import StructureError, UnknownNameError, check_fields, validate_arguments
 
 _MAX_FREQUENCY_HZ = 2e3  # natural frequency [Hz]: beyond, a unit is wrong, and a second takes over 80,000 steps
 _SYMMETRY = 1e-9  # relative difference of K and K' that rounding may leave
@@ -95,7 +95,7 @@ class System:
         """Links that are dampers."""
         return tuple(link for link in self.links if link.role == "damper")
 
-    @checked()
+    @validate_arguments()
     def point(self, name: str) -> tuple[Floats, Floats]:
         """Return a point as a combination of the coordinates (n,) and of the channels' heights (q,)."""
         row, road = np.zeros(len(self.coordinates)), np.zeros(len(self.channels))

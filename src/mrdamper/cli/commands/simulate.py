@@ -110,9 +110,13 @@ def register(app: typer.Typer) -> None:
                 bands = monte_carlo(loop, drawn, done, tell)
             if out is not None:
                 from mrdamper.report.simulation import write_simulation
-                from mrdamper.systems.contest import contest
+                from mrdamper.systems.controller_comparison import compare_controllers
 
-                table = contest(loaded.system, shaken_by, dampers, others, done.step, highest, tell) if others else None
+                table = (
+                    compare_controllers(loaded.system, shaken_by, dampers, others, done.step, highest, tell)
+                    if others
+                    else None
+                )
                 tell("writing", 1.0)
                 paths = write_simulation(done, out, table, bands)
         for line in shortened([f"{path}" for path in paths], 2, verbose):

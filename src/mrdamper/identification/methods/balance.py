@@ -21,9 +21,9 @@ from mrdamper.identification.harmonic_balance import HarmonicProjection, SineRec
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models import Model, Scale
 from mrdamper.physics.hysteresis import steady_loop
-from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.statistics.linear import solve_bounded
+from mrdamper.statistics.stop_reason import StopReason
 
 _MIN_HARMONICS = 3  # one harmonic gives two equations, for at least four unknowns
 

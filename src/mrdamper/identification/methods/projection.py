@@ -25,10 +25,10 @@ from mrdamper.models import Model, Scale, SearchAxis
 from mrdamper.physics.hysteresis import Shape
 from mrdamper.physics.hysteresis.batch import batch_cost
 from mrdamper.physics.motion import Path
-from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares
 from mrdamper.statistics.linear import FixedColumns, on_one_blas_thread, solve_bounded
-from mrdamper.statistics.one_number import least_squares_in_one
+from mrdamper.statistics.scalar_least_squares import least_squares_in_one
+from mrdamper.statistics.stop_reason import StopReason
 
 _GRID_SAMPLES = 1500  # the grid only has to find the valley
 _GRID_SAMPLES_A_CYCLE, _GRID_CYCLES = 100, 3  # where all shapes are tried at once

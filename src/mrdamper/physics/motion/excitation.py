@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mrdamper.data.runs import Floats
-from mrdamper.errors import ExcitationError, checked
+from mrdamper.errors import ExcitationError, validate_arguments
 from mrdamper.physics.motion.path import Path
 
 _STILL, _REST = 0.01, 0.1  # share of the peak speed below which a motion stands still, and for how long [s]
@@ -79,7 +79,7 @@ class Excitation:
         pick = {name: getattr(self, name)[mask] for name in self.__dataclass_fields__}
         return Excitation(**pick)
 
-    @checked()
+    @validate_arguments()
     def with_current(self, current: ArrayLike) -> Excitation:
         """Return the same motion at another current [A], a scalar or one value per sample."""
         motion = replace(self, current=np.asarray(current, dtype=float))
@@ -87,12 +87,12 @@ class Excitation:
             motion.__dict__["path"] = self.path  # the current does not bend it
         return motion
 
-    @checked()
+    @validate_arguments()
     def about(self, centre: float) -> Excitation:
         """Return the same motion with displacements counted from `centre` [m]."""
         return replace(self, displacement=self.displacement - centre)
 
-    @checked()
+    @validate_arguments()
     def delayed(self, delay: float) -> Excitation:
         """Return the motion `delay` seconds later, to first order in the delay, for small delays."""
         return replace(

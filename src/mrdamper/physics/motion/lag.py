@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.physics.motion.path import LONG, Path, lately_along
+from mrdamper.physics.motion.path import LONG, Path, memoize_per_path
 from mrdamper.tracing import Tape, choose, streamed
 
 _SHORT = 1e-4  # step over time constant below which a series loses fewer digits
@@ -64,7 +64,7 @@ def _weights(time: Floats, time_constant: float) -> Iterator[Floats]:
     yield from _spans(keep)
 
 
-@lately_along
+@memoize_per_path
 def _known_weights(time: Floats, time_constant: float) -> Floats:
     """Return the weights as rows of a table, for the next signal along these times."""
     return np.stack(list(_weights(time, time_constant)))
@@ -118,7 +118,7 @@ def leaking_load(time: Floats, path: Path, length: float, leak: float) -> Floats
     return np.ones(time.size) if leak <= 0 else _loaded(path, time, length, leak)
 
 
-@lately_along
+@memoize_per_path
 def _loaded(path: Path, time: Floats, length: float, leak: float) -> Floats:
     built, leaked = np.diff(path.travel) / length, leak * np.diff(time)
     both = np.maximum(built + leaked, np.finfo(float).tiny)

@@ -7,14 +7,14 @@ from collections.abc import Callable
 import numpy as np
 
 from mrdamper.data import Condition, Floats
-from mrdamper.errors import ExcitationError, checked
+from mrdamper.errors import ExcitationError, validate_arguments
 from mrdamper.physics.motion.excitation import Excitation
 
 _SAMPLES_PER_CYCLE = 1000
 _MAX_SAMPLES = 10**8  # samples of one motion
 
 
-@checked()
+@validate_arguments()
 def sine(condition: Condition, cycles: float = 1.0, samples_per_cycle: int = _SAMPLES_PER_CYCLE) -> Excitation:
     """Sine x = X sin(2πft) at constant current; the last sample closes the last cycle.
 
@@ -57,7 +57,7 @@ def triangle(condition: Condition, cycles: float = 1.0, samples_per_cycle: int =
     return Excitation(time, x, v, np.zeros_like(x), np.full(time.size, condition.current_A))
 
 
-@checked()
+@validate_arguments()
 def sweep(
     start_Hz: float,
     end_Hz: float,

@@ -97,7 +97,7 @@ class Path:
         return turn, back, move
 
 
-def lately_along(function: Callable[..., Floats]) -> Callable[..., Floats]:
+def memoize_per_path(function: Callable[..., Floats]) -> Callable[..., Floats]:
     """Remember what a function of a path or of samples, and of some numbers, gave the last two times.
 
     A search moves one parameter at a time, to and fro: what the others lead to stays. It is forgotten

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats, held_current
-from mrdamper.data.pieces import taken
+from mrdamper.data.chunks import take
 from mrdamper.rig_files.quality.motion import steady_window
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding, Record
@@ -40,7 +40,7 @@ def current_in(record: Record, window: tuple[float, float] | None) -> Floats:
     """The current's samples that are there within a window of time, thinned where they are many."""
     assert record.current is not None
     thinned = np.arange(0, record.time.size, max(1, record.time.size // _MOST))
-    time, current = taken(record.time, thinned), taken(record.current, thinned)
+    time, current = take(record.time, thinned), take(record.current, thinned)
     there = np.isfinite(current)
     if window is not None:
         there &= (time >= window[0]) & (time <= window[1])

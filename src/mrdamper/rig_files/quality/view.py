@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data import Floats, Run
-from mrdamper.data.pieces import taken
+from mrdamper.data.chunks import take
 from mrdamper.errors import ExcitationError, QualityError
 from mrdamper.physics.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
 from mrdamper.rig_files.quality.strokes import Strokes, find_strokes
@@ -66,7 +66,7 @@ class View:
         """Usual step of time [s]."""
         time = self.record.time
         at = np.arange(0, time.size - 1, max(1, time.size // MOST_SAMPLES))
-        steps = taken(time, at + 1) - taken(time, at)
+        steps = take(time, at + 1) - take(time, at)
         steps = steps[np.isfinite(steps)]
         return float(np.median(steps)) if steps.size else 0.0
 
@@ -78,10 +78,10 @@ class View:
         bounds = np.searchsorted(index, [a for a, _ in self.segments] + [self.segments[-1][1]])
         return Run(
             id=self.record.id,
-            time=taken(self.record.time, index),
-            displacement=taken(self.record.displacement, index),
-            force=taken(self.record.force, index),
-            current=np.zeros(index.size) if current is None else taken(current, index),
+            time=take(self.record.time, index),
+            displacement=take(self.record.displacement, index),
+            force=take(self.record.force, index),
+            current=np.zeros(index.size) if current is None else take(current, index),
             segments=tuple((int(a), int(b)) for a, b in pairwise(bounds) if b > a),
         )
 
@@ -145,7 +145,7 @@ class View:
             return self._in_segments(np.flatnonzero(record.present))
         most = record.time.size // MOST_SAMPLES
         coarse = self._there(np.arange(0, record.time.size, most))
-        period = find_strokes(taken(record.time, coarse), taken(record.displacement, coarse)).period
+        period = find_strokes(take(record.time, coarse), take(record.displacement, coarse)).period
         stride = 1 if period is None or self.step <= 0 else int(np.clip(period / self.step / _FINE, 1, most))
         thinned = np.arange(0, record.time.size, stride)
         middle = max(0, thinned.size - MOST_SAMPLES) // 2
@@ -167,7 +167,7 @@ class View:
 
     def _there(self, index: np.ndarray) -> np.ndarray:
         channels = (self.record.time, self.record.displacement, self.record.force, self.record.current)
-        return index[np.all([np.isfinite(taken(c, index)) for c in channels if c is not None], axis=0)]
+        return index[np.all([np.isfinite(take(c, index)) for c in channels if c is not None], axis=0)]
 
 
 def sample_noise(signal: Floats) -> float:

@@ -14,7 +14,7 @@ from typing import IO
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.data.pieces import pieces
+from mrdamper.data.chunks import chunks
 
 LARGE = 16 * 2**20  # bytes
 
@@ -63,6 +63,6 @@ def rescale(values: Floats, factor: float, offset: float = 0.0) -> Floats:
         return values
     if not isinstance(values, np.memmap):
         return factor * values + offset if offset else factor * values
-    for _, piece in pieces(values):
+    for _, piece in chunks(values):
         piece[:] = factor * piece + offset
     return values

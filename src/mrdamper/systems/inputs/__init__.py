@@ -9,7 +9,7 @@ from pathlib import Path
 from mrdamper.data.atomic import path_of
 from mrdamper.data.parameters import parameters_of, with_values
 from mrdamper.discovery import Registry
-from mrdamper.errors import RecordError, UnknownNameError, checked
+from mrdamper.errors import RecordError, UnknownNameError, validate_arguments
 from mrdamper.systems.inputs.base import Input
 
 __all__ = ["Input", "input_types", "load_input"]
@@ -34,7 +34,7 @@ def made_inputs() -> dict[str, tuple[type[Input], Mapping[str, float]]]:
     return inputs
 
 
-@checked("name")
+@validate_arguments("name")
 def load_input(name: str | Path, values: Mapping[str, float] | None = None, time_scale: float = 1.0) -> Input:
     """Return an input by name: a record's file, the name of a bundled record, or a synthetic input.
 

@@ -17,7 +17,7 @@ from mrdamper.systems.structure import System
 
 
 @dataclass(frozen=True, eq=False)
-class Contest:
+class ControllerComparison:
     """Runs of one system at one step."""
 
     runs: Mapping[str, Simulation]  # by title; no current and the highest current first, the preview last
@@ -29,7 +29,7 @@ class Contest:
         return (worst - costs[title]) / (worst - best) if worst > best else 1.0
 
 
-def contest(
+def compare_controllers(
     system: System,
     source: Input,
     dampers: Mapping[str, Damper],
@@ -37,7 +37,7 @@ def contest(
     step: float | None = None,
     highest: float | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
-) -> Contest:
+) -> ControllerComparison:
     """Run controllers one after the other, all at the step that the first one settles at.
 
     `system`, `source`, `dampers`, `step`, `highest`: as `simulate_system`; `controllers`: beside no current, the
@@ -52,7 +52,7 @@ def contest(
     for number, (title, controller) in enumerate(several.items()):
         progress(title, number / len(several))
         runs[title] = SystemLoop(system, source, dampers, controller, highest).run(first.step)
-    return Contest(runs)
+    return ControllerComparison(runs)
 
 
 def _title(controller: Controller) -> str:

@@ -1,4 +1,4 @@
-"""Least squares in a single number whose derivative is known.
+"""Least squares in a single parameter whose derivative is known.
 
 One evaluation a step and no matrix: for searches that are run by the thousand. The curvature
 comes from the change of the gradient (secant), at the first step from the Jacobian; a bracket
@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mrdamper.statistics.ending import StopReason
 from mrdamper.statistics.levenberg_marquardt import Minimum
 from mrdamper.statistics.linear import Floats
+from mrdamper.statistics.stop_reason import StopReason
 
 Evaluation = tuple[Floats, Floats]  # residual, its derivative
 

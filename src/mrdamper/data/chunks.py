@@ -8,29 +8,29 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-PIECE = 2**20  # samples
+CHUNK = 2**20  # samples
 
 
-def pieces(values: NDArray, overlap: int = 0) -> Iterator[tuple[int, NDArray]]:
-    """Start and samples of every piece of an array, in order; each but the last holds `overlap` samples of the next."""
-    for at in range(0, max(values.size, 1), PIECE):
-        yield at, values[at : at + PIECE + overlap]
-        release(values)
+def chunks(values: NDArray, overlap: int = 0) -> Iterator[tuple[int, NDArray]]:
+    """Start and samples of every chunk of an array, in order; each but the last holds `overlap` samples of the next."""
+    for at in range(0, max(values.size, 1), CHUNK):
+        yield at, values[at : at + CHUNK + overlap]
+        drop_pages(values)
 
 
-def taken(values: NDArray, index: NDArray) -> NDArray:
+def take(values: NDArray, index: NDArray) -> NDArray:
     """Return the samples of an increasing index, without holding all of a memory-mapped array at once."""
-    if values.size <= PIECE:
+    if values.size <= CHUNK:
         return values[index]
-    bounds = np.searchsorted(index, np.arange(PIECE, values.size, PIECE))
+    bounds = np.searchsorted(index, np.arange(CHUNK, values.size, CHUNK))
     parts = []
     for part in np.split(index, bounds):
         parts.append(values[part])
-        release(values)
+        drop_pages(values)
     return np.concatenate(parts)
 
 
-def release(values: NDArray) -> None:
+def drop_pages(values: NDArray) -> None:
     """Let go of the memory of a memory-mapped array, or of a view of one; its numbers stay in its file."""
     held: object = values
     while held is not None:
