@@ -169,7 +169,7 @@ class Run(Displayable):
             raise RunError(
                 change,
                 where=self._where,
-                remedy="use a joint model, which takes a current channel",
+                remedy="use a global model, which takes a current channel",
                 code="E_CURRENT_VARIES",
             )
         return current

@@ -9,7 +9,7 @@ class StopReason(StrEnum):
     """Reason for which a search stopped, as a sentence; programs compare the member itself."""
 
     SOLVED = "solved: every parameter is linear"
-    SETTLED = "converged: the cost changes no more"
+    SETTLED = "converged: the cost no longer changes"
     NO_STEP = "converged: no step lowers the cost"
     AT_BOUNDS = "every coordinate ended at a bound"
     STEPS_SPENT = "stopped at the limit of steps, the cost still falling"

@@ -314,7 +314,7 @@ def study_rig(
     trusted, distrusted = accepted_runs(dataset)
     everything, unusable = runs_for_global_fit(run for run in trusted if run.split == "train")
     unusable |= distrusted
-    refused = {name: unusable.get(name, f"{why}; the joint model takes it whole") for name, why in refused.items()}
+    refused = {name: unusable.get(name, f"{why}; the global model uses it") for name, why in refused.items()}
     refused = aside | refused
     if not everything:
         raise IdentificationError(
