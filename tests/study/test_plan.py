@@ -49,7 +49,7 @@ def test_every_record_is_allowed_and_shrinks_the_doubt(reckoning):
         assert item.condition.peak_velocity <= 0.2 * (1 + 1e-9)
         assert item.after < item.before
     assert [item.before for item in made[1:]] == [item.after for item in made[:-1]]
-    assert "90 % band of the force over the envelope" in reckoning.said(made)
+    assert "90 % prediction interval of the force over the envelope" in reckoning.summary(made)
 
 
 def test_sessions_are_taken_where_they_pay(reckoning):
@@ -75,7 +75,7 @@ def test_a_doubt_can_be_chosen(damper, reckoning):
     i = about.names.index("c1")
     error = np.sqrt(damper.uncertainty.covariance[i, i]) / damper.fitted_parameters["c1"].value
     assert made[0].before == pytest.approx(error, rel=1e-3)
-    assert "standard error of c1" in about.said(made)
+    assert "standard error of c1" in about.summary(made)
     whole = reckoning.chosen(0.3)
     assert made[-1].after < about.spread(whole)
     _, at = plan_tests(damper, LIMITS, 0.3, Condition(1.0, 0.5, 0.02))
@@ -144,7 +144,7 @@ def test_the_records_are_read_back(damper, tmp_path):
     got = CliRunner().invoke(application(), asked)
     assert got.exit_code == 0, got.output
     assert "least informative runs: r" in got.stdout
-    assert "band of the force at 0.5 A, 2 Hz, 8 mm" in got.stdout.replace("2.00", "2").replace("8.00", "8")
+    assert "interval of the force at 0.5 A, 2 Hz, 8 mm" in got.stdout.replace("2.00", "2").replace("8.00", "8")
     with (tmp_path / "next" / "plan.csv").open() as file:
         listed = list(csv.DictReader(file))
     for row in listed:

@@ -279,8 +279,8 @@ class Calibration:
         if self.units < _ENOUGH_UNITS:
             few = f"; {self.units} independent {self.unit}s reach {100 * self.reachable:.0f} % at most"
         return (
-            f"{100 * self.level:.3g} % prediction intervals covered {force} of the samples, {peak} of the peak forces and "
-            f"{energy} of the energies of {self.units} cross-validated {self.unit}s{few}"
+            f"{100 * self.level:.3g} % prediction intervals covered {force} of the samples, "
+            f"{peak} of the peak forces and {energy} of the energies of {self.units} cross-validated {self.unit}s{few}"
         )
 
     def factor(self, quantity: Quantity, level: float) -> float:

@@ -159,7 +159,9 @@ class Limits:
         allowed = [c for c in conditions if c.peak_velocity <= self.velocity_m_s * (1 + 1e-9)]
         least = self.opening + min(self.minutes(c) for c in allowed)
         if not (math.isfinite(hours) and hours * 60 >= least):
-            raise bad_limits(f"{hours:g} hours", f"a session set up with its shortest record takes {least:.1f} minutes")
+            raise bad_limits(
+                f"{hours:g} hours", f"a session with its shortest record takes {least:.1f} minutes with setting up"
+            )
         return allowed
 
 

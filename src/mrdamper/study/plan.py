@@ -247,24 +247,24 @@ class ExperimentDesign:
                 before = after
         return proposals
 
-    def said(self, proposals: Sequence[Proposal]) -> str:
+    def summary(self, proposals: Sequence[Proposal]) -> str:
         """State the standard deviation before and after as text."""
         before, after = proposals[0].before, proposals[-1].after
         if self.about in self.names:
             return f"standard error of {self.about} {100 * before:.1f} -> {100 * after:.1f} % of its value"
-        numbers, whole = (
+        parameters, total = (
             [100 * student(_LEVEL, np.inf) * math.sqrt(s**2 + more) for s in (before, after)]
             for more in (0, self.beside)
         )
         return (
-            f"{100 * _LEVEL:g} % band of the force {self.about}, of its peak: ±{numbers[0]:.1f} -> ±{numbers[1]:.1f} % "
-            f"by what is not known of the numbers; ±{whole[0]:.1f} -> ±{whole[1]:.1f} % with the gain of an unknown "
-            "session and the model's own error"
+            f"{100 * _LEVEL:g} % prediction interval of the force {self.about}, relative to the peak force: "
+            f"±{parameters[0]:.1f} -> ±{parameters[1]:.1f} % from the parameters; "
+            f"±{total[0]:.1f} -> ±{total[1]:.1f} % with a future session and model error"
         )
 
 
 def _slopes(damper: Damper, uncertainty: Uncertainty, names: Sequence[str], condition: Condition) -> Floats:
-    """(D, K, P + 2) derivatives over half the peak-to-peak force: by the numbers, by a gain, by an offset [N]."""
+    """(D, K, P + 2) derivatives over half the peak-to-peak force: by the parameters, by a gain, by an offset [N]."""
     rng = np.random.default_rng(_SEED)
     root = np.linalg.cholesky(uncertainty.covariance + 1e-12 * np.diag(np.diag(uncertainty.covariance)))
     motion, last = sine(condition, 2, 4 * _SAMPLES), slice(-4 * _SAMPLES, None, 4)

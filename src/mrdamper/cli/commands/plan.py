@@ -72,7 +72,7 @@ def register(app: typer.Typer) -> None:
         )
         if damper is None or reckoning is None:
             return
-        typer.echo(reckoning.said(chosen))
+        typer.echo(reckoning.summary(chosen))
         if least := least_informative_runs(damper):
             runs = ", ".join(f"{name} ({100 * share:.1f} %)" for name, share in least)
             typer.echo(f"least informative runs: {runs} of the information")
