@@ -349,9 +349,6 @@ def test_a_motion_repeats_from_nearly_a_cycle_on(monkeypatch, cycles, asked):
     assert bool(seen) is asked
 
 
-def test_errors_are_those_of_the_spread_and_powers_are_powers():
-    J, residual, time = RNG.standard_normal((90, 2)), RNG.standard_normal(90), np.arange(90) / 30
-    errors = covariance.standard_errors(J, residual, time, 1.3)
-    assert errors == pytest.approx(spread(J, residual, time, 1.3).errors)
+def test_powers_are_powers():
     base = np.exp(1j * np.array([0.1, 2.0]))
     assert covariance._powers(base, 3) == pytest.approx(np.array([base, base**2, base**3]))

@@ -71,7 +71,7 @@ def test_a_loop_that_gives_energy_is_refused_from_a_twentieth_on(monkeypatch, sh
     made = view(viscous)
     if not refused:
         return dissipates(made)
-    with pytest.raises(QualityError, match=r"\(6 % of the force pushes along.*count in opposite directions") as told:
+    with pytest.raises(QualityError, match=r"\(6 % of the force acts along.*count in opposite directions") as told:
         dissipates(made)
     assert told.value.code == "E_DISSIPATION_SIGN"
     monkeypatch.setattr(loop, "_exchanged", lambda view: True)
