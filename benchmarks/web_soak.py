@@ -73,6 +73,7 @@ class User:
 
     def __init__(self, server: Server, seed: int, times: dict[str, list[float]], errors: list[str]):
         self.server, self.rng, self.times, self.errors = server, random.Random(seed), times, errors
+        self.works: list[threading.Thread] = []
         self.at, self.keys, self.where = "", [""], {"current_A": 0.5, "frequency_Hz": 1.0, "amplitude_m": 0.012}
 
     def timed(self, kind: str, method: str, path: str, body: Any = None) -> bytes:
@@ -126,7 +127,11 @@ class User:
             else:
                 self.errors.append(f"{kind}: {job}")
 
-        return lambda: threading.Thread(target=follow, daemon=True).start()
+        def begin() -> None:
+            self.works.append(threading.Thread(target=follow, daemon=True))
+            self.works[-1].start()
+
+        return begin
 
     def use(self, seconds: float) -> None:
         """Everything, each at times of its own."""
@@ -140,6 +145,8 @@ class User:
             if moment < seconds:
                 time.sleep(max(0.0, begin + moment - time.perf_counter()))
                 action()
+        for work in self.works:
+            work.join()  # a session is closed once its work has ended
 
 
 def soak(seconds: float) -> list[str]:
