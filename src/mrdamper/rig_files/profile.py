@@ -168,15 +168,14 @@ class Profile(Table):
                 raise ValueError(f"{channel.unit!r} is no unit of {dimension} ({name})")
         return channels
 
-    def of_file(self, name: str) -> tuple[str, Profile] | None:
-        """The test that a file belongs to, and the profile of its channels; None if no channel names such files."""
+    def of_file(self, name: str) -> tuple[str, Profile]:
+        """The test that a file of some channels belongs to, and its profile; an empty name for any other file."""
         stated = {role: channel for role, channel in self.channels.items() if channel.file is not None}
         matches = {role: re.fullmatch(_as_expression(c.file or ""), name[:255]) for role, c in stated.items()}
         runs = {match["run"] for match in matches.values() if match}
-        if len(runs) != 1:
-            return None
         channels = {role: c for role, c in self.channels.items() if role not in stated or matches[role]}
-        return runs.pop(), self.model_copy(update={"channels": channels})
+        own = self.model_copy(update={"channels": channels}) if stated else self
+        return runs.pop() if len(runs) == 1 else "", own
 
     def channel(self, name: str) -> Channel:
         """Return the settings of a channel."""

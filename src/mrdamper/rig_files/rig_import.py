@@ -203,13 +203,13 @@ class _Intake:
         """Read a file, and check the tests in it whose current is known."""
         self._order[str(path)] = len(self._order)
         self._given |= {path} if given else set()
-        share = self._profile.of_file(path.name)
-        if share is not None:
-            self._shares[path] = share
+        run, profile = self._profile.of_file(path.name)
+        if run:
+            self._shares[path] = run, profile
             return
         try:
             with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused
-                records, problems = records_of_file(path, self._profile)
+                records, problems = records_of_file(path, profile)
         except InputError as error:
             refusals = [Refusal(str(path), one) for one in getattr(error, "errors", (error,))]
             self.met.append((path, ""))
@@ -271,7 +271,7 @@ class _Intake:
 
     def _join_channels(self, others: list[Path]) -> set[Path]:
         """Join displacements and forces of two files, and currents that other files state; the files that were used."""
-        parts = [part for path in others if (part := part_of(path, self._profile))]
+        parts = [part for path in others if (part := part_of(path, self._profile.of_file(path.name)[1]))]
         parts += [part for path, (run, own) in self._shares.items() if (part := part_of(path, own, run))]
         used: set[Path] = set()
         for record, paths in joined_parts(parts, self._profile):

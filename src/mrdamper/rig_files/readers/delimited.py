@@ -66,7 +66,7 @@ class DelimitedText(Reader):
             stream.source,
             layout.names,
             units,
-            lambda columns: _read(stream, layout, block, tuple(columns)),
+            lambda columns: _read(stream, layout, block, tuple(dict.fromkeys(columns))),
             layout.header_line,
             f"block {index + 1}" if count > 1 else "",
             _form(stream, layout),

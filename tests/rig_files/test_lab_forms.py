@@ -1,0 +1,173 @@
+"""Forms in which laboratories keep what belongs to a record: beside it, in codes, in formulas, in other files."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mrdamper.rig_files.profile import parse_profile
+from mrdamper.rig_files.rig_import import import_files, read_run, read_runs
+
+T = np.arange(0.0, 4.0, 0.005)
+V = np.cos(2 * np.pi * T)
+X = 10 * np.sin(2 * np.pi * T)  # [mm]
+
+
+def force(amperes: float, seed: int = 0) -> np.ndarray:
+    """Force [N] of a damper at a current."""
+    return (200 + 500 * amperes) * np.tanh(6 * V) + 100 * V + np.random.default_rng(seed).normal(0, 2, T.size)
+
+
+def rows(*columns: np.ndarray, separator: str = ",") -> str:
+    return "".join(separator.join(f"{v:.5f}" for v in row) + "\n" for row in zip(*columns, strict=True))
+
+
+def currents(records) -> list[float]:
+    return sorted(round(float(np.mean(record.current)), 3) for record in records)
+
+
+def test_codes_in_names_are_read_by_a_legend_beside_the_files(tmp_path):
+    for code, amperes in (("I1", 0.0), ("I2", 0.6)):
+        (tmp_path / f"MRD_{code}_F1.csv").write_text("time (s),disp (mm),force (N)\n" + rows(T, X, force(amperes)))
+    (tmp_path / "legend.txt").write_text("Names of files\nI1 = 0 A\nI2 = 0.6 A\nF1 = 1 Hz\n")
+    assert currents(import_files([tmp_path]).records) == [0.0, 0.6]
+
+
+def test_without_a_legend_codes_state_no_current(tmp_path):
+    (tmp_path / "MRD_I2_F1.csv").write_text("time (s),disp (mm),force (N)\n" + rows(T, X, force(0.6)))
+    assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_CURRENT_MISSING"]
+
+
+def test_a_magnitude_has_the_sign_of_the_sense_beside_it(tmp_path):
+    measured = force(0.5)
+    text = "T = tension, C = compression\nCoil current: 0.5 A\n\nTime s,Displacement mm,Load N,Sense\n"
+    text += "".join(
+        f"{t:.4f},{x:.4f},{abs(f):.3f},{'CT'[int(f > 0)]}\n" for t, x, f in zip(T, X, measured, strict=True)
+    )
+    (tmp_path / "frame.csv").write_text(text)
+    assert np.allclose(read_run(tmp_path / "frame.csv").force, measured, atol=1e-3)
+
+
+def test_channels_in_rows_are_turned(tmp_path):
+    cells = [("Time [s]", T), ("Displacement [mm]", X), ("Force [N]", force(0.5))]
+    text = "Test;7\nCoil current [A];0.5\n" + "".join(
+        f"{n};" + ";".join(f"{v:.4f}" for v in c) + "\n" for n, c in cells
+    )
+    (tmp_path / "rows.csv").write_text(text)
+    record = read_run(tmp_path / "rows.csv")
+    assert record.time.size == T.size
+    assert currents([record]) == [0.5]
+
+
+def test_an_xml_file_beside_a_record_names_columns_rate_and_current(tmp_path):
+    (tmp_path / "data.csv").write_text(rows(X, force(0.5) / 1e3))
+    meta = """<test><samplingRate unit="Hz">200</samplingRate><coilCurrent unit="A">0.5</coilCurrent>
+    <channel column="2" name="Force" unit="kN"/><channel column="1" name="Displacement" unit="mm"/></test>"""
+    (tmp_path / "meta.xml").write_text(meta)
+    (record,) = import_files([tmp_path]).records
+    assert np.ptp(record.displacement) == pytest.approx(0.020, rel=1e-3)
+    assert record.time[-1] == pytest.approx(T[-1])
+    (tmp_path / "meta.xml").write_text('<!DOCTYPE t [<!ENTITY a "b">]>' + meta)
+    assert import_files([tmp_path]).records == ()
+
+
+def test_numbered_keys_state_names_units_scales_and_the_step(tmp_path):
+    head = "DELTA_T=5.0E-03\nDESC.CHAN_1=Actuator displacement\nUNITS.CHAN_1=mm\nSCALE.CHAN_1=1.25E-03\n"
+    head += (
+        "DESC.CHAN_2=Damper force\nUNITS.CHAN_2=N\nSCALE.CHAN_2=9.0E-02\nDESCRIPTION=sine, coil current 0.5 A\nDATA\n"
+    )
+    counts = zip(np.round(X / 1.25e-3).astype(int), np.round(force(0.5) / 9e-2).astype(int), strict=True)
+    (tmp_path / "road.txt").write_text(head + "".join(f"{a}\t{b}\n" for a, b in counts))
+    record = read_run(tmp_path / "road.txt")
+    assert np.ptp(record.displacement) == pytest.approx(0.020, rel=1e-3)
+    assert currents([record]) == [0.5]
+
+
+def test_points_of_time_and_value_are_channels(tmp_path):
+    tests = [
+        {
+            "setpoints": {"coilCurrent": {"value": 1e3 * amperes, "unit": "mA"}},
+            "series": [
+                {
+                    "channel": name,
+                    "unit": unit,
+                    "timeUnit": "ms",
+                    "points": [list(p) for p in zip(1e3 * T, c, strict=True)],
+                }
+                for name, unit, c in (("piston.position", "mm", X), ("rod.force", "N", force(amperes)))
+            ],
+        }
+        for amperes in (0.0, 0.6)
+    ]
+    (tmp_path / "export.json").write_text(json.dumps({"tests": tests}))
+    assert currents(read_runs(tmp_path / "export.json")) == [0.0, 0.6]
+
+
+def test_a_cell_of_matrices_takes_its_numbers_from_the_vectors_beside_it(tmp_path):
+    savemat = pytest.importorskip("scipy.io").savemat
+    data = np.empty((2, 1), object)
+    data[0, 0], data[1, 0] = (np.column_stack([T, X, force(amperes)]) for amperes in (0.0, 0.5))
+    names = np.array(["t [s]", "s [mm]", "F [N]"], object)
+    savemat(tmp_path / "m.mat", {"data": data, "columns": names, "I_coil_A": np.array([[0.0], [0.5]])})
+    tests = read_runs(tmp_path / "m.mat")
+    assert currents(tests) == [0.0, 0.5]
+    assert np.ptp(tests[1].force) > np.ptp(tests[0].force)
+
+
+def test_counts_are_scaled_by_the_formula_that_a_text_states_and_refused_without_it(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    for name, says in (("stated", "physical = raw * gain + offset"), ("open", "see the manual")):
+        with h5py.File(tmp_path / f"{name}.h5", "w") as file:
+            file.attrs["coil_current_A"], file.attrs["sample_rate_Hz"] = 0.5, 200.0
+            for channel, values, unit, gain in (("displacement", X, "mm", 5e-4), ("force", force(0.5), "N", 0.125)):
+                counts = file.create_dataset(channel, data=np.round((values - 0.5) / gain).astype("<i4"))
+                counts.attrs.update({"unit": unit, "gain": gain, "offset": 0.5, "conversion": says})
+    assert np.ptp(read_run(tmp_path / "stated.h5").displacement) == pytest.approx(0.020, rel=1e-3)
+    assert [r.error.code for r in import_files([tmp_path / "open.h5"]).refusals] == ["E_AMBIGUOUS"]
+
+
+def test_rows_of_a_netcdf_table_are_tests(tmp_path):
+    netcdf_file = pytest.importorskip("scipy.io").netcdf_file
+    with netcdf_file(tmp_path / "t.nc", "w") as file:
+        file.createDimension("test", 2), file.createDimension("time", T.size)
+        for name, unit, shape, values in (
+            ("time", "s", ("time",), T),
+            ("coil_current", "A", ("test",), np.array([0.0, 0.5])),
+            ("displacement", "mm", ("test", "time"), np.stack([X, X])),
+            ("force", "N", ("test", "time"), np.stack([force(0.0), force(0.5)])),
+        ):
+            variable = file.createVariable(name, "d", shape)
+            variable[:], variable.units = values, unit
+    assert currents(read_runs(tmp_path / "t.nc")) == [0.0, 0.5]
+
+
+def test_a_profile_joins_files_of_one_channel_each_and_refuses_a_file_without_its_other(tmp_path):
+    for run, amperes in (("01", 0.0), ("02", 0.5)):
+        (tmp_path / f"C1--{run}.csv").write_text("Time,Ampl\n" + rows(T, X / 2.5))
+        (tmp_path / f"C2--{run}.csv").write_text("Time,Ampl\n" + rows(T, force(amperes) / 50))
+    (tmp_path / "readme.txt").write_text("trace  coil current\n01  0.0 A\n02  0.5 A\n")
+    profile = parse_profile(
+        '[channels.time]\ncolumn = 1\nunit = "s"\n'
+        '[channels.displacement]\nfile = "C1--{run}.csv"\ncolumn = 2\nunit = "mm"\nscale = 2.5\n'
+        '[channels.force]\nfile = "C2--{run}.csv"\ncolumn = 2\nunit = "N"\nscale = 50\n'
+    )
+    imported = import_files([tmp_path], profile)
+    assert [record.id for record in imported.records] == ["01", "02"]
+    assert currents(imported.records) == [0.0, 0.5]
+    (tmp_path / "C2--02.csv").unlink()
+    assert {r.error.code for r in import_files([tmp_path], profile).refusals} >= {"E_COLUMN"}
+
+
+def test_a_profile_integrates_a_velocity(tmp_path):
+    text = "# Coil current: 0.5 A\nTime (s),Velocity (mm/s),Force (N)\n" + rows(T, 20 * np.pi * V, force(0.5))
+    (tmp_path / "lvt.csv").write_text(text)
+    profile = parse_profile('[channels.displacement]\ncolumn = "Velocity (mm/s)"\nunit = "mm/s"\nintegrate = true\n')
+    assert np.ptp(read_run(tmp_path / "lvt.csv", profile).displacement) == pytest.approx(0.020, rel=2e-3)
+
+
+def test_a_heading_that_states_another_amplitude_is_reported(tmp_path):
+    head = "Amplitude: 10 mm\nCurrent: 0.5 A\nTime (s),Displacement (mm),Force (N)\n"
+    (tmp_path / "a.csv").write_text(head + rows(T, X / 25.4, force(0.5)))
+    assert "W_NAME" in [finding.code for finding in read_run(tmp_path / "a.csv").findings]
+    (tmp_path / "b.csv").write_text(head + rows(T, X, force(0.5)))
+    assert "W_NAME" not in [finding.code for finding in read_run(tmp_path / "b.csv").findings]
