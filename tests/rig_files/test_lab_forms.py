@@ -171,3 +171,11 @@ def test_a_heading_that_states_another_amplitude_is_reported(tmp_path):
     assert "W_NAME" in [finding.code for finding in read_run(tmp_path / "a.csv").findings]
     (tmp_path / "b.csv").write_text(head + rows(T, X, force(0.5)))
     assert "W_NAME" not in [finding.code for finding in read_run(tmp_path / "b.csv").findings]
+
+
+def test_channels_in_volts_are_refused_with_the_scale_that_is_missing(tmp_path):
+    head = "Vertical Units,V,V,\nLabel,LVDT,Load cell,\n\nTIME,CH1,CH2\n"
+    (tmp_path / "tek_0.5A.csv").write_text(head + rows(T, X / 2, force(0.5) / 200))
+    (refusal,) = {str(r.error) for r in import_files([tmp_path]).refusals if "force" in str(r.error)}
+    assert "CH1, CH2 in volts without a scale" in refusal
+    assert "unit and scale" in refusal

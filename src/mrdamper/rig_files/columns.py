@@ -259,6 +259,10 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
     shown += "" if any(header.unit for header in table.headers) else ", without units"
     remedy = 'set [channels.{}] column = "..."{} in a profile'
     fixed = {"time": " or, with a fixed rate, [file] sample_rate_Hz = ..."}
+    volts = [table.names[i] for i, header in enumerate(table.headers) if header.dimension == "voltage"]
+    if volts:  # a column alone would not do
+        shown += f"; {', '.join(volts)} in volts without a scale"
+        fixed |= dict.fromkeys(("displacement", "force"), ", unit and scale (unit per volt)")
     return [
         _refusal(
             ColumnError, table, f"no column is known to be {r} (found {shown})", remedy.format(r, fixed.get(r, ""))
