@@ -38,9 +38,11 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
         E_BLOCKS if there are more than 500 tests.
     """
     whole = [slice(0, time.size)]
+    if not 400 <= time.size <= _LONGEST:  # a longer record lies in a file and is not read as a whole
+        return whole
     there = np.isfinite(time) & np.isfinite(displacement)
     current = np.zeros(time.size) if current is None else current
-    if not there.all() or not 400 <= time.size <= _LONGEST or np.any(np.diff(time) <= 0):
+    if not there.all() or np.any(np.diff(time) <= 0):
         return whole
     borders = [(at, at) for at in _borders(time, displacement)] or _steps(time, displacement, current)
     ends = [*(stop for stop, _ in borders), time.size]
