@@ -50,7 +50,12 @@ class NetCdf(Reader):
             return [
                 array_table(source, list(arrays), units, column_of, title=self.title, constants=single, remarks=remarks)
             ]
-        count, samples = arrays[across[0]].shape
+        return self._tests(source, arrays, units, column_of, arrays[across[0]].shape, single, remarks)
+
+    def _tests(self, source, arrays, units, column_of, shape, single, remarks) -> list[RawTable]:
+        """A table for each row of the arrays of a shape, with its own of the numbers one a row."""
+        variables = list(arrays.values())
+        count, samples = shape
         kept = [i for i, variable in enumerate(variables) if samples in variable.shape]
         names = list(arrays)
         tables = []
