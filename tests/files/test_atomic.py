@@ -12,7 +12,7 @@ import pytest
 from support.command import mrdamper
 
 from mrdamper.data import atomic
-from mrdamper.data.atomic import MADE, publish, require_writable, write_file, write_folder, write_into
+from mrdamper.data.atomic import MADE, ResultRecord, publish, require_writable, write_file, write_folder, write_into
 from mrdamper.errors import InputError, OutputError, ResourceError, resource_error
 
 posix = pytest.mark.skipif(os.name != "posix", reason="kills and locks as POSIX knows them")
@@ -39,10 +39,12 @@ def test_a_result_takes_the_place_of_the_earlier_one_and_files_of_others_stay(tm
     (out / "figures" / "mine.svg").write_text("mine")
     if here:
         monkeypatch.chdir(out)
-    listed = publish(out, "page", result(["page", "model.json", "figures/b.svg"], "new"), {"seconds": 1.5})
+    record = ResultRecord(seconds={"in all": 1.5})
+    listed = publish(out, "page", result(["page", "model.json", "figures/b.svg"], "new"), record)
     assert [p.relative_to(out).as_posix() for p in listed] == ["page", "model.json", "figures/b.svg"]
     found = files(out)
-    assert json.loads(found.pop(MADE)) == {"files": ["figures/b.svg", "model.json", "page"], "seconds": 1.5}
+    written = {"files": ["figures/b.svg", "model.json", "page"], "seconds": {"in all": 1.5}, "processes": None}
+    assert json.loads(found.pop(MADE)) == written
     new = dict.fromkeys(["page", "model.json", "figures/b.svg"], "new")
     assert found == new | dict.fromkeys(["mine.txt", "figures/mine.svg"], "mine")
     assert os.listdir(tmp_path) == ["out"]  # noqa: PTH208  hidden ones too

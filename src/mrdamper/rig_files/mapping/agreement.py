@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mrdamper.data import held_current
-from mrdamper.data.pieces import taken
+from mrdamper.data.chunks import take
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality.strokes import find_strokes
 from mrdamper.rig_files.record import Record
@@ -67,7 +67,7 @@ def _point(record: Record) -> _Point | None:
     if record.current is None:
         return None
     samples = np.arange(0, record.time.size, max(1, record.time.size // _MOST_SAMPLES))
-    channels = [taken(c, samples) for c in (record.time, record.displacement, record.force, record.current)]
+    channels = [take(c, samples) for c in (record.time, record.displacement, record.force, record.current)]
     there = np.all([np.isfinite(c) for c in channels], axis=0)
     time, x, force, current = (c[there] for c in channels)
     if time.size < 20:
