@@ -62,7 +62,7 @@ _LOADED = (
 )  # fmt: skip
 _STEPS = ("os.rename", "os.link", "os.remove", "os.rmdir", "os.mkdir", "ctypes.dlsym")  # the last: before an exchange
 _POINTS = {"disk": 20, "memory": 20, "file size": 10, "files": 4, "temporary folder": 1}  # of each command
-_TIMES = {"made", "table5_times", "fig26_times"}  # hold when a result was made and how long it took
+_TIMES = {"made", "seconds"}  # hold when a result was made and how long it took
 _GONE_S = 2.0  # in which children of a killed command must be gone
 
 
