@@ -35,9 +35,9 @@ from mrdamper.fleet import engine
 from mrdamper.fleet.item import digest_of
 from mrdamper.fleet.items import find_items
 from mrdamper.fleet.job import Settings, as_job, attempt
-from mrdamper.fleet.line import run_fleet
 from mrdamper.fleet.plan import Plan
 from mrdamper.fleet.profile import FleetProfile
+from mrdamper.fleet.run import run_fleet
 from mrdamper.fleet.table import TIMES
 from mrdamper.fleet.verdicts import drift, suspects, with_features
 from mrdamper.paper.virtual_rig import VirtualRig

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from mrdamper.discovery import register
     from mrdamper.errors import InputError
     from mrdamper.export import export_model
-    from mrdamper.fleet.line import run_fleet
+    from mrdamper.fleet.run import run_fleet
     from mrdamper.paper.study import reproduce
     from mrdamper.physics.gas_spring import GasSpring
     from mrdamper.physics.motion import Excitation, sine, sweep
@@ -63,7 +63,7 @@ _HOME = {
     "plot_loop": "report.plots.loops",
     "register": "discovery",
     "reproduce": "paper.study",
-    "run_fleet": "fleet.line",
+    "run_fleet": "fleet.run",
     "run_study": "study.workflow",
     "save_dataset": "rig_files.dataset_folder",
     "save_model": "dampers.model_file",

@@ -4,7 +4,7 @@ import pytest
 from support.fleets import LINE
 
 from benchmarks.synthetic_fleet import write_fleet
-from mrdamper.fleet.line import run_fleet
+from mrdamper.fleet.run import run_fleet
 
 
 @pytest.fixture(scope="session")

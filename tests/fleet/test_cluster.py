@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.fleet.engine import ClusterError
-from mrdamper.fleet.line import run_fleet
+from mrdamper.fleet.run import run_fleet
 
 
 class Cluster:

@@ -22,9 +22,9 @@ from mrdamper.errors import InputError
 from mrdamper.fleet.item import digest_of
 from mrdamper.fleet.items import find_items
 from mrdamper.fleet.job import Settings, as_job, attempt, read
-from mrdamper.fleet.lake import lake_dataset
-from mrdamper.fleet.line import run_fleet
+from mrdamper.fleet.parquet_folder import parquet_dataset
 from mrdamper.fleet.profile import FleetProfile
+from mrdamper.fleet.run import run_fleet
 from mrdamper.rig_files import sandbox
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 
@@ -290,7 +290,7 @@ def test_a_damaged_lake_is_refused_by_file(tmp_path):
             try:
                 if item.error is not None:
                     raise item.error
-                lake_dataset(item)
+                parquet_dataset(item)
             except InputError as error:
                 codes.add(error.code)
     assert "E_FORMAT" in codes
@@ -309,5 +309,5 @@ def test_what_a_lake_lacks_is_said_of_the_damper(line, tmp_path, column, value, 
         tmp_path / "a.parquet"
     )
     with pytest.raises(InputError) as refused:
-        lake_dataset(next(iter(find_items(tmp_path, FleetProfile()))))
+        parquet_dataset(next(iter(find_items(tmp_path, FleetProfile()))))
     assert refused.value.code == code

@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 from benchmarks.synthetic_fleet import FAULTS, Population, write_fleet
 from mrdamper.cli import application
 from mrdamper.errors import ColumnError
-from mrdamper.fleet.line import run_fleet
 from mrdamper.fleet.page import write_page
 from mrdamper.fleet.profile import ColumnLimits, FleetProfile, LimitsError, load_limits
+from mrdamper.fleet.run import run_fleet
 from mrdamper.fleet.verdicts import clock_findings, drift, suspects, with_features
 
 

@@ -30,7 +30,7 @@ from mrdamper.identification import identify
 from mrdamper.identification.loop_analysis import analyse_loop
 from mrdamper.identification.methods import all_methods
 from mrdamper.web.answers import frame
-from mrdamper.web.kept import DATA
+from mrdamper.web.saved_project import DATA
 from mrdamper.web.tasks import export_name
 
 SCREEN = 1e-6  # arrays travel as 32-bit floats: 6e-8 of each value, and sums of two
@@ -279,9 +279,9 @@ def test_a_band_is_the_dampers_own_and_not_of_a_held_one(client, bench, bundled,
 
 
 def test_a_kept_bench_comes_back_with_data_dampers_and_state(client, app, session, small_rig, joint, modified):
-    from mrdamper.web.drops import Intake
+    from mrdamper.web.uploads import ImportedData
 
-    next(iter(app.state.sessions)).put(Intake(small_rig, "drop"))
+    next(iter(app.state.sessions)).put(ImportedData(small_rig, "drop"))
     keys = [put_on(client, session, damper) for damper in (joint, modified)]
     logo = base64.b64encode(LOGO).decode()
     shown = {"state": json.dumps({"format": "mrdamper-bench-state"}), "damper": keys[1], "logo": logo}
@@ -384,9 +384,9 @@ def wait(client, session, job):
 
 
 def test_identified_values_are_those_of_identify(client, app, session, small_rig):
-    from mrdamper.web.drops import Intake
+    from mrdamper.web.uploads import ImportedData
 
-    next(iter(app.state.sessions)).put(Intake(small_rig, "drop"))
+    next(iter(app.state.sessions)).put(ImportedData(small_rig, "drop"))
     choice = {"rig": 0, "model": "bingham", "method": "projection", "runs": ["run0", "run1", "run2"]}
     report = wait(client, session, client.post(f"{session}/identify", json=choice).json())
     assert report["state"] == "done", report

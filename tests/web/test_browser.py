@@ -43,7 +43,7 @@ TAB_STOPS_OF_TOOL_BARS = """() => [...document.querySelectorAll(".modebar")].map
 
 
 def drop(page, files):
-    """Drop files on the page as a hand would: {name: bytes}."""
+    """Upload files on the page as a hand would: {name: bytes}."""
     packed = [[name, base64.b64encode(content).decode()] for name, content in files.items()]
     page.evaluate(
         """(files) => {

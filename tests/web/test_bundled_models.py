@@ -5,7 +5,7 @@ import pytest
 
 from mrdamper.study.validation import validate
 from mrdamper.study.workflow import run_study
-from mrdamper.web.intake import bundled_dampers
+from mrdamper.web.imported_data import bundled_dampers
 
 
 def test_there_is_one_per_rig_and_it_predicts_the_validation_runs(bundled):

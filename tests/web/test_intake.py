@@ -8,13 +8,13 @@ from web.rig_files import csv_of
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.dataset_folder import save_dataset
-from mrdamper.web.drops import FILE_COUNT_LIMIT, Drop, DropError, Intake, NothingTakenError
-from mrdamper.web.intake import bundled, read_drop
+from mrdamper.web.imported_data import bundled, read_upload
+from mrdamper.web.uploads import FILE_COUNT_LIMIT, ImportedData, NothingTakenError, Upload, UploadError
 
 
 @pytest.fixture
 def drop(tmp_path):
-    return Drop("drop1", tmp_path)
+    return Upload("drop1", tmp_path)
 
 
 def put(drop, name, content):
@@ -26,7 +26,7 @@ def test_a_dataset_folder_comes_back_as_it_was(drop, small_rig, tmp_path):
     save_dataset(small_rig, folder)
     for path in folder.iterdir():
         put(drop, f"my rig/{path.name}", path.read_bytes())
-    found = read_drop(drop)
+    found = read_upload(drop)
     assert found.dataset.name == "my rig"
     assert [run.id for run in found.dataset] == [run.id for run in small_rig]
     for there, here in zip(found.dataset, small_rig, strict=True):
@@ -37,7 +37,7 @@ def test_rig_files_are_read_with_the_current_of_their_names(drop, small_rig):
     runs = sorted(list(small_rig)[:3], key=lambda run: run.id)  # files are taken in the order of their names
     for run in runs:
         put(drop, f"{run.id}.csv", csv_of(run))
-    found = read_drop(drop)
+    found = read_upload(drop)
     assert [run.current_A for run in found.dataset] == [round(run.current_A, 3) for run in runs]
     for there, here in zip(found.dataset, runs, strict=True):
         # Written with six figures behind the point of millimetres.
@@ -48,8 +48,8 @@ def test_rig_files_are_read_with_the_current_of_their_names(drop, small_rig):
 def test_the_profile_shown_reads_the_same(drop, small_rig):
     run = next(iter(small_rig))
     put(drop, f"{run.id}.csv", csv_of(run))
-    first = read_drop(drop)
-    again = read_drop(drop, first.profile)
+    first = read_upload(drop)
+    again = read_upload(drop, first.profile)
     np.testing.assert_array_equal(again.dataset.runs[0].force, first.dataset.runs[0].force)
     assert again.profile == first.profile
 
@@ -58,18 +58,18 @@ def test_a_refused_drop_brings_the_profile_that_mends_it(drop, small_rig):
     run = next(iter(small_rig))
     put(drop, "no current in this name.csv", csv_of(run))
     with pytest.raises(NothingTakenError) as caught:
-        read_drop(drop)
+        read_upload(drop)
     (verdict,) = caught.value.verdicts
     assert verdict.name == "no current in this name.csv"
     assert verdict.findings[0][0] == "E_CURRENT_MISSING"
-    mended = read_drop(drop, f"{caught.value.profile}\n[current]\nvalue = 0.25\n")
+    mended = read_upload(drop, f"{caught.value.profile}\n[current]\nvalue = 0.25\n")
     assert mended.dataset.runs[0].current_A == 0.25
 
 
 def test_a_wrong_profile_is_told(drop, small_rig):
     put(drop, "run_1A.csv", csv_of(next(iter(small_rig))))
     with pytest.raises(InputError) as caught:
-        read_drop(drop, "rig = [")
+        read_upload(drop, "rig = [")
     assert caught.value.code == "E_PROFILE"
 
 
@@ -87,7 +87,7 @@ def test_what_cannot_be_read_is_refused_by_name(drop, files, code):
     for name, content in files.items():
         put(drop, name, content)
     with pytest.raises(InputError) as caught:
-        read_drop(drop)
+        read_upload(drop)
     assert caught.value.code == code
     assert caught.value.remedy
     assert str(drop.folder) not in str(caught.value)
@@ -95,7 +95,7 @@ def test_what_cannot_be_read_is_refused_by_name(drop, files, code):
 
 def test_too_many_files_are_refused(drop):
     drop.places = FILE_COUNT_LIMIT
-    with pytest.raises(DropError, match=str(FILE_COUNT_LIMIT)):
+    with pytest.raises(UploadError, match=str(FILE_COUNT_LIMIT)):
         drop.place("one more.csv")
 
 
@@ -106,7 +106,7 @@ def test_the_bundled_tests_are_read_once():
 def test_runs_that_do_not_move_are_shown_and_not_used(client, app, session, small_rig):
     one = next(iter(small_rig))
     still = replace(one, id="still", displacement=np.zeros(one.time.size))
-    next(iter(app.state.sessions)).put(Intake(small_rig.only([*small_rig, still]), "drop"))
+    next(iter(app.state.sessions)).put(ImportedData(small_rig.only([*small_rig, still]), "drop"))
     table = client.get(f"{session}/data/rigs/0").json()
     shown = next(run for run in table["runs"] if run["id"] == "still")
     assert shown["condition"] is None
@@ -122,11 +122,11 @@ def test_a_refused_file_is_mended_while_the_others_stay(drop, small_rig):
     reversed_force = replace(second, force=-second.force)
     put(drop, f"day 1/{first.id}.csv", csv_of(first))
     put(drop, f"day 2/{second.id}.csv", csv_of(reversed_force))
-    found = read_drop(drop)
+    found = read_upload(drop)
     assert (found.verdicts[0].name, found.verdicts[0].state) == (f"day 2/{second.id}.csv", "refused")
     assert found.verdicts[0].findings[0][0] == "E_DISSIPATION_SIGN"
     before, force, after = found.profile.partition("[channels.force]")
-    mended = read_drop(drop, before + force + after.replace("sign = 1", "sign = -1", 1), refused_only=True)
+    mended = read_upload(drop, before + force + after.replace("sign = 1", "sign = -1", 1), refused_only=True)
     assert {v.state for v in mended.verdicts} <= {"taken", "noted"}
     assert len(mended.dataset) == 2
     for run, there in zip((first, second), mended.dataset, strict=True):
@@ -137,7 +137,7 @@ def test_files_of_one_name_in_two_folders_are_two_runs(drop, small_rig):
     run = next(iter(small_rig))
     for day in (1, 2):
         put(drop, f"day {day}/{run.id}.csv", csv_of(run))
-    found = read_drop(drop)
+    found = read_upload(drop)
     assert len({r.id for r in found.dataset}) == 2
     assert [v.name for v in found.verdicts] == [f"day 1/{run.id}.csv", f"day 2/{run.id}.csv"]
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect
 
-from mrdamper.web.drops import FILE_LIMIT
 from mrdamper.web.security import FORM_LIMIT, HEADERS, Guard
+from mrdamper.web.uploads import FILE_LIMIT
 
 GUARD = Guard(None, ["127.0.0.1:8765", "localhost:8765"])
 GOOD = {"host": "127.0.0.1:8765", "origin": "http://127.0.0.1:8765"}

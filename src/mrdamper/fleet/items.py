@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mrdamper.errors import InputError
 from mrdamper.fleet.item import FleetError, Item, Kind, make_item
-from mrdamper.fleet.lake import is_lake, lake_items
+from mrdamper.fleet.parquet_folder import is_parquet_folder, parquet_items
 from mrdamper.fleet.profile import FleetProfile
 from mrdamper.rig_files.dataset_folder import runs_table
 from mrdamper.rig_files.dataset_samples import SAMPLE_FILES
@@ -27,8 +27,8 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
     lake = sorted(source.rglob("*.parquet")) if source.is_dir() else [source]
     results = [p for p in lake if p.name == "dampers.parquet" and _holds_results(p.parent)]
     lake = [p for p in lake if p.name not in SAMPLE_FILES and p.is_file() and p not in results]
-    if lake and is_lake(lake, profile):
-        items = lake_items(lake, profile)
+    if lake and is_parquet_folder(lake, profile):
+        items = parquet_items(lake, profile)
     elif source.is_dir():
         items = list(_in_folder(source, profile))
     else:

@@ -112,9 +112,9 @@ def read(item: Item, settings: Settings) -> tuple[Dataset, tuple[str, ...]]:
     """
     findings: list[str] = []
     if item.kind == "lake":
-        from mrdamper.fleet.lake import lake_dataset
+        from mrdamper.fleet.parquet_folder import parquet_dataset
 
-        dataset = lake_dataset(item)
+        dataset = parquet_dataset(item)
     elif item.kind == "dataset":
         from mrdamper.rig_files.dataset_folder import load_dataset
 

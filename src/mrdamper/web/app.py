@@ -24,10 +24,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mrdamper.errors import InputError, MissingExtraError
 from mrdamper.web.api import routers
-from mrdamper.web.drops import NothingTakenError
 from mrdamper.web.page import PageFiles
 from mrdamper.web.security import Guard
 from mrdamper.web.sessions import BrowserSessions
+from mrdamper.web.uploads import NothingTakenError
 from mrdamper.web.work import refusal
 
 _SWEEP_SECONDS = 60.0

@@ -26,9 +26,9 @@ from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.study.recipe import RecipeResult
 from mrdamper.web.bundled_studies import BundledStudies
-from mrdamper.web.drops import Drop, Intake
-from mrdamper.web.intake import bundled
+from mrdamper.web.imported_data import bundled
 from mrdamper.web.rig_table import RigTable, rig_table
+from mrdamper.web.uploads import ImportedData, Upload
 from mrdamper.web.work import Job
 
 IDLE_SECONDS = 12 * 3600  # a page that is open says so every minute; a closed one is forgotten after this
@@ -59,8 +59,8 @@ class Session:
     name: str
     folder: Path
     seen: float = field(default_factory=time.monotonic)
-    intake: Intake | None = None
-    drops: dict[str, Drop] = field(default_factory=dict)
+    imported: ImportedData | None = None
+    uploads: dict[str, Upload] = field(default_factory=dict)
     dampers: dict[str, Bench] = field(default_factory=dict)
     jobs: dict[str, Job] = field(default_factory=dict)
     newest: dict[str, Job] = field(default_factory=dict)  # of each kind, on the data of now
@@ -77,14 +77,14 @@ class Session:
     @property
     def dataset(self) -> Dataset:
         """The data on the bench; raises `InputError` if there is none yet."""
-        if self.intake is None:
+        if self.imported is None:
             raise InputError("no data on the bench", remedy="open the bundled tests, or drop files", code="E_NO_DATA")
-        return self.intake.dataset
+        return self.imported.dataset
 
     @property
     def bundled(self) -> bool:
         """True where the data are the bundled tests as they are."""
-        return self.intake is not None and self.intake.source == "bundled" and self.dataset is bundled().dataset
+        return self.imported is not None and self.imported.source == "bundled" and self.dataset is bundled().dataset
 
     def result(self, name: str, problem: str, remedy: str) -> Any:
         """Return the result of work under a name; raises `InputError` (E_NO_RESULT) where it left nothing."""
@@ -92,11 +92,11 @@ class Session:
             raise InputError(problem, remedy=remedy, code="E_NO_RESULT")
         return self.results[name]
 
-    def put(self, intake: Intake) -> None:
+    def put(self, imported: ImportedData) -> None:
         """Change the data: results that came from other data go."""
         self.cancel()
         self.newest.clear()
-        self.intake = intake
+        self.imported = imported
         self.results.clear()
 
     def table(self, number: int) -> RigTable:
@@ -108,7 +108,7 @@ class Session:
 
     def table_of(self, rig: str) -> RigTable | None:
         """The runs of the rig of that name, where they are on the bench."""
-        if self.intake is None or rig not in self.dataset.rigs:
+        if self.imported is None or rig not in self.dataset.rigs:
             return None
         return rig_table(self.dataset, rig)
 

@@ -48,8 +48,8 @@ def register(app: typer.Typer) -> None:
 
         from mrdamper.cli.output import shortened
         from mrdamper.cli.progress import progress_on_stderr
-        from mrdamper.fleet.line import run_fleet
         from mrdamper.fleet.profile import load_fleet_profile, load_limits
+        from mrdamper.fleet.run import run_fleet
 
         bounds = {} if limits is None else load_limits(limits)
         signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -14,10 +14,10 @@ from mrdamper.errors import UnknownNameError
 from mrdamper.rig_files.quality.table import Quality
 from mrdamper.web.answers import frame
 from mrdamper.web.curves import measured_cycle, measured_window, raw_record
-from mrdamper.web.drops import DROP_LIMIT, FILE_LIMIT, Drop, DropError, Intake
-from mrdamper.web.intake import bundled, bundled_dampers, read_drop
+from mrdamper.web.imported_data import bundled, bundled_dampers, read_upload
 from mrdamper.web.rig_table import condition_on_screen, describe
 from mrdamper.web.sessions import Current, Session
+from mrdamper.web.uploads import FILE_LIMIT, UPLOAD_LIMIT, ImportedData, Upload, UploadError
 
 router = APIRouter(prefix="/sessions/{session}")
 
@@ -42,12 +42,12 @@ def open_bundled(session: Current) -> dict[str, Any]:
 @router.post("/drops")
 def begin_drop(session: Current) -> dict[str, str]:
     """Make a place for files; an earlier place goes."""
-    for old in session.drops.values():
+    for old in session.uploads.values():
         shutil.rmtree(old.folder, ignore_errors=True)
     key = session.key("drop")
     folder = session.folder / key
     folder.mkdir(mode=0o700)
-    session.drops = {key: Drop(key, folder)}
+    session.uploads = {key: Upload(key, folder)}
     return {"drop": key}
 
 
@@ -56,49 +56,49 @@ async def take_file(
     key: str, session: Current, request: Request, name: str = Query(min_length=1, max_length=1000)
 ) -> dict[str, int]:
     """Take one file as it streams in; stops at the limit, whatever the length it announced."""
-    drop = _drop(session, key)
+    upload = _upload(session, key)
     announced = request.headers.get("content-length", "0")
     if announced.isdecimal() and int(announced) > FILE_LIMIT:
         raise _too_large(name)
-    path, size = drop.place(name), 0
+    path, size = upload.place(name), 0
     try:
         with path.open("xb") as file:
             async for piece in request.stream():
                 size += len(piece)
                 if size > FILE_LIMIT:
                     raise _too_large(name)
-                if drop.size + size > DROP_LIMIT:
-                    raise DropError(
+                if upload.size + size > UPLOAD_LIMIT:
+                    raise UploadError(
                         "the files together exceed 1 GB", remedy="drop fewer at once, or use mrdamper import"
                     )
                 file.write(piece)
     except BaseException:  # also a connection that breaks off: half a file is none
         path.unlink(missing_ok=True)
-        drop.names.pop(path, None)
+        upload.names.pop(path, None)
         raise
-    drop.size += size
+    upload.size += size
     return {"bytes": size}
 
 
 @router.post("/drops/{key}/read")
 def read(key: str, profile: ProfileRequest, session: Current) -> dict[str, Any]:
     """Read what was dropped and put it on the bench."""
-    session.put(read_drop(_drop(session, key), profile.toml, profile.refused_only))
+    session.put(read_upload(_upload(session, key), profile.toml, profile.refused_only))
     return overview(session)
 
 
 @router.get("/data")
 def overview(session: Current) -> dict[str, Any]:
     """Describe the loaded data, rig by rig."""
-    intake: Intake = session.intake or bundled()
+    imported: ImportedData = session.imported or bundled()
     data = session.dataset
     return {
         "name": data.name,
-        "source": intake.source,
+        "source": imported.source,
         "rigs": [{"name": name, "runs": len(data.rig(name))} for name in data.rigs],
         "runs": len(data),
-        "verdicts": [asdict(v) for v in intake.verdicts],
-        "profile": intake.profile,
+        "verdicts": [asdict(v) for v in imported.verdicts],
+        "profile": imported.profile,
     }
 
 
@@ -153,14 +153,14 @@ def _motion(group: list[Any], currents: list[float]) -> dict[str, Any]:
     return {"frequency_Hz": first["frequency_Hz"], "amplitude_mm": first["amplitude_mm"], "cells": cells}
 
 
-def _drop(session: Session, key: str) -> Drop:
-    if key not in session.drops:
+def _upload(session: Session, key: str) -> Upload:
+    if key not in session.uploads:
         raise UnknownNameError("that drop is over", remedy="drop the files again")
-    return session.drops[key]
+    return session.uploads[key]
 
 
-def _too_large(name: str) -> DropError:
-    return DropError(
+def _too_large(name: str) -> UploadError:
+    return UploadError(
         f"the file is over {FILE_LIMIT // 1_000_000} MB",
         where=name,
         remedy="read it with mrdamper import, which has no such limit, and drop the dataset folder",

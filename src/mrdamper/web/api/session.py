@@ -9,10 +9,10 @@ from typing import Any
 
 from fastapi import APIRouter, Depends, HTTPException, Request
 
-from mrdamper.web.drops import FILE_COUNT_LIMIT, FILE_LIMIT
-from mrdamper.web.intake import bundled
+from mrdamper.web.imported_data import bundled
 from mrdamper.web.rig_table import rig_table
 from mrdamper.web.sessions import Current
+from mrdamper.web.uploads import FILE_COUNT_LIMIT, FILE_LIMIT
 
 router = APIRouter(prefix="/sessions")
 
@@ -42,9 +42,9 @@ def open_session(request: Request) -> dict[str, Any]:
 @router.get("/{session}")
 def keep(session: Current) -> dict[str, Any]:
     """Say that the page is still open; says what is on the bench."""
-    intake = session.intake
+    imported = session.imported
     return {
-        "data": None if intake is None else {"source": intake.source, "name": intake.dataset.name},
+        "data": None if imported is None else {"source": imported.source, "name": imported.dataset.name},
         "dampers": len(session.dampers),
     }
 

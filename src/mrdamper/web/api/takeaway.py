@@ -17,7 +17,7 @@ from mrdamper.report.tables import prediction_rows
 from mrdamper.web.answers import archive, download, in_units, zipped
 from mrdamper.web.api.model import PredictionRequest
 from mrdamper.web.bench_model import as_damper, predict_held
-from mrdamper.web.kept import Kept, keep, open_kept
+from mrdamper.web.saved_project import SavedProject, open_saved_project, save_project
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import export_damper
 
@@ -136,21 +136,23 @@ class State(BaseModel, extra="forbid"):
 @router.post("/bench.zip")
 def keep_bench(shown: State, session: Current) -> Response:
     """Data, dampers, logo and state of this bench in one file."""
-    return download(keep(session, shown.state, shown.damper, shown.logo), "mrdamper-bench.zip", "application/zip")
+    return download(
+        save_project(session, shown.state, shown.damper, shown.logo), "mrdamper-bench.zip", "application/zip"
+    )
 
 
 @router.post("/drops/{key}/open")
 def open_bench(key: str, session: Current) -> dict[str, Any]:
     """Bring back what such a file holds."""
-    drop = session.drops.get(key)
-    if drop is None or len(drop.names) != 1:
+    upload = session.uploads.get(key)
+    if upload is None or len(upload.names) != 1:
         raise InputError("no saved project was dropped", remedy="drop it again, alone", code="E_DROP")
-    kept: Kept = open_kept(next(iter(drop.names)), drop.folder)
-    if kept.intake is not None:
-        session.put(kept.intake)
+    kept: SavedProject = open_saved_project(next(iter(upload.names)), upload.folder)
+    if kept.imported is not None:
+        session.put(kept.imported)
     keys = [session.add(damper, origin, note).key for damper, origin, note in kept.dampers]
     return {
-        "data": kept.intake is not None,
+        "data": kept.imported is not None,
         "state": kept.state,
         "logo": kept.logo,
         "damper": keys[kept.current] if kept.current is not None else None,

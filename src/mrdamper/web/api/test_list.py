@@ -16,10 +16,10 @@ from mrdamper.rig_files.preview import preview
 from mrdamper.rig_files.profile import Channel, Profile, parse_profile, profile_text
 from mrdamper.study.split import hold_out
 from mrdamper.web.api.data import overview
-from mrdamper.web.drops import Drop, Intake
-from mrdamper.web.intake import read_drop
-from mrdamper.web.rig_drop import reasons, split_again
+from mrdamper.web.imported_data import read_upload
+from mrdamper.web.rig_upload import reasons, split_again
 from mrdamper.web.sessions import Current, Session
+from mrdamper.web.uploads import ImportedData, Upload
 
 router = APIRouter(prefix="/sessions/{session}")
 _LARGEST_A = 200.0
@@ -63,27 +63,27 @@ class HeldOut(Strict):
 @router.get("/tests")
 def tests(session: Current) -> dict[str, Any]:
     """Every test that was dropped, the refused ones too, and how the first file begins."""
-    drop = next(iter(session.drops.values()), None)
-    if drop is None or not (drop.taken or drop.refused):
-        return {"tests": [_row(run) for run in session.dataset] if session.intake else [], "preview": None}
-    return {"tests": _rows(drop, session), "preview": _preview(drop)}
+    upload = next(iter(session.uploads.values()), None)
+    if upload is None or not (upload.taken or upload.refused):
+        return {"tests": [_row(run) for run in session.dataset] if session.imported else [], "preview": None}
+    return {"tests": _rows(upload, session), "preview": _preview(upload)}
 
 
 @router.post("/tests/current")
 def state_current(stated: StatedCurrent, session: Current) -> dict[str, Any]:
     """State the current of one test, and read its file again."""
-    drop = _drop(session)
-    path = _file(drop, stated.file)
+    upload = _upload(session)
+    path = _file(upload, stated.file)
     key = path, stated.run
-    before = drop.currents.pop(key, None)
+    before = upload.currents.pop(key, None)
     if stated.current_A is not None:
-        drop.currents[key] = stated.current_A
+        upload.currents[key] = stated.current_A
     try:
-        session.put(read_drop(drop, drop.toml, only=path))
+        session.put(read_upload(upload, upload.toml, only=path))
     except InputError as error:
         if error.code == "E_TESTS":  # no such test
-            drop.currents.pop(key)
-            drop.currents.update({} if before is None else {key: before})
+            upload.currents.pop(key)
+            upload.currents.update({} if before is None else {key: before})
         raise
     return overview(session)
 
@@ -91,26 +91,26 @@ def state_current(stated: StatedCurrent, session: Current) -> dict[str, Any]:
 @router.post("/tests/columns")
 def choose_columns(columns: Columns, session: Current) -> dict[str, Any]:
     """Say which columns the channels are, and read all files again."""
-    drop = _drop(session)
-    profile = parse_profile(drop.toml) if drop.toml.strip() else Profile()
+    upload = _upload(session)
+    profile = parse_profile(upload.toml) if upload.toml.strip() else Profile()
     chosen = {name: _channel(profile, name, column) for name, column in columns.channels.items()}
     text = profile_text(profile.model_copy(update={"channels": {**profile.channels, **chosen}}))
     parse_profile(text)  # units are checked here
-    session.put(read_drop(drop, text))
+    session.put(read_upload(upload, text))
     return overview(session)
 
 
 @router.post("/tests/split")
 def split(held: HeldOut, session: Current) -> dict[str, Any]:
     """Hold runs out, by the rules of `mrdamper split`."""
-    intake = session.intake
+    imported = session.imported
     chosen = hold_out(
         session.dataset, runs=held.runs, currents=held.currents, every=held.every, none=held.none, replace=True
     )
-    assert intake is not None  # session.dataset would have said so
-    for drop in session.drops.values():
-        drop.held_out = chosen.held_out
-    session.put(replace(intake, dataset=split_again(intake.dataset, chosen.held_out)))
+    assert imported is not None  # session.dataset would have said so
+    for upload in session.uploads.values():
+        upload.held_out = chosen.held_out
+    session.put(replace(imported, dataset=split_again(imported.dataset, chosen.held_out)))
     return {**overview(session), "reason": chosen.reason}
 
 
@@ -123,37 +123,37 @@ def _channel(profile: Profile, name: str, chosen: ChosenColumn) -> Channel:
     return Channel(**{**says, "column": chosen.column + 1, "sign": chosen.sign})
 
 
-def _drop(session: Session) -> Drop:
-    drop = next(iter(session.drops.values()), None)
-    if drop is None:
+def _upload(session: Session) -> Upload:
+    upload = next(iter(session.uploads.values()), None)
+    if upload is None:
         raise UnknownNameError("no files were dropped", remedy="drop the files of a rig")
-    return drop
+    return upload
 
 
-def _file(drop: Drop, number: int) -> Path:
-    paths = list(drop.names)
+def _file(upload: Upload, number: int) -> Path:
+    paths = list(upload.names)
     if number >= len(paths):
         raise UnknownNameError("no such file was dropped", remedy="choose one from the list")
     return paths[number]
 
 
-def _rows(drop: Drop, session: Session) -> list[dict[str, Any]]:
+def _rows(upload: Upload, session: Session) -> list[dict[str, Any]]:
     """Refused tests first, then those taken, in the order of the files."""
-    intake: Intake | None = session.intake
-    runs = iter(intake.dataset) if intake is not None and intake.source == "drop" else iter(())
+    imported: ImportedData | None = session.imported
+    runs = iter(imported.dataset) if imported is not None and imported.source == "drop" else iter(())
     refused, taken = [], []
-    for path in sorted(drop.names, key=lambda path: drop.names[path]):
-        number, name = list(drop.names).index(path), drop.names[path]
+    for path in sorted(upload.names, key=lambda path: upload.names[path]):
+        number, name = list(upload.names).index(path), upload.names[path]
         by_run: dict[str, list[Any]] = {}
-        for refusal in drop.refused.get(path, ()):
+        for refusal in upload.refused.get(path, ()):
             by_run.setdefault(refusal.run, []).append(refusal)
         for run_id, refusals in by_run.items():
-            stated = drop.currents.get((path, run_id))
+            stated = upload.currents.get((path, run_id))
             refused.append({
                 "file": number, "name": name, "test": run_id, "run": "", "current_A": stated, "motion": "", "split": "",
-                "state": "refused", "findings": reasons(drop, path, refusals),
+                "state": "refused", "findings": reasons(upload, path, refusals),
             })  # fmt: skip
-        for record, run in zip(drop.taken.get(path, ()), runs):  # noqa: B905 (the runs of all files in a row)
+        for record, run in zip(upload.taken.get(path, ()), runs):  # noqa: B905 (the runs of all files in a row)
             findings = [(finding.code, finding.text) for finding in record.findings]
             taken.append({**_row(run), "file": number, "name": name, "test": record.id, "findings": findings})
     return refused + taken
@@ -172,15 +172,15 @@ def _row(run: Run) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _preview(drop: Drop) -> dict[str, Any] | None:
-    profile = parse_profile(drop.toml) if drop.toml.strip() else None
-    for path in sorted(drop.names, key=lambda path: (path not in drop.refused, drop.names[path])):
+def _preview(upload: Upload) -> dict[str, Any] | None:
+    profile = parse_profile(upload.toml) if upload.toml.strip() else None
+    for path in sorted(upload.names, key=lambda path: (path not in upload.refused, upload.names[path])):
         try:
             shown = preview(path, profile)
         except InputError:
             continue
         channels = {name: dict(zip(("column", "unit", "sign"), c, strict=True)) for name, c in shown.channels.items()}
         names = [name or f"column {i}" for i, name in enumerate(shown.names, 1)]
-        head = {"name": drop.names[path], "names": names, "units": shown.units}
+        head = {"name": upload.names[path], "names": names, "units": shown.units}
         return {**head, "rows": shown.rows, "channels": channels}
     return None

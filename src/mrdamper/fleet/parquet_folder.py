@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-def is_lake(paths: Sequence[Path], profile: FleetProfile) -> bool:
+def is_parquet_folder(paths: Sequence[Path], profile: FleetProfile) -> bool:
     """Tell if the first readable of these files has a column for the serial number."""
     for path in paths:
         names = _columns(path)
@@ -30,7 +30,7 @@ def is_lake(paths: Sequence[Path], profile: FleetProfile) -> bool:
     return False
 
 
-def lake_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
+def parquet_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
     """Find the dampers of a folder of Parquet files, each with the rows it occupies in every file.
 
     A file that cannot be read, or lacks a column, becomes an item with the error; the others go on.
@@ -72,7 +72,7 @@ def lake_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
     return items + refused
 
 
-def lake_dataset(item: Item) -> Dataset:
+def parquet_dataset(item: Item) -> Dataset:
     """Read the records of one damper from a folder of Parquet files.
 
     Raises `ColumnError` or `RunError` or `TimeOrderError` or `NonFiniteError` if the channels of a run do not fit

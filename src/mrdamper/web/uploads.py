@@ -13,12 +13,12 @@ from mrdamper.rig_files.rig_import import Refusal
 
 FILE_LIMIT = 20_000_000
 FILE_COUNT_LIMIT = 1000
-DROP_LIMIT = 1_000_000_000
+UPLOAD_LIMIT = 1_000_000_000
 _NOT_SAFE = re.compile(r"[^A-Za-z0-9.+=_-]+")
 _NAME_LENGTH = 100
 
 
-class DropError(InputError):
+class UploadError(InputError):
     """Dropped files that cannot be taken."""
 
     code = "E_DROP"
@@ -33,7 +33,7 @@ class Verdict:
     findings: tuple[tuple[str, str], ...] = ()
 
 
-class NothingTakenError(DropError):
+class NothingTakenError(UploadError):
     """Every dropped file was refused; the page shows why, and the profile to correct."""
 
     code = "E_DROP_REFUSED"
@@ -46,7 +46,7 @@ class NothingTakenError(DropError):
 
 
 @dataclass(frozen=True, eq=False)
-class Intake:
+class ImportedData:
     """Data on the bench, and how it came there."""
 
     dataset: Dataset
@@ -56,7 +56,7 @@ class Intake:
 
 
 @dataclass(eq=False)
-class Drop:
+class Upload:
     """Files on their way in."""
 
     key: str
@@ -72,9 +72,9 @@ class Drop:
     held_out: frozenset[str] | None = None  # runs held out on the page; None where nobody chose
 
     def place(self, name: str) -> Path:
-        """Reserve the path of a file of that name; raises `DropError` if there are too many."""
+        """Reserve the path of a file of that name; raises `UploadError` if there are too many."""
         if self.places >= FILE_COUNT_LIMIT:
-            raise DropError(
+            raise UploadError(
                 f"over {FILE_COUNT_LIMIT} files",
                 remedy="drop fewer at once, or use mrdamper import",
                 code="E_DROP_COUNT",

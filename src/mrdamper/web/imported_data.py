@@ -18,22 +18,22 @@ from mrdamper.data import Dataset
 from mrdamper.errors import InputError
 from mrdamper.rig_files.dataset_folder import load_dataset
 from mrdamper.rig_files.dataset_samples import SAMPLE_FILES
-from mrdamper.web.drops import Drop, DropError, Intake, NothingTakenError
-from mrdamper.web.rig_drop import read_rig_files
+from mrdamper.web.rig_upload import read_rig_files
+from mrdamper.web.uploads import ImportedData, NothingTakenError, Upload, UploadError
 
 RUNS_FILE = "runs.csv"
 _READING = threading.Lock()
 
 
-def bundled() -> Intake:
+def bundled() -> ImportedData:
     """The bundled tests: read once, shared by every session, since runs are frozen."""
     with _READING:  # the bench reads them ahead while a page may ask
         return _bundled()
 
 
 @cache
-def _bundled() -> Intake:
-    return Intake(load_dataset(), "bundled")
+def _bundled() -> ImportedData:
+    return ImportedData(load_dataset(), "bundled")
 
 
 @cache
@@ -44,22 +44,27 @@ def bundled_dampers() -> tuple[Damper, ...]:
     return tuple(parse_model(path.read_text(encoding="utf-8"), where=path.name) for path in paths)
 
 
-def read_drop(drop: Drop, profile: str = "", refused_only: bool = False, only: Path | None = None) -> Intake:
+def read_upload(
+    upload: Upload, profile: str = "", refused_only: bool = False, only: Path | None = None
+) -> ImportedData:
     """Make data of a drop; raises `InputError` with the names the files came with.
 
     `profile` is a rig profile as TOML that replaces the guessed one; empty to guess. With `refused_only` the rig files
     that were taken before are kept and the refused ones read; with `only`, that file is, and the others stay.
     """
-    if not drop.names:
-        raise DropError("no files", remedy="drop rig files, or a dataset folder")
+    if not upload.names:
+        raise UploadError("no files", remedy="drop rig files, or a dataset folder")
     try:
-        parts = _dataset_parts(drop.names)
-        return _read_dataset(drop, parts) if parts else read_rig_files(drop, profile, refused_only, only)
+        parts = _dataset_parts(upload.names)
+        return _read_dataset(upload, parts) if parts else read_rig_files(upload, profile, refused_only, only)
     except NothingTakenError:
         raise
     except InputError as error:
         raise InputError(
-            drop.named(error.found), where=drop.named(error.where), remedy=drop.named(error.remedy), code=error.code
+            upload.named(error.found),
+            where=upload.named(error.where),
+            remedy=upload.named(error.remedy),
+            code=error.code,
         ) from error
 
 
@@ -70,13 +75,13 @@ def _dataset_parts(names: Mapping[Path, str]) -> dict[str, Path]:
     return parts if RUNS_FILE in parts else {}
 
 
-def _read_dataset(drop: Drop, parts: Mapping[str, Path]) -> Intake:
-    top = PurePosixPath(drop.names[parts[RUNS_FILE]]).parent.name
-    folder = drop.folder / "dataset"
+def _read_dataset(upload: Upload, parts: Mapping[str, Path]) -> ImportedData:
+    top = PurePosixPath(upload.names[parts[RUNS_FILE]]).parent.name
+    folder = upload.folder / "dataset"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     for name, path in parts.items():
         (folder / name).hardlink_to(path)
-    drop.names[folder] = top or "the dropped dataset"
+    upload.names[folder] = top or "the dropped dataset"
     dataset = load_dataset(folder)
-    return Intake(Dataset(dataset.runs, top or "dropped dataset"), "drop")
+    return ImportedData(Dataset(dataset.runs, top or "dropped dataset"), "drop")

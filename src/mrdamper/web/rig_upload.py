@@ -16,12 +16,12 @@ from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.rig_import import ImportResult, Refusal
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import StatedTest, TestsTable, load_tests
-from mrdamper.web.drops import Drop, Intake, NothingTakenError, Verdict
+from mrdamper.web.uploads import ImportedData, NothingTakenError, Upload, Verdict
 
 _PROFILES_TRIED = 5  # files looked at for the first whose form can be guessed
 
 
-def read_rig_files(drop: Drop, toml: str, refused_only: bool, only: Path | None = None) -> Intake:
+def read_rig_files(upload: Upload, toml: str, refused_only: bool, only: Path | None = None) -> ImportedData:
     """Read the files of a drop, those refused before or one, with a profile as TOML; empty to guess.
 
     Raises
@@ -35,25 +35,25 @@ def read_rig_files(drop: Drop, toml: str, refused_only: bool, only: Path | None 
     from mrdamper.rig_files.rig_import import import_files, to_dataset, with_unique_ids
 
     profile = parse_profile(toml) if toml.strip() else None
-    files = [path for path in drop.names if PurePosixPath(drop.names[path]).name != TESTS]
-    wanted = [path for path in files if not refused_only or path in drop.refused]
+    files = [path for path in upload.names if PurePosixPath(upload.names[path]).name != TESTS]
+    wanted = [path for path in files if not refused_only or path in upload.refused]
     wanted = wanted if only is None else [only]
-    table = _table_of(drop)
+    table = _table_of(upload)
     for path in wanted:
-        result = _imported(drop, path, profile, table, import_files)
-        drop.taken[path], drop.refused[path] = result.records, result.refusals
-    drop.taken = {path: records for path, records in drop.taken.items() if records}
-    drop.refused = {path: refusals for path, refusals in drop.refused.items() if refusals}
-    drop.toml = toml
-    verdicts = _verdicts(drop)
+        result = _imported(upload, path, profile, table, import_files)
+        upload.taken[path], upload.refused[path] = result.records, result.refusals
+    upload.taken = {path: records for path, records in upload.taken.items() if records}
+    upload.refused = {path: refusals for path, refusals in upload.refused.items() if refusals}
+    upload.toml = toml
+    verdicts = _verdicts(upload)
     shown = toml if toml.strip() else _guessed(wanted)
-    if not drop.taken:
-        count = len(drop.refused)
+    if not upload.taken:
+        count = len(upload.refused)
         text = "the file was refused" if count == 1 else f"all {count} files were refused"
         raise NothingTakenError(text, verdicts, shown)
-    records = with_unique_ids(record for path in _by_name(drop) for record in drop.taken.get(path, ()))
-    dataset = to_dataset(records, _name(drop, len(records)))
-    return Intake(split_again(dataset, drop.held_out), "drop", verdicts, shown)
+    records = with_unique_ids(record for path in _by_name(upload) for record in upload.taken.get(path, ()))
+    dataset = to_dataset(records, _name(upload, len(records)))
+    return ImportedData(split_again(dataset, upload.held_out), "drop", verdicts, shown)
 
 
 def split_again(dataset: Dataset, held_out: Collection[str] | None) -> Dataset:
@@ -64,18 +64,18 @@ def split_again(dataset: Dataset, held_out: Collection[str] | None) -> Dataset:
     return dataset.only(runs)
 
 
-def _table_of(drop: Drop) -> TestsTable | None:
+def _table_of(upload: Upload) -> TestsTable | None:
     """The table of tests that was dropped beside the files."""
-    tables = [path for path, name in drop.names.items() if PurePosixPath(name).name == TESTS]
+    tables = [path for path, name in upload.names.items() if PurePosixPath(name).name == TESTS]
     return load_tests(tables[0]) if tables else None
 
 
 def _imported(
-    drop: Drop, path: Path, profile: Profile | None, table: TestsTable | None, read: Callable[..., ImportResult]
+    upload: Upload, path: Path, profile: Profile | None, table: TestsTable | None, read: Callable[..., ImportResult]
 ) -> ImportResult:
     """A file read with what the dropped table says of its tests, and the currents that the page states for them."""
-    rows = () if table is None else table.of_file(Path(drop.names[path]))
-    stated = [StatedTest(0, "", run, current) for (file, run), current in drop.currents.items() if file == path]
+    rows = () if table is None else table.of_file(Path(upload.names[path]))
+    stated = [StatedTest(0, "", run, current) for (file, run), current in upload.currents.items() if file == path]
     if not rows and not stated:
         return read([path], profile)
     runs = {row.run for row in stated}
@@ -83,22 +83,22 @@ def _imported(
     return read([path], profile, tests=TestsTable(path.with_name(TESTS), statements))
 
 
-def _by_name(drop: Drop) -> list[Path]:
-    return sorted(drop.names, key=lambda path: drop.names[path])
+def _by_name(upload: Upload) -> list[Path]:
+    return sorted(upload.names, key=lambda path: upload.names[path])
 
 
-def _verdicts(drop: Drop) -> tuple[Verdict, ...]:
+def _verdicts(upload: Upload) -> tuple[Verdict, ...]:
     """List the result of every file, refused ones first."""
     refused = [
-        Verdict(_named(drop.names[path], refusals), "refused", reasons(drop, path, refusals))
-        for path in _by_name(drop)
-        if (refusals := drop.refused.get(path))
+        Verdict(_named(upload.names[path], refusals), "refused", reasons(upload, path, refusals))
+        for path in _by_name(upload)
+        if (refusals := upload.refused.get(path))
     ]
     taken = [
-        Verdict(drop.names[path], "noted" if findings else "taken", findings)
-        for path in _by_name(drop)
-        if path in drop.taken
-        for findings in (tuple((f.code, f.text) for record in drop.taken[path] for f in record.findings),)
+        Verdict(upload.names[path], "noted" if findings else "taken", findings)
+        for path in _by_name(upload)
+        if path in upload.taken
+        for findings in (tuple((f.code, f.text) for record in upload.taken[path] for f in record.findings),)
     ]
     return (*refused, *sorted(taken, key=lambda verdict: verdict.state != "noted"))
 
@@ -108,9 +108,9 @@ def _named(name: str, refusals: Sequence[Refusal]) -> str:
     return name if len(runs) == 1 else f"{name}, {len(runs)} tests"
 
 
-def reasons(drop: Drop, path: Path, refusals: Iterable[Refusal]) -> tuple[tuple[str, str], ...]:
+def reasons(upload: Upload, path: Path, refusals: Iterable[Refusal]) -> tuple[tuple[str, str], ...]:
     """Code and text of refusals, each once."""
-    return tuple(dict.fromkeys((r.error.code, drop.named(_reason(r.error, path))) for r in refusals))
+    return tuple(dict.fromkeys((r.error.code, upload.named(_reason(r.error, path))) for r in refusals))
 
 
 def _reason(error: InputError, path: Path) -> str:
@@ -120,12 +120,12 @@ def _reason(error: InputError, path: Path) -> str:
     return f"{text}; {error.remedy}" if error.remedy else text
 
 
-def _name(drop: Drop, count: int) -> str:
+def _name(upload: Upload, count: int) -> str:
     """Return the name of the data: that of their folder, or of the only file."""
-    tops = {PurePosixPath(name).parts[0] for name in drop.names.values() if len(PurePosixPath(name).parts) > 1}
+    tops = {PurePosixPath(name).parts[0] for name in upload.names.values() if len(PurePosixPath(name).parts) > 1}
     if len(tops) == 1:
         return tops.pop()
-    return PurePosixPath(next(iter(drop.names.values()))).stem if len(drop.names) == 1 else f"{count} dropped tests"
+    return PurePosixPath(next(iter(upload.names.values()))).stem if len(upload.names) == 1 else f"{count} dropped tests"
 
 
 def _guessed(paths: Sequence[Path]) -> str:

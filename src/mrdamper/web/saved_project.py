@@ -1,4 +1,4 @@
-"""A bench as one file: its data, its dampers and what its page shows, kept and brought back.
+"""Saved project of the app: data, dampers and state of the page in one file.
 
 The file is a zip of plain parts (CSV, Parquet, JSON). What comes back was written by anybody: only
 the names written here are read, each up to a size, and every part passes the checks its kind has anyway.
@@ -24,26 +24,26 @@ from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import InputError
 from mrdamper.report.about import logo_of
 from mrdamper.rig_files.dataset_folder import SAMPLE_FILES, load_dataset, save_dataset
-from mrdamper.web.drops import FILE_LIMIT, Intake
-from mrdamper.web.intake import bundled
+from mrdamper.web.imported_data import bundled
 from mrdamper.web.sessions import MOST_DAMPERS, Session
+from mrdamper.web.uploads import FILE_LIMIT, ImportedData
 
 LIST, STATE, LOGO, DATA = "bench.json", "bench-state.json", "logo", "dataset"
 _PART_LIMIT = 100_000_000  # bytes of one part, unpacked
 _SMALL_LIMIT = 5_000_000  # of a part that is text
 
 
-class KeptError(InputError):
+class SavedProjectError(InputError):
     """Saved project that cannot be read."""
 
     code = "E_KEPT"
 
 
 @dataclass(frozen=True)
-class Kept:
+class SavedProject:
     """Content of a saved project."""
 
-    intake: Intake | None  # data; None where there were none
+    imported: ImportedData | None  # data; None where there were none
     dampers: list[tuple[Damper, str, str]]  # with how each came to the bench and its note
     current: int | None  # the damper under the sliders
     state: str  # what the page showed, which the page checks
@@ -65,24 +65,24 @@ class _List(BaseModel, extra="forbid", strict=True):
     current: int | None = Field(default=None, ge=0)
 
 
-def keep(session: Session, state: str, shown: str | None, logo: str = "") -> bytes:
+def save_project(session: Session, state: str, shown: str | None, logo: str = "") -> bytes:
     """A session as such a file.
 
     Raises
     ------
-    KeptError
+    SavedProjectError
         If it would be too large to be dropped on a bench again.
     AboutError
         If the logo is no picture.
     """
     picture = _picture(logo)
-    intake, dampers = session.intake, list(session.dampers.values())
+    imported, dampers = session.imported, list(session.dampers.values())
     files = [f"dampers/{i}.json" for i in range(len(dampers))]
     about = _List(
         format="mrdamper-bench",
         version=1,
-        source=intake.source if intake else "",
-        name=intake.dataset.name if intake else "",
+        source=imported.source if imported else "",
+        name=imported.dataset.name if imported else "",
         dampers=[
             _Damper(file=f, origin=b.origin, note=b.note[:500]) for f, b in zip(files, dampers, strict=True)
         ],
@@ -96,10 +96,10 @@ def keep(session: Session, state: str, shown: str | None, logo: str = "") -> byt
             archive.writestr(LOGO, picture)
         for name, bench in zip(files, dampers, strict=True):
             archive.writestr(name, dump_model(bench.damper))
-        if intake and intake.source != "bundled":
-            _write_data(intake.dataset, archive)
+        if imported and imported.source != "bundled":
+            _write_data(imported.dataset, archive)
     if packed.tell() > FILE_LIMIT:
-        raise KeptError(
+        raise SavedProjectError(
             f"the bench is {packed.tell() / 1e6:.0f} MB, over the {FILE_LIMIT / 1e6:.0f} MB a bench takes back",
             remedy="keep its dataset folder and save the state alone",
         )
@@ -114,12 +114,12 @@ def _write_data(dataset: Dataset, archive: zipfile.ZipFile) -> None:
             archive.write(path, f"{DATA}/{path.name}")
 
 
-def open_kept(path: Path, place: Path) -> Kept:
+def open_saved_project(path: Path, place: Path) -> SavedProject:
     """Read such a file; `place` is a folder its data may be unpacked in.
 
     Raises
     ------
-    KeptError
+    SavedProjectError
         If it is no such file, is damaged, or holds what does not belong in it.
     InputError
         What reading a dataset or a model says.
@@ -128,22 +128,26 @@ def open_kept(path: Path, place: Path) -> Kept:
         with zipfile.ZipFile(path) as archive:
             return _read(archive, place / "kept")
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, zlib.error) as error:
-        raise KeptError(f"is damaged: {error}", where="the saved project", remedy="copy it again") from error
+        raise SavedProjectError(f"is damaged: {error}", where="the saved project", remedy="copy it again") from error
 
 
-def _read(archive: zipfile.ZipFile, place: Path) -> Kept:
+def _read(archive: zipfile.ZipFile, place: Path) -> SavedProject:
     names = archive.namelist()
     try:
         about = _List.model_validate(parse_json(_part(archive, LIST).decode("utf-8")))
     except ValueError as error:
-        raise KeptError("has another version", where=LIST, remedy="update mrdamper, or save it again") from error
+        raise SavedProjectError(
+            "has another version", where=LIST, remedy="update mrdamper, or save it again"
+        ) from error
     data = [f"{DATA}/{name}" for name in ("runs.csv", *SAMPLE_FILES)]
     expected = {LIST, STATE, LOGO, *(d.file for d in about.dampers), *data}
     if len(set(names)) != len(names) or not set(names) <= expected:
         odd = next((n for n in names if n not in expected), "one name twice")
-        raise KeptError(f"holds {PurePosixPath(odd).name!r:.60}", where="the saved project", remedy="save it again")
+        raise SavedProjectError(
+            f"holds {PurePosixPath(odd).name!r:.60}", where="the saved project", remedy="save it again"
+        )
     if about.current is not None and about.current >= len(about.dampers):
-        raise KeptError("names a damper it does not hold", where=LIST, remedy="save it again")
+        raise SavedProjectError("names a damper it does not hold", where=LIST, remedy="save it again")
     dampers = [
         (parse_model(_part(archive, d.file).decode("utf-8", "replace"), where=d.file), d.origin, d.note)
         for d in about.dampers
@@ -152,11 +156,11 @@ def _read(archive: zipfile.ZipFile, place: Path) -> Kept:
     try:
         parse_json(state)
     except ValueError as error:
-        raise KeptError(str(error), where=STATE, remedy="save it again") from error
+        raise SavedProjectError(str(error), where=STATE, remedy="save it again") from error
     logo = base64.b64encode(_part(archive, LOGO)).decode("ascii") if LOGO in names else ""
     _picture(logo)
-    intake = _data(archive, about, [n for n in data if n in names], place)
-    return Kept(intake, dampers, about.current, state, logo)
+    imported = _data(archive, about, [n for n in data if n in names], place)
+    return SavedProject(imported, dampers, about.current, state, logo)
 
 
 def _picture(logo: str) -> bytes:
@@ -166,7 +170,7 @@ def _picture(logo: str) -> bytes:
     return base64.b64decode(logo)
 
 
-def _data(archive: zipfile.ZipFile, about: _List, parts: list[str], place: Path) -> Intake | None:
+def _data(archive: zipfile.ZipFile, about: _List, parts: list[str], place: Path) -> ImportedData | None:
     if about.source == "bundled":
         return bundled()
     if not about.source:
@@ -176,7 +180,7 @@ def _data(archive: zipfile.ZipFile, about: _List, parts: list[str], place: Path)
     for name in parts:
         (place / PurePosixPath(name).name).write_bytes(_part(archive, name, _PART_LIMIT))
     try:
-        return Intake(Dataset(load_dataset(place).runs, about.name), "drop")
+        return ImportedData(Dataset(load_dataset(place).runs, about.name), "drop")
     except InputError as error:  # of the parts it names, not of the folder they were unpacked in
         error.where, error.found = (text.replace(str(place), DATA) for text in (error.where, error.found))
         raise
@@ -188,7 +192,9 @@ def _part(archive: zipfile.ZipFile, name: str, limit: int = _SMALL_LIMIT) -> byt
         with archive.open(name) as part:
             content = part.read(limit + 1)
     except KeyError as error:
-        raise KeptError(f"holds no {name}", where="the saved project", remedy="save it again") from error
+        raise SavedProjectError(f"holds no {name}", where="the saved project", remedy="save it again") from error
     if len(content) > limit:
-        raise KeptError(f"{name} is over {limit / 1e6:.0f} MB", where="the saved project", remedy="save it again")
+        raise SavedProjectError(
+            f"{name} is over {limit / 1e6:.0f} MB", where="the saved project", remedy="save it again"
+        )
     return content
