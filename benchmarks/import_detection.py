@@ -1,4 +1,4 @@
-"""How often the importer finds what is wrong with a record, and how often it accuses a clean one.
+"""Detection rate of the checks on records with faults, and false alarms on clean ones.
 
     python -m benchmarks.import_detection
 

@@ -37,7 +37,7 @@ samples = sum(record.time.size for record in result.records)
 seconds, memory = map(float, sys.argv[3:])
 print(f"{len(result.records)} tests, {samples} samples, {len(result.refusals)} refused, {codes}")
 print(f"processor {cpu:.1f} s (goal {seconds:g} s), peak {peak:.0f} MB (goal {memory:g} MB), "
-      f"by the clock {taken:.1f} s, {read:.1f} s of it reading and judging")
+      f"by the clock {taken:.1f} s, {read:.1f} s of it reading and checking")
 sys.exit(bool(cpu > seconds or peak > memory or result.refusals))
 """
 

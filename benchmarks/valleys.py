@@ -50,7 +50,11 @@ def main() -> None:
         least = min(end.error for end in [*single, *searched])
         shares = [np.mean([end.error <= _SAME * least for end in found]) for found in (single, searched)]
         second = problem.search(rounds=2, most_steps=15, settled=1e-4).second
-        other = "none" if second is None else f"knee {1e3 * second.yield_length:.2f} mm: {100 * second.error:.2f} %"
+        other = (
+            "none"
+            if second is None
+            else f"yield displacement {1e3 * second.yield_length:.2f} mm: {100 * second.error:.2f} %"
+        )
         spent = time.process_time() - begin
         print(
             f"| {name} | {100 * least:.3f} % | {shares[0]:.0%} | {shares[1]:.0%} | {other} | {spent:.0f} |", flush=True

@@ -1,4 +1,4 @@
-"""How fast the app is, measured in a browser: `python -m benchmarks.web`.
+"""Speed of the app in a browser: `python -m benchmarks.web`.
 
 First page, first picture, and slider to picture while ten loops of a thousand points are dragged. Needs the
 web extra, playwright and Chromium. Many sessions at once: `python -m benchmarks.web_soak`.

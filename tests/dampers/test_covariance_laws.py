@@ -91,7 +91,7 @@ def test_intervals_scale_with_the_force_and_forget_the_order_of_runs(sessions):
     assert (twice.run_gain, twice.run_offset) == pytest.approx((plain.run_gain, 2 * plain.run_offset), rel=1e-6)
     assert (twice.force, twice.peak, twice.energy) == pytest.approx((plain.force, plain.peak, plain.energy), rel=1e-6)
     assert twice.dof == pytest.approx(plain.dof, rel=1e-6)
-    assert sum(plain.taught.values()) == pytest.approx(1.0)
+    assert sum(plain.information.values()) == pytest.approx(1.0)
     assert set(plain.effective) == set(plain.names) == {"c", "fy", "f0"}
     assert all(1 <= n <= sum(RunResiduals.of(damper, r).picked.size for r in runs) for n in plain.effective.values())
 

@@ -1,4 +1,4 @@
-"""How sure a damper is: saved, in bands, in words, and wide where nothing is known."""
+"""Uncertainty of a damper: saved, in prediction intervals, in messages, and wide far from the tests."""
 
 import json
 from dataclasses import replace
@@ -52,12 +52,12 @@ def test_a_certainty_is_saved_bit_by_bit(damper):
         "run_dof",
         "calibration",
         "words",
-        "taught",
+        "information",
         "unknown",
         "one_sided",
     ):
         assert getattr(back, name) == getattr(damper.uncertainty, name)
-    assert sum(back.taught.values()) == pytest.approx(1.0)
+    assert sum(back.information.values()) == pytest.approx(1.0)
     assert "covariance" not in json.loads(dump_model(joint_damper()))
 
 

@@ -23,7 +23,7 @@ from mrdamper.statistics.linear import on_one_blas_thread, solve_linear
 
 _COARSE_TOLERANCE = 1e-4  # relative gain of a step that is enough to tell forms apart
 _NO_PLAY_LENGTH_M = 1e-2  # longer than any free play, so that none is left [m]
-_BLOCK_CYCLES = 12.0  # cycles of a record that is no sine that are left out together
+_BLOCK_CYCLES = 12.0  # cycles of one block of a record that is no sine, in cross-validation
 _LEVEL_TOLERANCE = 5e-3  # currents closer than this share of the largest are one level
 MODEL = "play-bypass"
 SEARCHED = ("leak", "cq", "qb")  # presets free from the first fit on: without them others make up for what they do

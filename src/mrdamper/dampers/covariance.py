@@ -97,7 +97,7 @@ def estimate_uncertainty(
         tuple(name for name in free if name in unknown | wide),
         effects.gain, effects.offset, effects.session_dof, effects.run_gain, effects.run_offset, effects.run_dof,
         words=(*words, *_rest_on_one_run(spread.names, parts, spread.information)),
-        taught=dict(zip([p.run.id for p in parts], _shares(spread.information), strict=True)),
+        information=dict(zip([p.run.id for p in parts], _shares(spread.information), strict=True)),
         effective=dict(zip(spread.names, spread.effective.tolist(), strict=True)),
     )  # fmt: skip
     uncertainty = _with_model_error(uncertainty, parts, spread.slopes, cross_validated, away, other_sessions)

@@ -39,7 +39,7 @@ _MAX_COST_RATIO = 0.85  # share of the first start's cost that another one must 
 _MAX_ERROR_RATIO = 0.995  # share of the first end's error that another one must come below
 _CACHED_LINEARISATIONS = 8  # linearisations
 _MIN_YIELD_DIFFERENCE = 0.1  # relative difference from which two yield displacements differ
-_MAX_RUNNER_UP_RATIO = 1.25  # times the error: a valley that describes the tests nearly as well
+_MAX_RUNNER_UP_RATIO = 1.25  # times the error: a local minimum that fits the tests nearly as well
 
 
 @dataclass(frozen=True)

@@ -317,7 +317,7 @@ def _describe_uncertainty(uncertainty: Uncertainty | None) -> _Covariance | None
             force=uncertainty.force, peak=uncertainty.peak, energy=uncertainty.energy, left_out=uncertainty.left_out
         ),
         words=uncertainty.words,
-        taught=dict(uncertainty.taught),
+        taught=dict(uncertainty.information),
         effective=dict(uncertainty.effective),
         sessions=uncertainty.sessions,
         runs=_Session(

@@ -77,7 +77,7 @@ class Uncertainty:
         Variation between sessions, days and hours, where the tests determine it.
     words : tuple of str
         Findings that need the runs: correlated parameters, and parameters determined mainly by one run.
-    taught : mapping of str to float
+    information : mapping of str to float
         Share of each run in the information on the parameters.
     effective : mapping of str to float
         Independent samples that would give each parameter's standard error, without sessions and correlated noise.
@@ -100,7 +100,7 @@ class Uncertainty:
     energy: float = 0.0
     left_out: int = 0
     words: tuple[str, ...] = ()
-    taught: Mapping[str, float] = field(default_factory=dict)
+    information: Mapping[str, float] = field(default_factory=dict)
     effective: Mapping[str, float] = field(default_factory=dict)
     sessions: Sessions | None = None
     calibration: Calibration | None = None

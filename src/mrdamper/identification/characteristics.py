@@ -25,7 +25,7 @@ _MIDDLE = 0.25  # share of the amplitude around mid-stroke where the force at mi
 
 @dataclass(frozen=True)
 class Stroke:
-    """Figures of one run, sides apart, gas force not yet taken away."""
+    """Figures of one run, sides apart, gas force not yet subtracted."""
 
     run_id: str
     condition: Condition  # measured, its current rounded to the level of the test matrix

@@ -92,7 +92,7 @@ def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> R
             "E_BLOCKS",
             f"holds {len(records)} tests",
             file=Path(path).name,
-            remedy='use read_runs, or say blocks = "join" under [file] of a profile',
+            remedy='use read_runs, or set blocks = "join" under [file] of a profile',
         )
     return records[0]
 

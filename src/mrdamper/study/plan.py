@@ -285,5 +285,5 @@ def _slopes(damper: Damper, uncertainty: Uncertainty, names: Sequence[str], cond
 def least_informative_runs(damper: Damper, least: int = 3) -> list[tuple[str, float]]:
     """Return the runs that carry least information on the parameters of a damper, each with its share."""
     uncertainty = damper.uncertainty
-    shares = sorted(uncertainty.taught.items(), key=lambda item: item[1]) if uncertainty else []
+    shares = sorted(uncertainty.information.items(), key=lambda item: item[1]) if uncertainty else []
     return shares[:least] if len(shares) > least else []

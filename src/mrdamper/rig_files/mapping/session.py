@@ -62,7 +62,7 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     if len(parts) > MOST_TESTS:
         raise ColumnError(
             f"rests cut the record into {len(parts)} tests of several conditions, more than {MOST_TESTS}",
-            remedy='export it in parts, or say blocks = "join" under [file] of a profile to keep it whole',
+            remedy='export it in parts, or set blocks = "join" under [file] of a profile to keep it whole',
             code="E_BLOCKS",
         )
     return parts
