@@ -12,6 +12,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run, current_levels, same_motion
 from mrdamper.physics.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.statistics.linear import solve_linear
 from mrdamper.statistics.metrics import dissipated_power
 
 
@@ -63,11 +64,8 @@ def damping_share(motion: Excitation, force: Floats) -> float:
     The sign is that of c in F = f0 + r t + k x + c v by least squares.
     """
     t = motion.time - motion.time[0]
-    columns = np.column_stack([motion.velocity, motion.displacement, np.ones_like(t), t])
-    scale = np.std(columns, axis=0)
-    scale[scale == 0] = 1.0
-    coefficient = float(np.linalg.lstsq(columns / scale, force, rcond=None)[0][0])
-    return coefficient / float(np.std(force))
+    columns = np.stack([motion.velocity, motion.displacement, np.ones_like(t), t]).T
+    return float(solve_linear(columns, force)[0] * np.std(motion.velocity) / np.std(force))
 
 
 def at_levels(loops: Sequence[LoopAnalysis]) -> tuple[LoopAnalysis, ...]:

@@ -24,6 +24,7 @@ _LEAKAGE = 15.0  # [dB] from octave to octave, on average: a slow change of a ch
 _OCTAVES = 2  # at least, over which the noise falls
 _CONVERTER = -106.0  # [dB] of the peak-to-peak value: noise of the steps of 16 bits over twice the range
 _LOUDEST = {"force": -80.0, "displacement": _CONVERTER}  # [dB] in the highest octave: bundled rigs have -66 at least
+_SURELY_LOUD = 4e-4  # noise from sample to sample, of the peak-to-peak value: 12 dB above that level
 _NO_NOISE = -160.0  # [dB] of the peak-to-peak value: less is rounding, of single precision too
 _CORNER = 20.0  # times the frequency of the motion; a filter above it is late by under 0.8 % of the period
 _LOWEST = 3.0  # times that frequency: below, cycles differ by more than noise
@@ -42,7 +43,8 @@ def channels_are_unfiltered(view: View) -> Iterator[Finding]:
     cycles = steady_cycles(view)
     if cycles is None or len(cycles.starts) < _FEWEST or len(view.segments) > 1 or view.noticed(*_COLOURED):
         return
-    for name in ("force", "displacement"):
+    loud = view.force_noise > _SURELY_LOUD * cycles.force.span
+    for name in ("displacement",) if loud else ("force", "displacement"):
         levels, highest = noise_by_octave(view, name)
         if levels.size <= _OCTAVES:
             continue

@@ -39,7 +39,8 @@ _UNFILTERED, _FILTERED = 0.0015, 0.2  # of the force's RMS, and of that: the mis
 _DELAYS = np.round(np.arange(-0.12, 0.161, 0.02), 3)  # tried first, of the period
 _FINE = np.array([-0.01, -0.005, -0.0025, 0.0025, 0.005, 0.01])  # and then around the best of them
 _CONSTANTS = (0.01, 0.02, 0.04, 0.07, 0.12)  # time constants, of the period
-_FINER = np.array([0.7, 0.85, 1.15, 1.3])  # times the best of them
+_FINER = np.array([0.7, 0.85, 1.0, 1.15, 1.3])  # times the best of them
+_LEAST = 0.3  # of the noise: misfits below are not told apart
 _AS_GOOD, _MODEL = 1.5, 0.1  # times the best misfit, and of that without lag: what the elements' own error may be
 _YIELD = np.geomspace(0.0005, 1.0, 40)  # yield displacements, of half the stroke
 _BETWEEN, _LARGEST = 9, 2  # yield displacements tried between the neighbours of those that act most
@@ -66,7 +67,7 @@ class ForceLag:
 
     def misfit(self, lag: Lag) -> float:
         """Misfit of a lag, less the noise."""
-        return float(np.sqrt(max(self.tried[lag] ** 2 - self.noise**2, (0.3 * self.noise) ** 2)))
+        return float(np.sqrt(max(self.tried[lag] ** 2 - self.noise**2, (_LEAST * self.noise) ** 2)))
 
     @property
     def best(self) -> Lag:
@@ -87,12 +88,22 @@ class ForceLag:
     @property
     def is_clear(self) -> bool:
         """True where the lag explains more than any rate dependence may."""
-        best, without, misfit = self.best, self.misfit(Lag()), self.misfit(self.best)
-        if best.constant:
-            return without > _UNFILTERED and misfit < _FILTERED * without
-        late = best.delay > 0
-        better = _MUCH_BETTER if without > _UNEXPLAINED else _BETTER if late and without > _LITTLE else _FAR_BETTER
-        return abs(best.delay) > LIMIT and without > (_NEARLY if late else _NEARLY_EARLY) and misfit < better * without
+        return _is_clear(self.best, self.misfit(Lag()), self.misfit(self.best))
+
+
+def _is_clear(lag: Lag, without: float, misfit: float) -> bool:
+    """Check that a lag explains more of a misfit than any rate dependence may."""
+    if lag.constant:
+        return without > _UNFILTERED and misfit < _FILTERED * without
+    late = lag.delay > 0
+    better = _MUCH_BETTER if without > _UNEXPLAINED else _BETTER if late and without > _LITTLE else _FAR_BETTER
+    return abs(lag.delay) > LIMIT and without > (_NEARLY if late else _NEARLY_EARLY) and misfit < better * without
+
+
+def _may_be_clear(misfit: float, noise: float) -> bool:
+    """Check that what is left without a lag is so much beyond the noise that some lag could be clear."""
+    without = float(np.sqrt(max(misfit**2 - noise**2, (_LEAST * noise) ** 2)))
+    return any(_is_clear(lag, without, _LEAST * noise) for lag in (Lag(1.0), Lag(-1.0), Lag(0.0, 1.0)))
 
 
 def force_channel(view: View) -> Iterator[Finding]:
@@ -185,13 +196,15 @@ def force_lag(view: View) -> ForceLag | None:
         return None
     phases = _phases(cycles)
     noise = view.force_noise * np.sqrt(POINTS / len(cycles.starts)) / size
-    behind = {0.0: _Behind(*motion, _YIELD)}
-    if behind[0.0].misfit(force) ** 2 > _UNFILTERED**2 + noise**2:
-        behind[0.0] = behind[0.0].refined(force)
-    misfit = behind[0.0].misfit(force)
-    if misfit**2 <= _UNFILTERED**2 + noise**2:
+    yields, plain = _YIELD, _Behind(_elements(*motion, _YIELD))
+    misfit, shares = plain.fit(force)
+    if _may_be_clear(misfit, noise):
+        yields = _refined(yields, shares)
+        plain = _Behind(_elements(*motion, yields))
+        misfit, shares = plain.fit(force)
+    if not _may_be_clear(misfit, noise):
         return None
-    tried = {Lag(): misfit}
+    tried, behind = {Lag(): misfit}, {0.0: plain}
 
     def moved(lag: Lag) -> Floats:
         return cycles.read(force, phases + lag.delay * cycles.period)
@@ -200,8 +213,8 @@ def force_lag(view: View) -> ForceLag | None:
         """Try lags, and return the best so far."""
         for lag in lags:
             if lag.constant not in behind:
-                behind[lag.constant] = behind[0.0].with_constant(lag.constant)
-            tried.setdefault(lag, behind[lag.constant].misfit(moved(lag)))
+                behind[lag.constant] = _Behind(plain.elements, lag.constant)
+            tried.setdefault(lag, behind[lag.constant].fit(moved(lag))[0])
         return min(tried, key=tried.__getitem__)
 
     late = 0.0
@@ -211,13 +224,13 @@ def force_lag(view: View) -> ForceLag | None:
     attempt(Lag(delay, constant) for constant in _CONSTANTS for delay in (0.0, max(late - constant, 0.0)))
     alone = min((lag for lag in tried if lag.constant and not lag.delay), key=tried.__getitem__)
     if tried[alone] < _MUCH_BETTER * misfit:
-        behind[alone.constant] = behind[alone.constant].refined(force)
-        tried[alone] = behind[alone.constant].misfit(force)
+        finer = _elements(*motion, _refined(yields, behind[alone.constant].fit(force)[1]))
         for constant in alone.constant * _FINER:
-            behind[constant] = behind[alone.constant].with_constant(constant)
-            attempt([Lag(0.0, float(constant))])
+            behind[constant] = _Behind(finer, constant)
+            tried[Lag(0.0, float(constant))] = behind[constant].fit(force)[0]
     lag = ForceLag(tried, noise, force)
-    return replace(lag, cycle=mean + behind[lag.best.constant].source(moved(lag.best)))
+    best = behind[lag.best.constant]
+    return replace(lag, cycle=mean + best.elements @ best.fit(moved(lag.best))[1])
 
 
 def _elements(x: Floats, v: Floats, yields: Floats) -> Floats:
@@ -234,41 +247,28 @@ _FREE = 7  # columns of `_elements` that may have either sign
 class _Behind:
     """Everything that may make up the force of one cycle, behind a first-order low-pass; its constant in periods."""
 
-    def __init__(self, x: Floats, v: Floats, yields: Floats, constant: float = 0.0):
-        self.motion, self.yields, self.constant = (x, v), yields, constant
-        self.elements = elements = _elements(x, v, yields)
+    def __init__(self, elements: Floats, constant: float = 0.0):
+        self.elements = elements
         if constant:
             response = 1 / (1 + 2j * np.pi * constant * np.arange(POINTS // 2 + 1))
             elements = np.fft.irfft(np.fft.rfft(elements, axis=0) * response[:, None], POINTS, axis=0)
         self.basis, triangle = np.linalg.qr(elements)
         self.table = np.column_stack([triangle[:, :_FREE], -triangle[:, :_FREE], triangle[:, _FREE:]])
 
-    def with_constant(self, constant: float) -> _Behind:
-        """The same elements behind another low-pass."""
-        return _Behind(*self.motion, self.yields, constant)
-
-    def refined(self, force: Floats) -> _Behind:
-        """Add yield displacements between those that act most and their neighbours: a single one is a free number."""
-        most = np.argsort(self.shares(force)[-self.yields.size :])[-_LARGEST:]
-        low, high = (self.yields[np.clip(most + step, 0, self.yields.size - 1)] for step in (-1, 1))
-        between = np.geomspace(low, high, _BETWEEN).reshape(-1)
-        return _Behind(*self.motion, np.unique(np.concatenate([_YIELD[::2], between])), self.constant)
-
-    def misfit(self, force: Floats) -> float:
-        """RMS of what the elements leave of a force, over its RMS; those that resist have no negative share."""
+    def fit(self, force: Floats) -> tuple[float, Floats]:
+        """RMS that the elements leave of a force, over its RMS, and their (M,) shares; none that resists is negative."""
         from scipy.optimize import nnls
 
         inside = self.basis.T @ force
         outside = max(float(force @ force - inside @ inside), 0.0)
-        return float(np.sqrt((outside + nnls(self.table, inside)[1] ** 2) / (force @ force)))
+        parts, left = nnls(self.table, inside)
+        shares = np.concatenate([parts[:_FREE] - parts[_FREE : 2 * _FREE], parts[2 * _FREE :]])
+        return float(np.sqrt((outside + left**2) / (force @ force))), shares
 
-    def shares(self, force: Floats) -> Floats:
-        """(M,) shares of the elements."""
-        from scipy.optimize import nnls
 
-        parts = nnls(self.table, self.basis.T @ force)[0]
-        return np.concatenate([parts[:_FREE] - parts[_FREE : 2 * _FREE], parts[2 * _FREE :]])
-
-    def source(self, force: Floats) -> Floats:
-        """(P,) force before the low-pass."""
-        return self.elements @ self.shares(force)
+def _refined(yields: Floats, shares: Floats) -> Floats:
+    """Yield displacements with those between the ones that act most and their neighbours: one is a free number."""
+    most = np.argsort(shares[-yields.size :])[-_LARGEST:]
+    low, high = (yields[np.clip(most + step, 0, yields.size - 1)] for step in (-1, 1))
+    between = np.geomspace(low, high, _BETWEEN).reshape(-1)
+    return np.unique(np.concatenate([_YIELD[::2], between]))

@@ -298,7 +298,7 @@ def cells_of(line: str, separator: str) -> list[str]:
 
 def _content(lines: Sequence[str]) -> list[tuple[int, str]]:
     rows = enumerate(lines)
-    return [(i, line) for i, line in rows if line[:1] in _DIGITS or (line.strip() and not is_comment(line))]
+    return [row for row in rows if row[1][:1] in _DIGITS or (row[1].strip() and not is_comment(row[1]))]
 
 
 def _separator(lines: Sequence[str], content: Sequence[tuple[int, str]], source: Source) -> str:

@@ -26,6 +26,7 @@ _GROUPED = {
     )
     for mark, other in (".,", ",.")
 }
+_LONGEST = 40  # characters of a number
 _CELLS_APART = re.compile(r"\S\s{2,}\S|[0-9]\s[+-]")  # what another separator would split
 _SIGN_APART = re.compile(r"([+-]) +(?=[0-9.,])")  # - 0.328
 MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "-nan", "+nan", "nan(ind)",
@@ -68,6 +69,11 @@ def number(token: str, mark: str) -> float | None:
 def looks_numeric(token: str) -> bool:
     """Tell if a cell is meant as a value, in any notation: separates rows of data from headers."""
     token = token.strip(" \t")
+    return _looks_numeric(token) if len(token) <= _LONGEST else _looks_numeric.__wrapped__(token)
+
+
+@lru_cache(maxsize=4096)  # a cell of a file's head is asked about several times
+def _looks_numeric(token: str) -> bool:
     if (
         NUMBER["."].fullmatch(token)
         or token.lower() in MISSING
@@ -77,7 +83,7 @@ def looks_numeric(token: str) -> bool:
     ):
         return True
     if (
-        len(token) > 40
+        len(token) > _LONGEST
         or _CELLS_APART.search(token)
         or not any(unicodedata.decimal(c, None) is not None for c in token)
     ):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 
 import numpy as np
 
@@ -21,7 +22,7 @@ def turned_table(source: Source, lines: Sequence[str]) -> RawTable | None:
 
     Raises `RigFileError`, its code E_NUMBER, if a cell of such a row is no number.
     """
-    filled = [line for line in lines if line.strip()]
+    filled = list(islice((line for line in lines if line.strip()), _MOST_LINES + 1))
     for separator in ("\t", ";", ",") if 1 < len(filled) <= _MOST_LINES else ():
         cells = [[cell.strip('"') for cell in cells_of(line.rstrip(separator), separator)] for line in filled]
         width = max(map(len, cells))
