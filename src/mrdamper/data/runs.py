@@ -221,7 +221,9 @@ class Run(Displayable):
 
     @validate_arguments()
     def part(self, start: int, stop: int) -> Run:
-        """Return the samples start..stop-1 as a run of their own."""
+        """Return the samples start..stop-1 as a run of their own; the run itself where these are all."""
+        if start == 0 and stop == self.time.size:
+            return self
         inner = [(max(a, start) - start, min(b, stop) - start) for a, b in self.segments]
         return replace(
             self,

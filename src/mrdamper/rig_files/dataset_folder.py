@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -302,29 +302,26 @@ def _write_samples(dataset: Dataset, folder: Path) -> None:
     """All samples in one table; those of long records pass piece by piece, so that memory stays small."""
     import polars as pl
 
-    path = folder / "samples.parquet"
+    path, tables = folder / "samples.parquet", _samples(dataset)
     if sum(run.time.size for run in dataset) <= 8 * _SAMPLES_PER_CHUNK:
-        pl.concat(_samples(dataset), how="diagonal").write_parquet(path, compression="zstd", statistics=False)
+        named = [table.select(pl.lit(run_id).alias("run_id"), pl.all()) for run_id, table in tables]
+        pl.concat(named, how="diagonal").write_parquet(path, compression="zstd", statistics=False)
         return
-    parts = []
-    for number, table in enumerate(_samples(dataset)):
-        parts.append(folder / f".part{number}.parquet")
-        table.write_parquet(parts[-1], compression="zstd", compression_level=1, statistics=False)
-    schemas = [pl.read_parquet_schema(part) for part in parts]
-    names = list(dict.fromkeys(name for schema in schemas for name in schema))
-    tables = [
-        pl.scan_parquet(part).with_columns(pl.lit(None, pl.Float64).alias(n) for n in names if n not in schema)
-        for part, schema in zip(parts, schemas, strict=True)
-    ]
-    pl.concat([table.select(names) for table in tables]).sink_parquet(
-        path, compression="zstd", statistics=False, row_group_size=_SAMPLES_PER_CHUNK
+    parts: list[Path] = []
+    named: list[pl.LazyFrame] = []
+    for run_id, table in tables:
+        parts.append(folder / f".part{len(parts)}.ipc")
+        table.write_ipc(parts[-1], compression="uncompressed")
+        named.append(pl.scan_ipc(parts[-1]).select(pl.lit(run_id).alias("run_id"), pl.all()))
+    pl.concat(named, how="diagonal").sink_parquet(
+        path, compression="zstd", compression_level=2, statistics=False, row_group_size=_SAMPLES_PER_CHUNK
     )
     for part in parts:
         part.unlink()
 
 
-def _samples(dataset: Dataset) -> Iterable[pl.DataFrame]:
-    """Tables of at most a million samples, in order."""
+def _samples(dataset: Dataset) -> Iterator[tuple[str, pl.DataFrame]]:
+    """Tables of some hundred thousand samples, in order, each with the run they are of."""
     import polars as pl
 
     varying = any(_varies(run.current) for run in dataset)
@@ -336,12 +333,10 @@ def _samples(dataset: Dataset) -> Iterable[pl.DataFrame]:
             channels["velocity_m_s"] = run.velocity
         channels |= run.further
         for start in range(0, run.time.size, _SAMPLES_PER_CHUNK):
-            inside = slice(start, min(start + _SAMPLES_PER_CHUNK, run.time.size))
-            size = inside.stop - inside.start
-            columns = {name: np.array(values[inside]) for name, values in channels.items()}
+            inside = slice(start, start + _SAMPLES_PER_CHUNK)
+            yield run.id, pl.DataFrame({name: np.array(values[inside]) for name, values in channels.items()})
             for values in channels.values():
                 drop_pages(values)
-            yield pl.DataFrame({"run_id": pl.repeat(run.id, size, eager=True), **columns})
 
 
 def _varies(current: np.ndarray) -> bool:

@@ -35,7 +35,7 @@ _TINY = 1e-30  # of the peak-to-peak value squared
 _COLOURED = ("W_LAG", "W_CLIPPED", "W_FROZEN", "W_DRIFT", "W_DISTURBED", "W_HELD", "W_UNSTEADY", "W_REPEATABILITY")
 _HARMONICS = 20  # of the mean cycle that a filter is taken off: beyond, noise
 _LINES = 12  # of a spectrum, in the lowest octave
-_SAMPLES = 64  # at least, that have one a period earlier
+_SAMPLES, _MOST = 64, 2**14  # at least and at most, that have one a period earlier
 
 
 def channels_are_unfiltered(view: View) -> Iterator[Finding]:
@@ -82,6 +82,7 @@ def noise_by_octave(view: View, name: str) -> tuple[Floats, float]:
     nyquist = 0.5 * (values.size - 1) / float(np.ptp(view.steady.time))
     period = 2 * nyquist / motion.condition.frequency_Hz
     lag = int(np.ceil(period)) + 2
+    values = values[-(lag + _MOST) :]
     if values.size - lag < _SAMPLES:
         return np.empty(0), nyquist
     place = np.arange(lag, values.size, dtype=np.float64) - period
@@ -93,8 +94,9 @@ def noise_by_octave(view: View, name: str) -> tuple[Floats, float]:
     weight = 4 * float(np.sum(window**2)) * float(np.ptp(values)) ** 2
     if not weight:
         return np.empty(0), nyquist
-    power = np.abs(np.fft.rfft(changes * window)) ** 2 / weight
-    power = power / np.maximum(4 * np.sin(np.pi * np.arange(power.size) / changes.size) ** 2, _TINY) + _TINY
+    length = 1 << (changes.size - 1).bit_length()  # a transform of a length with large factors takes ten times as long
+    power = np.abs(np.fft.rfft(changes * window, length)) ** 2 / weight
+    power = power / np.maximum(4 * np.sin(np.pi * np.arange(power.size) / length) ** 2, _TINY) + _TINY
     lowest = int(np.ceil(_LOWEST * motion.condition.frequency_Hz / nyquist * power.size))
     high, levels = power.size, []
     while high // 2 >= _LINES and high > lowest:

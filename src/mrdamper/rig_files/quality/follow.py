@@ -7,7 +7,7 @@ import numpy as np
 from mrdamper.rig_files.quality.current import held_in
 from mrdamper.rig_files.quality.loop import damping_share, repeatability
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, steady_window
-from mrdamper.rig_files.quality.view import View, sample_noise
+from mrdamper.rig_files.quality.view import MOST_SAMPLES, View, sample_noise
 
 _NOISE = 0.7  # of a channel's standard deviation: white noise has 1, a noisy load cell 0.1
 _LEAP, _LEAPS = 0.4, 0.4  # a step of such a share of the range, and the part of the path in such steps
@@ -19,8 +19,9 @@ _UNLIKE = 0.25  # scatter from cycle to cycle over the peak-to-peak force; beyon
 
 def motion_is_told(view: View) -> None:
     """Refuse channels without memory from sample to sample, and a motion of fewer samples than its strokes need."""
+    long = view.record.time.size > MOST_SAMPLES
     for name in ("displacement", "force"):
-        values = view.channels[name]
+        values = getattr(view.run, name) if long else view.channels[name]
         if sample_noise(values) > _NOISE * float(np.nanstd(values)):
             raise view.refused(
                 "E_NOISE",

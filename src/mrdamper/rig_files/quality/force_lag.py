@@ -256,7 +256,7 @@ class _Behind:
         self.table = np.column_stack([triangle[:, :_FREE], -triangle[:, :_FREE], triangle[:, _FREE:]])
 
     def fit(self, force: Floats) -> tuple[float, Floats]:
-        """RMS that the elements leave of a force, over its RMS, and their (M,) shares; none that resists is negative."""
+        """RMS that the elements leave of a force, over its RMS, and their (M,) shares; no resisting one is negative."""
         from scipy.optimize import nnls
 
         inside = self.basis.T @ force

@@ -90,9 +90,12 @@ def leaps_in(values: Floats, of_range: float, *, against: bool) -> np.ndarray:
     there = np.flatnonzero(np.isfinite(values))
     if there.size < 20:
         return np.empty(0, dtype=int)
-    finite = values[there]
+    finite = values if there.size == values.size else values[there]
     steps = np.diff(finite)
-    big = np.abs(steps) >= of_range * float(np.ptp(finite))
+    large = of_range * float(np.ptp(finite))
+    if max(float(np.max(steps)), -float(np.min(steps))) < large:
+        return np.empty(0, dtype=int)
+    big = np.abs(steps) >= large
     count = int(np.count_nonzero(big))
     if not count or count > _MOST * finite.size:
         return np.empty(0, dtype=int)

@@ -25,6 +25,8 @@ _CLOCK = 3.0  # times the mean step: larger ones are none of an even clock
 _RARE = 0.1  # of the samples: a value held more often is the channel's own
 _FEW = 50  # distinct values of a channel that does not vary
 _CHUNK = 1_000_000  # samples looked at together
+_SOME = 10_000  # samples that show a channel's levels
+_BLOCK = 2**16  # samples compared at a time: a cache holds them
 _LONG = 20  # a value held longer than this on average is a plateau, no code
 _OFTEN, _MORE = 2, 4  # times, and times more for each that a level beside it comes again
 _AROUND, _APART = 20, 0.4  # levels on either side, share that leaps
@@ -63,7 +65,7 @@ def code_in(values: Floats, coarsest: float) -> float | None:
     low = float(np.min(values, where=present, initial=np.inf))
     high = float(np.max(values, where=present, initial=-np.inf))
     scale = (high - low) + 0.05 * max(abs(low), abs(high)) + coarsest
-    levels = np.unique(values[present][:10_000])
+    levels = np.unique(values[:_SOME][present[:_SOME]])
     varies = levels.size >= _FEW
     for value in sorted(rare, key=abs, reverse=True):
         away = max(low - value, value - high)
@@ -108,6 +110,8 @@ def _drops_to(values: Floats, value: float, step: float) -> bool:
     before, after = values[starts - 1] - value, values[stops] - value
     slope = np.maximum(np.abs(values[starts - 2] - values[starts - 1]), np.abs(values[stops + 1] - values[stops]))
     away = np.where(before * after > 0, np.minimum(np.abs(before), np.abs(after)) - _SLOPES * slope, 0.0)
+    if not np.any(away > _TURNS * step):
+        return False
     steps = np.diff(values)
     turns = np.where(steps[1:] * steps[:-1] < 0, np.minimum(np.abs(steps[1:]), np.abs(steps[:-1])), 0.0)
     same = values == value
@@ -121,6 +125,8 @@ def _too_often(values: Floats, value: float) -> bool:
     Among samples of its own size a code does not stand off; but a channel passes each of its
     levels about as often, and its samples are smooth.
     """
+    if np.count_nonzero(values == value) < _OFTEN:
+        return False
     often, around = _levels_around(values[np.isfinite(values)], value)
     if often < _OFTEN + _MORE * (int(np.max(around, initial=1)) - 1):
         return False
@@ -133,15 +139,19 @@ def _too_often(values: Floats, value: float) -> bool:
 
 def _codes_among(values: Floats) -> set[float]:
     """Zero and codes in use that a channel holds more than once."""
-    values = values[np.isfinite(values)]
-    size = np.abs(values)
-    if not np.any(size):
+    largest = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
+    if not largest:
         return set()
-    decades = 10.0 ** np.arange(np.floor(np.log10(np.max(size))) - 6, np.floor(np.log10(np.max(size))) + 1)
+    decades = 10.0 ** np.arange(np.floor(np.log10(largest)) - 6, np.floor(np.log10(largest)) + 1)
     codes = np.outer(decades, _DIGITS).reshape(-1)
     middles = 0.5 * (codes[1:] + codes[:-1])
-    near = np.abs(size / codes[np.searchsorted(middles, size)] - 1) < 1e-9
-    repeated, counts = np.unique(values[near | (size == 0.0)], return_counts=True)
+    candidates = []
+    for start in range(0, values.size, _BLOCK):
+        piece = values[start : start + _BLOCK]
+        size = np.abs(piece)
+        near = np.abs(size - codes[np.searchsorted(middles, size)]) < 1e-9 * size
+        candidates.append(piece[near | (size == 0.0)])
+    repeated, counts = np.unique(np.concatenate(candidates), return_counts=True)
     return set(repeated[counts >= _OFTEN].tolist())
 
 

@@ -18,7 +18,7 @@ from mrdamper.rig_files.text.cells import RowFormat, field_count, read_cells, sp
 from mrdamper.rig_files.text.labview import is_labview, named, stated_form, with_step
 from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
 from mrdamper.rig_files.text.spool import Spool
-from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, open_text, too_long
+from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, line_feeds, open_text, too_long
 from mrdamper.rig_files.text.tokens import looks_numeric
 from mrdamper.rig_files.text.turned import turned_table
 
@@ -123,7 +123,7 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
             numbers.append(int(rows.lines[i]))
         size += rows.lines.size
         odd |= rows.odd
-        line += chunk.count(b"\n")
+        line += line_feeds(chunk)
     form.refuse_wrong()
     if not size:
         raise stream.source.refuse("E_NO_DATA", "a header without data", "export the file again")
@@ -145,7 +145,7 @@ def _words(stream: TextStream, layout: Layout, block: Block, column: int) -> Wor
         texts = stream.decode(chunk).split("\n")
         rows, _ = split_rows(texts, line, form, at >= stream.stop)
         codes.append(np.array([indices.setdefault(row[column], len(indices)) for row in rows], dtype=np.int32))
-        line += chunk.count(b"\n")
+        line += line_feeds(chunk)
     form.refuse_wrong()
     return Words(np.concatenate(codes) if codes else np.empty(0, dtype=np.int32), tuple(indices))
 
@@ -187,7 +187,7 @@ def _without_cut_row(form: RowFormat, block: Block) -> tuple[Block, tuple[Findin
     if block.stop < stream.stop or not last.strip():
         return block, ()
     text = stream.decode(last)
-    line = block.line + sum(chunk.count(b"\n") for chunk in stream.chunks(block.start, block.stop))
+    line = block.line + sum(line_feeds(chunk) for chunk in stream.chunks(block.start, block.stop))
     if text.lstrip()[:1] in ("#", "%"):
         return block, ()
     stream.check(last, line)

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 
 from mrdamper.rig_files.text.layout import Layout, is_comment, is_footer, split, units_in
-from mrdamper.rig_files.text.stream import TextStream
+from mrdamper.rig_files.text.stream import TextStream, line_feeds
 from mrdamper.rig_files.text.tokens import looks_numeric
 
 _SEGMENT = re.compile(r"(?:Channels|Samples|Date|Time|Y_Unit_Label|X_Dimension|X0|Delta_X|\*{3}End_of_Header)\b")
@@ -50,7 +50,7 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
                 size, skipped = _units_below(stream, layout, at + line_end, header_line)
                 begin, begin_line = at + line_end + size, header_line + 1 + skipped
             position = chunk.find(header, line_end)
-        line += chunk.count(b"\n")
+        line += line_feeds(chunk)
         at += len(chunk)
         tail = chunk[-_LOOK_BACK:]
     blocks.append(Block(begin, stop, begin_line, remarks))

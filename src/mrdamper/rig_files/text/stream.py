@@ -8,12 +8,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import IO
 
+import numpy as np
+
 from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import RigFileError, Source, scratch
 
 LONGEST_LINE = 64 * 1024
-CHUNK = 8 * 2**20
+CHUNK = 4 * 2**20
 _HEAD = 2**18
 _BOMS = (
     (codecs.BOM_UTF32_LE, "utf-32-le"),
@@ -98,6 +100,8 @@ class TextStream:
 
     def check(self, block: bytes, line: int) -> None:
         """Refuse bytes no text holds; `line` is the line the block starts at."""
+        if np.count_nonzero(np.frombuffer(block, dtype=np.uint8) < 32) == line_feeds(block):
+            return
         strange = block.translate(None, _TEXT)
         if not strange:
             return
@@ -113,6 +117,11 @@ class TextStream:
         raise self.source.refuse(
             "E_ENCODING", f"byte 0x{strange[0]:02X}, which no text holds", "export the file again as text", line=line
         )
+
+
+def line_feeds(block: bytes) -> int:
+    """Number of line feeds: bytes.count takes three times as long where they are many."""
+    return int(np.count_nonzero(np.frombuffer(block, dtype=np.uint8) == 10))
 
 
 def open_text(source: Source, form: FileForm) -> TextStream:
