@@ -15,7 +15,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol, TypeVar
 
 from fastapi import Depends, Request
 
@@ -36,6 +36,20 @@ MOST_SESSIONS = 64
 MOST_DAMPERS = 200
 _NAME_BYTES = 16
 _LAST_WAIT = 10.0  # seconds for workers to end when the bench stops
+
+
+class _Cached(Protocol):
+    def cache_clear(self) -> None: ...
+
+
+_SHARED: list[_Cached] = []
+_C = TypeVar("_C", bound=_Cached)
+
+
+def shared(cached: _C) -> _C:
+    """Drop the results of a cached function, which all sessions share, when no session is left."""
+    _SHARED.append(cached)
+    return cached
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,6 +241,9 @@ class BrowserSessions:
         for session in self:
             if now - session.seen > idle_seconds:
                 self.end(session.name)
+        if not self._open:
+            for cached in _SHARED:
+                cached.cache_clear()
 
     def close(self) -> None:
         """End all and remove every file."""

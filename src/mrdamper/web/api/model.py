@@ -21,7 +21,7 @@ from mrdamper.web.answers import frame, number
 from mrdamper.web.bench_model import held_model, loop_held, predict_held, sliders
 from mrdamper.web.curves import on_screen, predicted_cycle
 from mrdamper.web.rig_table import RigTable, condition_on_screen
-from mrdamper.web.sessions import Bench, Current, Session
+from mrdamper.web.sessions import Bench, Current, Session, shared
 
 router = APIRouter(prefix="/sessions/{session}/dampers")
 _FAMILY = 10  # loops of a family over current, at most
@@ -145,6 +145,7 @@ def _tested_currents(damper: Damper, table: RigTable | None) -> list[float]:
     return sorted({levels[i] for i in picked})
 
 
+@shared
 @lru_cache(maxsize=64)  # the same while the current is moved, and in every session with the same damper
 def _over_current(
     damper: Damper, held: tuple[tuple[str, float], ...], frequency_Hz: float, amplitude_m: float, points: int

@@ -26,7 +26,7 @@ from mrdamper.systems.simulate import SystemLoop, simulate_system
 from mrdamper.systems.structure import System
 from mrdamper.systems.system_file import bundled_systems, load_system
 from mrdamper.web.answers import frame, number
-from mrdamper.web.sessions import Current
+from mrdamper.web.sessions import Current, shared
 
 router = APIRouter(prefix="/sessions/{session}/ride")
 _LENGTH = 8.0  # s of a road
@@ -74,6 +74,7 @@ def ride(ask: RideRequest, session: Current) -> Response:
         )
 
 
+@shared
 @lru_cache(maxsize=48)
 def _ridden(
     damper: Damper, name: str, source_name: str, control: str, current_A: float, scaled: bool
@@ -105,6 +106,7 @@ def _ridden(
     return head, _thinned(_histories(done, source)) | idle
 
 
+@shared
 @lru_cache(maxsize=16)
 def _setting(damper: Damper, name: str, source: str, scaled: bool) -> tuple[System, Input, float, float]:
     """System, its input, the force of the damper [N] and the scale of a vehicle."""
@@ -115,6 +117,7 @@ def _setting(damper: Damper, name: str, source: str, scaled: bool) -> tuple[Syst
     return system, _source(source, system), capacity, scale
 
 
+@shared
 @lru_cache(maxsize=16)
 def _idle(damper: Damper, name: str, source_name: str, scaled: bool, step: float) -> tuple[dict[str, Floats], float]:
     """Accelerations of the system with that damper left without current, and its cost."""
