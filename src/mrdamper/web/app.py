@@ -31,7 +31,9 @@ from mrdamper.web.uploads import NothingTakenError
 from mrdamper.web.work import refusal
 
 _SWEEP_SECONDS = 60.0
-_TWO_ARENAS = (-8, 2)  # M_ARENA_MAX
+# Two arenas (M_ARENA_MAX), as one a thread keeps what each has held; arrays of 256 KB and more
+# (M_MMAP_THRESHOLD) return to the system when they are freed.
+_ALLOCATOR = {-8: 2, -3: 1 << 18}
 _STATUS = {"E_SESSION_ENDED": 410, "E_DROP_SIZE": 413}
 
 
@@ -60,7 +62,8 @@ def create_app(
 
     @asynccontextmanager
     async def life(app: FastAPI) -> AsyncIterator[None]:
-        _of_the_allocator("mallopt", *_TWO_ARENAS)  # one a thread would keep what each has once held
+        for option, value in _ALLOCATOR.items():
+            _of_the_allocator("mallopt", option, value)
         sweeper = asyncio.create_task(_sweep(sessions))
         yield
         sweeper.cancel()
