@@ -22,7 +22,8 @@ def folder(tmp_path):
     raw = tmp_path / "raw"
     (raw / "b").mkdir(parents=True)
     write(raw, "one_0.5A.csv", text())
-    write(raw, "two_-0.3A-.csv", text(header=("Zeit [s];Weg [mm];Kraft [N]",), separator=";", decimal=","), "utf-16")
+    german = text(rows(seed=2), header=("Zeit [s];Weg [mm];Kraft [N]",), separator=";", decimal=",")
+    write(raw, "two_-0.3A-.csv", german, "utf-16")
     write(raw / "b", "one_0.5A.npz", npz_bytes(**columns()))
     write(raw, "notes.md", "not a rig's file")
     return raw
@@ -36,7 +37,8 @@ def test_a_folder_becomes_a_dataset_with_its_provenance(folder, tmp_path):
     assert [item.current_A for item in dataset] == [0.5, 0.5, 0.3]
     for item in dataset:
         # Six decimals in the text files.
-        np.testing.assert_allclose(item.force, channels()["force"], rtol=0, atol=1e-6)
+        measured = channels(seed=2 if item.id.startswith("two") else 1)["force"]
+        np.testing.assert_allclose(item.force, measured, rtol=0, atol=1e-6)
         assert len(item.notes["sha256"]) == 64
         assert item.notes["current_from"] == "file name"
     assert dataset["two_-0.3A-"].notes["file"] == "two_-0.3A-.csv"
@@ -148,3 +150,23 @@ def test_a_profile_that_cannot_be_read_stops_at_once(folder, tmp_path):
     done = run(folder, "--out", tmp_path / "out", "--profile", profile)
     assert isinstance(done.exception, InputError)
     assert done.exception.code == "E_PROFILE"
+
+
+def test_one_record_under_several_currents_is_refused(tmp_path):
+    for name in ("0A.csv", "0.5A.csv"):
+        write(tmp_path, name, text())
+    result = import_files([tmp_path])
+    assert [refusal.error.code for refusal in result.refusals] == ["E_CONDITIONS"] * 2
+    write(tmp_path, "0.5A.csv", text(rows(seed=2)))
+    assert len(import_files([tmp_path]).records) == 2
+
+
+def test_files_of_one_name_in_several_folders_are_told_apart(tmp_path):
+    for number, folder in enumerate(("1Hz", "2Hz")):
+        (tmp_path / "raw" / folder).mkdir(parents=True)
+        write(tmp_path / "raw" / folder, "0.5A.csv", text(rows(seed=number)))
+    done = run(tmp_path / "raw", "--out", tmp_path / "out")
+    assert "2 runs from 2 files" in done.output
+    assert [item.notes["file"] for item in load_dataset(tmp_path / "out")] == ["1Hz/0.5A.csv", "2Hz/0.5A.csv"]
+    run(tmp_path / "raw", "--write-tests", tmp_path / "raw" / "tests.csv")
+    assert run(tmp_path / "raw", "--out", tmp_path / "again").exit_code == 0

@@ -179,3 +179,74 @@ def test_channels_in_volts_are_refused_with_the_scale_that_is_missing(tmp_path):
     (refusal,) = {str(r.error) for r in import_files([tmp_path]).refusals if "force" in str(r.error)}
     assert "CH1, CH2 in volts without a scale" in refusal
     assert "unit and scale" in refusal
+
+
+def motion(frequency: float, amperes: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement [mm] and force [N] of four strokes or more."""
+    v = np.cos(2 * np.pi * frequency * T)
+    noise = np.random.default_rng(seed).normal(0, 2, T.size)
+    return 10 * np.sin(2 * np.pi * frequency * T), (200 + 500 * amperes) * np.tanh(6 * v) + 100 * v + noise
+
+
+STEPS = [(1.0, 0.0), (1.0, 0.5), (2.0, 0.0), (2.0, 0.5)]  # frequency [Hz], current [A]
+
+
+def test_a_column_that_numbers_the_tests_is_joined_with_the_plan_by_its_key(tmp_path):
+    text = "Time (s),Step,Disp (mm),Force (N)\n"
+    for number, (frequency, amperes) in enumerate(STEPS, 1):
+        x, f = motion(frequency, amperes, number)
+        text += rows(T + 30 * number, np.full(T.size, number), x, f)
+    (tmp_path / "record_1.csv").write_text(text)
+    plan = "Step,Frequency (Hz),Coil Current (A)\n" + "".join(f"{n},{f},{i}\n" for n, (f, i) in enumerate(STEPS, 1))
+    (tmp_path / "method.csv").write_text(plan)
+    assert currents(import_files([tmp_path]).records) == [0.0, 0.0, 0.5, 0.5]
+    (tmp_path / "record_1.csv").write_text("time (s),disp (mm),force (N)\n" + rows(T, X, force(0.5)))
+    result = import_files([tmp_path])  # rows of several currents are no one value, whatever number the file's name ends in
+    assert not result.records
+    assert "E_CURRENT_MISSING" in {r.error.code for r in result.refusals}
+
+
+def test_a_session_is_cut_at_rests_at_steps_of_the_current_and_where_the_logger_was_off(tmp_path):
+    x, f, i = [], [], []
+    for number, frequency in enumerate((1.0, 2.0)):
+        for amperes in (0.0, 0.5):
+            moved, force_of = motion(frequency, amperes, number)
+            x, f, i = [*x, moved], [*f, force_of], [*i, np.full(T.size, amperes)]
+        x, f, i = [*x, np.zeros(400)], [*f, np.zeros(400)], [*i, np.zeros(400)]
+    x, f, i = (np.concatenate(channel) for channel in (x, f, i))
+    path = tmp_path / "session.csv"
+    path.write_text("time (s),disp (mm),force (N),current (A)\n" + rows(0.005 * np.arange(x.size), x, f, i))
+    assert currents(read_runs(path)) == [0.0, 0.0, 0.5, 0.5]
+    text = "time (s),disp (mm),force (N),current (A)\n"
+    for number, (frequency, amperes) in enumerate(STEPS):
+        text += rows(T + 60 * number, *motion(frequency, amperes, number), np.full(T.size, amperes))
+    path.write_text(text)
+    assert currents(read_runs(path)) == [0.0, 0.0, 0.5, 0.5]
+
+
+def test_channels_of_other_lengths_in_one_group_are_no_table_of_results(tmp_path):
+    import h5py
+
+    with h5py.File(tmp_path / "campaign.h5", "w") as file:
+        file["force"], file["current"] = np.arange(400.0), np.arange(40.0)
+        file["position"] = np.arange(200.0)
+    assert {r.error.code for r in import_files([tmp_path]).refusals} >= {"E_COLUMN"}
+
+
+@pytest.mark.parametrize(
+    ("heading", "codes"),
+    [
+        ("Sample rate: 800 Hz\nFrequency: 4 Hz\n", ["E_AMBIGUOUS"]),
+        ("Sample rate: 800 Hz\n", ["E_AMBIGUOUS"]),
+        ("Sample rate: 800 Hz\nFrequency: 1 Hz\n", []),  # every fourth sample was exported
+        ("Sample rate: 200 Hz\n", []),
+    ],
+)
+def test_a_stated_rate_that_contradicts_the_time_column_is_refused(tmp_path, heading, codes):
+    path = tmp_path / "run_0.5A.txt"
+    path.write_text(heading + "Time [s],Stroke [mm],Force [N]\n" + rows(T, X, force(0.5)))
+    assert [r.error.code for r in import_files([path]).refusals] == codes
+    by_column = import_files([path], parse_profile('[channels.time]\ncolumn = "Time [s]"\n'))
+    assert [r.error.code for r in by_column.refusals] == (codes if "4 Hz" in heading else [])
+    by_rate = import_files([path], parse_profile("[file]\nsample_rate_Hz = 800\n"))
+    assert not by_rate.refusals

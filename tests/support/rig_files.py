@@ -21,9 +21,9 @@ def channels(samples: int = 600, seed: int = 1) -> dict[str, np.ndarray]:
     return {"time": t, "displacement": AMPLITUDE * np.sin(phase), "force": force, "velocity": v}
 
 
-def rows(samples: int = 600) -> np.ndarray:
+def rows(samples: int = 600, seed: int = 1) -> np.ndarray:
     """Time [s], displacement [mm], force [N]."""
-    c = channels(samples)
+    c = channels(samples, seed)
     return np.column_stack([c["time"], 1e3 * c["displacement"], c["force"]])
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from mrdamper.data import Dataset
 from mrdamper.errors import ColumnError, CombinedError, InputError
+from mrdamper.rig_files.coil_current import as_data
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.folder import files_in, is_left_out
 from mrdamper.rig_files.long_records import check_long_record
@@ -22,6 +23,7 @@ from mrdamper.rig_files.mapping.companions import (
     joined_parts,
     part_of,
     results_of,
+    tests_by,
     with_currents_of,
     with_legend_of,
     with_results_of,
@@ -166,11 +168,12 @@ def import_files(
         if table is not None:
             table.require_found(intake.met)
         refusals = intake.refusals
-        if intake.records or refusals:
+        if intake.tests() or refusals:
             left_out += [Path(note.file) for note in intake.notes]
         else:
             refusals = intake.notes
-        return ImportResult(with_unique_ids(intake.records), tuple(refusals), tuple(path.name for path in left_out))
+        records = with_unique_ids(_with_folders(intake.tests()))
+        return ImportResult(records, tuple(refusals), tuple(path.name for path in left_out))
 
 
 class _Intake:
@@ -193,11 +196,6 @@ class _Intake:
         if path not in self._tables_of_results:
             self._tables_of_results[path] = results_of(path)
         return self._tables_of_results[path]
-
-    @property
-    def records(self) -> list[Record]:
-        """The accepted tests, in the order of their files."""
-        return [record for _, record in sorted(self._found, key=lambda entry: entry[0])]
 
     def read(self, path: Path, *, given: bool) -> None:
         """Read a file, and check the tests in it whose current is known."""
@@ -259,7 +257,7 @@ class _Intake:
         self._refuse_names_without_point()
         for path in [path for path in others if path not in used and self._found]:
             results = self._results(path)
-            refused = contradictions_with(self._tests(), results, path) if results else None
+            refused = contradictions_with(self.tests(), results, path) if results else None
             if refused is not None:
                 self._refuse(refused)
             elif path not in self._given and is_list(path):
@@ -267,7 +265,7 @@ class _Intake:
             else:
                 continue
             self.refusals = [refusal for refusal in self.refusals if Path(refusal.file) != path]
-        self._refuse(contradictions([record for _, record in self._tests()]))
+        self._refuse(contradictions([record for _, record in self.tests()]))
 
     def _join_channels(self, others: list[Path]) -> set[Path]:
         """Join displacements and forces of two files, and currents that other files state; the files that were used."""
@@ -292,13 +290,23 @@ class _Intake:
         notes = [Path(note.file) for note in self.notes]
         for path in [path for path in (*others, *notes) if pending and path not in used]:
             results = self._results(path)
-            stated = with_results_of(pending, results, path) if results else None
-            stated = stated or with_legend_of(pending, path)
+            tests = self._numbered(results) if results else pending
+            stated = with_results_of(tests, results, path) if results else None
+            stated = stated or with_legend_of(tests, path)
             if stated:
-                self._pending = [(file, record) for (file, _), record in zip(pending, stated, strict=True)]
+                self._pending = [(file, record) for (file, _), record in zip(tests, stated, strict=True)]
                 self.notes = [note for note in self.notes if Path(note.file) != path]
                 return used | {path}
         return used
+
+    def _numbered(self, results: Results) -> list[tuple[Path, Record]]:
+        """The tests without a current, those of a file apart that one of its columns numbers as a table of results."""
+        tests: list[tuple[Path, Record]] = []
+        for path in dict.fromkeys(path for path, _ in self._pending):
+            own = [record for file, record in self._pending if file == path]
+            numbered = tests_by(path, results, self._profile.of_file(path.name)[1])
+            tests += [(path, record) for record in numbered or own]
+        return tests
 
     def _refuse_names_without_point(self) -> None:
         """Refuse currents of two digits in names, where another name of the set begins such a number with a zero."""
@@ -309,9 +317,9 @@ class _Intake:
             remedy="write the currents into tests.csv (--write-tests)",
             code="E_AMBIGUOUS",
         )
-        self._refuse({i: error for i, (file, _) in enumerate(self._tests()) if _TWO_DIGITS.search(file.name)})
+        self._refuse({i: error for i, (file, _) in enumerate(self.tests()) if _TWO_DIGITS.search(file.name)})
 
-    def _tests(self) -> list[tuple[Path, Record]]:
+    def tests(self) -> list[tuple[Path, Record]]:
         """The accepted tests with their files, in the order of these."""
         names = {number: Path(name) for name, number in self._order.items()}
         return [(names[number], record) for number, record in sorted(self._found, key=lambda entry: entry[0])]
@@ -319,7 +327,7 @@ class _Intake:
     def _refuse(self, errors: Mapping[int, InputError]) -> None:
         """Refuse accepted tests, each by its place among them."""
         problems_by_place = sorted(self._found, key=lambda entry: entry[0])
-        files = self._tests()
+        files = self.tests()
         self.refusals += [Refusal(str(files[i][0]), error, files[i][1].id) for i, error in errors.items()]
         self._found = [entry for i, entry in enumerate(problems_by_place) if i not in errors]
 
@@ -328,19 +336,32 @@ def found_tests(
     paths: Iterable[str | Path], profile: Profile | str | Path | None = None
 ) -> tuple[tuple[Record, ...], tuple[Refusal, ...]]:
     """Every test that files hold, unchecked, and the files that cannot be read: for a table of tests."""
-    records: list[Record] = []
+    records: list[tuple[Path, Record]] = []
     refusals: list[Refusal] = []
     with unpacked(paths) as given:
         for path in files_in(given)[0]:
             try:
                 of_file, problems = records_of_file(path, profile_of(profile))
-                records += of_file
+                records += [(path, record) for record in of_file]
                 refusals += [Refusal(str(path), problem) for problem in problems]
             except NoTableError as error:
                 refusals += [Refusal(str(path), error)] if path in given else []
             except InputError as error:
                 refusals.append(Refusal(str(path), error))
-    return tuple(records), tuple(refusals)
+    return tuple(_with_folders(records)), tuple(refusals)
+
+
+def _with_folders(tests: Sequence[tuple[Path, Record]]) -> list[Record]:
+    """Records whose file is told with its folders, where files of several folders have one name."""
+    paths = {path for path, _ in tests}
+    records = []
+    for path, record in tests:
+        depth = 1
+        while depth < len(path.parts) and any(p != path and p.parts[-depth:] == path.parts[-depth:] for p in paths):
+            depth += 1
+        file = as_data("/".join(path.parts[-depth:]))
+        records.append(record if depth == 1 else replace(record, provenance={**record.provenance, "file": file}))
+    return records
 
 
 def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:

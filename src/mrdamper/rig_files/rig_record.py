@@ -16,6 +16,7 @@ from mrdamper.rig_files.coil_current import as_data, constant, current_of, witho
 from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
 from mrdamper.rig_files.conditions import currents_in, stated_motion
+from mrdamper.rig_files.mapping.clocks import refuse_two_rates
 from mrdamper.rig_files.mapping.session import stretches_of_session
 from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.profile import Correction, Profile
@@ -51,6 +52,8 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     _refuse_tiny_currents(table, assigned, channels)
     if "time" not in channels:
         channels["time"], rate = _counted_time(table, profile, size)
+    else:
+        refuse_two_rates(table, profile, channels["time"], channels["displacement"])
     if profile.channel("displacement").integrate:
         channels["displacement"] = _integrated(channels["time"], channels["displacement"])
         findings.append(Finding("W_SCALE", "the displacement is the integral of the velocity"))

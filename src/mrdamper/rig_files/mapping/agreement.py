@@ -1,4 +1,4 @@
-"""Tests of one set beside each other: equal conditions have equal forces, and stronger coils no weaker ones."""
+"""Tests of one set beside each other: equal conditions have equal forces, and other currents other samples."""
 
 from __future__ import annotations
 
@@ -22,21 +22,47 @@ _Point = tuple[float, float, float, float]
 
 
 def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:
-    """The tests of equal conditions whose forces differ several-fold, by their place, and the refusal of each."""
+    """The tests that contradict each other, by their place, and the refusal of each.
+
+    Equal conditions whose forces differ several-fold; and the same samples under several currents.
+    """
     points = [_point(record) for record in records]
+    refused = _copies(records, points)
     groups: dict[tuple[str, int], list[int]] = defaultdict(list)
     for i, point in enumerate(points):
         if point is not None:
             notes = records[i].provenance
             owner = " ".join((records[i].rig, notes.get("specimen", ""), notes.get("session", "")))
             groups[owner, round(point[2] / _ALIKE_A / 2)].append(i)
-    refused: dict[int, QualityError] = {}
     for members in groups.values():
         for i in members:
             for j in members:
                 if i < j and _contradict(points[i], points[j]):
                     refused.setdefault(i, _refusal(records, points, i, j))
                     refused.setdefault(j, _refusal(records, points, j, i))
+    return refused
+
+
+def _copies(records: Sequence[Record], points: Sequence[_Point | None]) -> dict[int, QualityError]:
+    """The tests that hold the samples of another test and have another current than it."""
+    groups: dict[tuple[int, bytes, bytes], list[int]] = defaultdict(list)
+    for i, record in enumerate(records):
+        samples = np.arange(0, record.time.size, max(1, record.time.size // _MOST_SAMPLES))
+        force, moved = (take(channel, samples).tobytes() for channel in (record.force, record.displacement))
+        groups[record.time.size, force, moved].append(i)
+    refused: dict[int, QualityError] = {}
+    for members in groups.values():
+        currents = {i: point[2] for i in members if (point := points[i]) is not None}
+        for i, current in currents.items():
+            others = [records[j].id for j, its in currents.items() if abs(its - current) > _ALIKE_A]
+            if not others:
+                continue
+            refused[i] = QualityError(
+                f"has the very samples of {others[0]} and another current: {current:.3g} A",
+                where=records[i].provenance.get("file", records[i].id),
+                remedy="one of them is a copy under a wrong name: leave it out, or export the test again",
+                code="E_CONDITIONS",
+            )
     return refused
 
 

@@ -1,4 +1,4 @@
-"""Time that a table holds otherwise than as one column: seconds and thousandths apart, or the angle of a crank."""
+"""Time that a table holds otherwise than as one column: seconds and thousandths apart, the angle of a crank, a rate."""
 
 from __future__ import annotations
 
@@ -7,12 +7,47 @@ from dataclasses import replace
 
 import numpy as np
 
+from mrdamper.data import Floats
 from mrdamper.errors import InputError
-from mrdamper.rig_files.conditions import stated_speed
+from mrdamper.rig_files.conditions import stated_rate, stated_speed
+from mrdamper.rig_files.mapping.proposals import frequency_of, stated_frequencies
+from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import Finding
 
 _THOUSANDTHS = frozenset(("ms", "msec", "millisecond", "milliseconds", "millisekunden"))
+_SAME_RATE, _SAME_FREQUENCY = 0.2, 0.1  # relative differences of what is stated from what is measured
+_SAMPLES = 100_000  # looked at
+
+
+def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displacement: Floats) -> None:
+    """Refuse a time column that contradicts the sampling rate that stands beside the columns.
+
+    An export of every n-th sample has a lower rate than it was recorded at: it is taken where the frequency that
+    is stated is that of the time column, or where the profile names this column and no frequency contradicts it.
+    """
+    decimal = table.form.get("decimal")
+    try:
+        stated = stated_rate(table.remarks, table.constants, decimal if isinstance(decimal, str) else None)
+    except ValueError:
+        return  # of several channels
+    time, displacement = time[:_SAMPLES], displacement[:_SAMPLES]
+    steps = np.diff(time[np.isfinite(time)])
+    step = float(np.median(steps)) if steps.size else 0.0
+    if not stated or step <= 0 or abs(stated * step - 1) <= _SAME_RATE or abs(1 / (stated * step) - 1) <= _SAME_RATE:
+        return
+    frequencies, measured = {*stated_frequencies(table)} - {stated}, frequency_of(time, displacement)
+    near = [abs(measured / f - 1) <= _SAME_FREQUENCY for f in frequencies if f > 0] if measured else []
+    if any(near) or (profile.channel("time").column is not None and not near):
+        return
+    beside = f", and the motion {measured:.3g} Hz where {min(frequencies):g} Hz are stated" if measured and near else ""
+    raise table.source.refuse(
+        "E_AMBIGUOUS",
+        f"the file states {stated:g} samples per second, its time column has {1 / step:.4g}{beside}: which clock is right?",
+        'set [file] sample_rate_Hz = ... in a profile, or [channels.time] column = "..." if the time column is right'
+        if not near
+        else "set [file] sample_rate_Hz = ... in a profile, or correct the line that is wrong",
+    )
 
 
 def with_time_stated(table: RawTable) -> RawTable:

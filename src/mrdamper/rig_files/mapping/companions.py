@@ -15,6 +15,7 @@ from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.coil_current import as_data, constant, current_of
 from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.conditions import amperes, contradicts
+from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
 from mrdamper.rig_files.profile import Profile
@@ -162,12 +163,33 @@ def _decoded(content: bytes) -> str:
 
 def with_results_of(pending: Sequence[tuple[Path, Record]], results: Results, path: Path) -> list[Record] | None:
     """The records with the currents that a table of results states; None unless it names every one of them."""
-    tests = [(record.id, file.name, file.stem) for file, record in pending]
-    currents = results.by_test(tests)
+    currents = results.by_test(_called(pending))
     if len(currents) < len(pending):
         return None
     whence = f"{path.name}, {results.title}"
     return [_with_stated(record, currents[i], whence) for i, (_, record) in enumerate(pending)]
+
+
+def _called(tests: Sequence[tuple[Path, Record]]) -> list[tuple[str, ...]]:
+    """Names of each test: its own, that of its file, and its own without that of its file."""
+    stems = [re.sub(r"[^\w.+=-]+", "_", file.stem) for file, _ in tests]
+    return [
+        (record.id, file.name, file.stem, record.id.removeprefix(stem).lstrip("_"))
+        for (file, record), stem in zip(tests, stems, strict=True)
+    ]
+
+
+def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:
+    """The tests of a file whose column numbers them as a table of results does; empty if it has no such column."""
+    try:
+        with raw_tables(path, profile.file) as tables:
+            column = results.column_of_tests(tables[0]) if len(tables) == 1 else None
+        if column is None:
+            return []
+        form = profile.file.model_copy(update={"run_column": column})
+        return records_of_file(path, profile.model_copy(update={"file": form}))[0]
+    except InputError:
+        return []
 
 
 def with_legend_of(pending: Sequence[tuple[Path, Record]], path: Path) -> list[Record] | None:
@@ -200,7 +222,7 @@ def contradictions_with(
     tests: Sequence[tuple[Path, Record]], results: Results, path: Path
 ) -> dict[int, InputError] | None:
     """Refusals of tests whose current a table of results contradicts, by number; None unless it names every test."""
-    currents = results.by_test([(record.id, file.name, file.stem) for file, record in tests])
+    currents = results.by_test(_called(tests))
     if len(currents) < len(tests):
         return None
     refused: dict[int, InputError] = {}

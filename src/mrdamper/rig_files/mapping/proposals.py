@@ -41,14 +41,14 @@ def with_unit_of_time(table: RawTable) -> RawTable:
     moved = [i for i, header in enumerate(table.headers) if header.role == "displacement"]
     if len(times) != 1 or len(moved) != 1 or table.headers[times[0]].unit or table.source.size > _LARGEST:
         return table
-    stated = set(_frequencies(table))
+    stated = set(stated_frequencies(table))
     if len(stated) != 1:
         return table
     try:
         values = table.read([times[0], moved[0]]).values
     except InputError:
         return table
-    measured = _frequency(values[times[0]], values[moved[0]])
+    measured = frequency_of(values[times[0]], values[moved[0]])
     frequency = stated.pop()
     units = [u for u, f in _CLOCK_UNITS.items() if measured and abs(measured / f - frequency) < _AGREE * frequency]
     if len(units) != 1:
@@ -138,7 +138,7 @@ def _smooth_slope(time: Floats, x: Floats) -> Floats:
     return slope
 
 
-def _frequencies(table: RawTable) -> Iterator[float]:
+def stated_frequencies(table: RawTable) -> Iterator[float]:
     """Frequencies [Hz] that the title, the file's name or a number beside the columns states."""
     for text in (table.label, table.source.name, *table.remarks[-20:]):
         for match in _FREQUENCY.finditer(text[:255]):
@@ -149,7 +149,7 @@ def _frequencies(table: RawTable) -> Iterator[float]:
             yield header.known.factor * value
 
 
-def _frequency(time: Floats, x: Floats) -> float | None:
+def frequency_of(time: Floats, x: Floats) -> float | None:
     """Frequency of a motion, by the reversals of its sign about the middle."""
     from mrdamper.rig_files.quality.strokes import find_strokes
 

@@ -31,6 +31,7 @@ class Results:
     current: tuple[float, ...]  # [A], one a row
     cells: tuple[tuple[str, ...], ...]  # of every row those beside the current, by column
     title: str  # heading of the column of currents
+    keys: tuple[str, ...] = ()  # headings of the columns of `cells`; empty for the number of the row
 
     def by_test(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
         """The current [A] of each test by its number, where one column of the table tells all of them apart.
@@ -41,12 +42,25 @@ class Results:
             What each test is called: its label, its file, the lines above it.
         """
         names = [_names(texts) for texts in tests]
-        for exact in (True, False):
+        one_of_several = len(tests) == 1 < len(self.current)  # a number in its name alone may count anything
+        for exact in (True,) if one_of_several else (True, False):
             matches = [match for column in zip(*self.cells, strict=True) if (match := _match(column, names, exact))]
             currents = [{i: self.current[row] for i, row in match.items()} for match in matches]
             if currents:
                 return currents[0] if all(other == currents[0] for other in currents) else {}
         return {}
+
+
+    def column_of_tests(self, table: RawTable) -> str | None:
+        """The column of a record that numbers its tests as a column of this table, of the same name, does."""
+        for i, name in enumerate(table.names if table.words is not None else ()):
+            at = [k for k, key in enumerate(self.keys) if key and _key(split_name(key).name) == _key(split_name(name).name)]
+            if len(at) != 1 or table.words is None:
+                continue
+            numbers = {_key(label) for label in table.words(i).labels} - {""}
+            if len(numbers) > 1 and numbers <= {_key(cells[at[0]]) for cells in self.cells}:
+                return name
+        return None
 
 
 def results_in(lines: Sequence[str], decimal: str | None = None) -> Results | None:
@@ -105,6 +119,8 @@ def lines_of(table: RawTable) -> list[str]:
     columns = [table.words(i) for i in range(len(table.names))]
     if any(words.codes.size > _MOST_ROWS for words in columns):
         return []
+    if len({words.codes.size for words in columns}) > 1:  # channels of several rasters
+        return []
     rows = zip(*([words.labels[code] for code in words.codes] for words in columns), strict=True)
     units = (table.units,) if any(table.units) else ()
     return ["\t".join(cells) for cells in (table.names, *units, *rows)]
@@ -150,6 +166,7 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
             tuple(value for value in currents if value is not None),
             tuple((str(n), *(cells[i] for i in others)) for n, cells in enumerate(body, 1)),
             row[columns[0]],
+            ("", *(row[i] for i in others)),
         )
 
 

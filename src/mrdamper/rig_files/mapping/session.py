@@ -13,6 +13,7 @@ from mrdamper.rig_files.quality.strokes import find_strokes
 MOST_TESTS = 500  # of a record: more is a cut at noise
 _BLOCK_S = 0.1  # [s] in which a motion at rest stays within a share of its range
 _REST = 0.03  # of the motion's range
+_OFF_S, _OFF_STEPS = 1.0, 20  # a gap in time that is longer than both is a rest: the recording was off [s], [steps]
 _FEWEST_BLOCKS = 3  # of a rest
 _FEWEST_REVERSALS = 3  # of a test
 _FEWEST_REVERSALS_HELD = 5  # of a test at a current that steps to the next without a rest
@@ -28,9 +29,9 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     """The tests of a record that rests between them, with half of each rest; one stretch where it is one test.
 
     A record is cut only if every part between two rests is a motion of several strokes at a constant
-    current, and not all parts are of one condition: a pause within a test, the dwell of a trapezoidal
-    motion, and a slow stretch of a random one at one current are no borders. Without rests it is cut
-    where the current steps.
+    current, or at currents that step from one to the next, and not all parts are of one condition: a
+    pause within a test, the dwell of a trapezoidal motion, and a slow stretch of a random one at one
+    current are no borders. Time in which nothing was recorded is a rest.
 
     Raises
     ------
@@ -44,10 +45,12 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     current = np.zeros(time.size) if current is None else current
     if not there.all() or np.any(np.diff(time) <= 0):
         return whole
-    borders = [(at, at) for at in _borders(time, displacement)] or _steps(time, displacement, current)
-    ends = [*(stop for stop, _ in borders), time.size]
-    parts = [slice(a, b) for a, b in zip([0, *(start for _, start in borders)], ends, strict=True)]
-    parts = [part for part in parts if _moves(displacement[part], displacement)]
+    ends = [0, *_borders(time, displacement), time.size]
+    parts = [slice(a, b) for a, b in pairwise(ends) if _moves(displacement[a:b], displacement)]
+    for end in (0, -1):  # the motion starts or stops softly: no test
+        if len(parts) > 2 and find_strokes(time[parts[end]], displacement[parts[end]]).reversals.size < _FEWEST_REVERSALS:
+            del parts[end]
+    parts = [piece for part in parts for piece in _pieces(part, time, displacement, current)]
     if len(parts) < 2:
         return whole
     conditions = []
@@ -68,42 +71,47 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     return parts
 
 
-def _steps(time: Floats, x: Floats, current: Floats) -> list[tuple[int, int]]:
-    """First and last sample of every change of the current from one held value to another while the motion goes on.
+def _pieces(part: slice, time: Floats, displacement: Floats, current: Floats) -> list[slice]:
+    """The pieces of a part between changes of the current from one held value to another while the motion goes on.
 
     Between two steps the motion turns back several times: a shorter stretch is a test of the coil's response.
+    Pieces without motion, at the ends, are left out; the part itself where the current does not step.
     """
-    if not np.isfinite(current).all() or not held_current(current)[1]:
-        return []
-    strokes = find_strokes(time, x)
+    t, x, i = time[part], displacement[part], current[part]
+    if i.size < 3 or not np.isfinite(i).all() or not held_current(i)[1]:
+        return [part]
+    strokes = find_strokes(t, x)
     if strokes.period is None:
-        return []
-    step = float(np.median(np.diff(time)))
-    size = max(1, round(_SETTLED_PERIODS * strokes.period / step))
-    if time.size < 2 * size:
-        return []
-    ahead = np.abs(current[size:] - current[:-size]) > _ALIKE_A  # two sides of a step are so far apart
+        return [part]
+    size = max(1, round(_SETTLED_PERIODS * strokes.period / float(np.median(np.diff(t)))))
+    if t.size < 2 * size:
+        return [part]
+    ahead = np.abs(i[size:] - i[:-size]) > _ALIKE_A  # two sides of a step are so far apart
     edges = np.flatnonzero(np.diff(np.concatenate([[False], ahead, [False]]).astype(int)))
     steps = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     if not steps or any(not 0.5 * size <= b - a <= 2 * size for a, b in steps):
-        return []
+        return [part]
     # The first sample of which the one `size` ahead differs stands `size` before the step.
-    borders = [(a + size, max(b, a + size)) for a, b in steps]
-    bounds = [0, *(start for _, start in borders), time.size]
-    longest = [np.count_nonzero((strokes.reversals >= a) & (strokes.reversals < b)) for a, b in pairwise(bounds)]
-    return borders if min(longest) >= _FEWEST_REVERSALS_HELD else []
+    starts, stops = [0, *(max(b, a + size) for a, b in steps)], [*(a + size for a, _ in steps), t.size]
+    pieces = [(a, b) for a, b in zip(starts, stops, strict=True) if _moves(x[a:b], x)]
+    turns = [np.count_nonzero((strokes.reversals >= a) & (strokes.reversals < b)) for a, b in pieces]
+    if min(turns, default=0) < _FEWEST_REVERSALS_HELD:
+        return [part]
+    return [slice(part.start + a, part.start + b) for a, b in pieces]
 
 
 def _borders(time: Floats, x: Floats) -> list[int]:
-    """Middles of the rests of a motion."""
-    step = float(np.median(np.diff(time)))
+    """Middles of the rests of a motion, and the gaps in its time."""
+    steps = np.diff(time)
+    step = float(np.median(steps))
+    off = np.flatnonzero(steps > max(_OFF_S, _OFF_STEPS * step)) + 1
     size = max(2, round(_BLOCK_S / step))
     count = x.size // size
     blocks = x[: count * size].reshape(count, size)
     still = np.ptp(blocks, axis=1) < _REST * np.ptp(x)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
     rests = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= _FEWEST_BLOCKS]
-    return [int((a + b) * size // 2) for a, b in rests if a > 0 and b < count]
+    return sorted({*off.tolist(), *(int((a + b) * size // 2) for a, b in rests if a > 0 and b < count)})
 
 
 def _moves(part: Floats, x: Floats) -> bool:
