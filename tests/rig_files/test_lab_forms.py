@@ -201,7 +201,9 @@ def test_a_column_that_numbers_the_tests_is_joined_with_the_plan_by_its_key(tmp_
     (tmp_path / "method.csv").write_text(plan)
     assert currents(import_files([tmp_path]).records) == [0.0, 0.0, 0.5, 0.5]
     (tmp_path / "record_1.csv").write_text("time (s),disp (mm),force (N)\n" + rows(T, X, force(0.5)))
-    result = import_files([tmp_path])  # rows of several currents are no one value, whatever number the file's name ends in
+    result = import_files(
+        [tmp_path]
+    )  # rows of several currents are no one value, whatever number the file's name ends in
     assert not result.records
     assert "E_CURRENT_MISSING" in {r.error.code for r in result.refusals}
 

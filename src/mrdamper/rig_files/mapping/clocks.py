@@ -43,7 +43,7 @@ def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displaceme
     beside = f", and the motion {measured:.3g} Hz where {min(frequencies):g} Hz are stated" if measured and near else ""
     raise table.source.refuse(
         "E_AMBIGUOUS",
-        f"the file states {stated:g} samples per second, its time column has {1 / step:.4g}{beside}: which clock is right?",
+        f"the file states {stated:g} samples per second, its time column has {1 / step:.4g}{beside}: which is right?",
         'set [file] sample_rate_Hz = ... in a profile, or [channels.time] column = "..." if the time column is right'
         if not near
         else "set [file] sample_rate_Hz = ... in a profile, or correct the line that is wrong",

@@ -50,11 +50,14 @@ class Results:
                 return currents[0] if all(other == currents[0] for other in currents) else {}
         return {}
 
-
     def column_of_tests(self, table: RawTable) -> str | None:
         """The column of a record that numbers its tests as a column of this table, of the same name, does."""
         for i, name in enumerate(table.names if table.words is not None else ()):
-            at = [k for k, key in enumerate(self.keys) if key and _key(split_name(key).name) == _key(split_name(name).name)]
+            at = [
+                k
+                for k, key in enumerate(self.keys)
+                if key and _key(split_name(key).name) == _key(split_name(name).name)
+            ]
             if len(at) != 1 or table.words is None:
                 continue
             numbers = {_key(label) for label in table.words(i).labels} - {""}

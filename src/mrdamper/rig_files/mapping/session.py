@@ -48,7 +48,10 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     ends = [0, *_borders(time, displacement), time.size]
     parts = [slice(a, b) for a, b in pairwise(ends) if _moves(displacement[a:b], displacement)]
     for end in (0, -1):  # the motion starts or stops softly: no test
-        if len(parts) > 2 and find_strokes(time[parts[end]], displacement[parts[end]]).reversals.size < _FEWEST_REVERSALS:
+        if (
+            len(parts) > 2
+            and find_strokes(time[parts[end]], displacement[parts[end]]).reversals.size < _FEWEST_REVERSALS
+        ):
             del parts[end]
     parts = [piece for part in parts for piece in _pieces(part, time, displacement, current)]
     if len(parts) < 2:
