@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib import pyplot
 from support.rig_records import clean_record
 from typer.testing import CliRunner
 
@@ -75,10 +74,8 @@ def test_flagged_samples_are_marked_and_names_are_text():
     ]
     figure = quality_figure(panels)
     first, second = figure.axes[:2]
-    assert [line.get_xdata().size for line in first.lines] == [50, 5]
-    assert len(second.lines) == 1
+    assert [one.x.size for one in first.series] == [50, 5]
+    assert len(second.series) == 1
     # Drawn in millimetres.
-    assert first.lines[0].get_xdata().max() == pytest.approx(10.0)
-    assert first.get_title(loc="left") == "$x^2$ <b>"
-    figure.draw_without_rendering()
-    pyplot.close("all")
+    assert first.series[0].x.max() == pytest.approx(10.0)
+    assert ">(a) $x^2$ &lt;b&gt;</text>" in figure.drawn().file("svg").decode()

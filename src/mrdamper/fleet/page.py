@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mrdamper.data import Floats
 from mrdamper.data.atomic import write_file
@@ -19,7 +18,8 @@ from mrdamper.fleet.plan import Plan
 from mrdamper.fleet.profile import ColumnLimits
 from mrdamper.fleet.verdicts import FEATURES, clock_findings, drift, suspects, with_features
 from mrdamper.report.page import render_page
-from mrdamper.report.plots.style import PALETTE, Picture, label, new_figure
+from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.style import PALETTE, Picture
 
 if TYPE_CHECKING:
     import polars as pl
@@ -135,23 +135,25 @@ def _described(line: pl.DataFrame, name: str, about: tuple[str, str]) -> dict[st
 
 
 def _chart(values: Floats, first: Any, ranges: Any, average: Any, about: tuple[str, str]) -> Figure:
-    figure, axes = new_figure(2, 2, 4.6)
+    figure = Figure(2, 2, 4.6)
+    axes = figure.axes
     name = f"{about[0]} ({about[1]})"
-    axes[0].hist(values, bins=min(60, max(8, int(np.sqrt(values.size)))), color=PALETTE[1])
-    label(axes[0], name, "dampers", "Distribution")
+    heights, edges = np.histogram(values, min(60, max(8, int(np.sqrt(values.size)))))
+    axes[0].bars(edges, heights, PALETTE[1])
+    axes[0].label(name, "dampers", "Distribution")
     for place, chart, title in (
         (axes[1], first, "Individuals"),
         (axes[2], ranges, "Moving range"),
         (axes[3], average, "EWMA"),
     ):
         at = np.arange(1, chart.values.size + 1)
-        place.plot(at, chart.values, ".-", color=PALETTE[0], markersize=3, linewidth=0.6)
+        place.plot(at, chart.values, ".", ls="-", color=PALETTE[0], ms=3, lw=0.6)
         for limit in (chart.lower, chart.upper):
-            place.plot(at, limit, "--", color=PALETTE[2], linewidth=0.8)
-        place.axhline(chart.centre, color=PALETTE[1], linewidth=0.8)
+            place.plot(at, limit, ls="--", color=PALETTE[2], lw=0.8)
+        place.line("x", chart.centre, color=PALETTE[1], lw=0.8)
         out = list(chart.signals)
-        place.plot(at[out], chart.values[out], "o", color=PALETTE[2], markersize=5, fillstyle="none")
-        label(place, "number", name, title)
+        place.plot(at[out], chart.values[out], "o", color=PALETTE[2], ms=5, mfc="none")
+        place.label("number", name, title)
     return figure
 
 
@@ -170,15 +172,15 @@ def _worst(table: Path, line: pl.DataFrame, plan: Plan | None) -> dict[str, Any]
         .collect()
     )
     by_name = {(r[0], r[1]): r[2] for r in loops.iter_rows()}
-    figure, axes = new_figure(1, min(4, len(plan.matrix)), 2.6)
-    for number, place in enumerate(axes):
+    figure = Figure(1, min(4, len(plan.matrix)), 2.6)
+    for number, place in enumerate(figure.axes):
         current, frequency, amplitude = plan.matrix[number]
         phase = 2 * np.pi * (np.arange(len(plan.loops[number])) + 0.5) / len(plan.loops[number])
         speed = 1e3 * 2 * np.pi * frequency * amplitude * np.cos(phase)
         for key in keys.iter_rows():
             loop = by_name[key][number]
             if loop is not None:
-                place.plot(speed, loop, color=PALETTE[2], linewidth=0.6, alpha=0.8)
-        place.plot(speed, plan.loops[number], color=PALETTE[0], linewidth=1.4)
-        label(place, "velocity (mm/s)", "force (N)" if number == 0 else "", f"{current:g} A, {frequency:.3g} Hz")
+                place.plot(speed, loop, color=PALETTE[2], lw=0.6, alpha=0.8)
+        place.plot(speed, plan.loops[number], color=PALETTE[0], lw=1.4)
+        place.label("velocity (mm/s)", "force (N)" if number == 0 else "", f"{current:g} A, {frequency:.3g} Hz")
     return {"rows": far.rows(named=True), "picture": Picture.of(figure).files["svg"]}

@@ -6,13 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
-from mrdamper.report.plots.style import house_style, label, new_figure
+from mrdamper.report.plots.figure import Axes, Figure
 
 
 @dataclass(frozen=True)
@@ -56,43 +52,37 @@ class Panel:
 
 @dataclass(frozen=True)
 class FigureLayout:
-    """Panels of one figure; `legend` is "right", "above" or "", `margins` are those of `new_figure`."""
+    """Panels of one figure; `legend` is "right", "above" or "", `margins` are those of `Figure`."""
 
     panels: Sequence[Panel]
     height: float = 3.2
     legend: str = "right"
     rows: int = 1
-    margins: Mapping[str, float] = field(default_factory=dict)
+    margins: Mapping[str, Any] = field(default_factory=dict)
 
 
 def draw(chart: FigureLayout) -> Figure:
     """Draw a figure."""
-    with house_style():
-        columns = len(chart.panels) // chart.rows
-        figure, axes = new_figure(chart.rows, columns, chart.height, **chart.margins)
-        for panel, on in zip(chart.panels, axes, strict=True):
-            _fill(panel, on)
-        first = axes[columns - 1]
-        if chart.legend == "right":
-            first.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
-        elif chart.legend == "above":
-            handles, texts = axes[0].get_legend_handles_labels()
-            figure.legend(handles, texts, loc="upper center", ncols=min(len(texts), 4), fontsize=7)
-        return figure
+    columns = len(chart.panels) // chart.rows
+    figure = Figure(chart.rows, columns, chart.height, **chart.margins)
+    for panel, on in zip(chart.panels, figure.axes, strict=True):
+        _fill(panel, on)
+    if chart.legend == "right":
+        figure.axes[columns - 1].legend("right", size=7)
+    elif chart.legend == "above":
+        names = sum(bool(line.label) for line in chart.panels[0].lines)
+        figure.axes[0].legend("above", size=7, columns=max(1, min(names, 4)))
+    return figure
 
 
 def _fill(panel: Panel, axes: Axes) -> None:
     for line in panel.lines:
-        axes.plot(line.x, line.y, label=line.label or None, **{"lw": 0.9, **line.style})
-    for name in panel.log:
-        getattr(axes, f"set_{name}scale")("log")
-        axis = getattr(axes, f"{name}axis")
-        axis.set_major_locator(LogLocator(numticks=6))
-        axis.set_minor_formatter(NullFormatter())
+        axes.plot(line.x, line.y, label=line.label, **{"lw": 0.9, **line.style})
+    axes.x.log, axes.y.log = "x" in panel.log, "y" in panel.log
     if panel.rows:
-        axes.set_yticks(-np.arange(len(panel.rows)), panel.rows)
+        axes.y.places, axes.y.texts = [-row for row in range(len(panel.rows))], panel.rows
     if panel.low is not None:
-        (axes.set_xlim if panel.rows else axes.set_ylim)(panel.low)
-    label(axes, *panel.axes, panel.title)
+        (axes.x if panel.rows else axes.y).low = panel.low
+    axes.label(*panel.axes, panel.title)
     if panel.columns:
-        axes.set_xticks(range(len(panel.columns)), panel.columns, fontsize=7)
+        axes.x.places, axes.x.texts = range(len(panel.columns)), panel.columns

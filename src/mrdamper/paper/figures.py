@@ -12,7 +12,6 @@ from functools import partial
 from types import MappingProxyType
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
@@ -24,6 +23,7 @@ from mrdamper.paper.results import SAME, Reproduction, function_of, motions, rat
 from mrdamper.physics.motion import equivalent_sine, measured_motion
 from mrdamper.physics.simulation import simulate
 from mrdamper.report.plots.comparison import overlaid_loops
+from mrdamper.report.plots.figure import Figure
 from mrdamper.report.plots.rig_tests import test_analysis, test_matrix
 from mrdamper.report.plots.style import MEASURED, MM, PALETTE, Picture, current_colours, powered, thin
 from mrdamper.statistics.functions.fitting import fit_function
@@ -32,7 +32,7 @@ from mrdamper.study.recipe import Progress
 
 _MOST_LOOPS, _LOOP_POINTS = 9, 400  # loops in one panel, points of a loop
 _LIST = {"right": 2.3}  # margin for a list of motions [inches]
-_POINTS = {"marker": "o", "ms": 3.5}
+_POINTS = {"mark": "o", "ms": 3.5, "ls": "-"}
 
 Texts = Sequence[tuple[str, str]]  # of the axes of each panel
 Drawing = FigureLayout | Figure | str  # or why there is none
@@ -286,7 +286,7 @@ def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Dr
     (x, y), by_speed = axes[0], name == "F0"
     y, power = powered(y, float(np.max(np.abs(level))))
     u = [MM * c.frequency_Hz * c.amplitude_m if by_speed else c.frequency_Hz for c in firsts]
-    shades, dash = current_colours([c.peak_velocity for c in firsts]), {"marker": "_", "ms": 11, "mew": 1.4, "ls": ""}
+    shades, dash = current_colours([c.peak_velocity for c in firsts]), {"mark": "_", "ms": 11, "mew": 1.4, "ls": ""}
     lines = []
     for c, at, value, curve in zip(firsts, u, power * level, power * fitted, strict=True):
         lines.append(Series([at], [value], _named(c), {**_POINTS, "ls": "", "color": shades[c.peak_velocity]}))
@@ -365,7 +365,7 @@ def _genetic(study: Reproduction, axes: Texts) -> Drawing:
 def _seeds(study: Reproduction, axes: Texts) -> Drawing:
     if not study.seed_errors:
         return "noise seeds need a virtual rig"
-    style = {"marker": "|", "ms": 9, "ls": "", "color": PALETTE[1]}
+    style = {"mark": "|", "ms": 9, "ls": "", "color": PALETTE[1]}
     lines = [Series(100 * e, np.full(e.size, -row), style=style) for row, e in enumerate(study.seed_errors.values())]
     return FigureLayout([Panel(axes[0], lines, rows=list(study.seed_errors), low=0.0)], 2.4, "", margins={"left": 2.2})
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mrdamper.data import Dataset, Run, same_motion
 from mrdamper.data.atomic import publish
@@ -19,6 +18,7 @@ from mrdamper.identification.characteristics import SIDES, Characteristics, Stro
 from mrdamper.report.about import About, Limit
 from mrdamper.report.page import made_from, number, plain, render_page
 from mrdamper.report.plots.characteristics import continuous_velocity_plot, figures_over_current, peak_velocity_plot
+from mrdamper.report.plots.figure import Figure
 from mrdamper.report.plots.style import Picture
 
 _SOURCES = ("source", "file", "source_file")  # keys of a run's notes that name its source

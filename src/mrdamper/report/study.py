@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mrdamper.dampers.bands import scope
 from mrdamper.dampers.joint import JointFit
@@ -28,6 +27,7 @@ from mrdamper.report.about import About, Limit, about_of, load_about, load_limit
 from mrdamper.report.damper_tests import facts_of_tests, figures_of_tests, force_rows, provenance
 from mrdamper.report.limitations import Limitation, by_group, limitations
 from mrdamper.report.page import made_from, plain, render_page
+from mrdamper.report.plots.figure import Figure
 from mrdamper.report.plots.model import BAND_LEVEL, parameter_curves, predicted_loops, residual_map, score_strip
 from mrdamper.report.plots.reversal import force_since_reversal
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix

@@ -112,7 +112,6 @@ def _require_format(figure: Path) -> None:
 def _draw(verdicts: Sequence[Quality], path: Path) -> None:
     from mrdamper.data.atomic import write_file
     from mrdamper.report.plots.quality import LoopPanel, quality_figure
-    from mrdamper.report.plots.style import HOW_SAVED, house_style
     from mrdamper.rig_files.quality.flat import flagged_samples
     from mrdamper.rig_files.quality.view import View
 
@@ -127,5 +126,5 @@ def _draw(verdicts: Sequence[Quality], path: Path) -> None:
         )
         for verdict in verdicts
     ]
-    with house_style(), write_file(path) as target:
-        quality_figure(panels).savefig(target, **HOW_SAVED[path.suffix.lower()[1:]])
+    with write_file(path) as target:
+        target.write_bytes(quality_figure(panels).drawn().file(path.suffix.lower()[1:]))

@@ -121,13 +121,13 @@ def _write_figure(path: Path, prediction: Prediction, interval: Band | None, lev
     from mrdamper.data.atomic import write_file
     from mrdamper.errors import UnknownNameError
     from mrdamper.report.plots.loops import predicted_force
-    from mrdamper.report.plots.style import HOW_SAVED
+    from mrdamper.report.plots.style import KINDS
 
     kind = path.suffix.lower().removeprefix(".")
-    if kind not in HOW_SAVED:
-        raise UnknownNameError.of("kind of figure", path.suffix, [f".{name}" for name in HOW_SAVED])
+    if kind not in KINDS:
+        raise UnknownNameError.of("kind of figure", path.suffix, [f".{name}" for name in KINDS])
     with write_file(path) as target:
-        predicted_force(prediction, interval, level).savefig(target, format=kind, **HOW_SAVED[kind])
+        target.write_bytes(predicted_force(prediction, interval, level).drawn().file(kind))
 
 
 def _said(prediction: Prediction, interval: Band, level: float, where: str) -> str:

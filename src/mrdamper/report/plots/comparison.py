@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Run
 from mrdamper.physics.motion import equivalent_sine, measured_motion
-from mrdamper.report.plots.style import MEASURED, MM, PALETTE, house_style, label, new_figure
+from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.style import MEASURED, MM, PALETTE
 
 
 def ranking(scores: Mapping[str, tuple[float, float, float]]) -> Figure:
@@ -22,24 +22,20 @@ def ranking(scores: Mapping[str, tuple[float, float, float]]) -> Figure:
     scores : mapping of title to three fractions
         Best first.
     """
-    with house_style():
-        figure, (axes,) = new_figure(1, 1, 0.9 + 0.24 * len(scores), left=2.6, right=0.3)
-        rows = np.arange(len(scores))[::-1]
-        marks = zip(
-            ("identification", "cross-validation", "validation"), "osD", (PALETTE[i] for i in (6, 1, 2)), strict=True
-        )
-        for column, (name, mark, colour) in enumerate(marks):
-            values = 100 * np.array([entry[column] for entry in scores.values()])
-            axes.plot(values, rows, mark, ms=4.5, color=colour, label=name)
-        axes.set_yticks(rows, list(scores))
-        axes.set_xscale("log")
-        axes.xaxis.set_major_formatter("{x:g}")
-        axes.xaxis.set_minor_formatter("{x:g}")
-        axes.tick_params(axis="x", which="minor", labelsize=7)
-        axes.set_ylim(-0.7, len(scores) - 0.3)
-        label(axes, "nrmse_pp (%), median over runs", "")
-        axes.legend(loc="lower left", bbox_to_anchor=(0, 0.99), ncols=3)
-        return figure
+    figure = Figure(1, 1, 0.9 + 0.24 * len(scores), left=2.6, right=0.3)
+    (axes,) = figure.axes
+    rows = np.arange(len(scores))[::-1]
+    marks = zip(
+        ("identification", "cross-validation", "validation"), "osD", (PALETTE[i] for i in (6, 1, 2)), strict=True
+    )
+    for column, (name, mark, colour) in enumerate(marks):
+        values = 100 * np.array([entry[column] for entry in scores.values()])
+        axes.plot(values, rows, mark, ms=4.5, color=colour, label=name)
+    axes.y.places, axes.y.texts, axes.x.log = rows.tolist(), list(scores), True
+    axes.y.low, axes.y.high = -0.7, len(scores) - 0.3
+    axes.label("nrmse_pp (%), median over runs", "")
+    axes.legend("above", columns=3)
+    return figure
 
 
 def overlaid_loops(runs: Sequence[Run], dampers: Mapping[str, Damper]) -> Figure:
@@ -51,25 +47,24 @@ def overlaid_loops(runs: Sequence[Run], dampers: Mapping[str, Damper]) -> Figure
         One row each.
     dampers : mapping of title to Damper
     """
-    with house_style():
-        figure, axes = new_figure(len(runs), 2, 0.7 + 2.5 * len(runs))
-        for row, run in enumerate(runs):
-            sine = equivalent_sine(run)
-            motion = measured_motion(run).about(sine.centre)
-            last = int(np.flatnonzero(run.in_window)[-1])
-            first = int(np.searchsorted(run.time, run.time[last] - 1 / sine.condition.frequency_Hz))
-            cycle = slice(max(first - 1, 0), last + 1, max(1, (last - first) // 400))
-            curves: list[tuple[str, Any, dict[str, Any]]] = [
-                ("measured", run.force, {"color": MEASURED, "lw": 1.8, "alpha": 0.55})
-            ]
-            for number, (title, damper) in enumerate(dampers.items()):
-                style = {"color": PALETTE[1 + number % (len(PALETTE) - 2)], "lw": 0.9}
-                curves.append((title, damper.force_along(motion, sine.condition), style))
-            left, right = axes[2 * row], axes[2 * row + 1]
-            for title, force, style in curves:
-                left.plot(MM * motion.displacement[cycle], force[cycle], label=title, **style)
-                right.plot(motion.velocity[cycle], force[cycle], **style)
-            label(left, "Displacement (mm)", "Force (N)", str(sine.condition))
-            label(right, "Velocity (m/s)", "Force (N)")
-        axes[0].legend(loc="best", fontsize=6.5)
-        return figure
+    figure = Figure(len(runs), 2, 0.7 + 2.5 * len(runs))
+    for row, run in enumerate(runs):
+        sine = equivalent_sine(run)
+        motion = measured_motion(run).about(sine.centre)
+        last = int(np.flatnonzero(run.in_window)[-1])
+        first = int(np.searchsorted(run.time, run.time[last] - 1 / sine.condition.frequency_Hz))
+        cycle = slice(max(first - 1, 0), last + 1, max(1, (last - first) // 400))
+        curves: list[tuple[str, Any, dict[str, Any]]] = [
+            ("measured", run.force, {"color": MEASURED, "lw": 1.8, "alpha": 0.55})
+        ]
+        for number, (title, damper) in enumerate(dampers.items()):
+            style = {"color": PALETTE[1 + number % (len(PALETTE) - 2)], "lw": 0.9}
+            curves.append((title, damper.force_along(motion, sine.condition), style))
+        left, right = figure.axes[2 * row : 2 * row + 2]
+        for title, force, style in curves:
+            left.plot(MM * motion.displacement[cycle], force[cycle], label=title, **style)
+            right.plot(motion.velocity[cycle], force[cycle], **style)
+        left.label("Displacement (mm)", "Force (N)", str(sine.condition))
+        right.label("Velocity (m/s)", "Force (N)")
+    figure.axes[0].legend(size=6.5)
+    return figure

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
-
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any, Literal
 
 from mrdamper.dampers.bands import Band
 from mrdamper.dampers.base import Prediction
 from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError, UnknownNameError, require, shown
 from mrdamper.physics.motion import measured_motion
-from mrdamper.report.plots.style import KN, MM, PREDICTED, house_style, label, new_figure
+from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.style import KN, MM, PREDICTED
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_STYLE: dict[Any, Any] = {
+    "lines.linewidth": 1.2,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+}
 _OVER = {"displacement": ("Displacement (mm)", MM), "velocity": ("Velocity (mm/s)", MM)}
 
 
@@ -101,33 +109,33 @@ def predicted_force(prediction: Prediction, interval: Band | None = None, level:
 
     Returns
     -------
-    matplotlib Figure
+    Figure
     """
     motion = prediction.motion
     abscissas = [("Time (s)", motion.time)]
     if prediction.is_sine:
         abscissas = [("Displacement (mm)", MM * motion.displacement), ("Velocity (m/s)", motion.velocity)]
-    with house_style():
-        figure, panels = new_figure(1, len(abscissas), 3.2)
-        for axes, (name, x) in zip(panels, abscissas, strict=True):
-            axes.plot(x, prediction.force, color=PREDICTED, label="predicted")
-            for number, edge in enumerate((interval.low, interval.high) if interval else ()):
-                text = "_" if number else f"{100 * level:g} % interval"
-                axes.plot(x, edge, color=PREDICTED, lw=0.6, ls=":", label=text)
-            label(axes, name, "Force (N)")
-        panels[0].set_title(str(prediction.condition), loc="left")
-        panels[-1].legend()
+    figure = Figure(1, len(abscissas), 3.2)
+    panels = figure.axes
+    for axes, (name, x) in zip(panels, abscissas, strict=True):
+        axes.plot(x, prediction.force, color=PREDICTED, label="predicted")
+        for number, edge in enumerate((interval.low, interval.high) if interval else ()):
+            text = "" if number else f"{100 * level:g} % interval"
+            axes.plot(x, edge, color=PREDICTED, lw=0.6, ls=":", label=text)
+        axes.label(name, "Force (N)")
+    panels[0].title = str(prediction.condition)
+    panels[-1].legend()
     return figure
 
 
 def _drawn(axes: Axes | None, x: Floats, force: Floats, name: str, line: dict[str, Any]) -> Axes:
-    with house_style():
-        if axes is None:
-            from matplotlib import pyplot
+    from matplotlib import pyplot, rc_context
 
-            axes = pyplot.subplots()[1]
-        elif not hasattr(axes, "plot"):
-            raise InputError(f"axes is {shown(axes)}", remedy="give axes of matplotlib, or none", code="E_ARGUMENT")
+    if axes is not None and not hasattr(axes, "plot"):
+        raise InputError(f"axes is {shown(axes)}", remedy="give axes of matplotlib, or none", code="E_ARGUMENT")
+    with rc_context(_STYLE):
+        axes = axes or pyplot.subplots()[1]
         axes.plot(x, KN * force, **line)
-        label(axes, name, "Force (kN)")
+    axes.set_xlabel(name)
+    axes.set_ylabel("Force (kN)")
     return axes

@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.data import Floats, Run, same_motion
 from mrdamper.physics.motion import equivalent_sine
+from mrdamper.report.plots.figure import Figure
 from mrdamper.report.plots.style import (
     MEASURED,
     MM,
@@ -21,10 +20,7 @@ from mrdamper.report.plots.style import (
     PALETTE,
     PREDICTED,
     current_colours,
-    house_style,
-    label,
     levels,
-    new_figure,
     powered,
     speed_colours,
     thin,
@@ -48,77 +44,73 @@ _AXES = {
 def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
     """Measured and predicted force–velocity and force–displacement loops, last cycle in the window."""
     columns = 2 if len(runs) in (1, 2, 4) else 3
-    with house_style():
-        figure, axes = new_figure(2 * -(-len(runs) // columns), columns, 4.6 * -(-len(runs) // columns))
-        for number, run in enumerate(runs):
-            row, column = divmod(number, columns)
-            over_x, over_v = axes[2 * row * columns + column], axes[(2 * row + 1) * columns + column]
-            prediction = damper.predict_run(run)
-            period = 1 / prediction.condition.frequency_Hz
-            end = run.window[1] if run.window else float(run.time[-1])
-            last = (run.time <= end) & (run.time >= end - 1.02 * period)
-            motion = prediction.motion
-            x, v = thin(motion.displacement[last]), thin(motion.velocity[last])
-            curves: list[tuple[Floats, dict[str, Any]]] = [(run.force[last], {"color": MEASURED, "label": "measured"})]
-            if around := band(damper, prediction, BAND_LEVEL, last):
-                edge = {"color": PREDICTED, "lw": 0.6, "ls": ":"}
-                curves += [
-                    (around.low, edge),
-                    (around.high, {**edge, "label": f"{100 * BAND_LEVEL:.0f} % interval"}),
-                ]
-            curves.append((prediction.force[last], {"color": PREDICTED, "label": "predicted"}))
-            for force, look in curves:
-                over_x.plot(MM * x, thin(force), **look)
-                over_v.plot(v, thin(force), **look)
-            over_x.set_title(str(prediction.condition), loc="left", fontsize=8 if columns == 2 else 7)
-            label(over_x, "Displacement (mm)", "Force (N)" if column == 0 else "")
-            label(over_v, "Velocity (m/s)", "Force (N)" if column == 0 else "")
-        for unused in range(len(runs), columns * -(-len(runs) // columns)):
-            row, column = divmod(unused, columns)
-            axes[2 * row * columns + column].set_visible(False)
-            axes[(2 * row + 1) * columns + column].set_visible(False)
-        axes[0].legend(loc="center", fontsize=7)
-        return figure
+    figure = Figure(2 * -(-len(runs) // columns), columns, 4.6 * -(-len(runs) // columns))
+    axes = figure.axes
+    for number, run in enumerate(runs):
+        row, column = divmod(number, columns)
+        over_x, over_v = axes[2 * row * columns + column], axes[(2 * row + 1) * columns + column]
+        prediction = damper.predict_run(run)
+        period = 1 / prediction.condition.frequency_Hz
+        end = run.window[1] if run.window else float(run.time[-1])
+        last = (run.time <= end) & (run.time >= end - 1.02 * period)
+        motion = prediction.motion
+        x, v = thin(motion.displacement[last]), thin(motion.velocity[last])
+        curves: list[tuple[Floats, dict[str, Any]]] = [(run.force[last], {"color": MEASURED, "label": "measured"})]
+        if around := band(damper, prediction, BAND_LEVEL, last):
+            edge = {"color": PREDICTED, "lw": 0.6, "ls": ":"}
+            curves += [
+                (around.low, edge),
+                (around.high, {**edge, "label": f"{100 * BAND_LEVEL:.0f} % interval"}),
+            ]
+        curves.append((prediction.force[last], {"color": PREDICTED, "label": "predicted"}))
+        for force, look in curves:
+            over_x.plot(MM * x, thin(force), **look)
+            over_v.plot(v, thin(force), **look)
+        over_x.size = over_v.size = 9.0 if columns == 2 else 8.0
+        over_x.label("Displacement (mm)", "Force (N)" if column == 0 else "", str(prediction.condition))
+        over_v.label("Velocity (m/s)", "Force (N)" if column == 0 else "")
+    for unused in range(len(runs), columns * -(-len(runs) // columns)):
+        row, column = divmod(unused, columns)
+        axes[2 * row * columns + column].visible = False
+        axes[(2 * row + 1) * columns + column].visible = False
+    axes[0].legend("center", size=7)
+    return figure
 
 
 def parameter_curves(fit: ModifiedFit) -> Figure:
     """Identified values over current, one colour a motion, and the functions through them."""
     names = [name for name in fit.functions if np.ptp(fit.values[name]) > 0] or list(fit.functions)
-    with house_style():
-        rows = -(-len(names) // 2)
-        figure, axes = new_figure(rows, 2, 2.5 * rows, right=1.75)
-        groups = sorted(same_motion(fit.conditions, tolerance=0.08), key=lambda g: fit.conditions[g[0]].peak_velocity)
-        speeds = [fit.conditions[g[0]].peak_velocity for g in groups]
-        few = len(groups) <= MOST_NAMED
-        shades = current_colours(speeds) if few else speed_colours(figure, speeds)
-        dense = np.linspace(0, fit.damper.envelope.current_A[1], 60)
-        middle = fit.conditions[len(fit.conditions) // 2]
-        lines = [fit.conditions[g[0]] for g in groups] if few else [middle]
-        for panel, name in zip(axes, names, strict=False):
-            function = fit.functions[name].function
-            text, scale = _AXES.get(name, (name, 1.0))
-            curves = [scale * function(dense, c.frequency_Hz, c.amplitude_m) for c in lines]
-            largest = float(np.max(np.abs([*np.ravel(curves), *np.ravel(scale * np.asarray(fit.values[name]))])))
-            text, more = powered(text, 0.0 if function.log else largest)
-            for group in groups:
-                first = fit.conditions[group[0]]
-                currents = [fit.conditions[i].current_A for i in group]
-                key = f"{first.frequency_Hz:.2g} Hz, {MM * first.amplitude_m:.3g} mm"
-                values = more * scale * fit.values[name][group]
-                panel.plot(currents, values, "o", ms=3.5, color=shades[first.peak_velocity], label=key)
-            for condition, curve in zip(lines, curves, strict=True):
-                panel.plot(dense, more * curve, lw=0.9, color=shades[condition.peak_velocity] if few else MEASURED)
-            if function.log:
-                panel.set_yscale("log")
-                panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-                panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-                panel.yaxis.set_minor_locator(NullLocator())
-            label(panel, "Current (A)", text)
-        for panel in axes[len(names) :]:
-            panel.set_visible(False)
-        if few:
-            axes[min(1, len(names) - 1)].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        return figure
+    rows = -(-len(names) // 2)
+    figure = Figure(rows, 2, 2.5 * rows, right=1.75)
+    axes = figure.axes
+    groups = sorted(same_motion(fit.conditions, tolerance=0.08), key=lambda g: fit.conditions[g[0]].peak_velocity)
+    speeds = [fit.conditions[g[0]].peak_velocity for g in groups]
+    few = len(groups) <= MOST_NAMED
+    shades = current_colours(speeds) if few else speed_colours(figure, speeds)
+    dense = np.linspace(0, fit.damper.envelope.current_A[1], 60)
+    middle = fit.conditions[len(fit.conditions) // 2]
+    lines = [fit.conditions[g[0]] for g in groups] if few else [middle]
+    for panel, name in zip(axes, names, strict=False):
+        function = fit.functions[name].function
+        text, scale = _AXES.get(name, (name, 1.0))
+        curves = [scale * function(dense, c.frequency_Hz, c.amplitude_m) for c in lines]
+        largest = float(np.max(np.abs([*np.ravel(curves), *np.ravel(scale * np.asarray(fit.values[name]))])))
+        text, more = powered(text, 0.0 if function.log else largest)
+        for group in groups:
+            first = fit.conditions[group[0]]
+            currents = [fit.conditions[i].current_A for i in group]
+            key = f"{first.frequency_Hz:.2g} Hz, {MM * first.amplitude_m:.3g} mm"
+            values = more * scale * fit.values[name][group]
+            panel.plot(currents, values, "o", ms=3.5, color=shades[first.peak_velocity], label=key)
+        for condition, curve in zip(lines, curves, strict=True):
+            panel.plot(dense, more * curve, lw=0.9, color=shades[condition.peak_velocity] if few else MEASURED)
+        panel.y.log = function.log
+        panel.label("Current (A)", text)
+    for panel in axes[len(names) :]:
+        panel.visible = False
+    if few:
+        axes[min(1, len(names) - 1)].legend("right")
+    return figure
 
 
 def score_strip(validations: Mapping[str, Validation]) -> Figure:
@@ -126,53 +118,51 @@ def score_strip(validations: Mapping[str, Validation]) -> Figure:
 
     Errors beyond 25 % are arrows at the edge.
     """
-    with house_style():
-        figure, (axes,) = new_figure(1, 1, 0.8 + 0.3 * len(validations), left=3.0)
-        for row, validation in enumerate(validations.values()):
-            colour = PALETTE[1 + row % (len(PALETTE) - 2)]
-            values = 100 * np.array([run.scores.nrmse_pp for run in validation.runs])
-            floors = [100 * run.floor for run in validation.runs if run.floor is not None]
-            near, far = values[values <= _WORST_SHOWN], values[values > _WORST_SHOWN]
-            axes.plot(near, np.full(near.size, row), "o", ms=4, color=colour, alpha=0.65)
-            axes.plot(np.full(far.size, _WORST_SHOWN), np.full(far.size, row), ">", ms=5, color=colour, alpha=0.65)
-            axes.plot(floors, np.full(len(floors), row - 0.25), "|", ms=5, color="#888888")
-            axes.plot([min(np.median(values), _WORST_SHOWN)] * 2, [row - 0.3, row + 0.3], color=colour, lw=2.2)
-        axes.set_yticks(range(len(validations)), list(validations))
-        axes.invert_yaxis()
-        axes.set_xlim(left=0)
-        axes.grid(axis="y", visible=False)
-        label(axes, "nrmse_pp (%); grey ticks: cycle-to-cycle scatter", "")
-        return figure
+    figure = Figure(1, 1, 0.8 + 0.3 * len(validations), left=3.0)
+    (axes,) = figure.axes
+    for row, validation in enumerate(validations.values()):
+        colour = PALETTE[1 + row % (len(PALETTE) - 2)]
+        values = 100 * np.array([run.scores.nrmse_pp for run in validation.runs])
+        floors = [100 * run.floor for run in validation.runs if run.floor is not None]
+        near, far = values[values <= _WORST_SHOWN], values[values > _WORST_SHOWN]
+        axes.plot(near, np.full(near.size, row), "o", ms=4, color=colour, alpha=0.65)
+        axes.plot(np.full(far.size, _WORST_SHOWN), np.full(far.size, row), ">", ms=5, color=colour, alpha=0.65)
+        axes.plot(floors, np.full(len(floors), row - 0.25), "|", ms=5, color="#888888")
+        axes.plot([min(np.median(values), _WORST_SHOWN)] * 2, [row - 0.3, row + 0.3], color=colour, lw=2.2)
+    axes.y.places, axes.y.texts, axes.y.reversed, axes.y.grid = range(len(validations)), list(validations), True, False
+    axes.x.low = 0.0
+    axes.label("nrmse_pp (%); grey ticks: cycle-to-cycle scatter", "")
+    return figure
 
 
 def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
     """Draw mean and spread of the residual over velocity and phase, relative to the peak-to-peak force."""
-    with house_style():
-        figure, (over_v, over_phase) = new_figure(1, 2, 2.8, right=1.1, sharey=True)
-        steps = levels([run.mean_current for run in runs])
-        colours = current_colours(steps)
-        for step, run in zip(steps, runs, strict=True):
-            sine = equivalent_sine(run)
-            if not sine.is_sine:
-                continue
-            prediction = damper.predict_run(run)
-            inside = run.in_window
-            motion = prediction.motion.part(inside)
-            error = 100 * (prediction.force - run.force)[inside] / np.ptp(run.force[inside])
-            omega = 2 * np.pi * sine.condition.frequency_Hz
-            phase = np.degrees(np.arctan2(motion.displacement, motion.velocity / omega)) % 360
-            colour = colours[step]
-            for axes, key, bins in (
-                (over_v, motion.velocity / np.max(np.abs(motion.velocity)), np.linspace(-1, 1, 41)),
-                (over_phase, phase, np.linspace(0, 360, 61)),
-            ):
-                index = np.digitize(key, bins) - 1
-                mean = [error[index == i].mean() if np.any(index == i) else np.nan for i in range(bins.size - 1)]
-                axes.plot((bins[1:] + bins[:-1]) / 2, mean, color=colour, lw=0.9, alpha=0.8)
-        for current, colour in colours.items():
-            over_phase.plot([], [], color=colour, label=f"{current:g} A")
-        over_phase.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        label(over_v, "Velocity over its peak (–)", "Residual (% of peak-to-peak)")
-        label(over_phase, "Phase of the motion (°)", "")
-        over_phase.set_xticks([0, 90, 180, 270, 360])
-        return figure
+    figure = Figure(1, 2, 2.8, right=1.1, share_y=True)
+    over_v, over_phase = figure.axes
+    steps = levels([run.mean_current for run in runs])
+    colours = current_colours(steps)
+    for step, run in zip(steps, runs, strict=True):
+        sine = equivalent_sine(run)
+        if not sine.is_sine:
+            continue
+        prediction = damper.predict_run(run)
+        inside = run.in_window
+        motion = prediction.motion.part(inside)
+        error = 100 * (prediction.force - run.force)[inside] / np.ptp(run.force[inside])
+        omega = 2 * np.pi * sine.condition.frequency_Hz
+        phase = np.degrees(np.arctan2(motion.displacement, motion.velocity / omega)) % 360
+        colour = colours[step]
+        for axes, key, bins in (
+            (over_v, motion.velocity / np.max(np.abs(motion.velocity)), np.linspace(-1, 1, 41)),
+            (over_phase, phase, np.linspace(0, 360, 61)),
+        ):
+            index = np.digitize(key, bins) - 1
+            mean = [error[index == i].mean() if np.any(index == i) else np.nan for i in range(bins.size - 1)]
+            axes.plot((bins[1:] + bins[:-1]) / 2, mean, color=colour, lw=0.9, alpha=0.8)
+    for current, colour in colours.items():
+        over_phase.plot([], [], color=colour, label=f"{current:g} A")
+    over_phase.legend("right")
+    over_v.label("Velocity over its peak (–)", "Residual (% of peak-to-peak)")
+    over_phase.label("Phase of the motion (°)", "")
+    over_phase.x.places = (0, 90, 180, 270, 360)
+    return figure

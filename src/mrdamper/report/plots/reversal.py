@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats, Run
-from mrdamper.report.plots.style import MM, PREDICTED, current_colours, house_style, label, levels, new_figure
+from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.style import MM, PREDICTED, current_colours, levels
 
 _FARTHEST = 1.5e-3  # m
 
@@ -19,26 +19,26 @@ def force_since_reversal(runs: Sequence[Run], damper: Damper) -> Figure:
 
     Colours are currents; the thin line on each is the damper's prediction.
     """
-    with house_style():
-        figure, (axes,) = new_figure(1, 1, 3.0, right=1.2)
-        steps = levels([run.mean_current for run in runs])
-        colours = current_colours(steps)
-        bins = np.concatenate([np.linspace(0, 0.6e-3, 31), np.linspace(0.65e-3, _FARTHEST, 18)])
-        middle = (bins[1:] + bins[:-1]) / 2
-        for current, colour in colours.items():
-            members = [run for step, run in zip(steps, runs, strict=True) if step == current]
-            curves = np.array([_means(run, damper, bins) for run in members])
-            counts = np.isfinite(curves).sum(axis=0)
-            mean = np.where(counts > 0, np.nansum(curves, axis=0) / np.maximum(counts, 1), np.nan)
-            for row, (width, shade) in enumerate(((1.8, colour), (0.8, PREDICTED))):
-                finite = np.isfinite(mean[row])
-                axes.plot(MM * middle[finite], mean[row][finite], lw=width, color=shade)
-            axes.plot([], [], color=colour, lw=1.8, label=f"{current:g} A")
-        axes.plot([], [], color=PREDICTED, lw=0.8, label="predicted")
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        axes.set_xlim(0, MM * _FARTHEST)
-        label(axes, "Distance since the reversal (mm)", "Force along the motion over its peak (–)")
-        return figure
+    figure = Figure(1, 1, 3.0, right=1.2)
+    (axes,) = figure.axes
+    steps = levels([run.mean_current for run in runs])
+    colours = current_colours(steps)
+    bins = np.concatenate([np.linspace(0, 0.6e-3, 31), np.linspace(0.65e-3, _FARTHEST, 18)])
+    middle = (bins[1:] + bins[:-1]) / 2
+    for current, colour in colours.items():
+        members = [run for step, run in zip(steps, runs, strict=True) if step == current]
+        curves = np.array([_means(run, damper, bins) for run in members])
+        counts = np.isfinite(curves).sum(axis=0)
+        mean = np.where(counts > 0, np.nansum(curves, axis=0) / np.maximum(counts, 1), np.nan)
+        for row, (width, shade) in enumerate(((1.8, colour), (0.8, PREDICTED))):
+            finite = np.isfinite(mean[row])
+            axes.plot(MM * middle[finite], mean[row][finite], lw=width, color=shade)
+        axes.plot([], [], color=colour, lw=1.8, label=f"{current:g} A")
+    axes.plot([], [], color=PREDICTED, lw=0.8, label="predicted")
+    axes.legend("right")
+    axes.x.low, axes.x.high = 0.0, MM * _FARTHEST
+    axes.label("Distance since the reversal (mm)", "Force along the motion over its peak (–)")
+    return figure
 
 
 def _means(run: Run, damper: Damper, bins: Floats) -> Floats:

@@ -3,135 +3,128 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.transforms import ScaledTranslation
 
 from mrdamper.data import Dataset, same_motion
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, whole_cycles
 from mrdamper.physics.motion import measured_motion
+from mrdamper.report.plots.drawing import INCH
+from mrdamper.report.plots.figure import Axes, Figure
 from mrdamper.report.plots.style import (
     KN,
     MM,
     MOST_NAMED,
-    WIDTH,
     current_colours,
-    house_style,
-    label,
     levels,
-    new_figure,
     speed_colours,
     thin,
 )
 
 _BESIDE = 0.07  # inches between the marks of two currents
-_RIGHT: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
 
 
 def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
     """Measured frequency against amplitude, one colour a current; hollow marks are held out."""
-    with house_style():
-        steps = levels([loop.condition.current_A for loop in loops])
-        colours = current_colours(steps)
-        entries = len({(step, loop.split) for step, loop in zip(steps, loops, strict=True)})
-        figure, (axes,) = new_figure(1, 1, max(3.0, 0.8 + 0.16 * entries), right=1.7)
-        for number, (current, colour) in enumerate(colours.items()):
-            # Marks of one motion stand beside each other, one place a current.
-            aside = ScaledTranslation((number - (len(colours) - 1) / 2) * _BESIDE, 0, figure.dpi_scale_trans)
-            for split, face in (("train", colour), ("validate", "none")):
-                chosen = [
-                    loop.condition
-                    for step, loop in zip(steps, loops, strict=True)
-                    if step == current and loop.split == split
-                ]
-                if not chosen:
-                    continue
-                points = np.array([(c.frequency_Hz, MM * c.amplitude_m) for c in chosen])
-                axes.update_datalim(points)  # marks that are set aside are not counted
-                name = f"{current:g} A" + ("" if split == "train" else ", validation")
-                axes.plot(
-                    *points.T,
-                    "o",
-                    ms=5,
-                    mfc=face,
-                    mec=colour,
-                    mew=1.1,
-                    transform=axes.transData + aside,
-                    label=name,
-                )
-        label(axes, "Frequency (Hz)", "Amplitude (mm)")
-        wide, beside = axes.get_position().width * WIDTH, (len(colours) / 2 + 1) * _BESIDE
-        axes.margins(x=beside / (wide - 2 * beside))
-        axes.autoscale_view()
-        axes.set_ylim(bottom=0)
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        return figure
+    steps = levels([loop.condition.current_A for loop in loops])
+    colours = current_colours(steps)
+    entries = len({(step, loop.split) for step, loop in zip(steps, loops, strict=True)})
+    figure = Figure(1, 1, max(3.0, 0.8 + 0.16 * entries), right=1.7)
+    (axes,) = figure.axes
+    for number, (current, colour) in enumerate(colours.items()):
+        # Marks of one motion stand beside each other, one place a current.
+        aside = (number - (len(colours) - 1) / 2) * _BESIDE
+        for split, face in (("train", colour), ("validate", "none")):
+            chosen = [
+                loop.condition
+                for step, loop in zip(steps, loops, strict=True)
+                if step == current and loop.split == split
+            ]
+            if not chosen:
+                continue
+            points = np.array([(c.frequency_Hz, MM * c.amplitude_m) for c in chosen])
+            name = f"{current:g} A" + ("" if split == "train" else ", validation")
+            axes.plot(
+                points[:, 0],
+                points[:, 1],
+                "o",
+                ms=5,
+                color=colour,
+                mfc=face,
+                mew=1.1,
+                shift=aside,
+                label=name,
+            )
+    axes.label("Frequency (Hz)", "Amplitude (mm)")
+    wide, beside = axes.width / INCH, (len(colours) / 2 + 1) * _BESIDE
+    axes.x.margin = beside / (wide - 2 * beside)
+    axes.y.low = 0.0
+    axes.legend("right")
+    return figure
 
 
 def measured_loops(dataset: Dataset, loops: Sequence[LoopAnalysis]) -> Figure:
     """Force–displacement and force–velocity loops: over current, then over the motion at one current."""
-    with house_style():
-        figure, axes = new_figure(2, 2, 5.6, right=1.7)
-        over_current = _over_current(loops)
-        colours = current_colours(list(over_current))
-        for current, loop in over_current.items():
-            _draw_loop(axes[0], axes[1], dataset, loop, f"{current:g} A", colours[current])
-        first = next(iter(over_current.values())).condition
-        axes[0].set_title(f"{first.frequency_Hz:.3g} Hz, {MM * first.amplitude_m:.3g} mm", loc="left")
-        axes[1].legend(**_RIGHT)
+    figure = Figure(2, 2, 5.6, right=1.7)
+    axes = figure.axes
+    over_current = _over_current(loops)
+    colours = current_colours(list(over_current))
+    for current, loop in over_current.items():
+        _draw_loop(axes[0], axes[1], dataset, loop, f"{current:g} A", colours[current])
+    first = next(iter(over_current.values())).condition
+    axes[0].title = f"{first.frequency_Hz:.3g} Hz, {MM * first.amplitude_m:.3g} mm"
+    axes[1].legend("right")
 
-        over_motion = _over_motion(loops)
-        shades = current_colours([loop.condition.peak_velocity for loop in over_motion])
-        for loop in over_motion:
-            condition = loop.condition
-            name = f"{condition.frequency_Hz:.2g} Hz, {MM * condition.amplitude_m:.3g} mm"
-            _draw_loop(axes[2], axes[3], dataset, loop, name, shades[condition.peak_velocity])
-        axes[2].set_title(f"{over_motion[0].condition.current_A:.3g} A", loc="left")
-        axes[3].legend(**_RIGHT)
-        return figure
+    over_motion = _over_motion(loops)
+    shades = current_colours([loop.condition.peak_velocity for loop in over_motion])
+    for loop in over_motion:
+        condition = loop.condition
+        name = f"{condition.frequency_Hz:.2g} Hz, {MM * condition.amplitude_m:.3g} mm"
+        _draw_loop(axes[2], axes[3], dataset, loop, name, shades[condition.peak_velocity])
+    axes[2].title = f"{over_motion[0].condition.current_A:.3g} A"
+    axes[3].legend("right")
+    return figure
 
 
 def test_analysis(loops: Sequence[LoopAnalysis], ranges: Sequence[DynamicRange]) -> Figure:
     """Peak force, dissipated energy, equivalent damping and dynamic range over current."""
-    with house_style():
-        figure, axes = new_figure(2, 2, 5.2, right=1.75)
-        quantities: list[tuple[str, Callable[[LoopAnalysis], float]]] = [
-            ("Peak force (N)", lambda loop: loop.peak_force),
-            ("Dissipated energy (J per cycle)", lambda loop: loop.dissipated_energy),
-            ("Equivalent damping (kN s/m)", lambda loop: KN * loop.equivalent_damping),
-        ]
-        groups = [[loops[i] for i in g] for g in same_motion([loop.condition for loop in loops])]
-        groups.sort(key=lambda g: g[0].condition.peak_velocity)
-        speeds = [g[0].condition.peak_velocity for g in groups]
-        shades = current_colours(speeds) if len(groups) <= MOST_NAMED else speed_colours(figure, speeds)
-        for panel, (name, value) in zip(axes, quantities, strict=False):
-            for group in groups:
-                condition = group[0].condition
-                ordered = sorted(group, key=lambda loop: loop.condition.current_A)
-                panel.plot(
-                    [loop.condition.current_A for loop in ordered],
-                    [value(loop) for loop in ordered],
-                    "o-",
-                    ms=3.5,
-                    color=shades[condition.peak_velocity],
-                    label=f"{condition.frequency_Hz:.2g} Hz, {MM * condition.amplitude_m:.3g} mm",
-                )
-            label(panel, "Current (A)", name)
-            panel.set_ylim(bottom=0)
-        for entry in ranges:
-            speed = min(shades, key=lambda s: abs(s - 2 * np.pi * entry.frequency_Hz * entry.amplitude_m))
-            axes[3].plot(entry.currents_A, entry.ratios, "o-", ms=3.5, color=shades[speed])
-        label(axes[3], "Current (A)", "Dynamic range (–)")
-        if ranges:
-            axes[3].set_ylim(bottom=0)
-        else:
-            axes[3].text(0.5, 0.5, "no motion was tested at two currents", ha="center", transform=axes[3].transAxes)
-        if len(groups) <= MOST_NAMED:
-            axes[1].legend(**_RIGHT)
-        return figure
+    figure = Figure(2, 2, 5.2, right=1.75)
+    axes = figure.axes
+    quantities: list[tuple[str, Callable[[LoopAnalysis], float]]] = [
+        ("Peak force (N)", lambda loop: loop.peak_force),
+        ("Dissipated energy (J per cycle)", lambda loop: loop.dissipated_energy),
+        ("Equivalent damping (kN s/m)", lambda loop: KN * loop.equivalent_damping),
+    ]
+    groups = [[loops[i] for i in g] for g in same_motion([loop.condition for loop in loops])]
+    groups.sort(key=lambda g: g[0].condition.peak_velocity)
+    speeds = [g[0].condition.peak_velocity for g in groups]
+    shades = current_colours(speeds) if len(groups) <= MOST_NAMED else speed_colours(figure, speeds)
+    for panel, (name, value) in zip(axes, quantities, strict=False):
+        for group in groups:
+            condition = group[0].condition
+            ordered = sorted(group, key=lambda loop: loop.condition.current_A)
+            panel.plot(
+                [loop.condition.current_A for loop in ordered],
+                [value(loop) for loop in ordered],
+                "o",
+                ls="-",
+                ms=3.5,
+                color=shades[condition.peak_velocity],
+                label=f"{condition.frequency_Hz:.2g} Hz, {MM * condition.amplitude_m:.3g} mm",
+            )
+        panel.label("Current (A)", name)
+        panel.y.low = 0.0
+    for entry in ranges:
+        speed = min(shades, key=lambda s: abs(s - 2 * np.pi * entry.frequency_Hz * entry.amplitude_m))
+        axes[3].plot(entry.currents_A, entry.ratios, "o", ls="-", ms=3.5, color=shades[speed])
+    axes[3].label("Current (A)", "Dynamic range (–)")
+    if ranges:
+        axes[3].y.low = 0.0
+    else:
+        axes[3].text(0.5, 0.5, "no motion was tested at two currents", anchor="middle")
+    if len(groups) <= MOST_NAMED:
+        axes[1].legend("right")
+    return figure
 
 
 def _over_current(loops: Sequence[LoopAnalysis]) -> dict[float, LoopAnalysis]:
@@ -151,9 +144,7 @@ def _over_motion(loops: Sequence[LoopAnalysis], most: int = 5) -> list[LoopAnaly
     return [chosen[i] for i in picks]
 
 
-def _draw_loop(
-    left: Axes, right: Axes, dataset: Dataset, loop: LoopAnalysis, name: str, colour: tuple[float, ...]
-) -> None:
+def _draw_loop(left: Axes, right: Axes, dataset: Dataset, loop: LoopAnalysis, name: str, colour: str) -> None:
     run = dataset[loop.run_id].steady()
     motion = measured_motion(run).about(loop.motion.series.mean)
     cycle = whole_cycles(run.time, loop.condition.frequency_Hz)
@@ -161,5 +152,5 @@ def _draw_loop(
     x, v, force = (thin(array[last]) for array in (motion.displacement, motion.velocity, run.force))
     left.plot(MM * x, force, color=colour, label=name)
     right.plot(v, force, color=colour, label=name)
-    label(left, "Displacement (mm)", "Force (N)")
-    label(right, "Velocity (m/s)", "Force (N)")
+    left.label("Displacement (mm)", "Force (N)")
+    right.label("Velocity (m/s)", "Force (N)")

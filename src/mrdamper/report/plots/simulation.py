@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from mrdamper.report.plots.style import MM, PALETTE, house_style, label, new_figure
+from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.style import MM, PALETTE
 from mrdamper.systems.result import Simulation
 
 _POINTS = 4000  # of a history that are drawn
@@ -20,20 +20,20 @@ def histories(runs: Mapping[str, Simulation]) -> Figure:
     first = next(iter(shown.values()))
     point = int(np.argmax(first.peaks["acceleration_m_s2"])) if first.system.ground is not None else 0
     span = list(first.system.spans)[int(np.argmax(first.peaks["drift_m"]))]
-    with house_style():
-        figure, (top, middle, bottom) = new_figure(3, 1, 6.4)
-        for colour, (title, run) in zip(PALETTE, shown.items(), strict=False):
-            every = slice(None, None, max(1, run.time.size // _POINTS))
-            top.plot(run.time[every], run.a[every, point], color=colour, lw=0.8, label=title)
-            middle.plot(run.time[every], MM * run.span(span)[every], color=colour, lw=0.8)
-            for i, link in enumerate(run.links):
-                if link.role == "damper":
-                    bottom.plot(run.time[every], run.force[every, i], color=colour, lw=0.8)
-        top.legend(ncols=2)
-        label(top, "", "acceleration (m/s²)", first.system.coordinates[point])
-        label(middle, "", "displacement (mm)", span)
-        label(bottom, "time (s)", "damper force (N)")
-        return figure
+    figure = Figure(3, 1, 6.4)
+    top, middle, bottom = figure.axes
+    for colour, (title, run) in zip(PALETTE, shown.items(), strict=False):
+        every = slice(None, None, max(1, run.time.size // _POINTS))
+        top.plot(run.time[every], run.a[every, point], color=colour, lw=0.8, label=title)
+        middle.plot(run.time[every], MM * run.span(span)[every], color=colour, lw=0.8)
+        for i, link in enumerate(run.links):
+            if link.role == "damper":
+                bottom.plot(run.time[every], run.force[every, i], color=colour, lw=0.8)
+    top.legend(columns=2)
+    top.label("", "acceleration (m/s²)", first.system.coordinates[point])
+    middle.label("", "displacement (mm)", span)
+    bottom.label("time (s)", "damper force (N)")
+    return figure
 
 
 def spectra(runs: Mapping[str, Simulation]) -> Figure:
@@ -42,18 +42,19 @@ def spectra(runs: Mapping[str, Simulation]) -> Figure:
 
     first = next(iter(runs.values()))
     point = int(np.argmax(first.peaks["acceleration_m_s2"])) if first.system.ground is not None else 0
-    with house_style():
-        figure, (left, right) = new_figure(1, 2, 3.0)
-        for colour, (title, run) in zip(PALETTE, runs.items(), strict=False):
-            size = min(run.time.size, int(4 / run.step))
-            f, density = welch(run.a[:, point], 1 / run.step, nperseg=size)
-            inside = (f > 0) & (f < 60)
-            left.loglog(f[inside], density[inside], color=colour, lw=0.9, label=title)
-            every = slice(None, None, -(-run.time.size // _LOOP_POINTS))
-            for i, link in enumerate(run.links):
-                if link.role == "damper":
-                    right.plot(1e3 * run.stroke[every, i], run.force[every, i], color=colour, lw=0.5)
-        left.legend(fontsize=6)
-        label(left, "frequency (Hz)", "PSD of acceleration (m²/s³)", first.system.coordinates[point])
-        label(right, "stroke (mm)", "force (N)", "damper")
-        return figure
+    figure = Figure(1, 2, 3.0)
+    left, right = figure.axes
+    left.x.log = left.y.log = True
+    for colour, (title, run) in zip(PALETTE, runs.items(), strict=False):
+        size = min(run.time.size, int(4 / run.step))
+        f, density = welch(run.a[:, point], 1 / run.step, nperseg=size)
+        inside = (f > 0) & (f < 60)
+        left.plot(f[inside], density[inside], color=colour, lw=0.9, label=title)
+        every = slice(None, None, -(-run.time.size // _LOOP_POINTS))
+        for i, link in enumerate(run.links):
+            if link.role == "damper":
+                right.plot(1e3 * run.stroke[every, i], run.force[every, i], color=colour, lw=0.5)
+    left.legend(size=6)
+    left.label("frequency (Hz)", "PSD of acceleration (m²/s³)", first.system.coordinates[point])
+    right.label("stroke (mm)", "force (N)", "damper")
+    return figure

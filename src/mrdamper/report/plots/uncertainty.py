@@ -5,53 +5,45 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mrdamper.dampers.likelihood import CHI_SQUARED_95, LikelihoodProfile
 from mrdamper.dampers.posterior import Samples
-from mrdamper.report.plots.style import PALETTE, WIDTH, house_style, label, new_figure
+from mrdamper.report.plots.figure import WIDTH, Figure
+from mrdamper.report.plots.style import PALETTE
 
 _BINS = 30
 
 
 def profile_curves(profiles: Sequence[LikelihoodProfile]) -> Figure:
     """Fall of the likelihood as each number moves and all others follow; the line is where 95 % end."""
-    with house_style():
-        columns = min(3, len(profiles))
-        rows = -(-len(profiles) // columns)
-        figure, panels = new_figure(rows, columns, 0.9 + 2.1 * rows)
-        for axes, profile in zip(panels, profiles, strict=False):
-            axes.plot(profile.values, profile.fall, marker=".", color=PALETTE[1])
-            axes.axhline(CHI_SQUARED_95, color=PALETTE[2], lw=0.8)
-            axes.axvline(profile.estimate, color=PALETTE[0], lw=0.6, ls=":")
-            axes.set_ylim(0, 3 * CHI_SQUARED_95)
-            label(axes, f"{profile.name} ({profile.unit or '–'})", "−2 Δ ln L (–)", profile.kind)
-        for axes in panels[len(profiles) :]:
-            axes.set_visible(False)
+    columns = min(3, len(profiles))
+    rows = -(-len(profiles) // columns)
+    figure = Figure(rows, columns, 0.9 + 2.1 * rows)
+    panels = figure.axes
+    for axes, profile in zip(panels, profiles, strict=False):
+        axes.plot(profile.values, profile.fall, ".", ls="-", color=PALETTE[1])
+        axes.line("x", CHI_SQUARED_95, color=PALETTE[2], lw=0.8)
+        axes.line("y", profile.estimate, color=PALETTE[0], lw=0.6, ls=":")
+        axes.y.low, axes.y.high = 0.0, 3 * CHI_SQUARED_95
+        axes.label(f"{profile.name} ({profile.unit or '–'})", "−2 Δ ln L (–)", profile.kind)
+    for axes in panels[len(profiles) :]:
+        axes.visible = False
     return figure
 
 
 def corner(samples: Samples) -> Figure:
     """Samples of every pair of numbers, and each number's own distribution on the diagonal."""
     size = len(samples.names)
-    with house_style():
-        figure = Figure(figsize=(WIDTH, WIDTH))
-        grid = figure.subplots(size, size, squeeze=False)
-        figure.subplots_adjust(0.08, 0.08, 0.98, 0.98, 0.06, 0.06)
-        for i in range(size):
-            for j in range(size):
-                axes = grid[i, j]
-                axes.set_visible(j <= i)
-                if j < i:
-                    axes.plot(samples.values[:, j], samples.values[:, i], ",", color=PALETTE[1])
-                elif i == j:
-                    axes.hist(samples.values[:, i], _BINS, color=PALETTE[1])
-                axes.set_xticks([])
-                axes.set_yticks([])
-                if i == size - 1:
-                    axes.set_xlabel(samples.names[j], fontsize=7)
-                if j == 0 and i:
-                    axes.set_ylabel(samples.names[i], fontsize=7)
+    figure = Figure(size, size, WIDTH, left=0.4, right=0.1, top=0.1, bottom=0.4, gap=0.08, lettered=False)
+    for number, axes in enumerate(figure.axes):
+        i, j = divmod(number, size)
+        axes.visible, axes.size, axes.x.places, axes.y.places = j <= i, 7.0, (), ()
+        if j < i:
+            axes.plot(samples.values[:, j], samples.values[:, i], ",", color=PALETTE[1])
+        elif i == j:
+            heights, edges = np.histogram(samples.values[:, i], _BINS)
+            axes.bars(edges, heights, PALETTE[1])
+        axes.label(samples.names[j] if i == size - 1 else "", samples.names[i] if j == 0 and i else "")
     return figure
 
 
