@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from itertools import pairwise, product
 from typing import Any, ClassVar, Self
 
@@ -133,8 +134,7 @@ class Envelope:
         """Distance of a condition and the currents (N,) [A] along its motion; zero where only ranges are known."""
         if not self.conditions or condition.frequency_Hz <= 0 or condition.amplitude_m <= 0:
             return Distance()
-        tested = [Condition(*point) for point in self.conditions]
-        nearest = distance_from(tested, condition, current, swept_A=self.current_A if self.any_motion else None)
+        nearest = distance_from(self._tested, condition, current, swept_A=self.current_A if self.any_motion else None)
         if not self.any_motion:
             return nearest
         larger = max(0.0, np.log(condition.amplitude_m / self.amplitude_m[1]))
@@ -145,13 +145,11 @@ class Envelope:
         """Tell if a condition lies in the convex hull of the tested ones, in I, log f and log A (and log f·A)."""
         if not self.conditions or condition.frequency_Hz <= 0 or condition.amplitude_m <= 0:
             return True
-        from scipy.optimize import nnls  # slow to import, and needed only here
+        return _in_hull(self.conditions, max(self.current_A[1], _SAME_CURRENT), _point(condition))
 
-        scale = max(self.current_A[1], _SAME_CURRENT)
-        corners = np.array([_features(point, scale) for point in self.conditions])
-        asked = _features(_point(condition), scale)
-        centred = np.column_stack([corners - asked, np.full(len(corners), _SUM_WEIGHT)])
-        return bool(nnls(centred.T, np.array([0.0, 0.0, 0.0, _SUM_WEIGHT]))[1] < SLACK)
+    @cached_property
+    def _tested(self) -> tuple[Condition, ...]:
+        return tuple(Condition(*point) for point in self.conditions)
 
     def motion_flags(self, motion: Excitation) -> tuple[str, ...]:
         """List the quantities of a motion that is no sine outside the tested ranges."""
@@ -166,6 +164,15 @@ class Envelope:
             for name, lowest, highest, (low, high) in checks
             if highest > high * (1 + SLACK) or (name != "velocity" and lowest < low - SLACK * high)
         )
+
+
+@lru_cache(maxsize=4096)
+def _in_hull(tested: tuple[tuple[float, float, float], ...], scale: float, asked: tuple[float, float, float]) -> bool:
+    from scipy.optimize import nnls  # slow to import, and needed only here
+
+    corners = np.array([_features(point, scale) for point in tested]) - _features(asked, scale)
+    centred = np.column_stack([corners, np.full(len(corners), _SUM_WEIGHT)])
+    return bool(nnls(centred.T, np.array([0.0, 0.0, 0.0, _SUM_WEIGHT]))[1] < SLACK)
 
 
 def samples_in_yield_displacement(motion: Excitation, yield_length: float) -> float:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from numbers import Real
 
 import numpy as np
@@ -79,6 +80,11 @@ def current_levels(currents: Sequence[float]) -> list[float]:
     Measured currents of one level differ by noise; those within 5 mA + 2 % of their neighbour are
     one level, named by its median to three digits.
     """
+    return list(_levels(tuple(currents)))
+
+
+@lru_cache(maxsize=256)
+def _levels(currents: tuple[float, ...]) -> tuple[float, ...]:
     order = np.argsort(currents)
     values = np.asarray(currents, dtype=float)[order]
     begins = np.diff(values, prepend=-np.inf) > 5e-3 + 0.02 * np.abs(values)
@@ -86,25 +92,25 @@ def current_levels(currents: Sequence[float]) -> list[float]:
     names = [float(f"{np.median(values[level == i]):.3g}") for i in range(level[-1] + 1)] if values.size else []
     levels = np.empty(values.size)
     levels[order] = [0.0 if abs(names[i]) < 5e-3 else names[i] for i in level]
-    return levels.tolist()
+    return tuple(levels.tolist())
 
 
 def same_condition(conditions: Sequence[Condition]) -> list[list[int]]:
     """Group the indices of conditions that agree in current and, to 3 %, in frequency and amplitude."""
-    return _grouped(
-        conditions,
-        lambda a, b: (
-            abs(a.current_A - b.current_A) <= 1e-3 + _SAME * abs(b.current_A) and _agree_in_motion(a, b, _SAME)
-        ),
-    )
+    return [list(group) for group in _grouped(tuple(conditions), _SAME, True)]
 
 
 def same_motion(conditions: Sequence[Condition], tolerance: float = 0.05) -> list[list[int]]:
     """Group the indices of conditions whose frequency and amplitude agree to a tolerance, at any current."""
-    return _grouped(conditions, lambda a, b: _agree_in_motion(a, b, tolerance))
+    return [list(group) for group in _grouped(tuple(conditions), tolerance, False)]
 
 
-def _grouped(conditions: Sequence[Condition], agree: Callable[[Condition, Condition], bool]) -> list[list[int]]:
+@lru_cache(maxsize=256)
+def _grouped(conditions: tuple[Condition, ...], tolerance: float, by_current: bool) -> list[list[int]]:
+    def agree(a: Condition, b: Condition) -> bool:
+        near = not by_current or abs(a.current_A - b.current_A) <= 1e-3 + tolerance * abs(b.current_A)
+        return near and _agree_in_motion(a, b, tolerance)
+
     groups: list[list[int]] = []
     for index, condition in enumerate(conditions):
         for group in groups:

@@ -254,14 +254,16 @@ def _fold_errors(
     q = np.linalg.qr(weighted / np.linalg.norm(weighted, axis=0))[0]
     right = target * weight
     residual = right - q @ (q.T @ right)
-    errors: list[Floats] = []
-    for group in groups:
-        own = q[group]
-        spare = np.eye(len(group)) - own @ own.T
-        determined = np.linalg.eigvalsh(spare)[0] > _RANK_LIMIT
-        missed = np.abs(np.linalg.solve(spare, residual[group])) if determined else np.full(len(group), np.inf)
-        errors.append(missed)
-    return np.concatenate(errors) * (target.size / max(target.size - rates, 1))
+    errors = np.full(target.size, np.inf)
+    for size in {len(group) for group in groups}:  # groups of one size at a time
+        rows = np.array([group for group in groups if len(group) == size])
+        own = q[rows]
+        spare = np.eye(size) - own @ own.transpose(0, 2, 1)
+        determined = np.linalg.eigvalsh(spare)[:, 0] > _RANK_LIMIT
+        missed = np.linalg.solve(spare[determined], residual[rows[determined], None])
+        errors[rows[determined]] = np.abs(missed[..., 0])
+    order = [i for group in groups for i in group]
+    return errors[order] * (target.size / max(target.size - rates, 1))
 
 
 def _weights(uncertainty: ArrayLike | None, target: Floats) -> Floats:

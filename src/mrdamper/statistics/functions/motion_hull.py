@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -38,18 +39,7 @@ class MotionHull:
     @classmethod
     def of(cls, conditions: Sequence[Condition]) -> MotionHull:
         """Take the hull of the motions of tested conditions; a hull without width becomes a segment or a point."""
-        points = np.log([(c.frequency_Hz, c.amplitude_m) for c in conditions])
-        groups = same_motion(conditions, _SLEEK)
-        centres = np.array([points[group].mean(axis=0) for group in groups])
-        middle = centres.mean(axis=0)
-        axes = np.linalg.svd(centres - middle, full_matrices=True)[2]
-        along = (centres - middle) @ axes.T
-        if np.ptp(along[:, 0]) < _SLEEK:
-            return cls((_motion(middle),))
-        if np.ptp(along[:, 1]) < _SLEEK:
-            ends = middle + np.outer([along[:, 0].min(), along[:, 0].max()], axes[0])
-            return cls(tuple(_motion(end) for end in ends))
-        return cls(tuple(_motion(corner) for corner in _convex(centres)))
+        return _hull(tuple(conditions))
 
     def nearest(self, frequency: Any, amplitude: Any) -> tuple[Any, Any]:
         """Frequency [Hz] and amplitude [m] of the nearest motion of the hull; arrays and traced numbers alike."""
@@ -78,6 +68,22 @@ class MotionHull:
         if count == 2:
             return f, A
         return np.where(inside, frequency, f), np.where(inside, amplitude, A)
+
+
+@lru_cache(maxsize=256)
+def _hull(conditions: tuple[Condition, ...]) -> MotionHull:
+    points = np.log([(c.frequency_Hz, c.amplitude_m) for c in conditions])
+    groups = same_motion(conditions, _SLEEK)
+    centres = np.array([points[group].mean(axis=0) for group in groups])
+    middle = centres.mean(axis=0)
+    axes = np.linalg.svd(centres - middle, full_matrices=True)[2]
+    along = (centres - middle) @ axes.T
+    if np.ptp(along[:, 0]) < _SLEEK:
+        return MotionHull((_motion(middle),))
+    if np.ptp(along[:, 1]) < _SLEEK:
+        ends = middle + np.outer([along[:, 0].min(), along[:, 0].max()], axes[0])
+        return MotionHull(tuple(_motion(end) for end in ends))
+    return MotionHull(tuple(_motion(corner) for corner in _convex(centres)))
 
 
 def _motion(point: Floats) -> tuple[float, float]:

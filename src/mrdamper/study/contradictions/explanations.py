@@ -111,17 +111,21 @@ class ExplanationCandidate:
         self._others = [t for k, t in enumerate(tracks) if k != index]
         self._moved: list[tuple[Trial, RowProducts]] = []
 
-    def explanations(self, others: Posterior) -> list[Explanation]:
+    def explanations(self, others: Posterior, like: Sequence[Trial] = ()) -> list[Explanation]:
         """Explanations that are more than differences between sessions, the most probable first.
 
         Parameters
         ----------
         others : Posterior
             What the other runs determine.
+        like : sequence of Trial
+            Look only at explanations like one of these, if there are any.
         """
         least = others.log_probability(others.weigh(self.own))
         candidates = []
         for trial, products in self._trials(others):
+            if like and not any(trial.is_like(one) for one in like):
+                continue
             if self._is_large(trial, products, others):
                 odds = trial.odds + (_EDGE_ODDS if trial.cause in ("force", "current") and self._is_edge else 0.0)
                 gain = others.log_probability(others.weigh(products)) - odds - least

@@ -279,9 +279,12 @@ class Search:
         others = self.evidence.posterior([self._members[k] for k in rest])
         kept, own = [self._products[k] for k in rest], [self._products[k] for k in group]
         base = self._base + _MEMBER_ODDS * (len(group) - 1)
-        options = [self._candidates[k].explanations(others) for k in group]
+        first, *rest_of_group = (self._candidates[k] for k in group)
+        compared = first.explanations(others)[:_COMPARED_EXPLANATIONS]
+        trials = [explanation.trial for explanation in compared]
+        options = [compared, *(one.explanations(others, trials) for one in rest_of_group if compared)]
         best, joint = _NO_PROPOSAL, -np.inf
-        for explanation in options[0][:_COMPARED_EXPLANATIONS]:
+        for explanation in compared:
             if explanation.cause == "current" and not self._may_share(group, explanation.trial.value):
                 continue
             alike = [next((e for e in of if e.trial.is_like(explanation.trial)), None) for of in options]
