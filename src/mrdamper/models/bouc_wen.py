@@ -13,6 +13,7 @@ from mrdamper.data import Floats
 from mrdamper.data.parameters import param
 from mrdamper.errors import IdentificationError
 from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis, require_positive
+from mrdamper.models.recorded import recorded
 from mrdamper.physics.hysteresis import Shape, follow
 from mrdamper.physics.motion import Excitation
 from mrdamper.tracing import plain
@@ -73,6 +74,7 @@ class BoucWen(Model):
         """Alpha · z_max, the hysteretic force after yield [N]."""
         return self.alpha * self.yield_displacement
 
+    @recorded
     def state(self, motion: Excitation) -> Floats:
         """Z [m] along the motion, from z = 0."""
         return self.yield_displacement * follow(self.shape, motion.path)

@@ -17,7 +17,7 @@ from mrdamper.tracing.compiled import RecordProgram
 
 _CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", "turn", "turn_back", "move")
 S = TypeVar("S", bound=Callable[..., Floats])
-_MIN_COMPILED_SAMPLES = 5_000  # samples of a motion, from which compiled code is used; never the history of the process
+_MIN_COMPILED_SAMPLES = 2_000  # samples of a motion, from which compiled code is used; never the history of the process
 
 
 def recorded(state: S) -> S:
