@@ -32,6 +32,7 @@ from mrdamper.statistics.stop_reason import StopReason
 RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
 _SEARCH_TOLERANCE = 1e-6  # relative gain of a step at which the search ends
 _LAG_BOUNDS_S, _START_LAG_S = (1e-4, 0.2), 8e-3  # of a coil's field [s]
+_DIFFERENCE_RATIO = 1e-6  # of the box, over which parameters are differentiated by the search axes
 _TRIAL_RUNS, _TRIAL_STEPS = 6, 5  # runs on which starts are tried, and steps from each
 _REFIT_TOLERANCE = 5e-4  # relative gain of a step at which a fit without some runs ends
 _REFIT_STEPS = 15  # of such a fit
@@ -486,6 +487,22 @@ class JointProblem:
             np.array([axis.coordinate(axis.lower) for axis in self.axes]),
             np.array([axis.coordinate(axis.upper) for axis in self.axes]),
         )
+
+    def parameters_by_axis(self, point: Floats) -> tuple[tuple[str, ...], Floats]:
+        """Names of the K parameters that the search axes move, and their derivatives (D, K); no names with a coil."""
+        if any(axis.name in (RISE, FALL) for axis in self.axes):
+            return (), np.zeros((point.size, 0))
+        lower, upper = self.box()
+        reach = _DIFFERENCE_RATIO * (upper - lower)
+        slopes = []
+        for i in range(point.size):
+            step = np.where(np.arange(point.size) == i, reach, 0.0)
+            ends = np.clip(point - step, lower, upper), np.clip(point + step, lower, upper)
+            low, high = (np.array(list(self.without_linear(end).values().values())) for end in ends)
+            slopes.append((high - low) / (ends[1][i] - ends[0][i]))
+        moved = np.any(slopes, axis=0)
+        names = [info.name for info in self.model_type.parameters()]
+        return tuple(n for n, m in zip(names, moved, strict=True) if m), np.array(slopes)[:, moved]
 
     def without_linear(self, point: Floats) -> Model:
         """The model at a point of the search axes, its linear parameters zero."""

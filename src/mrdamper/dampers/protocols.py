@@ -79,6 +79,10 @@ class SearchSpace(Protocol):
         """Return the response of the field at a point."""
         ...
 
+    def parameters_by_axis(self, point: Floats) -> tuple[tuple[str, ...], Floats]:
+        """Return the parameters that the coordinates move, and their derivatives by them."""
+        ...
+
     def without_linear(self, point: Floats) -> Any:
         """Return the model of a point with its linear parameters at zero."""
         ...

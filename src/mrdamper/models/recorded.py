@@ -1,8 +1,8 @@
-"""States of models along whole records, compiled from the models' own array code."""
+"""States of models along whole records, and tangents of their force, compiled from the models' own array code."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from typing import Any, TypeVar, cast
 
@@ -12,8 +12,9 @@ from mrdamper.data import Floats
 from mrdamper.physics.motion import Excitation
 from mrdamper.physics.motion.path import memoize_per_path
 from mrdamper.physics.motion.traced import TracedMotion, TracedStep
-from mrdamper.tracing import Tape, program
+from mrdamper.tracing import Program, Tape, TraceError, program
 from mrdamper.tracing.compiled import RecordProgram
+from mrdamper.tracing.tangent import with_tangents
 
 _CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", "turn", "turn_back", "move")
 S = TypeVar("S", bound=Callable[..., Floats])
@@ -26,28 +27,60 @@ def recorded(state: S) -> S:
     The array code runs once on symbols; without a compiler, and for few samples, it runs as it is written. Both
     agree to rounding. For models whose state is one number a sample.
     """
-    records_of: dict[type, list[RecordProgram]] = {}
 
     @wraps(state)
     def along(self: Any, motion: Excitation) -> Floats:
         if not isinstance(motion, Excitation):
             return state(self, motion)
-        values = self.values()
-        if len(motion) < _MIN_COMPILED_SAMPLES or not all(isinstance(value, float | int) for value in values.values()):
-            return state(self, motion)
-        given = tuple(map(float, values.values()))
-        records = records_of.setdefault(type(self), [])
-        for record in records:
-            if (derived := record.prepare(given)) is not None:
-                break
-        else:
-            record = RecordProgram(_traced(type(self), values, state))
-            derived = record.prepare(given)
-            records.append(record)
-        states = derived is not None and record.compiled_along(given, derived, record.starts, channels(motion))
-        return states.outputs[0] if states and states.failed < 0 else state(self, motion)
+        outputs = _along(self, motion, None, lambda free, traced, tape: {"state": state(free, traced)})
+        return state(self, motion) if outputs is None else outputs[0]
 
     return cast(S, along)
+
+
+def force_tangents(model: Any, motion: Excitation, names: Sequence[str]) -> Floats | None:
+    """(K, N) derivatives of the force by K parameters along a motion, memory included, in one compiled pass.
+
+    None where there is no compiler, the motion is short, or the model has no derivative of this kind.
+    """
+    return _along(
+        model, motion, tuple(names), lambda free, traced, tape: with_tangents(tape, _force(free, traced), names)
+    )
+
+
+def _force(model: Any, motion: Any) -> Any:
+    return model.force(motion, model.state(motion))
+
+
+_PROGRAMS: dict[tuple[type, tuple[str, ...] | None], list[RecordProgram]] = {}
+
+
+def _along(
+    model: Any,
+    motion: Excitation,
+    names: tuple[str, ...] | None,
+    outputs: Callable[[Any, Any, Tape], Mapping[str, Any]],
+) -> Floats | None:
+    """(K, N) outputs of a program of the model along a motion; programs are kept by the names of their tangents."""
+    values = model.values()
+    if len(motion) < _MIN_COMPILED_SAMPLES or not all(isinstance(value, float | int) for value in values.values()):
+        return None
+    given = tuple(map(float, values.values()))
+    programs = _PROGRAMS.setdefault((type(model), names), [])
+    for record in programs:
+        if (derived := record.prepare(given)) is not None:
+            break
+    else:
+        try:
+            record = RecordProgram(_traced(type(model), values, outputs))
+        except TraceError:
+            if names is None:
+                raise
+            return None
+        derived = record.prepare(given)
+        programs.append(record)
+    found = derived is not None and record.compiled_along(given, derived, record.starts, channels(motion))
+    return found.outputs if found and found.failed < 0 else None
 
 
 def channels(motion: Excitation) -> tuple[Floats, ...]:
@@ -67,10 +100,10 @@ def _steps(time: Floats) -> Floats:
     return np.maximum(rounding * np.round(steps / rounding), rounding)
 
 
-def _traced(model: type, values: dict[str, float], state: Callable[[Any, Any], Any]) -> Any:
-    """Trace the program of a model's state at one sample, its parameters free."""
+def _traced(model: type, values: dict[str, float], outputs: Callable[[Any, Any, Tape], Mapping[str, Any]]) -> Program:
+    """Trace a program of a model at one sample, its parameters free."""
     tape = Tape()
     x, v, a, current, dt, turn, back, move = (tape.input(name) for name in _CHANNELS)
     motion = TracedMotion(tape, x, v, a, current, TracedStep(tape, dt), TracedStep(tape, move, (turn, back)))
     free = model(**{name: tape.parameter(name, value) for name, value in values.items()})
-    return program(tape, {"state": state(free, motion)})
+    return program(tape, outputs(free, motion, tape))
