@@ -97,9 +97,11 @@ def _is_own(point: EntryPoint) -> bool:
 
 def _require_this_version(distribution: Distribution | None) -> None:
     """Refuse a package that is made for another version of mrdamper."""
+    if distribution is None or distribution.name == OWN:
+        return
     from packaging.requirements import Requirement
 
-    for wanted in map(Requirement, (distribution.requires or ()) if distribution else ()):
+    for wanted in map(Requirement, distribution.requires or ()):
         if wanted.name == OWN and not wanted.specifier.contains(version(OWN), prereleases=True):
             raise ImportError(f"it needs mrdamper {wanted.specifier}, this is {version(OWN)}")
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from numbers import Real
 
 import numpy as np
@@ -89,7 +90,9 @@ def _levels(currents: tuple[float, ...]) -> tuple[float, ...]:
     values = np.asarray(currents, dtype=float)[order]
     begins = np.diff(values, prepend=-np.inf) > 5e-3 + 0.02 * np.abs(values)
     level = np.cumsum(begins) - 1
-    names = [float(f"{np.median(values[level == i]):.3g}") for i in range(level[-1] + 1)] if values.size else []
+    ends = np.append(np.flatnonzero(begins), values.size)
+    middle = [(values[(a + b - 1) // 2] + values[(a + b) // 2]) / 2 for a, b in pairwise(ends)]  # medians
+    names = [float(f"{value:.3g}") for value in middle]
     levels = np.empty(values.size)
     levels[order] = [0.0 if abs(names[i]) < 5e-3 else names[i] for i in level]
     return tuple(levels.tolist())

@@ -61,7 +61,6 @@ def register(app: typer.Typer) -> None:
         from mrdamper.errors import ConditionError, InputError
         from mrdamper.identification.intervals import student
         from mrdamper.report.tables import prediction_rows
-        from mrdamper.rig_files.motion_file import load_motion
 
         for name, value in (("--current", current), ("--frequency", frequency), ("--amplitude", amplitude)):
             if value is not None and not 0 <= value < math.inf:
@@ -76,6 +75,8 @@ def register(app: typer.Typer) -> None:
             driver = damper.coil.driver if damper.coil else None
             damper = replace(damper, coil=Coil(1e-3 * coil_lag, 1e-3 * coil_lag, driver))  # type: ignore[type-var]
         if motion is not None:
+            from mrdamper.rig_files.motion_file import load_motion
+
             if frequency is not None or amplitude is not None:
                 raise InputError("--motion together with --frequency or --amplitude", remedy="give one of them")
             prediction = damper.predict_run(load_motion(motion, current))
