@@ -492,17 +492,32 @@ class JointProblem:
         """Names of the K parameters that the search axes move, and their derivatives (D, K); no names with a coil."""
         if any(axis.name in (RISE, FALL) for axis in self.axes):
             return (), np.zeros((point.size, 0))
+        names, several = self._moved_by_axes
+        slopes = np.zeros((point.size, len(names)))
+        for i, axis in enumerate(self.axes):
+            if i in several:
+                slopes[i] = self._moved_along(i, point, names)
+            else:
+                slopes[i, names.index(axis.name)] = axis.value(float(point[i])) if axis.log else 1.0
+        return names, slopes
+
+    @cached_property
+    def _moved_by_axes(self) -> tuple[tuple[str, ...], frozenset[int]]:
+        """Names of the parameters that the axes move, and the axes that move more than the parameter of their name."""
+        names = tuple(info.name for info in self.model_type.parameters())
+        middle = np.mean(self.box(), axis=0)
+        moved = np.array([self._moved_along(i, middle, names) != 0 for i in range(len(self.axes))])
+        own = np.array([[name == axis.name for name in names] for axis in self.axes])
+        several = frozenset(np.flatnonzero((moved != own).any(axis=1)).tolist())
+        return tuple(names[k] for k in np.flatnonzero(moved.any(axis=0))), several
+
+    def _moved_along(self, i: int, point: Floats, names: Sequence[str]) -> Floats:
+        """(K,) derivatives of parameters by an axis."""
         lower, upper = self.box()
-        reach = _DIFFERENCE_RATIO * (upper - lower)
-        slopes = []
-        for i in range(point.size):
-            step = np.where(np.arange(point.size) == i, reach, 0.0)
-            ends = np.clip(point - step, lower, upper), np.clip(point + step, lower, upper)
-            low, high = (np.array(list(self.without_linear(end).values().values())) for end in ends)
-            slopes.append((high - low) / (ends[1][i] - ends[0][i]))
-        moved = np.any(slopes, axis=0)
-        names = [info.name for info in self.model_type.parameters()]
-        return tuple(n for n, m in zip(names, moved, strict=True) if m), np.array(slopes)[:, moved]
+        step = np.where(np.arange(point.size) == i, _DIFFERENCE_RATIO * (upper - lower), 0.0)
+        ends = np.clip(point - step, lower, upper), np.clip(point + step, lower, upper)
+        low, high = (np.array([getattr(self.without_linear(end), name) for name in names]) for end in ends)
+        return (high - low) / (ends[1][i] - ends[0][i])
 
     def without_linear(self, point: Floats) -> Model:
         """The model at a point of the search axes, its linear parameters zero."""

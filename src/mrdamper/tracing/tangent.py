@@ -13,7 +13,7 @@ import numpy as np
 
 from mrdamper.tracing.expression import Expression, TraceError
 from mrdamper.tracing.program import postorder
-from mrdamper.tracing.tape import Tape
+from mrdamper.tracing.tape import Tape, TracedLoop
 
 # Derivative by the argument a, given the value y of the operation.
 _BY_ARGUMENT: Mapping[str, Callable[[Any, Any], Any]] = {
@@ -39,11 +39,10 @@ def with_tangents(tape: Tape, output: Any, along: Sequence[str]) -> dict[str, An
     TraceError
         If an operation has no derivative here: loops and tables.
     """
-    nodes = [
-        node
-        for node in postorder([output, *tape.updates.values()])
-        if isinstance(node, Expression) and not node.logical
-    ]
+    every = postorder([output, *tape.updates.values()])
+    if any(isinstance(node, TracedLoop) for node in every):
+        raise TraceError("a loop has no derivative here")
+    nodes = [node for node in every if not node.logical]
     updates = dict(tape.updates)
     outputs = {"value": output}
     for name in along:

@@ -219,11 +219,11 @@ class Evidence:
         mean = float(one @ run.gram @ expected) / run.rows
         shared = np.column_stack([spread.gain * (expected - mean * one), spread.offset * np.sqrt(max(size, 0.1)) * one])
         along = weight * run.gram @ shared
-        inner = np.linalg.inv(np.eye(2) + shared.T @ along)
+        (a, b), (_, d) = np.eye(2) + shared.T @ along
+        determinant = float(a * d - b * b)
+        inner = np.array([[d, -b], [-b, a]]) / determinant
         with_force = weight * shared.T @ run.moment
-        normalisation = _INDEPENDENT_SAMPLES * np.log(spread.misfit**2 * level / size**2) - float(
-            np.linalg.slogdet(inner)[1]
-        )
+        normalisation = _INDEPENDENT_SAMPLES * np.log(spread.misfit**2 * level / size**2) + np.log(determinant)
         return Moments(
             weight * run.gram - along @ inner @ along.T,
             weight * run.moment - along @ inner @ with_force,

@@ -123,9 +123,7 @@ class ExplanationCandidate:
         """
         least = others.log_probability(others.weigh(self.own))
         candidates = []
-        for trial, products in self._trials(others):
-            if like and not any(trial.is_like(one) for one in like):
-                continue
+        for trial, products in self._trials(others, like):
             if self._is_large(trial, products, others):
                 odds = trial.odds + (_EDGE_ODDS if trial.cause in ("force", "current") and self._is_edge else 0.0)
                 gain = others.log_probability(others.weigh(products)) - odds - least
@@ -157,13 +155,14 @@ class ExplanationCandidate:
             np.all(self.track.current > currents.max() * 1.05) or np.all(self.track.current < currents.min() * 0.95)
         )
 
-    def _trials(self, others: Posterior) -> Iterator[tuple[Trial, RowProducts]]:
+    def _trials(self, others: Posterior, like: Sequence[Trial]) -> Iterator[tuple[Trial, RowProducts]]:
         for trial in (*self._of_the_force(others), *self._of_the_current()):
-            yield trial, self.changed(trial)
+            if not like or any(trial.is_like(one) for one in like):
+                yield trial, self.changed(trial)
         if not self._moved:
             trials = list(self._of_the_motion())
             self._moved = list(zip(trials, self.evidence.products([self._move(t) for t in trials]), strict=True))
-        yield from self._moved
+        yield from (moved for moved in self._moved if not like or any(moved[0].is_like(one) for one in like))
 
     def _of_the_force(self, others: Posterior) -> Iterator[Trial]:
         """A factor or an offset of the force."""

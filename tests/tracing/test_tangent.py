@@ -1,0 +1,91 @@
+"""Tangents of traced programs: what a small change of a parameter does, memory included."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mrdamper.dampers.concatenated_runs import JointResiduals
+from mrdamper.dampers.joint import JointProblem
+from mrdamper.models import recorded
+from mrdamper.models.play_bypass import PlayBypass
+from mrdamper.physics.motion import Excitation
+from mrdamper.statistics.levenberg_marquardt import forward_differences
+from mrdamper.tracing import Tape, TraceError, program
+from mrdamper.tracing.compiled import RecordProgram
+from mrdamper.tracing.tangent import with_tangents
+
+NAMES = ("fy0", "fy1", "d", "e", "cb", "h0", "h1", "vh", "T", "qb", "Ic", "leak", "si")
+
+
+@pytest.fixture(scope="module")
+def motion():
+    t = np.arange(4000) * 1e-3
+    x = 0.01 * np.sin(2 * np.pi * 1.3 * t) + 2e-3 * np.sin(2 * np.pi * 4.1 * t + 1)
+    return Excitation(t, x, np.gradient(x, t), np.gradient(np.gradient(x, t), t), 0.6 + 0.4 * np.sin(t))
+
+
+@pytest.fixture(scope="module")
+def model():
+    return PlayBypass(
+        f0=1.0, k=1e3, c0=800.0, c1=200.0, fy0=150.0, fy1=600.0, d=2e-4, e=5e-5, cb=3e4, h0=0.4, h1=0.1, vh=0.01,
+        T=0.005, asymmetry=0.05, cq=10.0, qb=0.1, Ic=0.2, leak=18.0, si=0.1,
+    )  # fmt: skip
+
+
+def test_tangents_of_a_damper_are_what_small_changes_do(motion, model):
+    tangents = recorded.force_tangents(model, motion, NAMES)
+    assert tangents is not None, "a compiler is needed"
+
+    def force(**changed):
+        moved = replace(model, **changed)
+        return moved.force(motion, moved.state(motion))
+
+    assert tangents[0] == pytest.approx(force(), abs=1e-9)
+    for name, tangent in zip(NAMES, tangents[1:], strict=True):
+        value = getattr(model, name)
+        step = 1e-6 * value
+        difference = (force(**{name: value + step}) - force(**{name: value - step})) / (2 * step)
+        off = np.abs(tangent - difference) > 1e-6 * np.abs(difference).max()
+        assert np.mean(off) < 0.01, name  # all but the samples that a corner lies between
+
+
+def test_every_operation_has_the_slope_of_its_values():
+    tape = Tape()
+    p, x = tape.parameter("p", 0.4), tape.input("x")
+    held = tape.remember("held")
+    mixed = np.tanh(p * x) + np.exp(-p) / (1 + p * x * x) - np.sqrt(p + x * x) + np.log1p(p * p) * np.arctan(p * x)
+    mixed = mixed + np.abs(x - p) + np.maximum(p, x) * np.minimum(2 * p, x) + np.power(p + x * x, p) - np.expm1(p * x)
+    mixed = mixed + 0.5 * held + np.log(p + x * x) + np.tan(0.3 * p) + np.arctanh(0.2 * p)
+    tape.update(held, mixed)
+    record = RecordProgram(program(tape, with_tangents(tape, mixed, ["p"])))
+    xs = np.linspace(0.05, 1.0, 40)
+
+    def along(value):
+        derived = record.prepare((value,))
+        return record.interpreted_along((value,), derived, record.starts, [xs]).outputs
+
+    difference = (along(0.4 + 1e-6)[0] - along(0.4 - 1e-6)[0]) / 2e-6
+    assert along(0.4)[1] == pytest.approx(difference, rel=1e-7)
+
+
+def test_what_has_no_tangent_is_refused():
+    tape = Tape()
+    p = tape.parameter("p", 1.0)
+    (value,) = tape.loop([p], lambda v: (v < 2.0, [v * 1.5]), 5)
+    with pytest.raises(TraceError):
+        with_tangents(tape, value * p, ["p"])
+
+
+def test_slopes_of_a_joint_fit_are_those_of_differences(bundled):
+    runs = [run for run in bundled.rig("utfsm").split("train") if run.excitation == "sine"][::4]
+    problem = JointProblem(runs, "play-bypass", free=("leak", "qb", "Ic"))
+    table, point = JointResiduals(problem, problem.parts), np.mean(problem.box(), axis=0)
+    solved = table.solve(point)
+    exact = table._moved(point, solved.model, solved.residual)
+    weights = table.weights[table.owner]
+    near = forward_differences(
+        lambda u: table.residual(u, solved.model) * weights, point, solved.residual, *problem.box()
+    )
+    for column, other in zip(exact.T, near.T, strict=True):
+        assert np.linalg.norm(column - other) < 0.02 * np.linalg.norm(other) + 1e-6
