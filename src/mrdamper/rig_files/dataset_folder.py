@@ -304,8 +304,8 @@ def _write_samples(dataset: Dataset, folder: Path) -> None:
 
     path, tables = folder / "samples.parquet", _samples(dataset)
     if sum(run.time.size for run in dataset) <= 8 * _SAMPLES_PER_CHUNK:
-        named = [table.select(pl.lit(run_id).alias("run_id"), pl.all()) for run_id, table in tables]
-        pl.concat(named, how="diagonal").write_parquet(path, compression="zstd", statistics=False)
+        whole = [table.select(pl.lit(run_id).alias("run_id"), pl.all()) for run_id, table in tables]
+        pl.concat(whole, how="diagonal").write_parquet(path, compression="zstd", statistics=False)
         return
     parts: list[Path] = []
     named: list[pl.LazyFrame] = []
