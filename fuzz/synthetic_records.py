@@ -17,10 +17,13 @@ from mrdamper.rig_files.record import Record
 
 ELASTIC_PLASTIC = "elastic-plastic"
 FAMILIES = ("bouc-wen", "smooth-bingham", "kwok", "guo", "dahl", "lugre", ELASTIC_PLASTIC)
+OTHERS = ("spencer", "biviscous", "herschel-bulkley")  # drawn apart: the numbers of the faults stay as they are
 CURRENTS = (0.0, 0.25, 0.5, 1.0, 2.0)  # [A]
 
 
-def clean_record(number: int, rng: np.random.Generator, least_cycles: float = 1.3) -> Record:
+def clean_record(
+    number: int, rng: np.random.Generator, least_cycles: float = 1.3, families: tuple[str, ...] = FAMILIES
+) -> Record:
     """Draw a clean record.
 
     Parameters
@@ -30,6 +33,8 @@ def clean_record(number: int, rng: np.random.Generator, least_cycles: float = 1.
     rng : Generator
     least_cycles : float
         One record in ten holds so many to 4 cycles, the others 4 to 15.
+    families : tuple of str
+        They take turns.
 
     Returns
     -------
@@ -48,7 +53,7 @@ def clean_record(number: int, rng: np.random.Generator, least_cycles: float = 1.
     v = amplitude * omega * (np.cos(angle) + 3 * distortion * np.cos(3 * angle))
     current = float(rng.choice(CURRENTS))
     motion = Excitation(time, x, v, np.gradient(v, time), np.full(time.size, current))
-    force = force_of(FAMILIES[number % len(FAMILIES)], motion, rng)
+    force = force_of(families[number % len(families)], motion, rng)
     warming = 1 - rng.uniform(0, 0.008) * time / time[-1]
     force = force * warming + _log_uniform(rng, 2e-4, 4e-3) * np.ptp(force) * rng.standard_normal(time.size)
     x = x + rng.uniform(-0.03, 0.03) + _log_uniform(rng, 1e-5, 3e-4) * amplitude * rng.standard_normal(time.size)
@@ -84,6 +89,12 @@ def force_of(family: str, motion: Excitation, rng: np.random.Generator) -> Float
             "fc": yield_force, "presliding": bend, "stribeck": rng.uniform(1.0, 1.3), "vs": width,
             "sigma1": 0.1 * viscosity, "sigma2": viscosity, "f0": offset,
         },
+        "spencer": {  # without k0, by which the mean force would take many cycles to settle
+            "c1": yield_force / (0.3 * width), "c0_ratio": 0.3 * width * viscosity / yield_force, "k0_rate": 0.0,
+            "creep": 0.3 * width, "yield_displacement": bend, "k1": stiffness, "f0": offset,
+        },
+        "biviscous": {"cpo": viscosity, "fy": yield_force, "vy": width, "vh": 2 * (share - 0.5) * width, "f0": offset},
+        "herschel-bulkley": {"fy": yield_force, "vc": speed, "m": share, "c": viscosity * speed**share, "f0": offset},
     }  # fmt: skip
     if family == ELASTIC_PLASTIC:
         loop = _elastic_plastic(motion.displacement, bend)
