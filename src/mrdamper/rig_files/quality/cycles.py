@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,30 +58,48 @@ class Cycles:
         return np.interp(place, np.arange(POINTS + 1), np.append(loop, loop[0]))
 
 
-@once_per_run
-def steady_cycles(view: View) -> Cycles | None:
-    """Fold the steady cycles of a record; None under one cycle of a periodic motion.
+class Folded(NamedTuple):
+    """K cycles of a record, each at P equal phases."""
 
-    The first of three or more is left out: it may hold the way in from rest. A cycle with a gap is, too.
-    """
+    starts: Floats  # (K,) [s]
+    period: float  # [s]
+    displacement: Floats  # (K, P) [m]
+    force: Floats  # (K, P) [N]
+
+
+@once_per_run
+def every_cycle(view: View) -> Folded | None:
+    """Fold the cycles of a record without a gap, up to its end; None under one cycle of a periodic motion."""
     motion = view.motion
-    if motion is None:
+    count = 0 if motion is None else int(motion.cycles + 0.02)
+    if motion is None or count < 1:
         return None
-    count = int(motion.cycles + 0.02)
-    if count < 1:
-        return None
-    count -= count > 2
     run, period = view.steady, 1 / motion.condition.frequency_Hz
     grid = float(run.time[-1]) - count * period + period * np.arange(count * POINTS) / POINTS
     starts = grid[::POINTS]
     kept = view.without_leap(starts, starts + period)
     if not kept.any():
         return None
-    channels = [
-        _channel(np.interp(grid, run.time, values).reshape(count, POINTS)[kept])
-        for values in (run.displacement, run.force)
-    ]
-    return Cycles(starts[kept], period, *channels)
+    channels = (np.interp(grid, run.time, v).reshape(count, POINTS)[kept] for v in (run.displacement, run.force))
+    return Folded(starts[kept], period, *channels)
+
+
+@once_per_run
+def steady_cycles(view: View) -> Cycles | None:
+    """The steady cycles of a record beside each other; None under one cycle of a periodic motion.
+
+    The first of three or more is left out: it may hold the way in from rest. A cycle with a gap is, too.
+    """
+    folded = every_cycle(view)
+    if folded is None:
+        return None
+    count = round((float(view.steady.time[-1]) - folded.starts[0]) / folded.period)
+    assert view.motion is not None
+    first = int(count > 2 and count == int(view.motion.cycles + 0.02))
+    if first == folded.starts.size:
+        return None
+    channels = (_channel(values[first:]) for values in (folded.displacement, folded.force))
+    return Cycles(folded.starts[first:], folded.period, *channels)
 
 
 def _channel(values: Floats) -> CycleChannel:

@@ -10,7 +10,7 @@ from mrdamper.data import Floats, once_per_run
 from mrdamper.errors import QualityError
 from mrdamper.identification.loop_analysis import damping_share as share_of_damping
 from mrdamper.physics.motion.harmonics import fit_harmonics
-from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
+from mrdamper.rig_files.quality.cycles import POINTS, Folded, every_cycle, steady_cycles
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, steady_window
 from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
 from mrdamper.rig_files.record import Finding, SteadyPart
@@ -89,50 +89,36 @@ def _is_folded(view: View, force: Floats, out: float, back: float) -> bool:
 
 def keeps_its_sign(view: View) -> None:
     """Refuse a force that changes its sign within the record: cycle against cycle, or stretches of one."""
-    motion = view.motion
-    if motion is None or view.noticed("W_FROZEN"):
+    cycles = every_cycle(view)
+    if cycles is None or len(cycles.starts) < 2 or cycles.period < _FEWEST * view.step or view.noticed("W_FROZEN"):
         return  # a force that stands still opposes its own other half cycle
-    period = 1 / motion.condition.frequency_Hz
-    time = view.run.time
-    starts = np.asarray(view.steady.time[0] + period * np.arange(int(motion.cycles + 0.05)), dtype=np.float64)
-    starts = starts[view.without_leap(starts, starts + period)]
-    cycles = [tuple(map(int, np.searchsorted(time, (start, start + period)))) for start in starts]
-    if len(cycles) < 2 or min(b - a for a, b in cycles) < _FEWEST:
-        return
-    phase = np.linspace(0.0, period, POINTS, endpoint=False)
-    grid = (starts[:, None] + phase).reshape(-1)
-    folded = np.interp(grid, time, view.run.force).reshape(-1, POINTS)
-    velocity, x = (
-        np.interp(grid, time, v).reshape(-1, POINTS) for v in (view.moving.velocity, view.moving.displacement)
-    )
-    shares = _shares(velocity, x, folded)
+    starts, force = cycles.starts, cycles.force
+    shares = _shares(cycles)
     flipped = np.flatnonzero(shares < -_CLEARLY)
     if flipped.size and float(np.max(shares)) > _CLEARLY:
-        raise _flip(view, float(starts[flipped[0]]), flipped.size, len(cycles))
-    if len(cycles) < 3:
+        raise _flip(view, float(starts[flipped[0]]), flipped.size, len(starts))
+    if len(starts) < 3:
         return
-    _keeps_its_scale(view, starts, folded)
-    usual = np.median(folded, axis=0)
+    _keeps_its_scale(view, starts, force)
+    usual = np.median(force, axis=0)
     counts = np.abs(usual) > 0.3 * np.max(np.abs(usual))
-    against = counts & (np.abs(folded + usual) < 0.3 * np.abs(folded - usual))
+    against = counts & (np.abs(force + usual) < 0.3 * np.abs(force - usual))
     for start, row in zip(starts, against, strict=True):
         begins, ends = runs_of(row)
         if begins.size and np.max(ends - begins) > _LONG * POINTS:
-            raise _flip(view, start + phase[begins[np.argmax(ends - begins)]], 1, len(cycles))
+            at = start + begins[np.argmax(ends - begins)] * cycles.period / POINTS
+            raise _flip(view, at, 1, len(starts))
 
 
-def _shares(velocity: Floats, displacement: Floats, force: Floats) -> Floats:
-    """(K,) parts of the force's standard deviation that oppose the velocity, of K cycles of (K, P) samples each.
+def _shares(cycles: Folded) -> Floats:
+    """(K,) parts of the force's standard deviation that oppose the velocity, of K cycles.
 
     Those of c in F = f0 + r t + k x + c v by least squares.
     """
-    ramp = np.broadcast_to(np.linspace(-0.5, 0.5, force.shape[1]), force.shape)
-    columns = np.stack([velocity, displacement, ramp, force])
-    columns = columns - columns.mean(axis=2, keepdims=True)
-    columns = columns / np.maximum(columns.std(axis=2, keepdims=True), np.finfo(float).tiny)
-    normal = np.einsum("ikp,jkp->kij", columns, columns) / force.shape[1]
-    table = normal[:, :3, :3] + 1e-9 * np.eye(3)
-    return np.asarray(np.linalg.solve(table, normal[:, :3, 3:])[:, 0, 0])
+    x = np.mean(cycles.displacement, axis=0)
+    velocity = np.roll(x, -1) - np.roll(x, 1)
+    table = np.column_stack([velocity / np.std(velocity), x / np.std(x), np.ones(POINTS), np.linspace(-1, 1, POINTS)])
+    return np.linalg.lstsq(table, cycles.force.T, rcond=None)[0][0] / np.std(cycles.force, axis=1)
 
 
 def _keeps_its_scale(view: View, starts: Floats, folded: Floats) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.rig_files.quality.effects import REFUSED, percent
-from mrdamper.rig_files.quality.view import View, sample_noise
+from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
 from mrdamper.rig_files.record import Finding
 
 _FAST = 0.3  # of the peak step: slower, a lost sample does not show
@@ -94,10 +94,8 @@ def _level_share(values: Floats) -> float:
 
 def _long_runs(mask: np.ndarray, least: int) -> np.ndarray:
     """Keep the runs of true values of at least a length."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]])))
-    starts, stops = edges[::2], edges[1::2]
+    starts, stops = runs_of(mask)
     kept = np.zeros(mask.size, dtype=bool)
     for start, stop in zip(starts, stops, strict=True):
-        if stop - start >= least:
-            kept[start:stop] = True
+        kept[start:stop] = stop - start >= least
     return kept
