@@ -1,6 +1,7 @@
 """Tangents of traced programs: what a small change of a parameter does, memory included."""
 
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -52,7 +53,7 @@ def test_tangents_of_a_damper_are_what_small_changes_do(motion, model):
 
 def test_every_operation_has_the_slope_of_its_values():
     tape = Tape()
-    p, x = tape.parameter("p", 0.4), tape.input("x")
+    p, x = cast(Any, tape.parameter("p", 0.4)), cast(Any, tape.input("x"))
     held = tape.remember("held")
     mixed = np.tanh(p * x) + np.exp(-p) / (1 + p * x * x) - np.sqrt(p + x * x) + np.log1p(p * p) * np.arctan(p * x)
     mixed = mixed + np.abs(x - p) + np.maximum(p, x) * np.minimum(2 * p, x) + np.power(p + x * x, p) - np.expm1(p * x)
@@ -63,6 +64,7 @@ def test_every_operation_has_the_slope_of_its_values():
 
     def along(value):
         derived = record.prepare((value,))
+        assert derived is not None
         return record.interpreted_along((value,), derived, record.starts, [xs]).outputs
 
     difference = (along(0.4 + 1e-6)[0] - along(0.4 - 1e-6)[0]) / 2e-6

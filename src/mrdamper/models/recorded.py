@@ -9,7 +9,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.physics.motion import Excitation
+from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.path import memoize_per_path
 from mrdamper.physics.motion.traced import TracedMotion, TracedStep
 from mrdamper.tracing import Program, Tape, TraceError, program
@@ -79,8 +79,8 @@ def _along(
             return None
         derived = record.prepare(given)
         programs.append(record)
-    found = derived is not None and record.compiled_along(given, derived, record.starts, channels(motion))
-    return found.outputs if found and found.failed < 0 else None
+    result = derived is not None and record.compiled_along(given, derived, record.starts, channels(motion))
+    return result.outputs if result and result.failed < 0 else None
 
 
 def channels(motion: Excitation) -> tuple[Floats, ...]:
