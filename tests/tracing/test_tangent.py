@@ -21,7 +21,7 @@ NAMES = ("fy0", "fy1", "d", "e", "cb", "h0", "h1", "vh", "T", "qb", "Ic", "leak"
 
 @pytest.fixture(scope="module")
 def motion():
-    t = np.arange(4000) * 1e-3
+    t = 1e-3 * np.arange(4000.0)
     x = 0.01 * np.sin(2 * np.pi * 1.3 * t) + 2e-3 * np.sin(2 * np.pi * 4.1 * t + 1)
     return Excitation(t, x, np.gradient(x, t), np.gradient(np.gradient(x, t), t), 0.6 + 0.4 * np.sin(t))
 

@@ -20,7 +20,6 @@ from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import RunError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.models import Model
-from mrdamper.models.recorded import force_tangents
 from mrdamper.physics.motion import Excitation, equivalent_sine, measured_motion
 from mrdamper.statistics.levenberg_marquardt import forward_differences, least_squares
 from mrdamper.statistics.linear import robust_weights, solve_bounded
@@ -321,11 +320,9 @@ class JointResiduals:
         Exact in one pass where the model gives tangents, else by forward differences.
         """
         weights = self.weights[self.owner]
-        names, by_axis = self.problem.parameters_by_axis(point)
         motion = self.concatenated.with_field_current(self.problem.coil_at(point))
-        tangents = force_tangents(model, motion, names) if names else None
-        if tangents is not None:
-            return (by_axis @ tangents[1:, self.picked]).T * (weights * self.unit)[:, None]
+        if (slopes := self.problem.force_slopes(point, model, motion, self.picked)) is not None:
+            return slopes * (weights * self.unit)[:, None]
         return forward_differences(lambda u: self.residual(u, model) * weights, point, residual, *self.problem.box())
 
     def residual(self, point: Floats, model: Model) -> Floats:

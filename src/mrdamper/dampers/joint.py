@@ -17,6 +17,7 @@ from itertools import product
 from typing import ClassVar, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.dampers.base import UNTESTED, Damper, Envelope, Saved, not_held
 from mrdamper.dampers.coil import Coil
@@ -25,6 +26,8 @@ from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
+from mrdamper.models.recorded import force_tangents
+from mrdamper.physics.motion import Excitation
 from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares, newton_refine
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.statistics.stop_reason import StopReason
@@ -488,18 +491,24 @@ class JointProblem:
             np.array([axis.coordinate(axis.upper) for axis in self.axes]),
         )
 
-    def parameters_by_axis(self, point: Floats) -> tuple[tuple[str, ...], Floats]:
-        """Names of the K parameters that the search axes move, and their derivatives (D, K); no names with a coil."""
+    def force_slopes(self, point: Floats, model: Model, motion: Excitation, picked: NDArray[np.intp]) -> Floats | None:
+        """(N, D) derivatives of the force at some samples of a motion by the search axes, the linear parameters held.
+
+        None where the coil's lags are searched, or where the model has no tangents.
+        """
         if any(axis.name in (RISE, FALL) for axis in self.axes):
-            return (), np.zeros((point.size, 0))
+            return None
         names, several = self._moved_by_axes
+        tangents = force_tangents(model, motion, names)
+        if tangents is None:
+            return None
         slopes = np.zeros((point.size, len(names)))
         for i, axis in enumerate(self.axes):
             if i in several:
                 slopes[i] = self._moved_along(i, point, names)
             else:
                 slopes[i, names.index(axis.name)] = axis.value(float(point[i])) if axis.log else 1.0
-        return names, slopes
+        return (slopes @ tangents[1:, picked]).T
 
     @cached_property
     def _moved_by_axes(self) -> tuple[tuple[str, ...], frozenset[int]]:

@@ -79,8 +79,8 @@ class SearchSpace(Protocol):
         """Return the response of the field at a point."""
         ...
 
-    def parameters_by_axis(self, point: Floats) -> tuple[tuple[str, ...], Floats]:
-        """Return the parameters that the coordinates move, and their derivatives by them."""
+    def force_slopes(self, point: Floats, model: Any, motion: Any, picked: Any) -> Floats | None:
+        """Return the derivatives of the force at some samples by the coordinates, where they are exact."""
         ...
 
     def without_linear(self, point: Floats) -> Any:
