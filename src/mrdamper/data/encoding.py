@@ -92,6 +92,8 @@ def file_names(texts: Iterable[str]) -> dict[str, str]:
 
 
 def _csv_field(value: object) -> str:
+    if type(value) is float:  # most fields
+        return repr(value)
     if value is None:
         return ""
     if isinstance(value, str):
