@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
@@ -97,31 +97,35 @@ def _covered(damper: Damper, runs: Sequence[Run]) -> tuple[tuple[float, float], 
     return (float(peak), float(energy)), (float(peak_width), float(energy_width))
 
 
-def run_cases(count: int, designs: Sequence[Design], processes: int) -> list[Case]:
-    """Study some dampers by some designs."""
+def run_cases(count: int, designs: Sequence[Design], processes: int) -> Iterator[Case]:
+    """Study some dampers by some designs; each case comes when it is done."""
     jobs: list[tuple[SyntheticDamper, Design]] = [(damper, design) for damper in drawn(count) for design in designs]
     if processes < 2:
-        return [studied(*job) for job in jobs]
+        yield from (studied(*job) for job in jobs)
+        return
     with ProcessPoolExecutor(processes) as pool:
-        return list(pool.map(studied, *zip(*jobs, strict=True)))
+        yield from pool.map(studied, *zip(*jobs, strict=True))
 
 
-def table(cases: Sequence[Case], details: bool = False) -> str:
-    """Ratios and coverage by design and family, as text."""
+def details(case: Case) -> str:
+    """A line for each thing that is asked, with the errors of all candidates."""
     lines = []
-    for case in cases if details else []:
-        for what in ASKED:
-            best = sorted(case.errors[what].items(), key=lambda entry: entry[1])
-            errors = ", ".join(f"{name} {100 * error:.1f}" for name, error in best)
-            shares = " ".join(
-                f"{100 * share:.0f}±{100 * w:.0f}"
-                for share, w in zip(case.inside[what], case.widths[what], strict=True)
-            )
-            lines.append(
-                f"{case.damper:24}{case.design:8}{what:8} ratio {case.ratio(what):5.2f}  inside {shares}  "
-                f"chosen {case.chosen}; {errors}; {case.seconds:.1f} s"
-            )
-    lines.append(f"{'cases':28}{'<= 1.3 x':>10}{'worst':>8}{'error':>8}{'peak inside':>18}{'energy inside':>18}")
+    for what in ASKED:
+        best = sorted(case.errors[what].items(), key=lambda entry: entry[1])
+        errors = ", ".join(f"{name} {100 * error:.1f}" for name, error in best)
+        shares = " ".join(
+            f"{100 * share:.0f}±{100 * w:.0f}" for share, w in zip(case.inside[what], case.widths[what], strict=True)
+        )
+        lines.append(
+            f"{case.damper:24}{case.design:8}{what:8} ratio {case.ratio(what):5.2f}  inside {shares}  "
+            f"chosen {case.chosen}; {errors}; {case.seconds:.1f} s"
+        )
+    return "\n".join(lines)
+
+
+def table(cases: Sequence[Case]) -> str:
+    """Ratios and coverage by design and family, as text."""
+    lines = [f"{'cases':28}{'<= 1.3 x':>10}{'worst':>8}{'error':>8}{'peak inside':>18}{'energy inside':>18}"]
     groups = {"all": list(cases)}
     for case in cases:
         groups.setdefault(case.design, []).append(case)
@@ -148,9 +152,14 @@ def main() -> None:
     parser.add_argument("--dampers", type=int, default=42)
     parser.add_argument("--designs", nargs="+", choices=DESIGNS, default=DESIGNS)
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--details", action="store_true", help="a line a case, with the errors of all candidates")
+    parser.add_argument("--details", action="store_true", help="lines for each case as it is done")
     chosen = parser.parse_args()
-    print(table(run_cases(chosen.dampers, chosen.designs, chosen.processes), chosen.details))
+    cases = []
+    for case in run_cases(chosen.dampers, chosen.designs, chosen.processes):
+        cases.append(case)
+        if chosen.details:
+            print(details(case), flush=True)
+    print(table(cases))
 
 
 if __name__ == "__main__":

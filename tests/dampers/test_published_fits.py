@@ -136,6 +136,17 @@ def test_boada_standardises_what_it_learns():
             assert getattr(given, name) == pytest.approx(getattr(wanted, name), rel=0.05), name
 
 
+def test_boada_names_the_weights_at_a_bound_of_their_search(monkeypatch):
+    models = [Guo(fy=math.exp(5 + c.current_A), kappa=60.0, v0=0.02, c=900.0, k=300.0, f0=20.0) for c in CONDITIONS]
+    cls = all_published()["boada-type"]
+    assert AT_BOUNDS not in cls.fit([], identified(models)).provenance
+    monkeypatch.setattr("mrdamper.dampers.published.boada._MAX_WEIGHT", 0.5)
+    damper = cls.fit([], identified(models))
+    ended = {name for name, value in damper.coefficients.items() if name[:6] == "weight" and abs(value) == 0.5}
+    assert ended
+    assert set(damper.provenance[AT_BOUNDS].split(", ")) == ended
+
+
 def test_refining_on_runs_finds_the_coefficients_they_were_made_with():
     truth = {"fy0": 150.0, "fy1": 900.0, "fy2": -80.0, "m": 0.7, "consistency_log": math.log(2500.0), "f0": -12.0}
     cls = all_published()["lv-type"]

@@ -148,10 +148,11 @@ class ConditionedDamper(Damper):
         )
         refined = replace(self, coefficients=dict(zip(names, (solution.point * size).tolist(), strict=True)))
         ended = np.abs(solution.point - centre) > (1 - 1e-6) * _COEFFICIENT_RANGE
-        if not ended.any():
-            return refined
-        held = ", ".join(name for name, at_bound in zip(names, ended, strict=True) if at_bound)
-        return replace(refined, provenance={**self.provenance, AT_BOUNDS: held})
+        return refined.stating_bounds([name for name, at_bound in zip(names, ended, strict=True) if at_bound])
+
+    def stating_bounds(self, names: Sequence[str]) -> Self:
+        """The damper whose provenance names the coefficients that ended at a bound of the search."""
+        return replace(self, provenance={**self.provenance, AT_BOUNDS: ", ".join(names)}) if names else self
 
     @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:

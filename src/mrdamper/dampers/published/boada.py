@@ -64,7 +64,9 @@ class BoadaType(ConditionedDamper):
         return {f"{name}{i}": float(value) for name, values in named.items() for i, value in enumerate(values)}
 
     def refined(self, runs: Sequence[Run]) -> Self:
-        return self
+        """The weights have no refinement; those at a bound of their search are named."""
+        weights = {name: value for name, value in self.coefficients.items() if name.startswith("weight")}
+        return self.stating_bounds([n for n, value in weights.items() if abs(value) > (1 - 1e-6) * _MAX_WEIGHT])
 
     def model_at(self, condition: Condition) -> Guo:
         scaled = zip(_raw(condition), self._part("centre", _INPUTS), self._part("spread", _INPUTS), strict=True)
