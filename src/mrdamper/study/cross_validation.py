@@ -51,19 +51,20 @@ def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
     Returns
     -------
     dict
-        "inner current": every level of sines between others; "edge current": the lowest and the highest; "fastest
-        motions": those whose peak velocity is within a fifth of the largest; "session": every session of several;
-        "other records": everything that is no sine at one current. A kind is absent where it would leave fewer than
-        two levels, two motions or two sessions.
+        "current": every level of sines but 0 A, below which no current can be asked for; "fastest motions": those
+        whose peak velocity is within a fifth of the largest; "session": every session of several; "other records":
+        everything that is no sine at one current. A kind is absent where it would leave fewer than two levels, two
+        motions or two sessions.
     """
     motions = [equivalent_sine(piece) for piece in pieces]
     sines = [i for i, motion in enumerate(motions) if motion.is_sine and not pieces[i].current_changes]
     conditions = [motions[i].condition for i in sines]
     folds: dict[str, list[list[int]]] = {}
     levels = np.array(current_levels([abs(c.current_A) for c in conditions]))
-    by_level = [[sines[k] for k in np.flatnonzero(levels == level)] for level in np.unique(levels)]
-    if len(by_level) > 2:
-        folds["inner current"], folds["edge current"] = by_level[1:-1], [by_level[0], by_level[-1]]
+    if np.unique(levels).size > 2:
+        folds["current"] = [
+            [sines[k] for k in np.flatnonzero(levels == level)] for level in np.unique(levels[levels > 0])
+        ]
     if fastest := _fastest([motions[i].condition for i in sines]):
         folds["fastest motions"] = [[sines[k] for k in fastest]]
     if sessions := _sessions(pieces):

@@ -58,7 +58,7 @@ _SIZES = (
     ("current", "A", 12, lambda run: float(np.median(np.abs(run.current)))),
 )
 CONDITION = "condition"  # kind of fold: the runs of one condition, a stretch of another record
-AWAY = ("inner current", "edge current", "fastest motions")  # kinds that tell how errors grow away from the tests
+AWAY = ("current", "fastest motions")  # kinds that tell how errors grow away from the tests
 STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the one everybody compares with
 
 
