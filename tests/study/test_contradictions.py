@@ -12,6 +12,7 @@ from mrdamper.study.contradictions.evidence import AssumedScatter, Evidence
 from mrdamper.study.contradictions.tracks import tracks_of
 
 sys.path.insert(0, str(Path(__file__).parent.parent.parent))
+from benchmarks import synthetic_dampers
 from benchmarks.contradicting_folders import DAMPERS, folders, full_matrix, make_run, motions, sound_folder
 from benchmarks.contradicting_folders_two import DAMPERS as SECOND
 from benchmarks.contradicting_folders_two import second_folders
@@ -36,9 +37,20 @@ def test_no_run_of_a_bundled_rig_is_accused(bundled, rig):
     assert find_contradictions(list(bundled.rig(rig))) == []
 
 
-@pytest.mark.parametrize("number", [1, 4, 9, 14, 24])
+@pytest.mark.parametrize("number", [1, 4, 9, 14, 24, 86])
 def test_no_run_of_a_sound_folder_is_accused(number):
     assert find_contradictions(sound_folder(number)) == []
+
+
+@pytest.mark.parametrize("number", [3, 21])
+def test_a_motion_that_the_comparison_describes_badly_accuses_no_run(number):
+    """The loops of these dampers at the slowest motion are none that elastic-plastic elements make."""
+    damper = synthetic_dampers.drawn(number + 1)[number]
+    runs = synthetic_dampers.tests_of(damper, "matrix", np.random.default_rng(number))
+    assert find_contradictions(runs) == []
+    slow = next(run for run in runs if run.id == "sine18")  # 0.75 of the full current at that motion
+    in_lbf = [replace(run, force=run.force / 4.448) if run is slow else run for run in runs]
+    assert [(one.run_id, one.cause) for one in find_contradictions(in_lbf)] == [("sine18", "force")]
 
 
 def test_a_gain_of_sessions_is_no_contradiction(sound):

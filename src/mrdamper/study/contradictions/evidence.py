@@ -70,6 +70,8 @@ class RowProducts:
         Half the peak-to-peak force.
     over : (K,) array or None
         Shares of the nodes at the run's constant current.
+    misfit : float
+        Factor of the model error that is usual at the run's motion, over that of all runs.
     """
 
     gram: Floats
@@ -78,6 +80,16 @@ class RowProducts:
     rows: int
     size: float
     over: Floats | None
+    misfit: float = 1.0
+
+    def unexplained(self, expected: Floats, most_gain: float) -> float:
+        """RMS error of an expected force, at the best gain up to `most_gain` and the best offset."""
+        one = self.constant
+        table = np.column_stack([expected, one])
+        best = np.linalg.lstsq(table.T @ self.gram @ table, table.T @ self.moment, rcond=1e-10)[0]
+        force = table @ np.clip(best, [1 / most_gain, -np.inf], [most_gain, np.inf])
+        power = self.power - 2 * float(force @ self.moment) + float(force @ self.gram @ force)
+        return float(np.sqrt(max(power, 0.0) / self.rows))
 
     @property
     def constant(self) -> Floats:
@@ -213,7 +225,7 @@ class Evidence:
     def weigh(self, run: RowProducts, expected: Floats) -> Moments:
         """Weighted products of a run; its gain multiplies the force of the coefficients expected of it."""
         spread, size = self.spread, run.size
-        level = (_MISFIT * size) ** 2 + _MIN_MISFIT**2 * min(1.0, size)
+        level = model_error(run) ** 2
         weight = _INDEPENDENT_SAMPLES / (run.rows * spread.misfit**2 * level)
         one = run.constant
         mean = float(one @ run.gram @ expected) / run.rows
@@ -273,6 +285,11 @@ class Evidence:
                 for j in at:
                     blocks[i, :, j, :] += member.over[i] * member.over[j] * member.gram
         return gram, moment
+
+
+def model_error(run: RowProducts) -> float:
+    """Standard deviation of the model error of a run, before the factor of all runs."""
+    return run.misfit * float(np.sqrt((_MISFIT * run.size) ** 2 + _MIN_MISFIT**2 * min(1.0, run.size)))
 
 
 def _outer(a: Floats, b: Floats) -> Floats:

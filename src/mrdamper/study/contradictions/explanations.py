@@ -36,7 +36,7 @@ MIN_FACTOR = 1.25  # of a force or a displacement
 MIN_OFFSET = 0.2  # of the median half range of the force
 MIN_CURRENT_EFFECT = 0.12  # RMS change of the force over the run's half range
 MIN_UNEXPLAINED = 0.1  # RMS error of the force over the run's half range, at the best gain of a session
-_MAX_SESSION_GAIN = 1.12  # gain of a session against the others
+MAX_SESSION_GAIN = 1.12  # gain of a session against the others
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class ExplanationCandidate:
         prior = self.evidence.prior
         own = others.weigh(self.own)
         gain = prior.log_probability(own) - _ALONE_ODDS - others.log_probability(own)
-        if self._unexplained(self.own, others) < MIN_UNEXPLAINED:
+        if self.own.unexplained(others.at(self.own.over)[0], MAX_SESSION_GAIN) < MIN_UNEXPLAINED * self.own.size:
             gain = -np.inf
         return Explanation(Trial("damper", 1.0, "", _ALONE_ODDS), gain, self.own)
 
@@ -162,7 +162,9 @@ class ExplanationCandidate:
         if not self._moved:
             trials = list(self._of_the_motion())
             self._moved = list(zip(trials, self.evidence.products([self._move(t) for t in trials]), strict=True))
-        yield from (moved for moved in self._moved if not like or any(moved[0].is_like(one) for one in like))
+        for trial, products in self._moved:
+            if not like or any(trial.is_like(one) for one in like):
+                yield trial, replace(products, misfit=self.own.misfit)
 
     def _of_the_force(self, others: Posterior) -> Iterator[Trial]:
         """A factor or an offset of the force."""
@@ -244,15 +246,6 @@ class ExplanationCandidate:
             change = others.at(products.over)[0] - others.at(self.own.over)[0]
             return _rms(products, change) > MIN_CURRENT_EFFECT * size
         return True
-
-    def _unexplained(self, products: RowProducts, others: Posterior) -> float:
-        """RMS error of the force expected by other runs, at the best gain and offset, over the half range."""
-        expected, one = others.at(products.over)[0], products.constant
-        table = np.column_stack([expected, one])
-        best = np.linalg.lstsq(table.T @ products.gram @ table, table.T @ products.moment, rcond=1e-10)[0]
-        force = table @ np.clip(best, [1 / _MAX_SESSION_GAIN, -np.inf], [_MAX_SESSION_GAIN, np.inf])
-        power = products.power - 2 * float(force @ products.moment) + float(force @ products.gram @ force)
-        return float(np.sqrt(max(power, 0.0) / products.rows)) / products.size
 
     def _is_nearer(self, factor: float) -> bool:
         """Tell whether a factor brings the stroke nearer to the usual one, as the right unit does."""

@@ -10,8 +10,21 @@ from itertools import combinations
 import numpy as np
 
 from mrdamper.data import Floats, current_levels
-from mrdamper.study.contradictions.evidence import AssumedScatter, Evidence, Moments, Posterior, RowProducts
-from mrdamper.study.contradictions.explanations import Cause, Explanation, ExplanationCandidate, Trial
+from mrdamper.study.contradictions.evidence import (
+    AssumedScatter,
+    Evidence,
+    Moments,
+    Posterior,
+    RowProducts,
+    model_error,
+)
+from mrdamper.study.contradictions.explanations import (
+    MAX_SESSION_GAIN,
+    Cause,
+    Explanation,
+    ExplanationCandidate,
+    Trial,
+)
 from mrdamper.study.contradictions.tracks import Track
 
 _ODDS, _FEW_ODDS = 12.0, 36.0  # logarithm of the odds from which an explanation is far better: always, over the runs
@@ -28,6 +41,7 @@ _EMPTY_CELL_ODDS = 6.0  # what an empty cell of the matrix of tests that is fill
 _MAX_IRREGULARITY = 0.5  # repeated and missing tests of a matrix that is nearly complete, over its tests
 _MIN_SHIFT_ODDS = 0.0  # prior odds of shifted rows at least
 _MEMBER_ODDS = 4.0  # the same against a further run with the same cause
+_MAJORITY_ODDS = 6.0  # the same against another current of most runs at a current
 _MIN_SHIFTED_RUNS = 2  # runs whose current a shift has to change
 _SAME_CURRENT = 0.01  # difference of two currents that are one [A]
 _TIE_ODDS = 6.0  # odds up to which a run nothing explains better takes the best explanation
@@ -38,6 +52,7 @@ _MIN_MISFIT = 0.5  # factor of the usual model error for groups at least
 _ERROR_FACTORS = (1.0, 0.7, 0.45, 0.3)  # factors of the model error that explained runs leave
 _REFINED_EXPLANATIONS = 4  # single explanations whose model error is adapted
 _GROUP_GAIN_DIFFERENCE = 0.3  # difference of the logarithms of the gains of two groups of runs at one current
+_MIN_AT_MOTION = 3  # other runs at a motion that say how well the model describes it
 _ROUNDS = 4  # assignments of runs to two groups
 
 
@@ -130,6 +145,26 @@ class Search:
         self.evidence.spread = max(scores, key=scores.__getitem__)
         expected = self.evidence.posterior([expected.weigh(self._products[k]) for k in agreeing])
         self._members = [expected.weigh(products) for products in self._products]
+        self._adapt_to_motions()
+        self._members = [expected.weigh(products) for products in self._products]
+
+    def _adapt_to_motions(self) -> None:
+        """Widen the model error of runs at a motion that the linear model describes worse than the others.
+
+        It fails there in every run alike: the others at a motion say how much, and not the run itself.
+        """
+        agreeing, posterior = self._agreeing(), self.posterior()
+        ratios = {}
+        for k in agreeing:
+            products = self._products[k] = replace(self._products[k], misfit=1.0)
+            error = products.unexplained(posterior.without(self._members[k])[0], MAX_SESSION_GAIN)
+            ratios[k] = error / (self.evidence.spread.misfit * model_error(products))
+        for i, track in enumerate(self.tracks):
+            beside = [ratio for k, ratio in ratios.items() if k != i and self.tracks[k].is_at_motion(track)]
+            misfit = max(1.0, float(np.quantile(beside, 0.75))) if len(beside) >= _MIN_AT_MOTION else 1.0
+            self._products[i] = replace(self._products[i], misfit=misfit)
+            candidate = self._candidates[i]
+            candidate.own = replace(candidate.own, misfit=misfit)
 
     def _proposals(self) -> Iterator[JointExplanation]:
         posterior, prior = self.posterior(), self.evidence.prior
@@ -291,6 +326,8 @@ class Search:
             members = {k: e for k, e in zip(group, alike, strict=True) if e is not None}
             if len(members) == len(group):
                 odds = max(e.trial.odds for e in members.values())
+                if explanation.cause == "current" and self._outnumbers(group):
+                    odds += _MAJORITY_ODDS
                 moments = [others.weigh(e.products) for e in members.values()]
                 score = self.evidence.log_evidence([*(self._members[k] for k in rest), *moments]) - odds
                 if score > joint:
@@ -313,6 +350,13 @@ class Search:
         inside = {level for k, level in zip(constant, levels, strict=True) if k in group}
         outside = {level for k, level in zip(constant, levels, strict=True) if k not in group}
         return inside <= outside and (len(inside) == 1 or current <= _SAME_CURRENT)
+
+    def _outnumbers(self, group: tuple[int, ...]) -> bool:
+        """Tell whether a group is most of the runs at one of its currents: the few others may be the wrong ones."""
+        constant = [k for k, track in enumerate(self.tracks) if not track.current_changes]
+        levels = current_levels([float(self.tracks[k].current[0]) for k in constant])
+        inside = [level for k, level in zip(constant, levels, strict=True) if k in group]
+        return any(2 * inside.count(level) > levels.count(level) for level in inside)
 
     def _smaller(self, proposal: JointExplanation) -> JointExplanation:
         """A proposal for a group without the runs that need no explanation once the others are explained."""
