@@ -8,6 +8,7 @@ import pytest
 from mrdamper.dampers import choice
 from mrdamper.dampers.choice import CrossValidation, ModelTerm, levels_of
 from mrdamper.data import Condition
+from mrdamper.models.play_bypass import RISE_CURRENT, _level_law
 
 RNG = np.random.default_rng(2)
 N, NAMES = 120, ("d", "h1", "c1", "f0")
@@ -82,14 +83,25 @@ def test_levels_are_runs_of_constant_current_a_two_hundredth_apart():
 
 @pytest.mark.parametrize(
     ("levels", "changes", "forms"),
-    [(1, False, 0), (2, False, 0), (3, False, 0), (4, False, 2), (5, False, 3), (2, True, 3)],
+    [(1, False, 1), (2, False, 1), (3, False, 2), (4, False, 5), (5, False, 6), (2, True, 6)],
 )
 def test_the_law_of_the_current_has_a_number_fewer_than_there_are_levels(levels, changes, forms):
     problem = SimpleNamespace(parts=[part(0.5 * k) for k in range(levels)] + [part(0.1, changes=True)] * changes)
     found = choice._level_laws(problem)
     assert len(found) == forms
     straight = 2  # yield force without current, and its rise
-    assert changes or all(straight + len(term.names) <= levels - 1 for term in found)
+    assert changes or all(straight + len(term.names) <= max(levels - 1, straight) for term in found)
+
+
+def test_two_levels_show_a_straight_line_and_more_choose_between_it_and_the_onset_of_the_preset():
+    def rise(law):
+        onset = dict(law.held).get("Ic", RISE_CURRENT)
+        return _level_law(np.array([0.05, 0.25, 0.5]), 10.0, 100.0, onset, 0.0)
+
+    few, several = (choice._level_laws(SimpleNamespace(parts=[part(0.5 * k) for k in range(n)])) for n in (2, 3))
+    assert [rise(law) for law in few] == [pytest.approx([15.0, 35.0, 60.0])]
+    assert rise(several[0]) == pytest.approx([15.0, 35.0, 60.0])
+    assert rise(several[1])[0] < 0.5 * 15.0 + 5.0
 
 
 def test_one_level_determines_no_rise_with_current():

@@ -197,8 +197,8 @@ class Growth:
     def of(cls, runs: Sequence[PredictedRun], at_tests: ModelError) -> Growth:
         """Least squares of the squared errors in excess of those at the tests, by the squared distances.
 
-        The fastest motions, or the highest current, are one observation, and a lucky one would leave no growth: the typical
-        growth is a second one. A distance that no run has gets the typical growth alone.
+        The fastest motions, or the highest current, are one observation, and a lucky one would leave no growth: the
+        typical growth is a second one. A distance that no run has gets the typical growth alone.
 
         Parameters
         ----------

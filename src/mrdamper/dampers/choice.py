@@ -22,6 +22,7 @@ from mrdamper.statistics.functions.selection import Errors, smaller_wins
 from mrdamper.statistics.linear import on_one_blas_thread, solve_linear
 
 _COARSE_TOLERANCE = 1e-4  # relative gain of a step that is enough to tell forms apart
+_NO_ONSET_A = 1e-4  # below the currents of any test: the yield force rises from no current on [A]
 _NO_PLAY_LENGTH_M = 1e-2  # longer than any free play, so that none is left [m]
 _BLOCK_CYCLES = 12.0  # cycles of one block of a record that is no sine, in cross-validation
 _LEVEL_TOLERANCE = 5e-3  # currents closer than this share of the largest are one level
@@ -40,17 +41,24 @@ class ModelTerm:
         Parameters it takes.
     neutral : tuple of float
         Their values in the model without the term.
+    held : tuple of (str, float)
+        Presets of the model that the term holds at another value.
     """
 
     title: str
     names: tuple[str, ...]
     neutral: tuple[float, ...]
+    held: tuple[tuple[str, float], ...] = ()
 
 
+_NO_ONSET = (("Ic", _NO_ONSET_A),)
 LEVEL_LAWS = (
-    ModelTerm("yield force rises over a current of its own", ("Ic",), (0.0,)),
-    ModelTerm("yield force saturates with current", ("si",), (0.0,)),
-    ModelTerm("yield force rises and saturates over currents of its own", ("Ic", "si"), (0.0, 0.0)),
+    ModelTerm("yield force rises with the current from no current on", (), (), held=_NO_ONSET),
+    ModelTerm("yield force begins to rise over the current of the preset", (), ()),
+    ModelTerm("yield force rises over a current of its own", ("Ic",), (_NO_ONSET_A,)),
+    ModelTerm("yield force saturates with current", ("si",), (0.0,), held=_NO_ONSET),
+    ModelTerm("yield force saturates, and rises over the current of the preset", ("si",), (0.0,)),
+    ModelTerm("yield force rises and saturates over currents of its own", ("Ic", "si"), (_NO_ONSET_A, 0.0)),
 )
 _LEVEL_LAW_PARAMETERS = ("Ic", "si")
 TERMS = (
@@ -121,10 +129,11 @@ def identify_jointly(
     """
     fixed = _undetermined(runs)
     problem = JointProblem(runs, MODEL, fixed)
-    laws = () if fixed else _level_laws(problem)
+    laws = _level_laws(problem)
     progress("one model, steady ends first", 0.0)
     ends = [part.steady_end() for part in problem.parts]
-    short = JointProblem(runs, MODEL, fixed, free=(*SEARCHED, *(_LEVEL_LAW_PARAMETERS if laws else ())), parts=ends)
+    searched = sorted({name for law in laws for name in law.names})
+    short = JointProblem(runs, MODEL, fixed, free=(*SEARCHED, *searched), parts=ends)
     fit = short.search(rounds=2, most_steps=15, settled=_COARSE_TOLERANCE)
     short, fit, tried = _lost_motion(short, fit)
     second = fit.second
@@ -132,7 +141,7 @@ def identify_jointly(
     law, fit, more, current = _level_law(short, fit, laws)
     tried = (*tried, *more)
     progress("whole records", 0.5)
-    problem = problem.with_free((*SEARCHED, *law), short.fixed)
+    problem = problem.with_free((*SEARCHED, *law.names), {**short.fixed, **dict(law.held)})
     fit = problem.fit(start=problem.from_point(fit), rounds=2, most_steps=8, settled=_COARSE_TOLERANCE / 10)
     progress("which terms the tests show", 0.8)
     evidence = CrossValidation.of(problem, fit)
@@ -192,45 +201,43 @@ def _absent(problem: JointProblem, fit: JointFit) -> tuple[Coil | Literal["deter
 
 
 def _level_laws(problem: JointProblem) -> tuple[ModelTerm, ...]:
-    """Forms of the level law beyond a straight line that the currents of the tests determine, the shortest first.
+    """Forms of the level law that the currents of the tests determine, the shortest first.
 
-    A law has a parameter fewer than there are levels; a current that changes passes through all.
+    A law has a parameter fewer than there are levels; a current that changes passes through all. Two levels show no
+    more than a straight line.
     """
-    if any(part.changes for part in problem.parts) or len(levels_of(problem)) > 4:
-        return LEVEL_LAWS
-    return LEVEL_LAWS[:2] if len(levels_of(problem)) > 3 else ()
+    levels = 5 if any(part.changes for part in problem.parts) else len(levels_of(problem))
+    return tuple(law for law in LEVEL_LAWS if len(law.names) + 2 < max(levels, 3))[: None if levels > 2 else 1]
 
 
 def _level_law(
     longest: JointProblem, fit: JointFit, forms: Sequence[ModelTerm]
-) -> tuple[tuple[str, ...], JointFit, tuple[TermTrial, ...], dict[str, Floats]]:
+) -> tuple[ModelTerm, JointFit, tuple[TermTrial, ...], dict[str, Floats]]:
     """Select the form of the yield force over current by cross-validation, the shortest first.
 
     Inner currents are left out where there are some: one step does not carry a form from current to current, so these
     are fitted, from starts that never saw them. The search began with every parameter of the law, for the others make
     up for a form that is too short.
     """
-    if not forms:
-        return (), fit, (), {}
-    levels = levels_of(longest)[1:-1]
+    levels = levels_of(longest)[1:-1] if len(forms) > 1 else []
     without = FoldFits(longest, levels)
     starts = [without.refit([i for i in range(len(longest.parts)) if i not in level]) for level in levels]
     tried: list[TermTrial] = []
-    best: tuple[tuple[str, ...], JointFit, Errors] | None = None
-    for term in (None, *forms):
-        form = term.names if term else ()
-        problem = longest.with_free([n for n in longest.free if n not in _LEVEL_LAW_PARAMETERS or n in form])
+    best: tuple[ModelTerm, JointFit, Errors] | None = None
+    for form in forms:
+        names = [n for n in longest.free if n not in _LEVEL_LAW_PARAMETERS or n in form.names]
+        problem = longest.with_free(names, dict(form.held))
         trial = fit
-        if set(problem.free) != set(longest.free):
+        if form.held or set(problem.free) != set(longest.free):
             trial = problem.fit(start=problem.from_point(fit), rounds=1, most_steps=10, settled=_COARSE_TOLERANCE)
         scores: Errors = CrossValidation.of(problem, trial).everything()
         if levels:
             scores = {**scores, "current": _left_out_current(problem, starts, levels)}
-        if term is None or best is None:
+        if best is None:
             best = form, trial, scores
             continue
         kept = not smaller_wins(best[2], scores)
-        tried.append(_tried(term.title, kept, scores, best[2]))
+        tried.append(_tried(form.title, kept, scores, best[2]))
         if kept:
             best = form, trial, scores
     assert best is not None

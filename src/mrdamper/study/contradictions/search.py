@@ -161,7 +161,10 @@ class Search:
             ratios[k] = error / (self.evidence.spread.misfit * model_error(products))
         for i, track in enumerate(self.tracks):
             beside = [ratio for k, ratio in ratios.items() if k != i and self.tracks[k].is_at_motion(track)]
-            misfit = max(1.0, float(np.quantile(beside, 0.75))) if len(beside) >= _MIN_AT_MOTION else 1.0
+            misfit = 1.0
+            if len(beside) >= _MIN_AT_MOTION:
+                most = max(_MISFITS) / self.evidence.spread.misfit  # beyond, runs do not agree at all
+                misfit = float(np.clip(np.quantile(beside, 0.75), 1.0, most))
             self._products[i] = replace(self._products[i], misfit=misfit)
             candidate = self._candidates[i]
             candidate.own = replace(candidate.own, misfit=misfit)
