@@ -1032,3 +1032,98 @@ def plan_that_agrees_with_the_names(tests, p):
         plan.append(f"{file};{q.current:.1f};{q.frequency:g}")
     put(p / "test_matrix.csv", plan)
     put(p / "notes.txt", ["Runs 1 to 4: 1.5 Hz, 10 mm. Run 5: 0.5 Hz, 20 mm.", "Written by hand, not checked."])
+
+
+@kind
+def plan_by_the_step_column(tests, p):
+    lines = ['"Total Time (s)","Cycle Time (s)","Step","Position (mm)","Load (kN)"']
+    plan = ["Step,Waveform,Frequency (Hz),Coil Current (A)"]
+    for step, q in enumerate(tests, 1):
+        lines += rows(40 * step + q.t, q.t % (1 / q.frequency), np.full(q.t.size, step), 1e3 * q.x, q.f / 1e3)
+        plan.append(f"{step},Sine,{q.frequency:g},{q.current:g}")
+    put(p / "tracking_1.csv", lines)
+    put(p / "method_steps.csv", plan)
+
+
+@kind
+def recorder_with_axes_apart(tests, p):
+    import scipy.io as sio
+
+    def structs(items):
+        out = np.empty((1, len(items)), dtype=[(key, "O") for key in items[0]])
+        for j, item in enumerate(items):
+            out[0, j] = tuple(item.values())
+        return out
+
+    for k, q in enumerate(tests, 1):
+        slow = slice(None, None, 10)
+        channels = (
+            ("pos_act", 1e3 * q.x, "mm", 1.0),
+            ("pos_ref", 1e3 * q.x + 0.02, "mm", 1.0),
+            ("F_rod", q.f, "N", 1.0),
+            ("i_coil", q.i[slow], "A", 2.0),
+        )
+        y = structs(
+            [{"Name": f'"Model Root"/"{n}"/"Out1"', "Data": v[None], "Unit": u, "XIndex": x} for n, v, u, x in channels]
+        )
+        x = structs([{"Name": "", "Data": t[None], "Raster": "r", "Unit": "s"} for t in (q.t, q.t[slow])])
+        sio.savemat(p / f"rec_{k:03d}.mat", {f"rec_{k:03d}": {"X": x, "Y": y, "Capture": "rec"}})
+
+
+@kind
+def signals_with_a_step_each(tests, p):
+    def signal(title, unit, values, step):
+        return {"name": title, "unit": unit, "dt": step, "t0": 0.0, "values": values.tolist()}
+
+    made = [
+        {
+            "conditions": {
+                "coil_current": {"value": q.current, "unit": "A"},
+                "frequency": {"value": q.frequency, "unit": "Hz"},
+            },
+            "signals": [
+                signal("rodForce", "kN", q.f / 1e3, 0.005),
+                signal("pistonDisplacement", "mm", 1e3 * q.x, 0.005),
+            ],
+        }
+        for q in tests
+    ]
+    (p / "campaign.json").write_text(json.dumps({"tests": made}))
+
+
+@kind
+def datasets_with_a_rate_each(tests, p):
+    import h5py
+
+    with h5py.File(p / "campaign.h5", "w") as file:
+        for k, q in enumerate(tests):
+            for title, values, unit, step in (
+                ("force", q.f, "N", 1),
+                ("displacement", q.x, "m", 2),
+                ("coil_current", q.i, "A", 10),
+            ):
+                item = file.create_dataset(f"test_{k}/{title}", data=values[::step])
+                item.attrs.update({"unit": unit, "sampling_rate_Hz": 200.0 / step})
+
+
+@kind
+def units_as_a_text_beside_arrays(tests, p):
+    units = json.dumps({"time": "s", "pos": "mm", "force": "N", "current": "A"})
+    for k, q in enumerate(tests):
+        np.savez(
+            p / f"run{k}.npz", time=q.t, pos=1e3 * q.x, force=q.f, current=q.current, fs=200.0, units=np.array(units)
+        )
+
+
+@kind
+def columns_named_once_for_all_tests(tests, p):
+    import scipy.io as sio
+
+    made = np.empty((1, len(tests)), dtype=[("cur_A", "O"), ("data", "O")])
+    for j, q in enumerate(tests):
+        made[0, j] = (q.current, np.c_[q.t, 100 * q.x, q.f])
+    words = {
+        key: np.array([cells], dtype=object)
+        for key, cells in (("channels", ["time", "disp", "force"]), ("units", ["s", "cm", "N"]))
+    }
+    sio.savemat(p / "all_tests.mat", {"tests": made, **words})

@@ -32,7 +32,7 @@ WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
                      "velocidade", "скорость", "速度", "속도"),
         "acceleration": ("acceleration", "accel", "acc", "beschleunigung", "accélération", "aceleracion",
                          "aceleración", "accelerazione", "加速度", "가속도"),
-        "current": ("current", "curr", "strom", "stromstärke", "courant", "corriente", "corrente", "amperage", "ток",
+        "current": ("current", "curr", "cur", "strom", "stromstärke", "courant", "corriente", "corrente", "amperage", "ток",
                     "电流", "電流", "電流値", "전류", "intensité", "intensidad", "intensità", "intensidade", "stroom",
                     "ström", "proud", "prąd", "virta", "akım", "strøm", "áram", "curent", "ρεύμα", "струм", "prúd",
                     "struja", "icoil", "ispule"),
@@ -75,8 +75,11 @@ _SET = frozenset(
 _NOT_MEASURED = frozenset(
     ("command", "cmd", "commanded", "setpoint", "set", "target", "soll", "reference", "ref", "demand", "desired",
      "error", "count", "counts", "cycle", "cycles", "segment", "segments", "index", "offset", "limit", "max", "min",
-     "consigne", "consigna", "sollwert", "rate", "id", "status", "state", "flag")
+     "consigne", "consigna", "sollwert", "rate", "id", "status", "state", "flag", "commande", "comando", "vorgabe",
+     "demanded", "objetivo", "obiettivo", "riferimento", "referencia", "référence", "zadana", "zadane", "задание",
+     "уставка", "hedef", "börvärde", "požadovaná", "err", "abweichung", "regelabweichung")
 )  # fmt: skip
+_COMMANDED = re.compile("指令|目标|目標|设定|設定|给定|給定|목표|지령")  # in words written without spaces
 # What says that a column is of another place than the damper's axis or coil.
 _ELSEWHERE = frozenset(
     ("lateral", "side", "transverse", "transversal", "radial", "bending", "shear", "quer", "querkraft", "seitenkraft",
@@ -166,6 +169,8 @@ def role_of(name: str) -> str | None:
     lower = [w.casefold().rstrip("0123456789") or w for w in words]
     if any(word in _NOT_MEASURED or word in _MADE or word in _ELSEWHERE for word in lower) or _FACTOR.search(name):
         return None
+    if _COMMANDED.search(name):
+        return None
     if len(words) == 1 and words[0] in _SYMBOLS:
         return _SYMBOLS[words[0]]
     if len(words) == 1 and words[0].rstrip("0123456789") in _SYMBOLS:  # t1, x1, F1
@@ -213,6 +218,12 @@ def names_condition(key: str, role: str) -> bool:
 def names_weight(name: str) -> bool:
     """Tell if a name is that of a load displayed as a weight."""
     return any(word.casefold().rstrip("0123456789") in _WEIGHT for word in words_of(name))
+
+
+def names_command(name: str) -> bool:
+    """Tell if a name states the command to a machine, or its error, rather than what was measured."""
+    words = {word.casefold().rstrip("0123456789") for word in words_of(name)}
+    return bool(words & (_NOT_MEASURED | _SET)) or _COMMANDED.search(name) is not None
 
 
 def says_nothing(name: str) -> bool:

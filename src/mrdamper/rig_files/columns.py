@@ -15,6 +15,7 @@ from mrdamper.rig_files.column_names import (
     WORDS,
     Header,
     names_coil,
+    names_command,
     names_compression,
     says_nothing,
     split_name,
@@ -212,7 +213,7 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
         if role not in (*REQUIRED, "current"):
             return None
         # Without a telling name the unit decides, if it is the only one of its kind.
-        fitting = [i for i, header in enumerate(headers) if header.dimension == DIMENSION[role]]
+        fitting = [i for i, h in enumerate(headers) if h.dimension == DIMENSION[role] and not names_command(h.name)]
         free = [i for i in fitting if i not in taken and says_nothing(headers[i].name)]
         return free[0] if len(free) == 1 == len(fitting) else None
     candidates = fitting or named

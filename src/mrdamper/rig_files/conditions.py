@@ -165,6 +165,30 @@ def stated_rate(lines: Iterable[str], numbers: Mapping[str, float], decimal: str
     return rates[0] if rates else None
 
 
+_BARE_RATE = re.compile(r"(?i)f_?s|(?:sampl(?:e|ing)|scan|abtast)?[ _]?(?:rate|freq(?:uency)?)")
+_BARE_STEP = re.compile(r"(?i)(?:sampl(?:e|ing)|time|wf|x)?[ _]?(?:d_?[tx]|delta_?[tx]|step|inc(?:r(?:ement)?)?|interval)")
+_START = re.compile(r"(?i)(?:t|x)_?0|(?:start|wf_start|x)[ _]?(?:time|offset)?|offset")
+
+
+def stated_clock(numbers: Mapping[str, float]) -> tuple[float, float, str] | None:
+    """Step, start and unit of a channel's clock by the numbers beside its samples: dt, sampling_rate_Hz, t0.
+
+    None if none states a step. The unit is empty where no name holds one.
+    """
+    clock, start = None, 0.0
+    for name, number in numbers.items():
+        header = split_name(name)
+        dimension, factor = header.dimension, header.known.factor if header.known else 1.0
+        unit = "s" if dimension in ("time", "frequency") else ""
+        if number > 0 and dimension in (None, "frequency") and _BARE_RATE.fullmatch(header.name):
+            clock = 1 / (factor * number), unit
+        elif number > 0 and dimension in (None, "time") and _BARE_STEP.fullmatch(header.name):
+            clock = factor * number, unit
+        elif dimension in (None, "time") and _START.fullmatch(header.name):
+            start = factor * number
+    return None if clock is None else (clock[0], start, clock[1])
+
+
 _WHICH = r"(?i)(?:test|excitation|motion|sine|drive|nominal|set|soll|prüf|anregungs|signal)?[ _-]*"
 _FREQUENCY_KEY = re.compile(_WHICH + r"(?:frequency|freq|frequenz|fréquence|frecuencia|frequenza|频率|周波数)")
 _AMPLITUDE_KEY = re.compile(_WHICH + r"(?:amplitude|ampl|amplitud|ampiezza|stroke|hub|course|振幅)")

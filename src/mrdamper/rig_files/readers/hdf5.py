@@ -7,10 +7,12 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.conditions import stated_clock
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import (
     array_table,
@@ -60,7 +62,7 @@ def hdf5_tables(source: Source, title: str) -> list[RawTable]:
         content = _Found(source)
         _walk(file, "", content)
     groups = {
-        group: _frame(columns) or _titled(columns, content.lists.get(group, []))
+        group: _with_clocks(_frame(columns) or _titled(columns, content.lists.get(group, [])))
         for group, columns in content.groups.items()
     }
     objects = content.objects
@@ -197,6 +199,43 @@ def _frame(columns: list[tuple]) -> list[tuple]:
     return framed
 
 
+@dataclass(frozen=True)
+class _Clock:
+    """The times of a dataset's samples, as a dataset."""
+
+    step: float
+    start: float
+    size: int
+    attrs: ClassVar[dict[str, Any]] = {}
+
+    def __getitem__(self, _: tuple) -> np.ndarray:
+        return self.start + self.step * np.arange(self.size)
+
+
+def _with_clocks(columns: list[tuple]) -> list[tuple]:
+    """The columns with the times that attributes of datasets state: one for all, or one before each channel."""
+    if any(split_name(name).role == "time" for name, *_ in columns):
+        return columns
+    clocks = []
+    for _, _, dataset, part in columns:
+        numbers = {} if dataset is None or part is not None else _numbers(dataset.attrs)
+        clock = stated_clock(numbers)
+        clocks.append(clock and (_Clock(*clock[:2], dataset.size), clock[2]))
+    if not any(clocks):
+        return columns
+    if len(set(clocks)) == 1:
+        clock, unit = clocks[0]
+        return [("time", unit, clock, None), *columns]
+    timed = [(column, clock) for column, clock in zip(columns, clocks, strict=True) if clock]
+    return [entry for column, (clock, unit) in timed for entry in (("time", unit, clock, None), column)]
+
+
+def _numbers(says: Any) -> dict[str, float]:
+    """The attributes that are one number each."""
+    values = {key: np.asarray(says[key]) for key in list(says)[:MOST_COLUMNS]}
+    return {k: float(v.reshape(-1)[0]) for k, v in values.items() if v.dtype.kind in "iuf" and v.size == 1}
+
+
 def _titled(columns: list[tuple], words: list[list[str]]) -> list[tuple]:
     """The columns with the names and units that lists of words give those of a matrix."""
     named = []
@@ -247,9 +286,8 @@ def _columns(dataset: Any, name: str, path: str, content: _Found) -> list[tuple]
     if kind.names:
         return [(field, "", dataset, field) for field in kind.names]
     stated = [dataset.attrs[name] for name in _UNIT_NAMES if name in dataset.attrs]
-    for key in dataset.attrs if kind.kind in "iu" else ():
-        if np.asarray(dataset.attrs[key]).dtype.kind in "iuf" and np.size(dataset.attrs[key]) == 1:
-            content.constants[path][f"{name}_{key}"] = float(np.reshape(dataset.attrs[key], -1)[0])
+    if kind.kind in "iu":
+        content.constants[path] |= {f"{name}_{key}": number for key, number in _numbers(dataset.attrs).items()}
     unit = next((_text(value) for value in stated if np.asarray(value).dtype.kind in "SUO"), "")
     unit = unit.partition(" since ")[0]  # netCDF counts time from a date
     shape = dataset.shape[::-1] if "MATLAB_class" in dataset.attrs else dataset.shape

@@ -1,13 +1,14 @@
 """Nested structures (structs of MATLAB, objects of JSON) as tables: one a node that holds arrays of samples.
 
 A node is a mapping, a list, an array, a number or a text. The path of a node becomes the label of its
-table; single numbers and texts of a node, of the nodes above it and of nodes beside it that hold no
-arrays stand beside its columns. A mapping with data, a name and a unit is one channel, with an x of
+table; single numbers, texts and lists of words of a node, of the nodes above it and of nodes beside it that
+hold no arrays stand beside its columns. A mapping with data, a name and a unit is one channel, with an x of
 its own where it has one: recordings of real-time systems, logged signals, exported time series.
 """
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.conditions import stated_clock
 from mrdamper.rig_files.readers.arrays import array_table, expand, pick, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Source
 from mrdamper.rig_files.units import is_unit
@@ -63,11 +65,13 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[R
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
-    tree = _spread(tree)
+    tree = _with_own_axes(_spread({key: _object_in(value) for key, value in tree.items()}))
     node.units = {**node.units, **_stated_units(tree)}
     for key, value in _paired(tree, node.units).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
-            if value and split_name(key).role is None:
+            if split_name(key).role is not None:
+                node.columns += _across(key, "", np.array([word[:_MOST_TEXT] for word in value]))
+            elif value:
                 node.lists.append(value)
         elif isinstance(value, list):
             inner += _items(key, value[:MOST_ITEMS], node)
@@ -88,7 +92,40 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     yield node
     for key, value in inner if depth < DEEPEST else ():
         label = f"{node.label}/{key}" if node.label and key else node.label or key
-        yield from _walk(value, _Node(label, [], [], dict(node.constants), list(node.remarks), node.units), depth + 1)
+        yield from _walk(
+            value, _Node(label, [], list(node.lists), dict(node.constants), list(node.remarks), node.units), depth + 1
+        )
+
+
+def _object_in(value: Any) -> Any:
+    """The object that a text holds as JSON; any other value as it is."""
+    if not isinstance(value, str) or not value.lstrip().startswith("{"):
+        return value
+    try:
+        says = json.loads(value)
+    except (ValueError, RecursionError):
+        return value
+    return {str(key): float(v) if isinstance(v, (int, float)) else str(v) for key, v in says.items()}
+
+
+def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Recordings of real-time systems: every channel of Y with the axis of X whose number it states, if it is a time."""
+    keys = {key.casefold(): key for key in tree}
+    if not {"x", "y"} <= set(keys):
+        return tree
+    axes, channels = ([v] if isinstance(v := tree[keys[k]], Mapping) else v for k in "xy")
+    if not all(isinstance(items, list) and all(isinstance(i, Mapping) for i in items) for items in (axes, channels)):
+        return tree
+    said = [{key.casefold(): value for key, value in axis.items()} for axis in axes]
+    units = [_unit_of(axis, _UNITS, "") for axis in said]
+    if not all(isinstance(a.get("data"), np.ndarray) for a in said) or any(split_name("", u).dimension not in (None, "time") for u in units):
+        return tree
+    timed = []
+    for channel in channels:
+        number = int(next((v for k, v in channel.items() if k.casefold() == "xindex" and isinstance(v, float)), 1.0))
+        at = number - 1 if 0 < number <= len(said) else 0
+        timed.append({**channel, "xdata": said[at]["data"], "xunit": units[at]})
+    return {**{key: value for key, value in tree.items() if key not in (keys["x"], keys["y"])}, keys["y"]: timed}
 
 
 def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -206,6 +243,10 @@ def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
     if split_name(name).role is None and split_name(key).role is not None:
         name = key
     columns = [_Column(c.name, unit if is_unit(unit) else "", c.array, c.part, name) for c in _across(name, "", data)]
+    stated_step = stated_clock({key: value for key, value in says.items() if isinstance(value, float)})
+    if time is None and stated_step is not None:
+        step, start, clock = stated_step
+        return [_Column("time", clock, start + step * np.arange(max(data.shape)), None, name), *columns]
     if time is None or time.size != max(data.shape):
         return columns
     clock = _unit_of(lower, _TIME_UNITS, "timeinfo") or ("s" if "timeinfo" in lower else "")
