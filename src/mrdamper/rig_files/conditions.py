@@ -165,9 +165,11 @@ def stated_rate(lines: Iterable[str], numbers: Mapping[str, float], decimal: str
     return rates[0] if rates else None
 
 
-_BARE_RATE = re.compile(r"(?i)f_?s|(?:sampl(?:e|ing)|scan|abtast)?[ _]?(?:rate|freq(?:uency)?)")
-_BARE_STEP = re.compile(r"(?i)(?:sampl(?:e|ing)|time|wf|x)?[ _]?(?:d_?[tx]|delta_?[tx]|step|inc(?:r(?:ement)?)?|interval)")
-_START = re.compile(r"(?i)(?:t|x)_?0|(?:start|wf_start|x)[ _]?(?:time|offset)?|offset")
+_BARE_RATE = re.compile(r"(?i)f_?s|(?:sampl(?:e|ing)|scan|abtast)[ _]?(?:rate|freq(?:uency)?)")
+_BARE_STEP = re.compile(
+    r"(?i)d_?t|delta_?t|(?:sampl(?:e|ing)|time|wf|x)[ _]?(?:delta|step|inc(?:r(?:ement)?)?|interval)|delta_?x"
+)
+_START = re.compile(r"(?i)[tx]_?0|(?:start|x)[ _]?time|wf_start_offset|x_?start")
 
 
 def stated_clock(numbers: Mapping[str, float]) -> tuple[float, float, str] | None:

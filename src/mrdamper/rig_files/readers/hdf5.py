@@ -212,15 +212,16 @@ class _Clock:
         return self.start + self.step * np.arange(self.size)
 
 
-def _with_clocks(columns: list[tuple]) -> list[tuple]:
+def _with_clocks(columns: list[Any]) -> list[Any]:
     """The columns with the times that attributes of datasets state: one for all, or one before each channel."""
     if any(split_name(name).role == "time" for name, *_ in columns):
         return columns
-    clocks = []
+    clocks: list[Any] = []
     for _, _, dataset, part in columns:
-        numbers = {} if dataset is None or part is not None else _numbers(dataset.attrs)
-        clock = stated_clock(numbers)
-        clocks.append(clock and (_Clock(*clock[:2], dataset.size), clock[2]))
+        if dataset is None or part is not None or (clock := stated_clock(_numbers(dataset.attrs))) is None:
+            clocks.append(None)
+        else:
+            clocks.append((_Clock(*clock[:2], int(np.prod(dataset.shape))), clock[2]))
     if not any(clocks):
         return columns
     if len(set(clocks)) == 1:

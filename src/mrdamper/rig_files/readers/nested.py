@@ -109,22 +109,24 @@ def _object_in(value: Any) -> Any:
 
 
 def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Recordings of real-time systems: every channel of Y with the axis of X whose number it states, if it is a time."""
+    """Recordings of real-time systems: every channel of Y with the axis of X whose number it states, if a time."""
     keys = {key.casefold(): key for key in tree}
     if not {"x", "y"} <= set(keys):
         return tree
     axes, channels = ([v] if isinstance(v := tree[keys[k]], Mapping) else v for k in "xy")
     if not all(isinstance(items, list) and all(isinstance(i, Mapping) for i in items) for items in (axes, channels)):
         return tree
-    said = [{key.casefold(): value for key, value in axis.items()} for axis in axes]
-    units = [_unit_of(axis, _UNITS, "") for axis in said]
-    if not all(isinstance(a.get("data"), np.ndarray) for a in said) or any(split_name("", u).dimension not in (None, "time") for u in units):
+    axes = [{key.casefold(): value for key, value in axis.items()} for axis in axes]
+    units = [_unit_of(axis, _UNITS, "") for axis in axes]
+    if any(split_name("", unit).dimension not in (None, "time") for unit in units):
+        return tree
+    if not axes or not all(isinstance(axis.get("data"), np.ndarray) for axis in axes):
         return tree
     timed = []
     for channel in channels:
         number = int(next((v for k, v in channel.items() if k.casefold() == "xindex" and isinstance(v, float)), 1.0))
-        at = number - 1 if 0 < number <= len(said) else 0
-        timed.append({**channel, "xdata": said[at]["data"], "xunit": units[at]})
+        at = number - 1 if 0 < number <= len(axes) else 0
+        timed.append({**channel, "xdata": axes[at]["data"], "xunit": units[at]})
     return {**{key: value for key, value in tree.items() if key not in (keys["x"], keys["y"])}, keys["y"]: timed}
 
 
