@@ -41,7 +41,7 @@ def part_rows() -> list[PartRow]:
         for what, seconds in clock.stopped().items():
             spent[what].append(seconds)
         begin = time.process_time()
-        figures = _figures(rigs[-1])
+        figures = _figures(rigs[-1], ())
         spent["figures: made"].append(time.process_time() - begin)
         with tempfile.TemporaryDirectory() as folder:
             begin = time.process_time()

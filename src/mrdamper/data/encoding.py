@@ -70,8 +70,10 @@ def csv_text(rows: Sequence[Mapping[str, object]], names: Iterable[str] | None =
     Cells that hold a semicolon or a tab are quoted too: some countries' spreadsheets split there.
     """
     heads = list(names) if names is not None else list(dict.fromkeys(name for row in rows for name in row))
-    lines = [heads, *([row.get(name) for name in heads] for row in rows)]
-    return "".join(f"{','.join(map(_csv_field, line))}\n" for line in lines)
+    lines = [",".join(map(_csv_field, heads))]
+    for row in rows:  # most fields are numbers
+        lines.append(",".join([repr(v) if type(v) is float else _csv_field(v) for v in map(row.get, heads)]))
+    return "\n".join([*lines, ""])
 
 
 def file_names(texts: Iterable[str]) -> dict[str, str]:
@@ -92,8 +94,6 @@ def file_names(texts: Iterable[str]) -> dict[str, str]:
 
 
 def _csv_field(value: object) -> str:
-    if type(value) is float:  # most fields
-        return repr(value)
     if value is None:
         return ""
     if isinstance(value, str):
