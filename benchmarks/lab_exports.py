@@ -65,9 +65,10 @@ def write(kind: str, lab: Lab, folder: Path) -> None:
 
 
 def accusations(record: Record) -> set[str]:
-    """Codes of what the quality checks say of a record, without the findings of its import."""
+    """Codes of what the quality checks say of a record, beside the findings of its import and cells that are empty."""
     try:
-        return {finding.code for finding in check_record(replace(record, findings=(), segments=())).findings}
+        findings = check_record(replace(record, findings=(), segments=())).findings
+        return {finding.code for finding in findings} - {"W_MISSING"}
     except QualityError as error:
         return {error.code}
 

@@ -45,11 +45,12 @@ class DelimitedText(Reader):
         """One table a block of rows."""
         stream = open_text(source, form)
         head = stream.head()
-        raw = head.split(b"\n")
-        if max(map(len, raw)) > LONGEST_LINE:
-            raise too_long(source, next(i for i, line in enumerate(raw, 1) if len(line) > LONGEST_LINE))
         whole = stream.start + len(head) >= stream.stop
-        lines = stream.decode(b"\n".join((raw if whole else raw[:-1])[:_HEAD_LINES])).split("\n")
+        raw = head.split(b"\n", _HEAD_LINES)
+        if max(map(len, raw[:_HEAD_LINES])) > LONGEST_LINE:
+            raise too_long(source, next(i for i, line in enumerate(raw, 1) if len(line) > LONGEST_LINE))
+        end = len(head) if whole and len(raw) <= _HEAD_LINES else -len(raw[-1]) - 1
+        lines = stream.decode(head[:end]).split("\n")
         lines = _with_whole_quotes([line.rstrip("\r") for line in lines] if b"\r" in head else lines)
         turned = turned_table(source, lines) if whole and form == FileForm() else None
         if turned is not None:
