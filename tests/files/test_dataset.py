@@ -42,6 +42,22 @@ def test_round_trip_keeps_every_bit(tmp_path):
     assert after["a"].velocity is None
 
 
+def test_records_too_long_for_one_table_are_stored_with_the_channels_of_each(tmp_path, monkeypatch):
+    """What is larger than some pieces is written piece by piece; no piece stays behind."""
+    monkeypatch.setattr("mrdamper.rig_files.dataset_folder._SAMPLES_PER_CHUNK", 60)
+    time = np.arange(1000.0)
+    warm = Run("warm", time, np.sin(time), np.cos(time), 0.5, further={"oil_C": 20 + time})
+    fast = Run("fast", time, np.sin(time), np.cos(time), np.linspace(0, 1, 1000), velocity=np.cos(time))
+    save_dataset(Dataset((warm, fast)), tmp_path / "ds")
+    assert sorted(path.name for path in (tmp_path / "ds").iterdir()) == ["runs.csv", "samples.parquet"]
+    for stored, run in zip(load_dataset(tmp_path / "ds"), (warm, fast), strict=True):
+        for name, values in run.table.items():
+            np.testing.assert_array_equal(stored.table[name], values)
+        assert set(stored.table) == set(run.table)
+        assert set(stored.further) == set(run.further)
+    np.testing.assert_array_equal(load_dataset(tmp_path / "ds").runs[0].further["oil_C"], 20 + time)
+
+
 def test_a_relative_path_is_of_the_folder_one_stands_in(tmp_path, monkeypatch):
     for name in ("first", "second"):  # the process that reads was started in the first
         (tmp_path / name).mkdir()

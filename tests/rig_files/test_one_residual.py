@@ -136,6 +136,22 @@ def test_a_clean_element_of_any_yield_displacement_is_not_late(bend):
     assert lag is None or not lag.is_clear
 
 
+@pytest.mark.parametrize("noise", [0.5, 5.0, 50.0])
+@pytest.mark.parametrize("share", [-0.06, 0.0, 0.06])
+def test_ending_the_search_for_a_lag_early_changes_no_finding(noise, share, monkeypatch):
+    """Where noise leaves no lag that could be reported, none is fitted: fitting them all reports none either."""
+    from mrdamper.rig_files.quality import force_lag as module
+
+    clean = sine_record(with_corners)
+    moved = np.interp(clean.time - share, clean.time, clean.force)
+    moved += noise * np.random.default_rng(5).standard_normal(moved.size)
+    record = Record("r", *(a[50:-50] for a in (clean.time, clean.displacement, moved)))
+    early = [finding.code for finding in module.force_channel(View(record))]
+    monkeypatch.setattr(module, "_may_be_clear", lambda misfit, noise: True)
+    assert early == [finding.code for finding in module.force_channel(View(record))]
+    assert early == ["W_LAG"] * (share != 0)
+
+
 # Recovery: one size of every kind that moves the result
 
 
