@@ -212,9 +212,11 @@ def force_lag(view: View) -> ForceLag | None:
     def attempt(lags: Iterable[Lag]) -> Lag:
         """Try lags, and return the best so far."""
         for lag in lags:
+            if lag in tried:
+                continue
             if lag.constant not in behind:
                 behind[lag.constant] = _Behind(plain.elements, lag.constant)
-            tried.setdefault(lag, behind[lag.constant].fit(moved(lag))[0])
+            tried[lag] = behind[lag.constant].fit(moved(lag))[0]
         return min(tried, key=tried.__getitem__)
 
     late = 0.0

@@ -9,7 +9,6 @@ import numpy as np
 from mrdamper.data import Floats, once_per_run
 from mrdamper.errors import QualityError
 from mrdamper.identification.loop_analysis import damping_share as share_of_damping
-from mrdamper.physics.motion.harmonics import fit_harmonics
 from mrdamper.rig_files.quality.cycles import POINTS, Folded, every_cycle, steady_cycles
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, steady_window
 from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
@@ -171,16 +170,12 @@ def _damping_share(view: View, start: int, stop: int) -> float:
 
 def _exchanged(view: View) -> bool:
     """Check for a channel called force that moves like a sine while the one called displacement does not."""
-    motion = view.motion
-    if motion is None or (not view.strokes.steady and cycles_of(view) < LEAST_CYCLES):
+    cycles = steady_cycles(view)
+    if cycles is None or (not view.strokes.steady and cycles_of(view) < LEAST_CYCLES):
         return float(np.ptp(view.run.displacement)) > float(np.ptp(view.run.force))
-    shares = []
-    for signal in (view.steady.displacement, view.steady.force):
-        series = fit_harmonics(view.steady.time, signal, 7, frequency=motion.condition.frequency_Hz)
-        rest = signal - series.mean - series.drift * (view.steady.time - series.origin)
-        first = series.amplitude() / np.sqrt(2)
-        shares.append(float(np.sqrt(max(np.mean(rest**2) - first**2, 0.0))) / first)
-    return shares[0] > 1.5 * shares[1]
+    first, *others = np.abs([np.fft.rfft(channel.loop)[1:] for channel in (cycles.displacement, cycles.force)]).T
+    distortion = np.linalg.norm(others, axis=0) / first
+    return bool(distortion[0] > 1.5 * distortion[1])
 
 
 def repeats(view: View) -> Iterator[Finding]:
