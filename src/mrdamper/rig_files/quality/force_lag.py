@@ -196,14 +196,13 @@ def force_lag(view: View) -> ForceLag | None:
         return None
     phases = _phases(cycles)
     noise = view.force_noise * np.sqrt(POINTS / len(cycles.starts)) / size
-    yields, plain = _YIELD, _Behind(_elements(*motion, _YIELD))
-    misfit, shares = plain.fit(force)
-    if _may_be_clear(misfit, noise):
-        yields = _refined(yields, shares)
+    shares = np.empty(0)
+    for every in (2, 1, 0):  # few yield displacements, more, and those between the ones that act most
+        yields = _YIELD[::every] if every else _refined(_YIELD, shares)
         plain = _Behind(_elements(*motion, yields))
         misfit, shares = plain.fit(force)
-    if not _may_be_clear(misfit, noise):
-        return None
+        if not _may_be_clear(misfit, noise):
+            return None
     tried, behind = {Lag(): misfit}, {0.0: plain}
 
     def moved(lag: Lag) -> Floats:
