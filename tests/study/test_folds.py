@@ -28,23 +28,26 @@ def rig_tests(currents, motions=MOTIONS, sessions=("a", "b", "c", "d")):
 def test_every_kind_omits_what_it_says():
     runs = rig_tests((0.0, 0.4, 1.0))
     kinds = folds_by_kind(runs)
-    assert set(kinds) == {"current", "fastest motions", "session"}
-    assert kinds["current"] == [[3, 4, 5], [6, 7, 8]]  # no current lies below 0 A
+    assert set(kinds) == {"current", "no current", "fastest motions", "session"}
+    assert kinds["current"] == [[3, 4, 5], [6, 7, 8]]
+    assert kinds["no current"] == [[0, 1, 2]]
     assert [sorted(fold) for fold in kinds["fastest motions"]] == [[1, 4, 7]]  # 1 Hz, 20 mm; two motions are left
     assert kinds["session"] == [[0, 4, 8], [1, 5], [2, 6], [3, 7]]
     assert condition_folds(runs) == [[i] for i in range(9)]
-    assert len(all_folds(runs)) == 9 + 2 + 1 + 4
+    assert len(all_folds(runs)) == 9 + 2 + 1 + 1 + 4
 
 
-def test_the_lowest_current_is_omitted_where_lower_ones_can_be_asked_for():
-    assert folds_by_kind(rig_tests((0.2, 0.6, 1.0)))["current"] == [[0, 1, 2], [3, 4, 5], [6, 7, 8]]
-    assert folds_by_kind(rig_tests((-0.0004, 0.6, 1.0)))["current"] == [[3, 4, 5], [6, 7, 8]]
+def test_only_a_lowest_current_below_which_others_can_be_asked_for_ranks_models():
+    kinds = folds_by_kind(rig_tests((0.2, 0.6, 1.0)))
+    assert kinds["current"] == [[0, 1, 2], [3, 4, 5], [6, 7, 8]] and "no current" not in kinds
+    kinds = folds_by_kind(rig_tests((-0.0004, 0.6, 1.0)))
+    assert kinds["current"] == [[3, 4, 5], [6, 7, 8]] and kinds["no current"] == [[0, 1, 2]]
 
 
 @pytest.mark.parametrize(
     ("runs", "absent"),
     [
-        (rig_tests((0.0, 1.0)), {"current"}),
+        (rig_tests((0.0, 1.0)), {"current", "no current"}),
         (rig_tests((0.0, 0.4, 1.0), MOTIONS[:2]), {"fastest motions"}),
         (rig_tests((0.0, 0.4, 1.0), sessions=("a", "b")), {"session"}),
         (rig_tests((0.0, 0.4, 1.0), sessions=("a", "b", "")), {"session"}),

@@ -23,6 +23,7 @@ _MOTION_TOLERANCE = 0.05  # frequencies and amplitudes this close are one motion
 _FAST_VELOCITY_RATIO = 0.8  # of the largest peak velocity, from which a motion is among the fastest
 _MIN_STRETCH_CYCLES = 12  # cycles of a long record that are left out together, at least
 _MAX_STRETCHES = 8  # stretches of a record
+NO_CURRENT = "no current"  # kind of fold that is shown and that no model is ranked by: no current lies below 0 A
 _STRETCH_NOTE = "stretch of"  # note of a stretch: the record it was cut from
 
 
@@ -51,10 +52,10 @@ def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
     Returns
     -------
     dict
-        "current": every level of sines but 0 A, below which no current can be asked for; "fastest motions": those
-        whose peak velocity is within a fifth of the largest; "session": every session of several; "other records":
-        everything that is no sine at one current. A kind is absent where it would leave fewer than two levels, two
-        motions or two sessions.
+        "current": every level of sines but 0 A; "no current": all sines at 0 A, shown but not ranked by, as no current
+        lies below it; "fastest motions": those whose peak velocity is within a fifth of the largest; "session": every
+        session of several; "other records": everything that is no sine at one current. A kind is absent where it would
+        leave fewer than two levels, two motions or two sessions.
     """
     motions = [equivalent_sine(piece) for piece in pieces]
     sines = [i for i, motion in enumerate(motions) if motion.is_sine and not pieces[i].current_changes]
@@ -62,9 +63,10 @@ def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
     folds: dict[str, list[list[int]]] = {}
     levels = np.array(current_levels([abs(c.current_A) for c in conditions]))
     if np.unique(levels).size > 2:
-        folds["current"] = [
-            [sines[k] for k in np.flatnonzero(levels == level)] for level in np.unique(levels[levels > 0])
-        ]
+        by_level = {level: [sines[k] for k in np.flatnonzero(levels == level)] for level in np.unique(levels)}
+        folds["current"] = [group for level, group in by_level.items() if level > 0]
+        if 0.0 in by_level:
+            folds[NO_CURRENT] = [by_level[0.0]]
     if fastest := _fastest([motions[i].condition for i in sines]):
         folds["fastest motions"] = [[sines[k] for k in fastest]]
     if sessions := _sessions(pieces):

@@ -31,6 +31,7 @@ from mrdamper.physics.motion import analyse_motion, equivalent_sine
 from mrdamper.rig_files.quality.table import check_run, with_findings
 from mrdamper.statistics.functions.selection import mean_error, smaller_wins
 from mrdamper.study.contradictions import Contradiction, find_contradictions
+from mrdamper.study.cross_validation import NO_CURRENT
 from mrdamper.study.dissipation import gains_energy
 from mrdamper.study.parallel import IN_PROCESS, Processes
 from mrdamper.study.recipe import (
@@ -343,7 +344,10 @@ def study_rig(
             where=f"rig {rig or dataset.name}",
             remedy="test more conditions, or leave this rig out of the dataset",
         )
-    errors = dict(zip(map(id, candidates), errors_by_kind(candidates), strict=True))
+    errors = {
+        id(c): {kind: values for kind, values in each.items() if kind != NO_CURRENT}
+        for c, each in zip(candidates, errors_by_kind(candidates), strict=True)
+    }
     candidates.sort(key=lambda c: mean_error(errors[id(c)]))
     unphysical = {c.recipe.name: why for c in candidates if (why := gains_energy(c.damper))}
     eligible = [c for c in eligible if c.recipe.name not in unphysical] or eligible
