@@ -39,9 +39,11 @@ def test_every_kind_omits_what_it_says():
 
 def test_only_a_lowest_current_below_which_others_can_be_asked_for_ranks_models():
     kinds = folds_by_kind(rig_tests((0.2, 0.6, 1.0)))
-    assert kinds["current"] == [[0, 1, 2], [3, 4, 5], [6, 7, 8]] and "no current" not in kinds
+    assert kinds["current"] == [[0, 1, 2], [3, 4, 5], [6, 7, 8]]
+    assert "no current" not in kinds
     kinds = folds_by_kind(rig_tests((-0.0004, 0.6, 1.0)))
-    assert kinds["current"] == [[3, 4, 5], [6, 7, 8]] and kinds["no current"] == [[0, 1, 2]]
+    assert kinds["current"] == [[3, 4, 5], [6, 7, 8]]
+    assert kinds["no current"] == [[0, 1, 2]]
 
 
 @pytest.mark.parametrize(
