@@ -68,7 +68,10 @@ ROOMS = (
     _room("fleet.charts fleet.verdicts", "fleet/test_charts.py fleet/test_verdicts.py"),
     _room("paper.options paper.assumptions paper.recipes", "paper/test_functions.py paper/test_measured.py"),
     _room("paper.virtual_rig", "paper/test_virtual_rig.py"),
-    _room("report.tables study.recipe study.cross_validation", "report/test_tables.py study/test_recipe.py"),
+    _room(
+        "report.tables study.recipe study.cross_validation",
+        "report/test_tables.py study/test_recipe.py study/test_folds.py",
+    ),
     _room(
         "paper.functions dampers.modified",
         "dampers/test_modified.py dampers/test_normal_equations.py study/test_recipe.py",

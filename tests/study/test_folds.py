@@ -8,7 +8,13 @@ import pytest
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.physics.motion import sine
-from mrdamper.study.cross_validation import all_folds, condition_folds, cross_validate_by_kind, folds_by_kind
+from mrdamper.study.cross_validation import (
+    all_folds,
+    condition_folds,
+    cross_validate_by_kind,
+    folds_by_kind,
+    stretches,
+)
 
 MOTIONS = ((0.5, 0.02), (1.0, 0.02), (2.0, 0.008))
 
@@ -72,3 +78,46 @@ def test_a_fold_without_which_there_is_no_damper_is_refused_by_its_runs():
     found = cross_validate_by_kind(rig_tests((0.0, 0.4, 1.0)), refit, "none")
     assert all(not each.runs for each in found.values())
     assert len(found["current"].refused) == 6
+
+
+def test_a_motion_within_a_fifth_of_the_fastest_goes_with_it():
+    """Peak velocities of 1, 0.85, 0.7 and 0.5 times 2 pi 20 mm/s: two are among the fastest."""
+    runs = rig_tests((0.0, 0.4, 1.0), ((1.0, 0.02), (0.85, 0.02), (0.7, 0.02), (0.5, 0.02)))
+    (fastest,) = folds_by_kind(runs)["fastest motions"]
+    assert sorted(fastest) == [0, 1, 4, 5, 8, 9]
+    (fastest,) = folds_by_kind(rig_tests((0.0, 0.4), ((1.0, 0.02), (0.95, 0.02), (0.9, 0.02))))["fastest motions"]
+    assert sorted(fastest) == [0, 3]  # two motions are left
+    (fastest,) = folds_by_kind(rig_tests((0.0, 0.4), ((2.0, 0.02), (1.0, 0.02), (0.5, 0.02), (0.2, 0.02))))[
+        "fastest motions"
+    ]
+    assert sorted(fastest) == [0, 4]
+
+
+def test_a_fold_is_predicted_by_a_damper_of_all_other_runs():
+    runs, made = rig_tests((0.0, 0.4, 1.0)), []
+
+    def refit(rows):
+        made.append(list(rows))
+        raise IdentificationError("only asked", remedy="none")
+
+    cross_validate_by_kind(runs, refit, "none")
+    folds = [fold for groups in folds_by_kind(runs).values() for fold in groups]
+    assert made == [[i for i in range(9) if i not in fold] for fold in folds]
+
+
+@pytest.mark.parametrize("window", [None, (5.0, 95.0)])
+def test_stretches_of_a_record_adjoin_and_begin_some_cycles_before_they_count(window):
+    time = np.arange(0, 100, 0.01)
+    waves = np.sin(2 * np.pi * np.linspace(0.7, 1.3, 9)[:, None] * time + np.arange(9.0)[:, None] ** 2)
+    x = 0.01 * waves.mean(axis=0)
+    parts = stretches(Run("random", time, x, 500 * x, 0.5, excitation="random", window=window))
+    assert 2 <= len(parts) <= 8
+    begin, end = window or (time[0], time[-1])
+    edges = np.array([part.window for part in parts])
+    assert edges[0, 0] == pytest.approx(begin)
+    assert edges[-1, 1] == pytest.approx(end, abs=0.011)  # a sample
+    np.testing.assert_allclose(edges[1:, 0] - edges[:-1, 1], 0.01, atol=1e-9)  # the next sample
+    np.testing.assert_allclose(np.diff(edges, axis=1), (end - begin) / len(parts), atol=0.02)
+    for part in parts:
+        assert part.time[0] <= max(part.window[0] - 1.0, time[0])
+    assert {part.notes["stretch of"] for part in parts} == {"random"}
