@@ -498,27 +498,27 @@ class JointProblem:
         """
         if any(axis.name in (RISE, FALL) for axis in self.axes):
             return None
-        names, several = self._moved_by_axes
+        # One program for all problems of a model: the tangents of parameters that are held are not looked at.
+        names = [info.name for info in self.model_type.parameters() if not info.linear]
         tangents = force_tangents(model, motion, names)
         if tangents is None:
             return None
         slopes = np.zeros((point.size, len(names)))
         for i, axis in enumerate(self.axes):
-            if i in several:
+            if i in self._entangled_axes:
                 slopes[i] = self._moved_along(i, point, names)
             else:
                 slopes[i, names.index(axis.name)] = axis.value(float(point[i])) if axis.log else 1.0
         return (slopes @ tangents[1:, picked]).T
 
     @cached_property
-    def _moved_by_axes(self) -> tuple[tuple[str, ...], frozenset[int]]:
-        """Names of the parameters that the axes move, and the axes that move more than the parameter of their name."""
-        names = tuple(info.name for info in self.model_type.parameters())
+    def _entangled_axes(self) -> frozenset[int]:
+        """Axes that move more than the parameter of their name."""
+        names = [info.name for info in self.model_type.parameters()]
         middle = np.mean(self.box(), axis=0)
         moved = np.array([self._moved_along(i, middle, names) != 0 for i in range(len(self.axes))])
         own = np.array([[name == axis.name for name in names] for axis in self.axes])
-        several = frozenset(np.flatnonzero((moved != own).any(axis=1)).tolist())
-        return tuple(names[k] for k in np.flatnonzero(moved.any(axis=0))), several
+        return frozenset(np.flatnonzero((moved != own).any(axis=1)).tolist())
 
     def _moved_along(self, i: int, point: Floats, names: Sequence[str]) -> Floats:
         """(K,) derivatives of parameters by an axis."""
