@@ -1127,3 +1127,95 @@ def columns_named_once_for_all_tests(tests, p):
         for key, cells in (("channels", ["time", "disp", "force"]), ("units", ["s", "cm", "N"]))
     }
     sio.savemat(p / "all_tests.mat", {"tests": made, **words})
+
+
+@kind
+def labview_rows_without_their_comment(tests, p):
+    lines = [
+        "LabVIEW Measurement\t",
+        "Separator\tTab",
+        "Decimal_Separator\t,",
+        "X_Columns\tOne",
+        "***End_of_Header***\t",
+    ]
+    for q in tests:
+        lines += [
+            "\t",
+            "Channels\t3",
+            "Y_Unit_Label\tmm\tN\tA",
+            "X_Dimension\tTime\tTime\tTime",
+            "***End_of_Header***\t",
+        ]
+        lines.append("X_Value\tDéplacement\tEffort\tCourant\tComment")
+        body = rows(q.t, 1e3 * q.x, q.f, q.i, fmt="%.5f", sep="\t", mark=",")
+        lines += [body[0] + "\tdébut", *body[1:]]
+    put(p / "essais.lvm", lines, "cp1252", "\r\n")
+
+
+@kind
+def logger_with_date_clock_and_thousandths(tests, p):
+    import datetime as dt
+
+    start, lines = dt.datetime(2022, 11, 17, 23, 58, 51), ["Data;Godzina;ms;Droga [mm];Siła [N];Prąd [mA];Uwagi"]
+    for n, q in enumerate(tests):
+        for t, x, f, i in zip(q.t, q.x, q.f, q.i):
+            at = start + dt.timedelta(milliseconds=round(40_000 * n + 1e3 * t))
+            cells = f"{1e3 * x:.3f};{f:.1f};{1e3 * i:.1f}".replace(".", ",")
+            lines.append(
+                f"{at:%d.%m.%Y};{at:%H:%M:%S};{at.microsecond // 1000:03d};{cells};{'próba' if t == 0 else ''}"
+            )
+    put(p / "rejestr.csv", lines, "cp1250", "\r\n")
+
+
+@kind
+def numbered_columns_and_a_sign_convention(tests, p):
+    for n, q in enumerate(tests, 1):
+        head = [
+            f"INPUT: SINE  FREQ =  {q.frequency:5.2f} HZ   COIL CURRENT =  {q.current:5.2f} AMP",
+            "SIGN CONVENTION: DISPLACEMENT POSITIVE IN EXTENSION, FORCE POSITIVE IN COMPRESSION",
+            "COL  1  TIME  (SEC)",
+            "COL  2  DISPLACEMENT  (IN)",
+            "COL  3  FORCE  (LBF)",
+            "COL  4  COMMAND  (IN)",
+        ]
+        body = zip(q.t, q.x / 0.0254, -q.f / 4.4482216, q.x / 0.0254)
+        put(p / f"MRB{n:03d}.OUT", head + ["".join(f"{v:13.5E}" for v in row) for row in body])
+
+
+@kind
+def serial_monitor_with_duty(tests, p):
+    for n, q in enumerate(tests, 1):
+        body = zip(1e3 * q.t + 4711, 1e3 * q.x, q.f / 9.80665)
+        lines = [
+            "tare done",
+            "millis,pos_mm,load_kgf,pwm_pct",
+            *(f"{t:.0f},{x:.2f},{f:.3f},{50 * q.current:.0f}" for t, x, f in body),
+        ]
+        put(p / f"log{n}.txt", [f"16:04:{k % 60:02d}.{k % 1000:03d} -> {line}" for k, line in enumerate(lines)])
+    put(p / "README.md", ["# Rig", "- coil driver: 100 % PWM = 2 A, linear"])
+
+
+@kind
+def groups_in_a_language_nobody_listed(tests, p):
+    for n, pair in enumerate([tests[i : i + 2] for i in (0, 2, 4)]):
+        titles, names, columns = [], [], []
+        size = min(q.t.size for q in pair)
+        for q in pair:
+            titles += [f"{q.current:g} A {name(q)}", "", ""]
+            names += ["Zaman (sn)", "Kayma (mm)", "Kuvvet (N)"]
+            columns += [q.t[:size], 1e3 * q.x[:size], q.f[:size]]
+        put(p / f"seri{n}.csv", [";".join(titles), ";".join(names), *rows(*columns, sep=";")])
+
+
+@kind
+def long_table_with_conditions_beside(tests, p):
+    import polars as pl
+
+    ids = [f"MRD-{1040 + 3 * n}" for n in range(len(tests))]
+    parts = [
+        pl.DataFrame({"test_id": [i] * q.t.size, "t_s": q.t, "stroke_mm": 1e3 * q.x, "load_N": q.f})
+        for i, q in zip(ids, tests)
+    ]
+    pl.concat(parts).write_parquet(p / "timeseries.parquet")
+    conditions = {"test_id": ids[::-1], "operator": ["ab"] * len(ids), "current_A": [q.current for q in tests[::-1]]}
+    pl.DataFrame(conditions).write_parquet(p / "conditions.parquet")

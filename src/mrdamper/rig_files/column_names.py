@@ -16,7 +16,7 @@ WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "time": ("time", "zeit", "temps", "tiempo", "tempo", "czas", "tijd", "tid", "timestamp", "timestamps",
                  "zeitstempel", "elapsed", "время", "时间", "時間", "시간", "čas", "aika", "zaman", "idő", "timp",
-                 "χρόνοσ", "час"),
+                 "χρόνοσ", "час", "godzina", "hora", "heure", "時刻", "时刻"),
         "displacement": ("displacement", "disp", "displ", "position", "pos", "stroke", "travel", "weg", "hub",
                          "verschiebung", "auslenkung", "läge", "förskjutning", "déplacement", "deplacement", "course",
                          "desplazamiento", "posicion", "posición", "spostamento", "corsa", "deslocamento", "lvdt",
@@ -105,6 +105,9 @@ _RATE_GROUP = re.compile(
 _FUSED = re.compile(r"[ _.:-]+")
 
 
+_BY_UNIT = MappingProxyType({"length": "displacement", "force": "force"})
+
+
 class Header(NamedTuple):
     """Header of a column: name, unit and channel."""
 
@@ -125,6 +128,12 @@ class Header(NamedTuple):
     def role(self) -> str | None:
         """The channel the name stands for."""
         return role_of(self.name)
+
+    @property
+    def channel(self) -> str | None:
+        """The channel the name stands for, or its unit where the name says nothing: s_Daempfer in mm."""
+        by_unit = _BY_UNIT.get(self.dimension or "")
+        return self.role or (by_unit if by_unit and says_nothing(self.name) else None)
 
 
 def split_name(header: str, unit: str = "") -> Header:

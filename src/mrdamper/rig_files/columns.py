@@ -285,6 +285,7 @@ def _ambiguous(table: RawTable, role: str, names: Sequence[str]) -> RigFileError
 def _convert(table: RawTable, role: str, column: int, channel: Channel) -> Assigned | None:
     header = table.headers[column]
     unit = channel.unit or header.unit
+    unit = "degF" if unit == "F" and role == "temperature" else unit
     uncalibrated = channel.scale is None and header.dimension == "voltage"  # no unit makes newtons of volts
     for text in (unit, header.unit) if uncalibrated else (unit,):
         problem = _unit_problem(table, "velocity" if channel.integrate else role, column, text)

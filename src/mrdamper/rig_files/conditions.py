@@ -230,7 +230,7 @@ def _quantities(line: str, decimal: str | None) -> Iterator[tuple[str, float, Un
     """Name, value in SI and unit of what a line states: one quantity, or several behind each other."""
     line = line[:_LONGEST_LINE]
     match = _LINE.match(line) or _SPACED.match(line)
-    parts = [line] if match else re.split(r"[,;|]\s+|[{}\t]|\s{2,}", line)
+    parts = [line] if match else re.split(r"[,;|]\s+|[{}\t]|\s{2,}", re.sub(r" *= +", "=", line))
     for part in parts[:_MOST_PARTS]:
         match = _LINE.match(part) or _SPACED.match(part)
         if match is None or _NUMERIC_CELL.search(match["key"]):  # a range or a calibration

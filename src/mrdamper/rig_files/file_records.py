@@ -14,7 +14,7 @@ from mrdamper.rig_files.columns import assign, partly_assigned
 from mrdamper.rig_files.folder import is_left_out
 from mrdamper.rig_files.mapping.clocks import with_time_stated
 from mrdamper.rig_files.mapping.completion import completed
-from mrdamper.rig_files.mapping.description import with_description
+from mrdamper.rig_files.mapping.description import with_description, with_notes
 from mrdamper.rig_files.mapping.long_table import with_channels_as_columns
 from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_unit_of_time
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
@@ -40,6 +40,7 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
     with raw_tables(path, profile.file) as every:
         if len(every) == 1:
             every = [with_description(every[0], path)]
+        every = [with_notes(table, path) for table in every]
         tables, problems = tables_of_tests(test_tables(every, profile), profile)
         tables, computed = _without_computed(tables)
         records: list[Record] = []

@@ -201,7 +201,7 @@ def _members(table: RawTable) -> dict[str, dict[str, int]]:
     """By group its columns by channel, where displacement and force come as often as each other."""
     by_role: dict[str, list[tuple[int, str]]] = {}
     for i, header in enumerate(table.headers):
-        role = header.role
+        role = header.channel
         if role is not None and header.dimension in (None, DIMENSION[role]):
             by_role.setdefault(role, []).append((i, _key(header.name, role)))
     moved, loads = by_role.get("displacement", []), by_role.get("force", [])

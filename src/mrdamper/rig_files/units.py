@@ -68,10 +68,12 @@ _WORDS = {
     "in/sec": "in/s", "kph": "km/h", "gs": "g",
     "amp": "A", "amps": "A", "ampere": "A", "amperes": "A", "milliamps": "mA",
     "volt": "V", "volts": "V", "millivolts": "mV", "celsius": "°C", "deg c": "°C", "grad c": "°C",
+    "deg f": "°F", "fahrenheit": "°F",
     "с": "s", "сек": "s", "мс": "ms", "м": "m", "см": "cm", "мм": "mm", "мкм": "um", "н": "N", "кн": "kN",
     "кгс": "kgf", "а": "A", "ма": "mA", "в": "V", "°с": "°C",
     "秒": "s", "毫秒": "ms", "米": "m", "毫米": "mm", "厘米": "cm", "微米": "um", "牛": "N", "牛顿": "N", "千牛": "kN",
     "安": "A", "安培": "A", "毫安": "mA", "伏": "V", "초": "s", "ミリ秒": "ms", "アンペア": "A",
+    "pct": "%", "percent": "%",
     "segment": "segments", "cycle": "cycles", "count": "counts", "degree": "deg", "degrees": "deg",
 }  # fmt: skip
 _OTHER = {

@@ -14,8 +14,13 @@ from mrdamper.rig_files.mapping.proposals import frequency_of, stated_frequencie
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.text.tokens import stamp
 
 _THOUSANDTHS = frozenset(("ms", "msec", "millisecond", "milliseconds", "millisekunden"))
+_DATES = frozenset(
+    ("date", "datum", "data", "fecha", "dato", "дата", "日期", "日付", "날짜", "tarih", "dátum", "päivä")
+)
+_DAY_S = 86_400.0
 _SAME_RATE, _SAME_FREQUENCY = 0.2, 0.1  # relative differences of what is stated from what is measured
 _SAMPLES = 100_000  # looked at
 
@@ -51,10 +56,13 @@ def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displaceme
 
 
 def with_time_stated(table: RawTable) -> RawTable:
-    """The table with a column of time, where seconds stand beside thousandths, or a crank turns at a stated speed."""
+    """The table with a column of time, where it stands in parts beside each other, or a crank turns at a stated speed.
+
+    Parts: a clock of whole seconds and thousandths; a clock of a day and its date.
+    """
     times = [i for i, header in enumerate(table.headers) if header.role == "time"]
     if len(times) == 1:
-        return _with_thousandths(table, times[0])
+        return _with_date(_with_thousandths(table, times[0]), times[0])
     return table if times else _with_crank(table)
 
 
@@ -79,6 +87,33 @@ def _with_thousandths(table: RawTable, clock: int) -> RawTable:
         if clock in completed:
             completed[clock] = completed[clock] + completed[part] / 1000
         return Content({i: completed[i] for i in columns}, content.lines, content.findings)
+
+    return replace(table, read=read)
+
+
+def _with_date(table: RawTable, clock: int) -> RawTable:
+    """A clock that goes back at midnight, with the dates beside it."""
+    beside = [i for i, name in enumerate(table.names) if name.strip().casefold() in _DATES]
+    if len(beside) != 1 or table.units[clock] != "s" or table.words is None:
+        return table
+    inner = table.read
+    try:
+        if not np.any(np.diff(inner([clock]).values[clock]) < -_DAY_S / 2):
+            return table
+        words = table.words(beside[0])
+    except InputError:
+        return table
+    stamps = [stamp(f"{label} 00:00:00") for label in words.labels]
+    if any(entry is None for entry in stamps):
+        return table
+    days = [entry[0] // 10**9 for entry in stamps if entry is not None]
+    since = np.array([float(day - days[0]) for day in days])[words.codes]
+
+    def read(columns: Sequence[int]) -> Content:
+        content = inner(columns)
+        if clock not in content.values or content.values[clock].size != since.size:
+            return content
+        return Content({**content.values, clock: content.values[clock] + since}, content.lines, content.findings)
 
     return replace(table, read=read)
 

@@ -20,7 +20,7 @@ from mrdamper.rig_files.column_names import (
 from mrdamper.rig_files.conditions import currents_in, without_currents
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import Finding
-from mrdamper.rig_files.text.layout import cells_of
+from mrdamper.rig_files.text.layout import LISTED, cells_of
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.units import DIMENSION, is_unit, parse_unit
 
@@ -30,7 +30,8 @@ _CLOCKS = {"micros": "us", "millis": "ms", "microseconds": "us", "milliseconds":
            "time since start": "", "epoch ms": "ms", "timestamp ms": "ms"}  # fmt: skip
 _WEIGHTS = {"g": "gf", "kg": "kgf", "t": "tf", "gram": "gf", "grams": "gf", "G": "gf", "Kg": "kgf", "KG": "kgf"}
 _SCALE = re.compile(
-    r"(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{1,4}|%)\s*(?:/|=|per|pro|entspricht|->)\s*"
+    r"(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{1,4}|%)"
+    r"(?:\s*(?:PWM|duty(?: cycle)?|drive|output))?\s*(?:/|=|per|pro|entspricht|->)\s*"
     r"(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{1,4}|%)(?![A-Za-z0-9/])"
 )
 _TIME_UNIT = re.compile(
@@ -45,11 +46,6 @@ _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.I
 _MONITOR = frozenset(("mon", "monitor", "imon", "iout", "i", "current", "curr", "strom", "amp", "amplifier", "shunt"))
 _LONGEST_CONDITIONS = 4000
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
-_LISTED = re.compile(
-    r"^[\s\"#%]*(?:ch(?:annel)?|column|col|spalte|kanal)?[\s#._]*(?P<number>[0-9]{1,3})\"?\s*[=:;,\t]\s*\"?"
-    r"(?P<name>[^\d\W][^;,\t\[\](){}=]*?)\"?\s*[;,\t\[({]\s*\"?(?P<unit>[^;,\t\[\](){}\"]{1,12})\"?[\])}]?[\s;,\"]*$",
-    re.IGNORECASE,
-)
 _INDEXED = re.compile(
     r"^\s*(?P<what>desc|name|label|units?|scale)[A-Za-z]*[._ ]*(?:chan(?:nel)?|ch)[._ ]*(?P<number>[0-9]{1,3})"
     r"\s*[=:]\s*(?P<value>.+?)\s*$",
@@ -58,7 +54,14 @@ _INDEXED = re.compile(
 _FLOAT = re.compile(r"[+-]?[0-9]+(?:[.][0-9]*)?(?:[eE][+-]?[0-9]+)?")
 _AXIS_UNIT = re.compile(r"(?i)^[\s\"]*x[ _-]?axis[ _-]?unit\"?\s*[;,:=\t]\s*\"?([a-zµ]{1,12})\"?[\s;,\"]*$")
 _SENSE_NAMES = frozenset(("sense", "direction", "dir", "sign", "richtung", "vorzeichen", "sens", "sentido", "verso"))
-_SENSES = {1: ("tensi", "pull", "zug", "traction", "tracc", "rebound"), -1: ("compress", "push", "druck", "compres")}
+_SENSES = {
+    1: ("tensi", "exten", "pull", "zug", "traction", "tracc", "rebound"),
+    -1: ("compress", "push", "druck", "compres"),
+}
+_COUNTED = (  # force positive in compression; Force (compression positive)
+    re.compile(r"(?i)(?P<what>[^\W\d_]+):? (?:is |are )?posit?iv[eo]? (?:in|for|on|bei|für|en) (?P<sense>[^\W\d_]+)"),
+    re.compile(r"(?i)(?P<what>[^\W\d_]+)[ ,:(]{1,3}(?P<sense>[^\W\d_]+) (?:is )?posit?iv[eo]?\b"),
+)
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _LONGEST_LINE = 300
 
@@ -71,7 +74,7 @@ def completed(table: RawTable) -> RawTable:
         return table
     table = _with_titles(_with_keyed_units(_with_row_of_currents(table)))
     table = _with_stated_time_unit(_with_listed_units(_with_keyed_axis(table)))
-    table = _with_clocks_and_weights(table)
+    table = _with_stated_signs(_with_clocks_and_weights(table))
     return _with_sense(_with_scales(_with_counts(table)))
 
 
@@ -112,6 +115,22 @@ def _sign_of(label: str, remarks: Sequence[str]) -> int:
     return signs.pop() if len(signs) == 1 else 0
 
 
+def _with_stated_signs(table: RawTable) -> RawTable:
+    """Displacement and force as tension counts positive, where a line states that compression does."""
+    stated: dict[str, set[int]] = {}
+    for line in table.remarks:
+        matches = next(filter(None, (list(form.finditer(line[:_LONGEST_LINE])) for form in _COUNTED)), [])
+        for match in matches:
+            stated.setdefault(role_of(match["what"]) or "", set()).add(_sign_of(match["sense"], ()))
+    for role in ("displacement", "force"):
+        columns = [i for i, header in enumerate(table.headers) if header.role == role]
+        if stated.get(role) == {-1} and len(columns) == 1:
+            name, unit = table.headers[columns[0]]
+            text = f"the sign of column {table.names[columns[0]]!r} is changed: the file counts compression positive"
+            table = _scaled(table, columns[0], name, unit, -1.0, text)
+    return table
+
+
 def _with_row_of_currents(table: RawTable) -> RawTable:
     """Titles with the currents of a line above the names: current (A), 0, , 0.5, , one for a column or a group."""
     width = len(table.names)
@@ -149,7 +168,7 @@ def _with_keyed_units(table: RawTable) -> RawTable:
 
 def _with_listed_names(table: RawTable) -> RawTable:
     """Names and units of columns without any, where numbered lines above state them: 1=Time;min."""
-    matches = [match for line in table.remarks if (match := _LISTED.match(line[:_LONGEST_LINE]))]
+    matches = [match for line in table.remarks if (match := LISTED.match(line[:_LONGEST_LINE]))]
     listed = {int(match["number"]): match for match in matches if is_unit(match["unit"].strip())}
     if len(listed) < len(matches) or set(listed) != set(range(1, len(table.names) + 1)):
         return table
@@ -288,7 +307,7 @@ def _with_counts(table: RawTable) -> RawTable:
 
 def _with_scales(table: RawTable) -> RawTable:
     """Channels recorded in volts or per cent, by a scale the file states: amplifier monitor: 0.5 A/V; 100 % = 2 A."""
-    volts = [i for i, header in enumerate(table.headers) if header.dimension == "voltage" or header.unit == "%"]
+    volts = scaled_columns(table)
     for i in volts:
         other = _stated_scale(table, i, volts)
         if other is None:
@@ -301,6 +320,17 @@ def _with_scales(table: RawTable) -> RawTable:
         name = name if role_of(name) == role else role
         table = _scaled(table, i, name, unit, factor * (header.known.factor if header.known else 1.0), text)
     return table
+
+
+def scaled_columns(table: RawTable) -> list[int]:
+    """The columns in volts or per cent, which mean something by a scale alone."""
+    percent = parse_unit("%")
+    return [i for i, h in enumerate(table.headers) if h.dimension == "voltage" or (h.unit and h.known == percent)]
+
+
+def states_scale(line: str) -> bool:
+    """Tell if a line states a scale: 0.5 A/V; 100 % PWM = 2 A."""
+    return bool(_scales(line[:_LONGEST_LINE]))
 
 
 def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[str, float, str] | None:

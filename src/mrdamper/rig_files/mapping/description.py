@@ -1,17 +1,34 @@
-"""An XML file beside a record that describes it: names and units of its columns, its sampling rate, its current."""
+"""Files beside a record that describe it: an XML file its columns, rate and current, a README its scales."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+from mrdamper.rig_files.mapping.completion import scaled_columns, states_scale
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.units import is_unit
 
 _LARGEST = 2**16  # bytes
 _PLACES = ("column", "number", "index", "no", "position", "channel")
 _MOST = 200  # elements
+_README = re.compile(
+    r"(?i)(?:read[_ ]?me|lies_?mich|lisez[-_ ]?moi|l[eé]eme|leggimi|leia[-_ ]?me|notes?|info|说明|説明|설명)\b.*"
+)
+
+
+def with_notes(table: RawTable, path: Path) -> RawTable:
+    """The table with the scales that a text for readers beside its file states, where it has columns that need one."""
+    if not scaled_columns(table):
+        return table
+    texts = sorted(p for p in path.parent.iterdir() if _README.fullmatch(p.name) and p.is_file() and p != path)
+    lines = []
+    for text in texts:
+        if text.suffix.lower() in ("", ".txt", ".md", ".rst") and text.stat().st_size <= _LARGEST:
+            lines += text.read_bytes().decode("utf-8-sig", "replace").splitlines()
+    return replace(table, remarks=(*table.remarks, *(line for line in lines if states_scale(line))))
 
 
 def with_description(table: RawTable, path: Path) -> RawTable:

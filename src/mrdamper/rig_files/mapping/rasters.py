@@ -10,12 +10,11 @@ import numpy as np
 
 from mrdamper.data import Floats, held_current
 from mrdamper.errors import InputError
-from mrdamper.rig_files.column_names import Header, role_of, says_nothing, split_name
+from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding
 
 _FEWEST_OVERLAP = 0.5  # of the force's time that every needed channel must cover
-_BY_UNIT = {"length": "displacement", "force": "force"}
 _SAME = 1e-9  # [s]: clocks that differ by less are one
 _TWO_STARTS = 1.0  # [s] between two clocks of all channels: more is a clock with another zero, as the time of day
 
@@ -32,7 +31,7 @@ def with_one_clock(table: RawTable) -> RawTable:
     if len(groups) < 2:
         return _with_clocks_compared(table)
     owner = {column: clock for clock, columns in groups.items() for column in columns}
-    roles = {role: [i for i in owner if _role(table.headers[i]) == role] for role in (*REQUIRED[1:], *OPTIONAL)}
+    roles = {role: [i for i in owner if table.headers[i].channel == role] for role in (*REQUIRED[1:], *OPTIONAL)}
     if not roles["force"] or not roles["displacement"]:
         return table
     together = [c for c in groups if all(any(owner[i] == c for i in roles[r]) for r in ("displacement", "force"))]
@@ -57,7 +56,7 @@ def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
     dropped: set[int] = set()
     for label, members in groups.items():
         timed = [table for table in members if any(header.role == "time" for header in table.headers)]
-        roles = [{_role(h) for h in _named(table).headers} for table in timed]
+        roles = [{h.channel for h in _named(table).headers} for table in timed]
         whole = [i for i, roles_of in enumerate(roles) if {"displacement", "force"} <= roles_of]
         every = [role for roles_of in roles for role in roles_of if role not in ("time", None)]
         needed = {"displacement", "force"} <= set(every) and len(set(every)) == len(every)
@@ -113,12 +112,6 @@ def _time_first(table: RawTable) -> list[int]:
     return [*times, *(i for i in range(len(table.names)) if i not in times)]
 
 
-def _role(header: Header) -> str | None:
-    """The channel that a name stands for, or its unit where the name says nothing: s_Daempfer in mm."""
-    by_unit = _BY_UNIT.get(header.dimension or "")
-    return header.role or (by_unit if by_unit and says_nothing(header.name) else None)
-
-
 def _clocks(table: RawTable) -> dict[int, list[int]]:
     """By the column of each time the channels that follow it."""
     groups: dict[int, list[int]] = {}
@@ -140,7 +133,7 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
     def common() -> tuple[slice, Floats]:
         """Rows of the force that lie within the displacement's time, if most do, and their times."""
         target = _filled(read(clock)) * factor[clock]
-        moved = next((i for i in owner if _role(table.headers[i]) == "displacement"), clock)
+        moved = next((i for i in owner if table.headers[i].channel == "displacement"), clock)
         other = _filled(read(owner.get(moved, moved)) * factor[owner.get(moved, moved)])
         inside = np.flatnonzero(_covered(target, other[np.isfinite(other)]))
         rows = slice(inside[0], inside[-1] + 1) if inside.size >= _FEWEST_OVERLAP * target.size else slice(target.size)

@@ -47,12 +47,7 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
         return whole
     ends = [0, *_borders(time, displacement), time.size]
     parts = [slice(a, b) for a, b in pairwise(ends) if _moves(displacement[a:b], displacement)]
-    for end in (0, -1):  # the motion starts or stops softly: no test
-        if (
-            len(parts) > 2
-            and find_strokes(time[parts[end]], displacement[parts[end]]).reversals.size < _FEWEST_REVERSALS
-        ):
-            del parts[end]
+    parts = _with_soft_ends(parts, time, displacement)
     parts = [piece for part in parts for piece in _pieces(part, time, displacement, current)]
     if len(parts) < 2:
         return whole
@@ -72,6 +67,21 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
             code="E_BLOCKS",
         )
     return parts
+
+
+def _with_soft_ends(parts: list[slice], time: Floats, x: Floats) -> list[slice]:
+    """The parts, those of fewer strokes than a test joined with the one they lead to or come from without a gap."""
+    joined: list[slice] = []
+    short = False
+    for part in parts:
+        few = find_strokes(time[part], x[part]).reversals.size < _FEWEST_REVERSALS
+        near = bool(joined) and joined[-1].stop == part.start and time[part.start] - time[part.start - 1] <= _OFF_S
+        if near and (short or (few and part is parts[-1])):
+            joined[-1], short = slice(joined[-1].start, part.stop), short and few
+        else:
+            joined.append(part)
+            short = few
+    return joined
 
 
 def _pieces(part: slice, time: Floats, displacement: Floats, current: Floats) -> list[slice]:

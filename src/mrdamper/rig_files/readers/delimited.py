@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.errors import printable
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words
+from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words, scratch
 from mrdamper.rig_files.record import Finding, LineNumbers
 from mrdamper.rig_files.text.blocks import Block, find_blocks
 from mrdamper.rig_files.text.bulk import read_bulk
@@ -25,6 +25,7 @@ from mrdamper.rig_files.text.turned import turned_table
 _ODD = re.compile("[\udc80-\udcff\ufffd\x80-\x9fÿþðÞÐ¤¦¬¸¨÷×]")  # bytes of another encoding, as they come out
 _HEADER_LINES, _BREAKS = 200, 12  # lines in which a quoted name may be broken, and into how many
 _FOOTER = 8192  # bytes in which lines of words below the rows are looked for
+_ARRIVED = re.compile(rb"\[?[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{1,6}\]? -> ?")
 _HEAD_LINES = 4000  # in which the data must have begun
 BULK_FROM = 2**16  # bytes; below, reading cell by cell takes less time than loading the fast reader
 
@@ -43,7 +44,7 @@ class DelimitedText(Reader):
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a block of rows."""
-        stream = open_text(source, form)
+        stream = open_text(_without_arrival(source), form)
         head = stream.head()
         whole = stream.start + len(head) >= stream.stop
         raw = head.split(b"\n", _HEAD_LINES)
@@ -76,6 +77,18 @@ class DelimitedText(Reader):
             over=layout.over,
             words=lambda column: _words(stream, layout, block, column),
         )
+
+
+def _without_arrival(source: Source) -> Source:
+    """The text without the time of arrival that a serial monitor writes before every line: 16:05:12.005 -> ."""
+    lines = [line for line in source.head(_FOOTER).splitlines()[:-1] if line.strip()]
+    if len(lines) < 2 or not all(map(_ARRIVED.match, lines)):
+        return source
+    file = scratch(source.keep)
+    source.file.seek(0)
+    for line in source.file:
+        file.write(_ARRIVED.sub(b"", line, count=1))
+    return replace(source, file=file, size=file.tell())
 
 
 def _with_whole_quotes(lines: list[str]) -> list[str]:

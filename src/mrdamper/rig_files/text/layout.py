@@ -39,6 +39,16 @@ _NAME_AND_UNIT = re.compile(r"[^\s\[(<{]+(?:\s*\[[^\[\]]*\]|\s*\([^()]*\))?")
 _QUANTITY = re.compile(
     r"([+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)[ \u00a0]?([^\W\d_]\S{0,6}|°\S)"
 )
+LISTED = re.compile(  # a numbered line that names a column and its unit: 1=Time;min, COL 2 FORCE (LBF)
+    r"^[\s\"#%]*(?:ch(?:annel)?|column|col|spalte|kanal)?[\s#._]*(?P<number>[0-9]{1,3})\"?(?:\s*[=:;,\t]\s*|\s+)\"?"
+    r"(?P<name>[^\d\W][^;,\t\[\](){}=]*?)\"?\s*[;,\t\[({]\s*\"?(?P<unit>[^;,\t\[\](){}\"]{1,12})\"?[\])}]?[\s;,\"]*$",
+    re.IGNORECASE,
+)
+_NOTES = frozenset(
+    ("comment", "comments", "remark", "remarks", "note", "notes", "bemerkung", "kommentar", "commentaire", "comentario",
+     "commento", "uwagi", "примечание", "备注", "備考", "비고")
+)  # fmt: skip
+_DATE = re.compile(r"[0-9]{1,2}\.[0-9]{1,2}\.[0-9]{2,4}|[0-9]{4}\.[0-9]{1,2}\.[0-9]{1,2}")
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
 
@@ -97,6 +107,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     names = form.names or (_cells(lines[header], separator, width) if header is not None else ("",) * width)
     levels = [] if header is None or form.names else _levels(lines[:header], separator, width)
     names, titles = _with_levels(names, levels)
+    trailing |= header is not None and separator != SPACES and _names_notes(cells_of(lines[header], separator), width)
     if len(names) != width:
         raise _mismatch(source, separator, len(names), width, first, lines)
     units = _cells(lines[unit_row], separator, width) if unit_row is not None else ("",) * width
@@ -395,7 +406,8 @@ def _rows(lines: Sequence[str], separator: str, width: int, trailing: bool) -> l
 
 
 def _decimal(rows: Sequence[Sequence[str]], source: Source, first: int) -> str:
-    numbers = [c for row in rows for c in row if c and looks_numeric(c) and stamp(c) is None]
+    cells = [c for row in rows for c in row if c and not _DATE.fullmatch(c)]
+    numbers = [c for c in cells if looks_numeric(c) and stamp(c) is None]
     dots = [c for c in numbers if "." in c and "," not in c]
     commas = [c for c in numbers if "," in c and "." not in c]
     few = _STRAY * (len(dots) + len(commas))
@@ -429,7 +441,7 @@ def _header_lines(
             if index is not None and not 0 <= index < len(lines):
                 raise source.refuse("E_PROFILE", f"there is no line {index + 1}", "correct [file] of the profile")
         return header, units
-    plain = [i for i, line in enumerate(lines[:first]) if line.strip() and not is_comment(line)]
+    plain = [] if _lists_columns(lines[:first], width) else _plain(lines[:first])
     keyed = {_cells(lines[i], separator, width)[0].casefold(): i for i in plain} if width > 1 else {}
     if {"name", "unit"} <= set(keyed) and len(_fields(lines[keyed["name"]], separator, width)) == width:
         return keyed["name"], keyed["unit"]  # rows that begin with what they hold
@@ -464,6 +476,17 @@ def _header_lines(
     return None, (form.units_line - 1 if form.units_line else None)
 
 
+def _plain(lines: Sequence[str]) -> list[int]:
+    """Indices of the lines that are neither empty nor remarks."""
+    return [i for i, line in enumerate(lines) if line.strip() and not is_comment(line)]
+
+
+def _lists_columns(lines: Sequence[str], width: int) -> bool:
+    """Tell if lines name the columns by their numbers, one a line."""
+    numbers = {int(match["number"]) for line in lines if (match := LISTED.match(line))}
+    return width > 1 and numbers == set(range(1, width + 1))
+
+
 def _names_columns(line: str, separator: str) -> bool:
     cells = cells_of(line, separator)
     return len([cell for cell in cells if cell]) >= 3 and not any(looks_numeric(cell) for cell in cells if cell)
@@ -479,7 +502,12 @@ def _fields(line: str, separator: str, width: int) -> list[str]:
         with_units = _NAME_AND_UNIT.findall(line.strip()) if len(narrow) != width else narrow
         return next((cells for cells in (wide, with_units) if len(cells) == width), narrow)
     cells = cells_of(line, separator)
-    return cells[:-1] if len(cells) == width + 1 and not cells[-1] else cells
+    return cells[:-1] if len(cells) == width + 1 and (not cells[-1] or _names_notes(cells, width)) else cells
+
+
+def _names_notes(cells: Sequence[str], width: int) -> bool:
+    """Tell if one more name than there are columns is that of notes, which most rows leave out."""
+    return len(cells) == width + 1 and cells[-1].strip('"').casefold() in _NOTES
 
 
 def _cells(line: str, separator: str, width: int) -> tuple[str, ...]:
