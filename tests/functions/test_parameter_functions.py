@@ -6,7 +6,7 @@ from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, UnknownNameError
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.statistics.functions.fitting import choose_function, fit_function
-from mrdamper.statistics.functions.forms import FORMS, ParameterFunction, features
+from mrdamper.statistics.functions.forms import FORMS, Form, ParameterFunction, features
 
 MATRIX = [
     Condition(i, f, a)
@@ -86,3 +86,28 @@ def test_a_map_stops_at_physical_bounds():
         "c": ParameterFunction("linear-current", (-1000.0, 500.0)),
     }
     assert ParameterMap(BoucWen, functions).at(Condition(2.0, 1.0, 0.01)).c == 0.0
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=lambda f: f.name)
+def test_a_form_counts_its_parameters_over_current_and_motion(form):
+    """Terms that change with the motion follow it; the others, and their rates, are over the current."""
+    rates = [1.3, 0.7][: len(form.rate_bounds)]
+    motions = ((1.0, 0.02), (1.7, 0.031))
+    here, elsewhere = (form.columns(np.array([0.8]), np.array([f]), np.array([a]), rates)[0] for f, a in motions)
+    follows = here != elsewhere
+    assert form.follows_motion == follows.any()
+    assert [term.follows_motion for term in form.terms] == follows.tolist()
+    over_current = [term for term, moved in zip(form.terms, follows, strict=True) if not moved]
+    assert form.current_terms == len(over_current) + len({t.decay_I for t in over_current if t.decay_I is not None})
+    assert form.current_terms + form.motion_terms == len(form.terms) + len(form.rate_bounds)
+
+
+@pytest.mark.parametrize(
+    ("name", "count"), [("constant", 1), ("linear-current", 2), ("saturating-current", 4), ("decaying-current", 3)]
+)
+def test_a_rate_over_the_current_is_a_parameter_of_its_law(name, count):
+    assert (FORMS[name].current_terms, FORMS[name].motion_terms) == (count, 0)
+
+
+def test_a_form_without_terms_has_no_column_but_every_condition():
+    assert Form("absent", ()).columns(*features(MATRIX), ()).shape == (len(MATRIX), 0)
