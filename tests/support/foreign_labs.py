@@ -1219,3 +1219,12 @@ def long_table_with_conditions_beside(tests, p):
     pl.concat(parts).write_parquet(p / "timeseries.parquet")
     conditions = {"test_id": ids[::-1], "operator": ["ab"] * len(ids), "current_A": [q.current for q in tests[::-1]]}
     pl.DataFrame(conditions).write_parquet(p / "conditions.parquet")
+
+
+@kind
+def file_a_channel_in_a_folder_a_test(tests, p):
+    for n, q in enumerate(tests, 1):
+        folder = p / f"Ensayo_{n:02d}_I={q.current:g}A"
+        folder.mkdir()
+        for title, values in (("tiempo_s", q.t), ("desplazamiento_mm", 1e3 * q.x), ("fuerza_N", q.f)):
+            put(folder / f"{title}.txt", rows(values, fmt="%.5f"))

@@ -20,6 +20,7 @@ from mrdamper.rig_files.mapping.agreement import contradictions
 from mrdamper.rig_files.mapping.companions import (
     contradictions_with,
     is_list,
+    joined_columns,
     joined_parts,
     part_of,
     results_of,
@@ -217,18 +218,22 @@ class _Intake:
                 self.refusals += refusals
             return
         self.refusals += [Refusal(str(path), problem) for problem in problems]
-        self.met += [(path, record.id) for record in records]
         for record in records:
-            completed, problems = record, []
-            if self._table is not None:
-                try:
-                    completed = applied(record, self._table.of(path, record.id), self._table)
-                except InputError as error:
-                    problems.append(error)
-            if completed.current is None and not problems:
-                self._pending.append((path, completed))
-            else:
-                self._check(path, completed, problems, several=len(records) > 1)
+            self._take(path, record, several=len(records) > 1)
+
+    def _take(self, path: Path, record: Record, *, several: bool) -> None:
+        """Check a test with what the table of tests says of it, or keep it until another file states its current."""
+        self.met.append((path, record.id))
+        problems: list[InputError] = []
+        if self._table is not None:
+            try:
+                record = applied(record, self._table.of(path, record.id), self._table)
+            except InputError as error:
+                problems.append(error)
+        if record.current is None and not problems:
+            self._pending.append((path, record))
+        else:
+            self._check(path, record, problems, several=several)
 
     def _check(self, path: Path, record: Record, problems: list[InputError], *, several: bool) -> None:
         from mrdamper.rig_files.quality import check_record
@@ -272,12 +277,13 @@ class _Intake:
         parts = [part for path in others if (part := part_of(path, self._profile.of_file(path.name)[1]))]
         parts += [part for path, (run, own) in self._shares.items() if (part := part_of(path, own, run))]
         used: set[Path] = set()
+        for records, paths in joined_columns(others, self._profile):
+            used |= set(paths)
+            for record in records:
+                self._take(paths[0], record, several=len(records) > 1)
         for record, paths in joined_parts(parts, self._profile):
             used |= set(paths)
-            if record.current is None:
-                self._pending.append((paths[0], record))
-            else:
-                self._check(paths[0], record, [], several=False)
+            self._take(paths[0], record, several=False)
         for path in [path for path in self._shares if path not in used]:
             problem = f"no other file of test {self._shares[path][0]!r} has the rest of its channels on the same clock"
             error = ColumnError(problem, where=path.name, remedy="correct file = ... of the channels in the profile")

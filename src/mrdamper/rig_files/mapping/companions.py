@@ -13,6 +13,7 @@ import numpy as np
 from mrdamper.data import Floats, held_current
 from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.coil_current import as_data, constant, current_of
+from mrdamper.rig_files.column_names import Header, role_of, split_name, words_of
 from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.conditions import amperes, contradicts
 from mrdamper.rig_files.file_records import records_of_file
@@ -20,7 +21,10 @@ from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers import raw_tables
+from mrdamper.rig_files.readers.arrays import array_table
 from mrdamper.rig_files.record import Finding, Record
+from mrdamper.rig_files.rig_record import records_of
+from mrdamper.rig_files.units import DIMENSION
 
 _FEWEST_ROWS = 50  # of a record
 _LARGEST_TEXT = 2**18  # bytes
@@ -65,6 +69,53 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
     if np.count_nonzero(there) < 2 or np.any(np.diff(time[there]) <= 0):
         return None
     return Part(path, time[there], {role: values[there] for role, values in channels.items()}, current, run)
+
+
+def joined_columns(paths: Sequence[Path], profile: Profile) -> list[tuple[list[Record], tuple[Path, ...]]]:
+    """Tests of which every channel is a file of one column, named by its file or heading, and these files.
+
+    Files of one test lie in one folder and have one name beside the channel's: force_N.txt and time_s.txt, or
+    run7_force_N.txt and run7_time_s.txt. They hold as many samples as each other.
+    """
+    groups: dict[tuple[Path, str], dict[Path, tuple[str, str, Floats]]] = defaultdict(dict)
+    for path in paths:
+        column = _only_column(path, profile)
+        if column is not None:
+            header = column[0]
+            rest = [word for word in words_of(split_name(path.stem).name) if role_of(word) != header.role]
+            groups[path.parent, "_".join(rest)][path] = header.name, header.unit, column[1]
+    tests = []
+    for (folder, rest), columns in groups.items():
+        names, units, values = zip(*columns.values(), strict=True)
+        roles = [role_of(name) for name in names]
+        whole = {"displacement", "force"} <= set(roles) and len(set(roles)) == len(roles)
+        if not whole or len({v.size for v in values}) > 1:
+            continue
+        first, where = next(iter(columns)), folder / rest if rest else folder
+        try:
+            with raw_tables(first, profile.file) as tables:
+                table = array_table(tables[0].source, names, units, lambda i, values=values: values[i])
+                records = records_of(table, profile, where)
+        except InputError:
+            continue
+        files = {"file": as_data(where.name), "files": as_data(", ".join(path.name for path in columns))}
+        tests.append(([replace(r, provenance={**files, **r.provenance}) for r in records], tuple(columns)))
+    return tests
+
+
+def _only_column(path: Path, profile: Profile) -> tuple[Header, Floats] | None:
+    """The heading and numbers of a file of one column that its heading or its name says to be a channel."""
+    named = split_name(path.stem)
+    try:
+        with raw_tables(path, profile.file) as tables:
+            if len(tables) != 1 or len(tables[0].names) != 1:
+                return None
+            header = tables[0].headers[0]
+            header = header if header.name else named
+            fits = header.role is not None and header.dimension == DIMENSION.get(header.role)
+            return (header, tables[0].read([0]).values[0]) if fits else None
+    except InputError:
+        return None
 
 
 def number_of(path: Path) -> tuple[str, ...]:
