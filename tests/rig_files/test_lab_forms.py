@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import import_files, read_run, read_runs
 
@@ -252,3 +253,27 @@ def test_a_stated_rate_that_contradicts_the_time_column_is_refused(tmp_path, hea
     assert [r.error.code for r in by_column.refusals] == (codes if "4 Hz" in heading else [])
     by_rate = import_files([path], parse_profile("[file]\nsample_rate_Hz = 800\n"))
     assert not by_rate.refusals
+
+
+def test_a_profile_that_answers_for_one_channel_leaves_the_others_to_physics(tmp_path):
+    text = "time (s),pos (mm),Force 1 (N),Force 2 (N)\n" + rows(T, X, force(0.5), 1.2 * force(0.5, 1))
+    (tmp_path / "run_0.5A.csv").write_text(text)
+    stated = parse_profile('[channels.time]\ncolumn = "time (s)"\n')
+    assert [r.error.code for r in import_files([tmp_path], stated).refusals] == ["E_AMBIGUOUS"]
+    stated = parse_profile('[channels.time]\ncolumn = "time (s)"\n[channels.force]\ncolumn = "Force 2 (N)"\n')
+    assert len(import_files([tmp_path], stated).records) == 1
+
+
+def test_a_written_profile_does_not_leave_out_the_other_sheets(tmp_path):
+    from openpyxl import Workbook
+
+    book = Workbook()
+    book.remove(book.active)
+    for number, amperes in enumerate((0.0, 0.5)):
+        sheet = book.create_sheet(f"{amperes} A")
+        sheet.append(["time (s)", "disp (mm)", "force (N)"])
+        for row in zip(T, X, force(amperes, number), strict=True):
+            sheet.append([float(v) for v in row])
+    book.save(tmp_path / "tests.xlsx")
+    profile = guess_profile(tmp_path / "tests.xlsx")
+    assert currents(import_files([tmp_path / "tests.xlsx"], profile).records) == [0.0, 0.5]

@@ -76,7 +76,7 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
         column = profile.channel(role).column
         if column is not None:
             try:
-                columns[role] = _named(table, column, role)
+                columns[role] = column_called(table, column, role)
             except ColumnError as error:
                 if role in REQUIRED:
                     problems.append(error)
@@ -121,7 +121,7 @@ def partly_assigned(table: RawTable, profile: Profile) -> dict[str, Assigned]:
         try:
             stated = profile.channel(role).column
             column = _choose(table, role, [e.column for e in assigned.values()]) if stated is None else None
-            column = _named(table, stated, role) if stated is not None else column
+            column = column_called(table, stated, role) if stated is not None else column
             entry = None if column is None else _convert(table, role, column, profile.channel(role))
         except InputError:
             continue
@@ -162,7 +162,7 @@ def left_out(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]
             continue
         stated = profile.channel(role).column
         try:
-            column = _choose(table, role, taken) if stated is None else _named(table, stated, role)
+            column = _choose(table, role, taken) if stated is None else column_called(table, stated, role)
         except ColumnError as error:
             reasons[role] = error.found
             continue
@@ -233,7 +233,8 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
     return candidates[0]
 
 
-def _named(table: RawTable, column: str | int, role: str) -> int:
+def column_called(table: RawTable, column: str | int, role: str) -> int:
+    """The column that a profile names for a channel; `ColumnError` if there is none."""
     if isinstance(column, int):
         if not 1 <= column <= len(table.names):
             problem = f"no column {column}: there are {len(table.names)}"

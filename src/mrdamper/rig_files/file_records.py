@@ -81,9 +81,9 @@ def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
     return parts
 
 
-def _stated_columns(profile: Profile) -> list[str]:
-    """The channels whose column the profile names."""
-    return [name for name, channel in profile.channels.items() if channel.column is not None]
+def _stated_columns(profile: Profile) -> dict[str, str | int]:
+    """The columns that the profile names, by channel."""
+    return {name: channel.column for name, channel in profile.channels.items() if channel.column is not None}
 
 
 def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawTable], list[InputError]]:

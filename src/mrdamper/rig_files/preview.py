@@ -45,7 +45,8 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
     profile = profile_of(profile)
     with raw_tables(path, profile.file) as tables:
         table, channels = _guess_channels(test_tables(tables, profile), profile)
-    form = {**table.form, **profile.file.model_dump(exclude_defaults=True)}
+    of_file = {key: value for key, value in table.form.items() if key != "sheet" or len(tables) == 1}  # tests in others
+    form = {**of_file, **profile.file.model_dump(exclude_defaults=True)}
     if not any(table.names):
         form["names"] = tuple(f"column {i + 1}" for i in range(len(table.names)))
     stated = "current" in channels or held_current_of(table) is not None

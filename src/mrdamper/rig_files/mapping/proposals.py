@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -12,7 +12,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, InputError
 from mrdamper.rig_files.column_names import split_name
-from mrdamper.rig_files.columns import candidates_of
+from mrdamper.rig_files.columns import candidates_of, column_called
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding
 
@@ -58,11 +58,20 @@ def with_unit_of_time(table: RawTable) -> RawTable:
     return replace(table, units=tuple(stated_units), findings=(*table.findings, Finding("W_UNITS", text)))
 
 
-def with_channels_by_physics(table: RawTable, taken: Sequence[str] = ()) -> RawTable:
-    """The table with the columns named that alone make a damper's loop, where names leave open which they are."""
+def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -> RawTable:
+    """The table with the columns named that alone make a damper's loop, where names leave open which they are.
+
+    The columns that are `stated`, by channel, are not open.
+    """
     if table.source.size > _LARGEST:
         return table
-    open_roles = {role: candidates_of(table, role) for role in REQUIRED if role not in taken}
+    try:
+        open_roles = {
+            role: [column_called(table, stated[role], role)] if role in stated else candidates_of(table, role)
+            for role in REQUIRED
+        }
+    except InputError:
+        return table
     if all(len(columns) == 1 for columns in open_roles.values()) or not all(open_roles.values()):
         return table
     ranked = ranked_candidates(table, open_roles)
