@@ -19,3 +19,14 @@ def test_the_last_steps_find_the_minimum():
 def test_a_plain_and_a_minimum_far_away_leave_the_point():
     np.testing.assert_array_equal(ended(lambda u: np.full(2, u.sum() - 1.7)), NEAR)
     np.testing.assert_array_equal(ended(lambda u: u - 1.5), NEAR)
+
+
+def test_newton_stays_inside_the_box_at_its_upper_end():
+    upper, centre = np.array([1.0, 2.0]), np.array([1.5, 0.3])
+
+    def gradient(u):
+        assert np.all(u <= upper)
+        return np.array([2.0, 3.0]) * (u - centre)
+
+    found = newton_refine(gradient, np.array([1.0, 0.31]), np.zeros(2), upper)
+    np.testing.assert_allclose(found, [1.0, 0.3], atol=1e-12)

@@ -137,8 +137,11 @@ def newton_refine(gradient: Callable[[Floats], Floats], point: Floats, lower: Fl
     width = upper - lower
     free = (point > lower) & (point < upper)
     first = gradient(point)
-    steps = np.diag(_CURVED * width)
-    curvature = np.stack([(gradient(point + s) - first) * width / _CURVED for s in steps])  # in widths of the box
+    shares = np.where(
+        point + _CURVED * width > upper, -_CURVED, _CURVED
+    )  # steps that stay inside, in widths of the box
+    pairs = zip(np.diag(shares * width), shares, strict=True)
+    curvature = np.stack([(gradient(point + step) - first) * width / share for step, share in pairs])
     curvature = (curvature + curvature.T)[np.ix_(free, free)] / 2
     if not free.any() or _is_plain(curvature):
         return point
