@@ -39,9 +39,9 @@ def page(results: Results) -> str:
         f"{os.getloadavg()[1]:.1f} on {os.cpu_count()} processors. Whole processes in wall time too. "
         + ("This was a quick run: few repetitions. " if results.quick else "")
         + "Figures marked * are multiplied up from a part that was measured.",
-        "Of their own: reading a large file, `python -m benchmarks.import_large --megabytes 1000`; what the importer "
-        "finds, `python -m benchmarks.import_detection`; the live bench, `python -m benchmarks.web`. A peer that is "
-        "not installed is left out (`pip install openseespy` brings the one that `make bench` does not).",
+        "Separate commands: reading a large file, `python -m benchmarks.import_large --megabytes 1000`; what the "
+        "importer finds, `python -m benchmarks.import_detection`; the app, `python -m benchmarks.web`. A peer that is "
+        "not installed is omitted (`pip install openseespy` brings the one that `make bench` does not).",
         "## Goals",
         _table(
             ("goal", "limit", "measured", "verdict", "why missed"),
