@@ -277,3 +277,10 @@ def test_a_written_profile_does_not_leave_out_the_other_sheets(tmp_path):
     book.save(tmp_path / "tests.xlsx")
     profile = guess_profile(tmp_path / "tests.xlsx")
     assert currents(import_files([tmp_path / "tests.xlsx"], profile).records) == [0.0, 0.5]
+
+
+def test_texts_that_hold_no_usable_object_are_texts(tmp_path):
+    arrays = {"time_s": T, "disp_mm": X, "force_N": force(0.5)}
+    for text in ("{broken", '{"a": 1' + "0" * 400 + "}", '{"a": [1, 2], "b": null}'):
+        np.savez(tmp_path / "run_0.5A.npz", **arrays, units=np.array(text))
+        assert currents(import_files([tmp_path]).records) == [0.5]

@@ -103,9 +103,9 @@ def _object_in(value: Any) -> Any:
         return value
     try:
         says = json.loads(value)
-    except (ValueError, RecursionError):
+        return {str(key): float(v) if isinstance(v, (int, float)) else str(v) for key, v in says.items()}
+    except (ValueError, RecursionError, OverflowError):
         return value
-    return {str(key): float(v) if isinstance(v, (int, float)) else str(v) for key, v in says.items()}
 
 
 def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -124,8 +124,8 @@ def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
         return tree
     timed = []
     for channel in channels:
-        number = int(next((v for k, v in channel.items() if k.casefold() == "xindex" and isinstance(v, float)), 1.0))
-        at = number - 1 if 0 < number <= len(axes) else 0
+        number = next((v for k, v in channel.items() if k.casefold() == "xindex" and isinstance(v, float)), 1.0)
+        at = int(number) - 1 if 1 <= number <= len(axes) else 0
         timed.append({**channel, "xdata": axes[at]["data"], "xunit": units[at]})
     return {**{key: value for key, value in tree.items() if key not in (keys["x"], keys["y"])}, keys["y"]: timed}
 
