@@ -22,7 +22,7 @@ runs = [
     Run(f"{i}", t, x, f, I, window=(w, t[-1]))
     for i, (t, x, f, I, w) in enumerate(zip(*(records[k] for k in ("t", "x", "f", "I", "w")), strict=True))
 ]
-found = [identify(run, clipped=True) for run in runs]
+found = [identify(run) for run in runs]
 assert max(i.scores.nrmse_std for i in found) < 0.05
 """
 

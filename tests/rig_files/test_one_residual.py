@@ -7,12 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mrdamper.data import Run
+from mrdamper.data import Condition, Run
+from mrdamper.models.bouc_wen import BoucWen
+from mrdamper.physics.motion import sine
+from mrdamper.physics.simulation import simulate
 from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
 from mrdamper.rig_files.quality.effects import damping, elastic_plastic
 from mrdamper.rig_files.quality.filtered import noise_by_octave
 from mrdamper.rig_files.quality.force_lag import force_lag
 from mrdamper.rig_files.quality.names import agrees_with_its_name
+from mrdamper.rig_files.quality.table import check_run, record_of
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Record
 
@@ -150,6 +154,24 @@ def test_ending_the_search_for_a_lag_early_changes_no_finding(noise, share, monk
     monkeypatch.setattr(module, "_may_be_clear", lambda misfit, noise: True)
     assert early == [finding.code for finding in module.force_channel(View(record))]
     assert early == ["W_LAG"] * (share != 0)
+
+
+@pytest.mark.parametrize("current", [0.0, 0.5, 1.0, 1.5])
+@pytest.mark.parametrize("frequency", [0.5, 2.0])
+def test_a_plateau_in_a_noisy_single_cycle_is_not_cut_off(current, frequency):
+    """The window excludes the cycle that starts from rest, and the noise of one cycle hides how its ends are formed."""
+    model = BoucWen.build({"c": 1300.0, "yield_force": 100 + 600 * current, "yield_displacement": 3e-4, "f0": 120.0})
+    motion = sine(Condition(current, frequency, 0.005), 2, 1000)
+    force = simulate(model, motion).force
+    force = force + 0.03 * np.std(force) * np.random.default_rng(0).standard_normal(force.size)
+    window = (1 / frequency, float(motion.time[-1]))
+    run = Run("r", motion.time, motion.displacement, force, current, window=window)
+    refused, findings = check_run(run)
+    assert refused is None
+    assert "W_CLIPPED" not in {finding.code for finding in findings}
+    cycles = steady_cycles(View(record_of(run)))
+    assert cycles is not None
+    assert len(cycles.starts) == 1
 
 
 # Recovery: one size of every kind that moves the result

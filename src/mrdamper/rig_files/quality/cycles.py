@@ -11,6 +11,7 @@ from mrdamper.data import Floats, once_per_run
 from mrdamper.rig_files.quality.view import View
 
 POINTS = 200  # phases of a cycle at which cycles are compared
+_EARLY = 0.02  # of the period: a cycle may begin before the window by so much
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,8 @@ def every_cycle(view: View) -> Folded | None:
 def steady_cycles(view: View) -> Cycles | None:
     """The steady cycles of a record beside each other; None under one cycle of a periodic motion.
 
-    The first of three or more is left out: it may hold the way in from rest. A cycle with a gap is, too.
+    The first of three or more is left out: it may hold the way in from rest. A cycle with a gap is, too, and one
+    before the window of a run that states one.
     """
     folded = every_cycle(view)
     if folded is None:
@@ -96,6 +98,9 @@ def steady_cycles(view: View) -> Cycles | None:
     count = round((float(view.steady.time[-1]) - folded.starts[0]) / folded.period)
     assert view.motion is not None
     first = int(count > 2 and count == int(view.motion.cycles + 0.02))
+    if view.record.window is not None:
+        before = folded.starts < view.record.window[0] - _EARLY * folded.period
+        first = max(first, int(np.count_nonzero(before)))
     if first == folded.starts.size:
         return None
     channels = (_channel(values[first:]) for values in (folded.displacement, folded.force))

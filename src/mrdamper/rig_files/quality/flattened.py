@@ -16,10 +16,11 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.rig_files.quality.cycles import POINTS, CycleChannel, steady_cycles
 from mrdamper.rig_files.quality.effects import NOTED, percent
-from mrdamper.rig_files.quality.view import View
+from mrdamper.rig_files.quality.view import View, sample_noise
 from mrdamper.rig_files.record import Finding
 
 _DEPTH = 0.006  # of the peak-to-peak value; at four times this depth the width is measured again
+_DEEPEST = 0.02  # of it: deeper, where noise asks for that, the steep sides of hysteresis are no wider either
 _FORCE_WIDER, _WIDER, _WIDER_ONE_SIDED = 1.45, 1.3, 1.47  # times as wide there: a parabola 2, bundled rigs 1.57, 1.34
 _ROUND = 1.75  # times as wide: an end that is not cut off
 _LEVEL = 1.25  # times as wide: a plateau on which the force does not depend on velocity
@@ -49,12 +50,13 @@ def cut_off_before_noise(view: View) -> Iterator[Finding]:
         return
     motion, force = cycles.displacement, cycles.force
     speed = np.abs(motion.slope)
-    ends = ends_of(force, len(cycles.starts))
-    one_sided = max(top.wider for top in ends) > _ROUND
+    count = len(cycles.starts)
+    ends = ends_of(force, count, view.force_noise)
+    one_sided = any(top.wider > _ROUND for top in ends)
     tops = [top for top in ends if _is_cut_off(top, speed, one_sided)]
     yield from _finding("force", "N", 1.0, tops, force.span)
-    ends = ends_of(motion, len(cycles.starts))
-    one_sided = max(top.wider for top in ends) > _ROUND
+    ends = ends_of(motion, count, sample_noise(view.steady.displacement))
+    one_sided = any(top.wider > _ROUND for top in ends)
     limit = _WIDER_ONE_SIDED if one_sided else _WIDER
     tops = [top for top in ends if top.wider < limit and _force_goes_on(top, force)]
     yield from _finding("displacement", "mm", 1e3, tops, motion.span)
@@ -101,10 +103,15 @@ def _finding(name: str, unit: str, scale: float, tops: list[Top], span: float) -
         )
 
 
-def ends_of(channel: CycleChannel, count: int) -> tuple[Top, Top]:
-    """Measure the upper and the lower end of the mean of a number of cycles."""
-    noise = float(np.sqrt(np.mean(channel.rest**2) / count))
-    depth = max(3 * noise, _DEPTH * channel.span)
+def ends_of(channel: CycleChannel, count: int, noise: float) -> tuple[Top, ...]:
+    """Measure the upper and the lower end of the mean of a number of cycles; neither where noise hides their form.
+
+    One cycle alone shows no scatter: its noise from sample to sample counts.
+    """
+    scatter = float(np.sqrt(np.mean(channel.rest**2))) if count > 1 else noise
+    depth = max(3 * scatter / np.sqrt(count), _DEPTH * channel.span)
+    if depth > _DEEPEST * channel.span:
+        return ()
     loop = (np.roll(channel.loop, 1) + channel.loop + np.roll(channel.loop, -1)) / 3
     upper, lower = (_top(sign * loop, depth) for sign in (1.0, -1.0))
     return upper, lower._replace(level=-lower.level)
