@@ -33,14 +33,14 @@ def put(rows: Rows, out: Path | None, as_json: bool, as_csv: Callable[[Rows], st
 
 
 def shortened(lines: Sequence[str], most: int, verbose: bool = False) -> list[str]:
-    """The first lines, and the number of those that `--verbose` prints as well."""
+    """Return the first lines, and the number of those that `--verbose` prints as well."""
     if verbose or len(lines) <= most:
         return list(lines)
     return [*lines[: most - 1], f"  {len(lines) - most + 1} more with --verbose"]
 
 
 def percent(share: float) -> str:
-    """A share in per cent, or a dash where there is none."""
+    """Return a share in per cent, or a dash where there is none."""
     return f"{100 * share:.2f} %" if math.isfinite(share) else "–"
 
 

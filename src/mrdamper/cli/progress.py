@@ -36,7 +36,7 @@ def progress_on_stderr(quiet: bool = False, began: float | None = None) -> Itera
 
 @contextmanager
 def progress_soon(what: str) -> Iterator[Progress]:
-    """The same from the second second on: also while nobody tells anything, what is done and for how long."""
+    """Show progress from the second second on: work, and the time it has taken."""
     began, lock, latest = time.monotonic(), Lock(), (what, 0.0)
     bar: Progress | None = None
     with ExitStack() as stack:

@@ -195,7 +195,7 @@ class PortableBand:
 
 
 def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
-    """The band of a damper in four parameters, from loops at the lowest, middle and highest tested current.
+    """Return the band of a damper in four parameters, from loops at the lowest, middle and highest tested current.
 
     None where there is no band. The error that comes from the damper's parameters is taken at its
     root mean square over these loops, so a band may differ by some per cent from `band`.

@@ -62,7 +62,7 @@ class Envelope:
 
     @classmethod
     def of(cls, conditions: Sequence[Condition]) -> Envelope:
-        """The envelope of a set of tested conditions."""
+        """Return the envelope of a set of tested conditions."""
 
         def span(values: list[float]) -> tuple[float, float]:
             return min(values), max(values)
@@ -76,7 +76,7 @@ class Envelope:
         )
 
     def with_motion(self, current: Floats, displacement: Floats, velocity: Floats) -> Envelope:
-        """The envelope widened by the samples of a record that is no sine at one current."""
+        """Return the envelope widened by the samples of a record that is no sine at one current."""
 
         def wider(span: tuple[float, float], values: Floats) -> tuple[float, float]:
             return min(span[0], float(np.min(values))), max(span[1], float(np.max(values)))
@@ -176,7 +176,7 @@ def _in_hull(tested: tuple[tuple[float, float, float], ...], scale: float, asked
 
 
 def samples_in_yield_displacement(motion: Excitation, yield_length: float) -> float:
-    """Samples a motion has, after the median reversal, before it has moved on by `yield_length` [m]."""
+    """Return samples a motion has, after the median reversal, before it has moved on by `yield_length` [m]."""
     path = motion.path
     inside = np.bincount(path.stroke[path.distance < yield_length], minlength=path.stroke[-1] + 1)
     return float(np.median(inside[1:])) if inside.size > 1 else np.inf
@@ -387,7 +387,7 @@ class Damper(Displayable):
         return {}
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
-        """The damper with some of its own numbers changed; only for derivatives and draws."""
+        """Return the damper with some of its own numbers changed; only for derivatives and draws."""
         raise not_held(self, values)
 
     @property
@@ -409,7 +409,7 @@ class Damper(Displayable):
     def from_saved(
         cls, saved: Any, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
     ) -> Self:
-        """The damper of what `to_saved` gave and what all kinds share.
+        """Return the damper of what `to_saved` gave and what all kinds share.
 
         Raises
         ------
@@ -419,7 +419,7 @@ class Damper(Displayable):
         raise NotImplementedError(cls.kind)  # a kind that cannot be saved is not looked for in files
 
     def holding(self, values: Mapping[str, float]) -> Damper:
-        """The damper with some of its own numbers held at a value.
+        """Return the damper with some of its own numbers held at a value.
 
         Raises
         ------
@@ -441,7 +441,7 @@ class Damper(Displayable):
         return simulate(self.model_at(at), self.with_field_current(motion)).force
 
     def with_field_current(self, motion: Excitation) -> Excitation:
-        """The motion with the current whose field is there: its magnitude, behind the coil's lags."""
+        """Return the motion with the current whose field is there: its magnitude, behind the coil's lags."""
         if self.coil is None:
             return motion.with_current(np.abs(motion.current))
         return motion.with_current(self.coil.along(motion.time, motion.current))
@@ -475,7 +475,7 @@ class Damper(Displayable):
         return replace(prediction, force=self.force_for(prediction))
 
     def force_for(self, prediction: Prediction) -> Floats:
-        """The force of this damper for what another one's prediction was made for."""
+        """Return the force of this damper for what another one's prediction was made for."""
         motion, condition = prediction.motion, prediction.condition
         if prediction.steady:
             return self.loop(condition).force
@@ -485,7 +485,7 @@ class Damper(Displayable):
 
 
 def not_held(damper: Damper, names: Iterable[str]) -> InputError:
-    """The refusal of numbers a damper is not made of."""
+    """Return the refusal of numbers a damper is not made of."""
     return InputError(
         f"{', '.join(names)} cannot be held in a saved model of this kind",
         where=damper.title,

@@ -82,7 +82,7 @@ class PredictedRun:
 
     @classmethod
     def joined(cls, run_id: str, parts: Sequence[PredictedRun]) -> PredictedRun:
-        """The run of stretches of about one length."""
+        """Return the run of stretches of about one length."""
         thin = slice(None, None, len(parts))
         return cls(
             run_id,

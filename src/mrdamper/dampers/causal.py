@@ -32,7 +32,7 @@ def free_name(number: str) -> str:
 
 
 def trace(damper: Damper, free: bool = False) -> Program:
-    """The program of one sample.
+    """Return the program of one sample.
 
     From displacement [m], velocity [m/s], acceleration [m/s²], current [A] and the step of time [s]
     to force [N] and a flag of 8 where the frequency was not tested. One model for all conditions keeps
@@ -73,7 +73,7 @@ def trace(damper: Damper, free: bool = False) -> Program:
 
 
 def _running_condition(damper: Damper, motion: TracedMotion) -> tuple[Condition, Any]:
-    """The sine the motion has resembled so far, and whether its frequency was not tested.
+    """Return the sine the motion has resembled so far, and whether its frequency was not tested.
 
     ω² is the mean square velocity over the mean square displacement, A² twice the latter; the
     means fade in two lags of one slowest period each, and are freed of their start.

@@ -190,7 +190,7 @@ def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, Jo
 
 
 def _absent(problem: JointProblem, fit: JointFit) -> tuple[Coil | Literal["determined"] | None, tuple[str, ...]]:
-    """The coil to look for, and presets, without those that ended where they do nothing."""
+    """Return the coil to look for, and presets, without those that ended where they do nothing."""
     least = {
         a.name
         for a, u in zip(problem.axes, fit.point, strict=True)
@@ -256,7 +256,7 @@ def _left_out_current(problem: JointProblem, starts: Sequence[JointFit], levels:
 
 
 def levels_of(problem: JointProblem) -> list[list[int]]:
-    """Runs of constant current, by level from the lowest."""
+    """Return runs of constant current, by level from the lowest."""
     constant = [i for i, part in enumerate(problem.parts) if not part.changes]
     highest = max((abs(problem.parts[i].condition.current_A) for i in constant), default=0.0)
     levels: list[list[int]] = []

@@ -103,7 +103,7 @@ class Coil:
 
 
 def field_current(time: Floats, current: Floats, rise: float, fall: float, signed: bool = False) -> Floats:
-    """Current that would, held for ever, make the field that is there: the lagged magnitude.
+    """Return current that would, held for ever, make the field that is there: the lagged magnitude.
 
     T di/dt + i = |I|, T = `rise` while |I| > i and `fall` while |I| < i, exact for |I| straight
     between samples; settled at the first sample.

@@ -113,7 +113,7 @@ class RunRows:
         )
 
     def steady_end(self) -> RunRows:
-        """The last cycles of the steady part, of other records the last third: enough to compare starts and forms."""
+        """Return the last cycles of the steady part, of other records the last third: enough to compare starts."""
         kept = np.flatnonzero((self.picked >= self.steady[0]) & (self.picked <= self.steady[1]))
         kept = kept[-_ROWS if self.is_sine else -max(_ROWS, kept.size // 3) :]
         begin, end = int(self.picked[kept[0]]), int(self.picked[kept[-1]]) + 1
@@ -129,7 +129,7 @@ class RunRows:
 
 
 def _carrying(motion: Excitation, condition: Condition) -> NDArray[np.bool_]:
-    """Samples without which the motion would be another: dense where it turns, few where it runs on or rests.
+    """Return samples without which the motion would be another: dense where it turns, few where it runs on or rests.
 
     A damper's force changes within a short way after a reversal; between two it changes slowly,
     however fast the record was sampled.
@@ -201,7 +201,7 @@ class ConcatenatedRuns:
         )
 
     def with_field_current(self, coil: Coil | None) -> Excitation:
-        """The motion with the current that the field feels; remembered while the coil stays."""
+        """Return the motion with the current that the field feels; remembered while the coil stays."""
         if self._lagged_motion[0] != coil:
             current = np.abs(self.measured.current)
             for part, begin in zip(self.parts, self.begins, strict=True):
@@ -230,7 +230,7 @@ class JointResiduals:
         self._solved: tuple[Floats, LinearSolution] | None = None
 
     def only(self, runs: Sequence[int]) -> JointResiduals:
-        """The samples of some of the runs, in order; the others are followed all the same, and not looked at."""
+        """Return the samples of some of the runs, in order; the others are followed all the same, and not looked at."""
         kept, table = np.isin(self.owner, runs), copy(self)
         for name in ("picked", "target", "share", "unit"):
             setattr(table, name, getattr(self, name)[kept])

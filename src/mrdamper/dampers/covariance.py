@@ -152,7 +152,7 @@ def _identifiable(
     slopes: Sequence[Floats],
     inverse: Floats,
 ) -> tuple[_Spread, set[str]]:
-    """The covariance of parameters whose intervals span less than three decades, and those whose do not.
+    """Return the covariance of parameters whose intervals span less than three decades, and those whose do not.
 
     One parameter after the other is held, the widest first, until the intervals of the others are
     bounded; all that were too wide beside free ones are not identifiable.
@@ -226,7 +226,7 @@ def _within(parts: Sequence[RunResiduals], slopes: Sequence[Floats], inverse: Fl
 
 
 def _inside(part: RunResiduals) -> PredictedRun:
-    """A run beside the force of the fit that saw it."""
+    """Return a run beside the force of the fit that saw it."""
     at, motion = part.picked, part.prediction.motion
     powers = [dissipated_power(f, motion.velocity[at], motion.time[at]) for f in (part.measured, part.predicted)]
     peak = peak_force(part.measured) / max(peak_force(part.predicted), 1e-300)

@@ -50,7 +50,7 @@ class FoldFits:
         return min((self.problem.refit(start, rows, _FIT_TOLERANCE) for start in able), key=lambda fit: fit.error)
 
     def _search(self, block: frozenset[int]) -> list[JointFit]:
-        """Ends of the search without a block: the best, and the best of other knees that come near it."""
+        """Return ends of the search without a block: the best, and the best of other knees that come near it."""
         whole = self.problem
         rows = [i for i in range(len(whole.parts)) if i not in block]
         short = JointProblem(
@@ -70,7 +70,7 @@ class FoldFits:
         return [self._in_whole(end) for end in kept[:_START_COUNT]]
 
     def _in_whole(self, end: JointFit) -> JointFit:
-        """The end of a search as a start for fits of this problem."""
+        """Return the end of a search as a start for fits of this problem."""
         whole, point = self.problem, self.problem.from_point(end)
         linear = {info.name: getattr(end.damper.model, info.name) for info in whole.linear}
         damper = replace(end.damper, model=replace(whole.without_linear(point), **linear))

@@ -145,7 +145,7 @@ class JointDamper(Damper):
 
 
 def damper_of(given: Damper | Model) -> Damper:
-    """A damper as it is; a bare model as a damper of no rig, tested nowhere."""
+    """Return a damper as it is; a bare model as a damper of no rig, tested nowhere."""
     if isinstance(given, Model):
         return JointDamper("", given, (), UNTESTED)
     require(given, Damper, "a damper or a model", "load_model(file) gives one")
@@ -207,7 +207,7 @@ class LocalMinimum:
 
     @classmethod
     def beside(cls, chosen: JointFit, ends: Iterable[JointFit]) -> LocalMinimum | None:
-        """The best of some ends of a search that differ from the chosen one, if any."""
+        """Return the best of some ends of a search that differ from the chosen one, if any."""
         own = chosen.damper.yield_length
         others = [
             (e.error, k)
@@ -274,7 +274,7 @@ class JointProblem:
             self.axes += tuple(SearchAxis(name, *_LAG_BOUNDS_S, (_START_LAG_S,), log=True) for name in (RISE, FALL))
 
     def with_free(self, free: Sequence[str], fixed: Mapping[str, float] | None = None) -> JointProblem:
-        """The same runs with other presets free, or more parameters held."""
+        """Return the same runs with other presets free, or more parameters held."""
         held = {**self.fixed, **(fixed or {})}
         return JointProblem(self.runs, self.model_type, held, free=free, coil=self.given_coil, parts=self.parts)
 
@@ -322,7 +322,7 @@ class JointProblem:
         return JointResiduals(self, [part.steady_end() for part in few])
 
     def _downhill(self, start: Floats) -> Minimum:
-        """Some steps from a start, on few runs."""
+        """Return some steps from a start, on few runs."""
         table = self._few
         return least_squares(table.solved_residual, start, *self.box(), _TRIAL_STEPS, 1e-3, slopes=table.slopes)
 
@@ -464,7 +464,7 @@ class JointProblem:
         )
 
     def coil_at(self, point: Floats) -> Coil | None:
-        """The coil at a point of the search axes."""
+        """Return the coil at a point of the search axes."""
         if all(axis.name != RISE for axis in self.axes):
             return self.coil
         lags = {axis.name: axis.value(float(u)) for axis, u in zip(self.axes, point, strict=True)}
@@ -529,7 +529,7 @@ class JointProblem:
         return (high - low) / (ends[1][i] - ends[0][i])
 
     def without_linear(self, point: Floats) -> Model:
-        """The model at a point of the search axes, its linear parameters zero."""
+        """Return the model at a point of the search axes, its linear parameters zero."""
         values = {axis.name: axis.value(float(u)) for axis, u in zip(self.axes, point, strict=True)}
         values = {name: value for name, value in values.items() if name not in (RISE, FALL)}
         return self.model_type.build({**self.fixed, **values, **{info.name: 0.0 for info in self.linear}})

@@ -144,7 +144,7 @@ def damper_bounds(damper: Damper) -> set[str]:
 
 
 def positive(matrix: Floats) -> Floats:
-    """A covariance made symmetric, and positive where rounding left it singular."""
+    """Return a covariance made symmetric, and positive where rounding left it singular."""
     even = (matrix + matrix.T) / 2
     return even + 1e-12 * np.diag(np.diag(even))
 
@@ -230,7 +230,7 @@ _NO_PARAMETERS = Uncertainty((), (), np.zeros((0, 0)), np.zeros(0))
 
 
 def _others(likelihood: Likelihood, held: int, value: float, start: Floats) -> tuple[Floats, float]:
-    """The other numbers that describe the runs best where one is held: chords, shortened where they overshoot."""
+    """Fit the other numbers to the runs with one held, by chord steps that are shortened where they overshoot."""
     free = np.arange(len(start)) != held
     solve = np.linalg.pinv(likelihood.turned[:, free])
     at = start.copy()

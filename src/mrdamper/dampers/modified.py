@@ -113,7 +113,7 @@ class ModifiedModel(Damper):
         return low, high * (_EXTRAPOLATED_AMPLITUDE if extrapolates else 1.0)
 
     def model_at(self, condition: Condition) -> Model:
-        """The model at a condition."""
+        """Return the model at a condition."""
         return self.parameters.at(condition)
 
     def holding(self, values: Mapping[str, float]) -> ModifiedModel:

@@ -78,7 +78,7 @@ class Condensed:
     bend: Floats
 
     def only(self, rows: Sequence[int]) -> Condensed:
-        """The same for some of the runs."""
+        """Return the same for some of the runs."""
         index = list(rows)
         return replace(
             self,
@@ -198,7 +198,7 @@ def _columns(problem: Problem, linear: tuple[str, ...], shape: Mapping[str, floa
 
 
 def _gram_of_shapes(problem: Problem, table: Floats, moving: int, shape: Shape, ladder: Floats) -> Floats:
-    """The same matrices, all shapes followed at once; only the rows of the moving column differ."""
+    """Return the same matrices, all shapes followed at once; only the rows of the moving column differ."""
     grams = np.stack([table.T @ table] * ladder.size)
     few = max(1, _MAX_STATES // len(problem.motion))
     for begin in range(0, ladder.size, few):
@@ -226,7 +226,7 @@ def _size(law: str | Law) -> int:
 
 
 def law_of(form: str | Law) -> Law:
-    """A form with its rates; a name alone has none."""
+    """Return a form with its rates; a name alone has none."""
     return (form, ()) if isinstance(form, str) else form
 
 
@@ -392,7 +392,7 @@ class _ShapeSearch:
         self._last: tuple[bytes, Floats, Floats, Floats, _Solution] | None = None
 
     def weighted(self, weights: Floats) -> _ShapeSearch:
-        """The same with other weights."""
+        """Return the same with other weights."""
         return _ShapeSearch(self.design, self.start, weights)
 
     def shape_values(self, u: Floats) -> Floats:
@@ -401,14 +401,14 @@ class _ShapeSearch:
         return np.exp(np.clip(self.columns @ u, np.log(ladder[0]), np.log(ladder[-1])))
 
     def solution(self, u: Floats) -> _Solution:
-        """The other functions' coefficients at a point."""
+        """Return the other functions' coefficients at a point."""
         return self._at(u)[-1]
 
     def residual(self, u: Floats) -> Floats:
         return (self.weights[:, None] * self.solution(u).error).ravel()
 
     def slopes(self, u: Floats) -> Floats:
-        """Derivatives of the residual, the other coefficients moving along [Kaufman 1975, BIT 15, 49]."""
+        """Return derivatives of the residual, the other coefficients moving along [Kaufman 1975, BIT 15, 49]."""
         slope, factor, table, solution = self._at(u)
         inverse = np.linalg.inv(factor)
         # A triangle whose square moves by `slope` moves by the upper half of this, times itself.
@@ -539,7 +539,7 @@ def _risen(
 
 
 def _broken(fit: JointFunctionFit, name: str, conditions: Sequence[Condition], dissipating: Mapping[str, str]) -> str:
-    """The law of physics that the function of a coordinate breaks, if any."""
+    """Return the law of physics that the function of a coordinate breaks, if any."""
     function = fit.parameters.functions.get(name)
     return broken_law(function, conditions, dissipating[name]) if function and name in dissipating else ""
 
@@ -550,7 +550,7 @@ def _tried(
     folds: Mapping[str, Sequence[Sequence[int]]],
     shape_values: Floats,
 ) -> tuple[JointFunctionFit, dict[str, Floats]]:
-    """A fit with some forms, and its errors by kind of fold."""
+    """Return a fit with some forms, and its errors by kind of fold."""
     for name in data.linear:
         if not law_of(forms[name])[1] and _form(forms[name]).terms:
             require_determined(law_of(forms[name])[0], data.conditions)

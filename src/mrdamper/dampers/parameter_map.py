@@ -33,7 +33,7 @@ class ParameterMap:
         object.__setattr__(self, "functions", dict(self.functions))
 
     def at(self, condition: Condition) -> Model:
-        """The model at a condition; values a function drives past a parameter's bounds stop there."""
+        """Return the model at a condition; values a function drives past a parameter's bounds stop there."""
         motion = condition.frequency_Hz, condition.amplitude_m
         if self.motions is not None and self.follows_motion:
             motion = self.motions.nearest(*motion)

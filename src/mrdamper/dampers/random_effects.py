@@ -60,7 +60,7 @@ class _Component:
     members: Floats | None
 
     def sums(self, table: Floats) -> Floats:
-        """Sums of the rows (R, ·) of each group."""
+        """Return sums of the rows (R, ·) of each group."""
         return table if self.members is None else self.members @ table
 
     @property
@@ -101,7 +101,7 @@ class GainsAndOffsets:
         self.sessions = members if len(names) >= SESSIONS_NEEDED else []
 
     def effects(self) -> Effects:
-        """The four standard deviations and the degrees of freedom behind them."""
+        """Return the four standard deviations and the degrees of freedom behind them."""
         single = [[k] for k in range(len(self.runs))]
         between, within = self._pair(self.sessions), self._pair(single)
         if not between or self._dof(between[0], len(self.sessions)) < 1:
@@ -161,7 +161,7 @@ class GainsAndOffsets:
         return self._moment(component, component) / count
 
     def _excess(self, component: _Component) -> float:
-        """The statistic of a component, less what noise alone gives it."""
+        """Return the statistic of a component, less what noise alone gives it."""
         read, noise = (values[component.which :: 2, None] for values in (self._read, self._noise))
         return float(np.sum((component.sums(read) ** 2 - component.sums(noise)) / component.sizes))
 
@@ -173,7 +173,7 @@ class GainsAndOffsets:
         return min(trace**2 / square, count - 1.0) if square > 0 else 0.0
 
     def _equations(self, components: Sequence[_Component]) -> Floats:
-        """Expectation of each statistic by each variance, every row over its own diagonal."""
+        """Return expectation of each statistic by each variance, every row over its own diagonal."""
         table = np.array([[self._moment(a, b) for b in components] for a in components])
         return table / np.maximum(np.diag(table), np.finfo(float).tiny)[:, None]
 

@@ -121,7 +121,7 @@ class RunScatter:
         return float(np.sqrt(self.session**2 + self.hour**2 + self.run**2))
 
     def covariance(self, a: Sequence[RecordingTime], b: Sequence[RecordingTime]) -> Floats:
-        """(A, B) of runs that are not the same."""
+        """Return (A, B) of runs that are not the same."""
         shared = [[x.session is not None and x.session == y.session for y in b] for x in a]
         same = np.array(shared, dtype=float).reshape(len(a), len(b))
         hours = [[np.nan if w.hour is None else w.hour for w in when] for when in (a, b)]
@@ -340,7 +340,7 @@ def known_errors(runs: Sequence[Run], left_out: Sequence[GainOffset]) -> Floats:
 
 
 def _refuse_disorder(runs: Sequence[Run], when: Sequence[RecordingTime]) -> None:
-    """A session is one stretch of time: runs of another within it say that a clock or a name is wrong."""
+    """Refuse a session interrupted by runs of another: a clock or a name is wrong."""
     timed = sorted((i for i, w in enumerate(when) if w.hour is not None), key=lambda i: when[i].hour or 0.0)
     timed = [i for i in timed if when[i].session is not None]
     ended: set[str | None] = set()

@@ -16,7 +16,7 @@ _RELATIVE_STEP = 1e-4  # of a number
 
 
 def force_slopes(damper: Damper, prediction: Prediction, names: Sequence[str]) -> Floats:
-    """Derivatives of a predicted force by some of the damper's own numbers, or by their logarithm.
+    """Return derivatives of a predicted force by some of the damper's own numbers, or by their logarithm.
 
     Of the linear parameters of one model they are columns that share one state; by the others the
     force is predicted again.

@@ -101,7 +101,7 @@ def load_about(path: str | Path) -> About:
 
 
 def about_of(table: Mapping[str, Any], where: str) -> About:
-    """The head of a report from its fields; the logo is a data address already.
+    """Return the head of a report from its fields; the logo is a data address already.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def about_of(table: Mapping[str, Any], where: str) -> About:
 
 
 def logo_of(text: str) -> str:
-    """A picture, given as base64, as the data address a page holds.
+    """Return a picture, given as base64, as the data address a page holds.
 
     Raises
     ------

@@ -131,7 +131,7 @@ def _rows(rig: RigComparison) -> list[dict[str, Any]]:
 
 
 def _evaluations(entry: RecipeResult) -> int | None:
-    """The budget of an identification: forces computed, median over runs."""
+    """Return the budget of an identification: forces computed, median over runs."""
     counts = [i.evaluations for i in entry.identifications]
     return int(np.median(counts)) if counts else None
 
@@ -200,7 +200,7 @@ def _plain(value: float) -> float | None:
 
 
 def text_table(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The ranking for a terminal."""
+    """Return the ranking for a terminal."""
     lines = [
         f"{'':3} {'model':42} {'per run':>8} {'ident.':>6} {'CV':>8} {'worst':>6} {'valid.':>8} {'worst':>6} "
         f"{'parameters':>10} {'s':>6}"

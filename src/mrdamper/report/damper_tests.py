@@ -106,7 +106,7 @@ def figures_of_tests(
 
 
 def _bar(limit: Limit) -> tuple[float, float, float, float]:
-    """Current [A], velocity [m/s], lower and upper force [N] of a limit as drawn: compression is negative."""
+    """Return current [A], velocity [m/s], lower and upper force [N] of a limit as drawn: compression is negative."""
     sign = 1.0 if limit.side == "rebound" else -1.0
     return limit.current_A, limit.velocity_m_s, sign * limit.lower_N, sign * limit.upper_N
 

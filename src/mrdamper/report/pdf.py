@@ -208,14 +208,14 @@ class _Writer:
         return scale if scale >= _MIN_SCALE else 0.0
 
     def logo(self, element: _Element) -> None:
-        """A picture that stands in the page itself, at the right margin."""
+        """Draw a picture that stands in the page itself, at the right margin."""
         picture = b64decode((element.attributes.get("src") or "").partition("base64,")[2])
         top = self.paper.get_y()
         self.paper.image(picture, Align.R, top, _LOGO[0], _LOGO[1], keep_aspect_ratio=True, alt_text="logo")
         self.paper.set_y(top + _LOGO[1] + 2)
 
     def heading(self, element: _Element) -> None:
-        """A heading, with room below it for what it heads."""
+        """Draw a heading, with room below it for what it heads."""
         paper, size = self.paper, _SIZES[element.tag]
         if element.tag == "h2":
             self.place_waiting(all_of_them=True)
@@ -229,7 +229,7 @@ class _Writer:
         paper.ln(0.12 * size)
 
     def paragraph(self, element: _Element, size: float = _SIZES["p"], indent: float = 0.0) -> None:
-        """Running text, with bold and code inside."""
+        """Draw running text, with bold and code inside."""
         paper = self.paper
         faint = (element.attributes.get("class") or "") in ("faint", "caption")
         paper.set_text_color(*(_FAINT if faint else _INK))
@@ -269,17 +269,17 @@ class _Writer:
         return 6.0 + 4.0 * lines + (0.0 if caption_only else tall * min(1.0, self.paper.epw / wide))
 
     def item(self, element: _Element) -> None:
-        """An item of a list."""
+        """Draw an item of a list."""
         self.paragraph(_Element("p", element.attributes, ["•  ", *element.children]), indent=3.0)
 
     def numbers(self, element: _Element) -> None:
-        """The large figures of a summary, one a line."""
+        """Draw the large figures of a summary, one a line."""
         for box in element.elements("div"):
             value = next(box.elements("b")).text
             self.paragraph(_Element("p", {}, [_Element("b", {}, [value]), f"  {next(box.elements('span')).text}"]))
 
     def figure(self, element: _Element) -> None:
-        """A figure and its caption, on one page: smaller where it nearly fits, later where it does not."""
+        """Draw a figure and its caption, on one page: smaller where it nearly fits, later where it does not."""
         name = element.attributes.get("id") or ""
         paper = self.paper
         scale = self._scale(element) if name in self.figures else 1.0
@@ -298,7 +298,7 @@ class _Writer:
             self.paragraph(_Element("p", {"class": "caption"}, caption.children), _SIZES["caption"])
 
     def table(self, element: _Element) -> None:
-        """A table whose headings stand on every page it runs over."""
+        """Draw a table whose headings stand on every page it runs over."""
         caption = next(element.elements("caption"), None)
         rows = _cells(element)
         if not rows:

@@ -64,7 +64,7 @@ def prediction_rows(prediction: Prediction, band: Band | None = None) -> list[di
 
 
 def score_row(run: RunScore) -> dict[str, Any]:
-    """The columns of the command-line contract for one scored run."""
+    """Return the columns of the command-line contract for one scored run."""
     s = run.scores
     return {
         "run_id": run.run_id,
@@ -80,7 +80,7 @@ def score_row(run: RunScore) -> dict[str, Any]:
 
 
 def _ends(identification: Identification) -> dict[str, float | None]:
-    """Ends of the 95 % intervals of the free parameters."""
+    """Return ends of the 95 % intervals of the free parameters."""
     columns: dict[str, float | None] = {}
     for name in (info.name for info in identification.model.parameters() if info.name in identification.free):
         columns[f"{name} low 95 %"], columns[f"{name} high 95 %"] = identification.interval(name) or (None, None)

@@ -30,7 +30,7 @@ _FOLDERS = 3  # above a file, whose names may state its current
 def current_of(
     table: RawTable, profile: Profile, path: Path, channel: Floats | None, rows: slice
 ) -> tuple[float | None, dict[str, str]]:
-    """The current [A] that a test states beside its columns, and where; None where the channel has it, or nothing does.
+    """Return the current [A] that a test states beside its columns, and where; None if the channel has it, or neither.
 
     Of a table of several tests one after the other, this one has the given rows.
 
@@ -121,7 +121,7 @@ def _set_points(table: RawTable, rows: slice) -> list[Statement]:
 
 
 def _folders(table: RawTable, path: Path) -> list[Statement]:
-    """The nearest folder, of a file or within an archive, whose name states a current."""
+    """Return the nearest folder, of a file or within an archive, whose name states a current."""
     inner = PurePosixPath(table.source.name.removeprefix(f"{path.name}:")).parent.parts
     for name in (*reversed(inner), *(folder.name for folder in list(path.parents)[:_FOLDERS])):
         stated = currents_in(name) or tuple(s.amperes for s in stated_by_lines([name]))
@@ -147,7 +147,7 @@ def as_data(text: str) -> str:
 
 
 def without_gaps(current: Floats) -> tuple[Floats, tuple[Finding, ...]]:
-    """A current that is recorded at every n-th sample only, by its mean, where it is constant."""
+    """Return a current that is recorded at every n-th sample only, by its mean, where it is constant."""
     count = sum(int(np.count_nonzero(np.isfinite(piece))) for _, piece in chunks(current))
     if count < _FEWEST_SLOW or count > 0.6 * current.size:
         return current, ()

@@ -164,13 +164,13 @@ def split_name(header: str, unit: str = "") -> Header:
 
 
 def words_of(name: str) -> list[str]:
-    """The words a name is made of: coil_current, coilCurrent, Coil current."""
+    """Return the words a name is made of: coil_current, coilCurrent, Coil current."""
     return [word for word in re.split(r"[^\w]+|_|(?<=[a-zà-ÿ])(?=[A-Z])", name[:_LONGEST_NAME]) if word]
 
 
 @lru_cache(maxsize=4096)
 def role_of(name: str) -> str | None:
-    """The channel a name stands for, None if it says nothing or names a command."""
+    """Return the channel a name stands for, None if it says nothing or names a command."""
     if len(name) > _LONGEST_NAME:
         return None
     name = _RATE_GROUP.sub("", name)

@@ -115,7 +115,7 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
 
 
 def partly_assigned(table: RawTable, profile: Profile) -> dict[str, Assigned]:
-    """The channels of a table that is no whole test, as far as they are known beyond doubt."""
+    """Return the channels of a table that is no whole test, as far as they are known beyond doubt."""
     assigned: dict[str, Assigned] = {}
     for role in ROLES:
         try:
@@ -131,7 +131,7 @@ def partly_assigned(table: RawTable, profile: Profile) -> dict[str, Assigned]:
 
 
 def rate_of(table: RawTable, profile: Profile) -> float | None:
-    """Sampling rate [Hz] of a table without time stamps, by the profile or by what stands beside the columns."""
+    """Return sampling rate [Hz] of a table without time stamps, by the profile or by what stands beside the columns."""
     if profile.file.sample_rate_Hz:
         return profile.file.sample_rate_Hz
     decimal = table.form.get("decimal")
@@ -145,13 +145,13 @@ def rate_of(table: RawTable, profile: Profile) -> float | None:
 
 
 def index_of_samples(table: RawTable) -> int | None:
-    """The column that counts samples, None if there is none or several may."""
+    """Return the column that counts samples, None if there is none or several may."""
     columns = [i for i, name in enumerate(table.names) if name.strip(" .#").casefold() in _INDEX]
     return columns[0] if len(columns) == 1 else None
 
 
 def left_out(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]) -> dict[str, str]:
-    """Optional channels that a column is named after but that its unit forbids to use, and why.
+    """Return optional channels that a column is named after but that its unit forbids to use, and why.
 
     A column without a unit is only told of if it may be the coil current, which no test can do without.
     """
@@ -192,7 +192,7 @@ def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
 
 
 def candidates_of(table: RawTable, role: str) -> list[int]:
-    """The columns that may be a channel: the one its name tells, else all of its unit that name nothing else."""
+    """Return the columns that may be a channel: the one its name tells, else all of its unit that name nothing else."""
     try:
         choice = _choose(table, role, ())
     except InputError:
@@ -234,7 +234,7 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
 
 
 def column_called(table: RawTable, column: str | int, role: str) -> int:
-    """The column that a profile names for a channel; `ColumnError` if there is none."""
+    """Return the column that a profile names for a channel; `ColumnError` if there is none."""
     if isinstance(column, int):
         if not 1 <= column <= len(table.names):
             problem = f"no column {column}: there are {len(table.names)}"
@@ -251,7 +251,7 @@ def column_called(table: RawTable, column: str | int, role: str) -> int:
 
 
 def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> list[InputError]:
-    """A refusal for every channel that no column is known to be."""
+    """Return a refusal for every channel that no column is known to be."""
     missing = [r for r in REQUIRED if r not in columns and not (r == "time" and rate_of(table, profile))]
     if missing and not any(table.names):
         what = f"{len(table.names)} columns without names or units"
@@ -336,7 +336,7 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
 
 
 def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> None:
-    """A name and a row of units must not say different things."""
+    """Refuse a column whose name and row of units state different units."""
     inner = split_name(table.names[column]) if table.units[column] else None
     other = parse_unit(unit)
     if inner is None or other in (None, inner.known) or inner.dimension != DIMENSION[role]:
@@ -373,7 +373,7 @@ def _refuse_two_values(table: RawTable, column: int) -> None:
 
 
 def _second_clock(table: RawTable, time: Assigned) -> list[InputError]:
-    """The refusal of a file with another time that runs otherwise."""
+    """Return the refusal of a file with another time that runs otherwise."""
     clocks = [i for i, header in enumerate(table.headers) if header.role == header.dimension == "time"]
     for other in [i for i in clocks if i != time.column][:3]:
         try:

@@ -93,12 +93,12 @@ def currents_in_cells(line: str) -> list[float]:
 
 
 def without_currents(text: str) -> str:
-    """A title without the currents it states."""
+    """Return a title without the currents it states."""
     return re.sub(r"\s{2,}", " ", _IN_NAME.sub(" ", text[:255])).strip() if currents_in(text) else text
 
 
 def amperes(number: str, unit: str) -> float:
-    """A number with decimal point, comma, x or p, in A or mA."""
+    """Return a number with decimal point, comma, x or p, in A or mA."""
     value = float(re.sub("[,xp]", ".", number))
     return value / 1000 if unit == "mA" else value
 
@@ -126,7 +126,7 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
 
 
 def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
-    """The current in the free text of lines that name no limit or range, if all say one: "Test 3: 0.4 A, 2 Hz"."""
+    """Return the current in free text of lines that name no limit or range, if all state one: "Test 3: 0.4 A"."""
     statements = []
     for line in lines:
         stated = () if _RATING.search(line) else currents_in(line)
@@ -136,7 +136,7 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
 
 
 def rate_in_name(name: str) -> float | None:
-    """Sampling rate [Hz] in a file's name: 500Hz_fs, fs_2kHz; None if there is none."""
+    """Return sampling rate [Hz] in a file's name: 500Hz_fs, fs_2kHz; None if there is none."""
     match = _RATE_IN_NAME.search(name[:255])
     if match is None:
         return None
@@ -145,7 +145,7 @@ def rate_in_name(name: str) -> float | None:
 
 
 def stated_rate(lines: Iterable[str], numbers: Mapping[str, float], decimal: str | None = None) -> float | None:
-    """Sampling rate [Hz] that lines or numbers beside the columns state, as a rate or as a step; None if none does.
+    """Return the sampling rate [Hz] that lines or numbers beside the columns state, as a rate or a step, or None.
 
     Raises ValueError if two of them contradict each other.
     """
@@ -253,7 +253,7 @@ def _value(number: str, decimal: str | None) -> float | None:
 
 
 def agreed(statements: Sequence[Statement]) -> Statement | None:
-    """The first of statements that agree; None if there is none.
+    """Return the first of statements that agree; None if there is none.
 
     Raises ValueError with what was found, if two contradict each other or one is no coil current.
     """
@@ -269,7 +269,7 @@ def agreed(statements: Sequence[Statement]) -> Statement | None:
 
 
 def contradicted(channel: Floats, stated: float) -> float | None:
-    """The mean of a constant current channel that contradicts what is stated [A]; None where it does not."""
+    """Return the mean of a constant current channel that contradicts what is stated [A]; None where it does not."""
     finite = channel[np.isfinite(channel)]
     mean, change = held_current(finite) if finite.size >= 3 else (stated, "")
     return mean if not change and contradicts(mean, stated) else None

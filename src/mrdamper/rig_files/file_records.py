@@ -82,7 +82,7 @@ def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
 
 
 def _stated_columns(profile: Profile) -> dict[str, str | int]:
-    """The columns that the profile names, by channel."""
+    """Return the columns that the profile names, by channel."""
     return {name: channel.column for name, channel in profile.channels.items() if channel.column is not None}
 
 
@@ -128,7 +128,7 @@ def _rows(table: RawTable, column: int) -> int:
 
 
 def _incomplete(table: RawTable, error: InputError) -> InputError:
-    """The refusal of one of a file's tests, with its table named."""
+    """Return the refusal of one of a file's tests, with its table named."""
     label = json.dumps(table.label, ensure_ascii=False)
     return ColumnError(
         error.found,

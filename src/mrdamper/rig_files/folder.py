@@ -21,7 +21,7 @@ def is_left_out(name: str, profile: Profile) -> bool:
 
 
 def files_in(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
-    """The files to be read, and those of the folders that are of other kinds."""
+    """Return the files to be read, and those of the folders that are of other kinds."""
     files: list[Path] = []
     others: list[Path] = []
     for path in paths:

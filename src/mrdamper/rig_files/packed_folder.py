@@ -32,7 +32,7 @@ _NESTED = (".zip", ".gz", ".tgz", ".tar", ".bz2", ".xz", ".7z", ".rar")
 
 @contextlib.contextmanager
 def unpacked(paths: Iterable[str | Path]) -> Iterator[list[Path]]:
-    """The same paths, with a folder in the place of every archive of several files; raises as `opened`."""
+    """Yield the same paths, with a folder in the place of every archive of several files; raises as `opened`."""
     with contextlib.ExitStack() as stack:
         members = []
         for path in map(Path, paths):

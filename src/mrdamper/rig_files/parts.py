@@ -86,7 +86,7 @@ def _rows_of(codes: np.ndarray, code: int) -> slice | np.ndarray:
 
 
 def _remembered(table: RawTable) -> Callable[[tuple[int, ...]], Content]:
-    """The table's columns, kept while its tests are taken out one by one; of a small file all are read in one pass."""
+    """Keep the table's columns while its tests are taken out one by one; of a small file all are read in one pass."""
     if table.source.size > _SMALL:
         return lru_cache(maxsize=2)(lambda columns: table.read(columns))
 
@@ -113,7 +113,7 @@ def _part(
     rows: Callable[[], slice | np.ndarray],
     label: str,
 ) -> RawTable:
-    """Some of a table's columns in the rows of one test, which are asked for when they are needed."""
+    """Return some of a table's columns in the rows of one test, which are asked for when they are needed."""
 
     def part(wanted: Sequence[int]) -> Content:
         content, inside = read(tuple(columns[i] for i in wanted)), rows()
@@ -142,7 +142,7 @@ def _lines(lines: LineNumbers | None, rows: slice | np.ndarray) -> LineNumbers |
 
 
 def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
-    """Groups of columns beside each other, each a test; empty if the table has none.
+    """Return groups of columns beside each other, each a test; empty if the table has none.
 
     A group has its own displacement and force. What tells a test from a second sensor is a
     time of its own, or a title that states a current.
@@ -231,7 +231,7 @@ def _key(name: str, role: str) -> str:
 
 
 def _shared(table: RawTable, members: dict[str, dict[str, int]]) -> list[int]:
-    """The one time or current that belongs to every group."""
+    """Return the one time or current that belongs to every group."""
     grouped = {i for roles in members.values() for i in roles.values()}
     shared = []
     for role in ("time", "current"):
@@ -242,7 +242,7 @@ def _shared(table: RawTable, members: dict[str, dict[str, int]]) -> list[int]:
 
 
 def _filled(table: RawTable, read: Callable[[tuple[int, ...]], Content], roles: dict[str, int], label: str) -> slice:
-    """The rows of a group, down to its last: shorter groups end in empty cells."""
+    """Return the rows of a group, down to its last: shorter groups end in empty cells."""
     both = tuple(sorted((roles["displacement"], roles["force"])))
     values = read(both).values
     there = np.flatnonzero(np.isfinite(values[both[0]]) | np.isfinite(values[both[1]]))

@@ -169,7 +169,7 @@ class Profile(Table):
         return channels
 
     def of_file(self, name: str) -> tuple[str, Profile]:
-        """The test that a file of some channels belongs to, and its profile; an empty name for any other file."""
+        """Return the test that a file of some channels belongs to, and its profile; an empty name for other files."""
         stated = {role: channel for role, channel in self.channels.items() if channel.file is not None}
         matches = {role: re.fullmatch(_as_expression(c.file or ""), name[:255]) for role, c in stated.items()}
         runs = {match["run"] for match in matches.values() if match}
@@ -194,19 +194,19 @@ def load_profile(path: str | Path) -> Profile:
 
 
 def profile_of(profile: Profile | str | Path | None) -> Profile:
-    """The profile given, read from its file where a path is given; an empty one for None."""
+    """Return the profile given, read from its file where a path is given; an empty one for None."""
     if profile is None:
         return Profile()
     return profile if isinstance(profile, Profile) else load_profile(profile)
 
 
 def parse_profile(text: str, where: str = "profile") -> Profile:
-    """A profile from TOML text; raises as `load_profile`."""
+    """Return a profile from TOML text; raises as `load_profile`."""
     return parse_toml(text, Profile, ProfileError, _HELP, where)
 
 
 def profile_text(profile: Profile) -> str:
-    """The profile as TOML that reads back equal."""
+    """Return the profile as TOML that reads back equal."""
     lines = [f"{key} = {_toml(getattr(profile, key))}" for key in ("rig", "excitation", "split")]
     sections = {"file": profile.file.model_dump(exclude_none=True, exclude_defaults=True)}
     plain = Channel().model_dump(exclude_none=True)
@@ -267,7 +267,7 @@ def current_in_name(name: str, profile: Profile) -> float | None:
 
 
 def current_pattern(name: str) -> CurrentSource | None:
-    """The pattern by which a file name states its current, None if it states none."""
+    """Return the pattern by which a file name states its current, None if it states none."""
     stated = current_in_name(name, Profile())
     if stated is None:
         return None

@@ -56,7 +56,7 @@ class LineNumbers:
     def __getitem__(self, sample: slice | np.ndarray) -> np.ndarray: ...
 
     def __getitem__(self, sample):
-        """The line of one sample, or of several."""
+        """Return the line of one sample, or of several."""
         index = np.arange(self.size)[sample] if isinstance(sample, slice) else np.asarray(sample)
         if index.dtype == bool:
             index = np.flatnonzero(index)
@@ -66,7 +66,7 @@ class LineNumbers:
         return int(line) if np.ndim(line) == 0 else line
 
     def part(self, start: int, stop: int) -> LineNumbers:
-        """The lines of the samples start..stop-1."""
+        """Return the lines of the samples start..stop-1."""
         inner = [i for i, at in enumerate(self.starts) if start < at < stop]
         starts = (0, *(self.starts[i] - start for i in inner))
         return LineNumbers(stop - start, starts, (self[start], *(self.lines[i] for i in inner)))
@@ -158,5 +158,5 @@ class Record:
         return there
 
     def noticed(self, *findings: Finding) -> Record:
-        """The same record with further findings."""
+        """Return the same record with further findings."""
         return replace(self, findings=(*self.findings, *findings))

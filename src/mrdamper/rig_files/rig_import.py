@@ -112,7 +112,7 @@ def read_runs(path: str | Path, profile: Profile | str | Path | None = None) -> 
 
 @contextlib.contextmanager
 def first_file(paths: Sequence[str | Path]) -> Iterator[Path]:
-    """The first file among files, folders and archives, for as long as the block goes."""
+    """Yield the first file among files, folders and archives, for as long as the block goes."""
     with unpacked(paths) as given:
         yield files_in(given)[0][0]
 
@@ -193,7 +193,7 @@ class _Intake:
         self._tables_of_results: dict[Path, Results | None] = {}
 
     def _results(self, path: Path) -> Results | None:
-        """The table of results that a file holds, read once."""
+        """Return the table of results that a file holds, read once."""
         if path not in self._tables_of_results:
             self._tables_of_results[path] = results_of(path)
         return self._tables_of_results[path]
@@ -306,7 +306,7 @@ class _Intake:
         return used
 
     def _numbered(self, results: Results) -> list[tuple[Path, Record]]:
-        """The tests without a current, those of a file apart that one of its columns numbers as a table of results."""
+        """Return the tests without a current, apart for those of a file that a column numbers as results do."""
         tests: list[tuple[Path, Record]] = []
         for path in dict.fromkeys(path for path, _ in self._pending):
             own = [record for file, record in self._pending if file == path]
@@ -358,7 +358,7 @@ def found_tests(
 
 
 def _with_folders(tests: Sequence[tuple[Path, Record]]) -> list[Record]:
-    """Records whose file is told with its folders, where files of several folders have one name."""
+    """Return records whose file is told with its folders, where files of several folders have one name."""
     paths = {path for path, _ in tests}
     records = []
     for path, record in tests:
@@ -371,7 +371,7 @@ def _with_folders(tests: Sequence[tuple[Path, Record]]) -> list[Record]:
 
 
 def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
-    """The runs of judged records, with their provenance as notes.
+    """Return the runs of judged records, with their provenance as notes.
 
     Raises
     ------
@@ -384,7 +384,7 @@ def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
 
 
 def _with_current(record: Record) -> Record:
-    """The record, if it has a current."""
+    """Return the record, if it has a current."""
     if record.current is not None:
         return record
     why = [f.text for f in record.findings if f.text.startswith("the current channel")]
@@ -398,7 +398,7 @@ def _with_current(record: Record) -> Record:
 
 
 def with_unique_ids(records: Iterable[Record]) -> tuple[Record, ...]:
-    """Records told apart by their names: files of different folders may share one."""
+    """Return records told apart by their names: files of different folders may share one."""
     by_id: dict[str, Record] = {}
     for record in records:
         name, count = record.id, 2

@@ -37,7 +37,7 @@ _LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged c
 
 
 def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
-    """The records a table of one test holds, not yet judged: several where its time starts again and again.
+    """Return the records a table of one test holds, not yet judged: several where its time starts again and again.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
 
 
 def _read(table: RawTable, assigned: dict[str, Assigned]):
-    """The columns' numbers, what was noticed, the lines; a damaged cell of a further channel costs that channel."""
+    """Return the columns' numbers, findings and lines; a damaged cell of a further channel costs that channel."""
     content = table.read([entry.column for name, entry in assigned.items() if name not in _LENIENT])
     raw = dict(content.values)
     for column, values in raw.items():

@@ -42,7 +42,7 @@ _PATIENCE = 30  # real time over processor time, on a loaded machine
 
 @contextlib.contextmanager
 def guarded_tables(source: Source, reader: Reader, form: FileForm) -> Iterator[list[RawTable]]:
-    """The tables of a file, read by a process of its own.
+    """Yield the tables of a file, read by a process of its own.
 
     Raises what the reader raises; E_FORMAT if its library crashes, hangs or takes too much memory,
     E_READER_KILLED if somebody else ends it; `MissingExtraError` if the library is not installed.
@@ -90,7 +90,7 @@ class _Asked:
         return answer
 
     def table(self, index: int, table: dict[str, Any]) -> RawTable:
-        """A table whose columns are asked for when they are needed."""
+        """Return a table whose columns are asked for when they are needed."""
 
         def read(columns: Sequence[int]) -> Content:
             answer = self({"table": index, "columns": list(columns)})
@@ -156,7 +156,7 @@ class _Sandboxes:
 
     @contextlib.contextmanager
     def taken(self, reader: str) -> Iterator[_Sandbox]:
-        """The child, for one file at a time; if it dies, its successor makes ready for that reader."""
+        """Yield the child, for one file at a time; if it dies, its successor makes ready for that reader."""
         with self._lock:
             if self._owner != os.getpid():  # a fork must not share its parent's pipes
                 self._sandbox, self._owner = None, os.getpid()
@@ -186,7 +186,7 @@ def _sleeps(pid: int) -> bool:
 
 
 def _on_disk(source: Source, stack: contextlib.ExitStack) -> Path:
-    """A path of the unpacked content."""
+    """Return a path of the unpacked content."""
     if source.name == source.path.name and source.size == source.path.stat().st_size:
         return source.path
     copy = stack.enter_context(tempfile.NamedTemporaryFile(prefix="mrdamper-"))  # noqa: SIM115

@@ -58,7 +58,7 @@ def serve() -> None:
 
 
 def _library(name: str) -> Reader:
-    """The reader of that name, with its library loaded."""
+    """Return the reader of that name, with its library loaded."""
     from mrdamper.rig_files.readers import all_readers
     from mrdamper.rig_files.readers.arrays import load
 

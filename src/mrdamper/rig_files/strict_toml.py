@@ -59,7 +59,7 @@ def parse_toml(text: str, kind: type[T], refuse: type[InputError], help: str, wh
 
 
 def _nearest(kind: type[BaseModel], place: tuple[int | str, ...]) -> str:
-    """The known key that is written most like an unknown one, as a question; empty if none is near."""
+    """Return the known key that is written most like an unknown one, as a question; empty if none is near."""
     fields: Any = kind.model_fields
     for part in place[:-1]:
         types = _models(fields[part].annotation) if isinstance(part, str) and part in fields else []
@@ -69,7 +69,7 @@ def _nearest(kind: type[BaseModel], place: tuple[int | str, ...]) -> str:
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
-    """The schemas within a type."""
+    """Return the schemas within a type."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [model for inner in get_args(annotation) for model in _models(inner)]

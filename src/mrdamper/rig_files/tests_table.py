@@ -57,13 +57,13 @@ class TestsTable:
     __test__ = False
 
     def of(self, path: Path, run: str) -> StatedTest | None:
-        """The row of a test: of its run, else of its file."""
+        """Return the row of a test: of its run, else of its file."""
         own = [row for row in self.rows if _is_file(row.file, path) and row.run in ("", run)]
         own.sort(key=lambda row: row.run == "")
         return own[0] if own else None
 
     def of_file(self, path: Path) -> tuple[StatedTest, ...]:
-        """The rows of a file's tests."""
+        """Return the rows of a file's tests."""
         return tuple(row for row in self.rows if _is_file(row.file, path))
 
     def require_found(self, tests: Iterable[tuple[Path, str]]) -> None:
@@ -143,7 +143,7 @@ def load_tests(path: str | Path) -> TestsTable:
 
 
 def applied(record: Record, row: StatedTest | None, table: TestsTable) -> Record:
-    """A record with what its row says; E_CURRENT_CONTRADICTS if its channel, name or heading states another current."""
+    """Apply a row to a record; E_CURRENT_CONTRADICTS if its channel, name or heading states another current."""
     if row is None:
         return record
     if row.current is not None:

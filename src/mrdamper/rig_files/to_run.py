@@ -16,7 +16,7 @@ from mrdamper.rig_files.record import FURTHER, Record
 
 
 def to_run(record: Record) -> Run:
-    """The run a record holds.
+    """Return the run a record holds.
 
     Missing samples are left out, as are segments of under five samples. Where the motion is
     periodic, the steady window is the largest whole number of its last steady cycles. The

@@ -92,7 +92,7 @@ _PLAIN = re.compile(r"[A-Za-zµμΩ°]{1,20}(?:\^?-?[1-4])?(?:[*/·⋅ ][A-Za-z�
 
 
 def parse_unit(text: str) -> Unit | None:
-    """The unit a text states, None if it states none that is known."""
+    """Return the unit a text states, None if it states none that is known."""
     return _parse(text) if len(text) <= 40 else None
 
 

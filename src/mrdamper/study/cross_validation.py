@@ -42,7 +42,7 @@ def cross_validate(pieces: Sequence[Run], refit: Callable[[Sequence[int]], Dampe
 
 
 def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
-    """Indices of runs that are left out together, by kind of fold beyond a single condition.
+    """Return indices of runs that are left out together, by kind of fold beyond a single condition.
 
     Parameters
     ----------
@@ -78,12 +78,12 @@ def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
 
 
 def all_folds(pieces: Sequence[Run]) -> list[list[int]]:
-    """Indices left out together in any kind of fold."""
+    """Return indices left out together in any kind of fold."""
     return [*condition_folds(pieces), *(group for groups in folds_by_kind(pieces).values() for group in groups)]
 
 
 def condition_folds(pieces: Sequence[Run]) -> list[list[int]]:
-    """Indices of the runs of every condition; records that are no sine at one current are a condition each."""
+    """Return indices of the runs of every condition; records that are no sine at one current are a condition each."""
     motions = [equivalent_sine(piece) for piece in pieces]
     sines = [i for i, motion in enumerate(motions) if motion.is_sine and not pieces[i].current_changes]
     groups = same_condition([motions[i].condition for i in sines])
@@ -92,7 +92,7 @@ def condition_folds(pieces: Sequence[Run]) -> list[list[int]]:
 
 
 def _fastest(conditions: Sequence[Condition]) -> list[int]:
-    """The sines of the largest peak velocities, those of one motion at least; empty where they leave fewer than two."""
+    """Return the sines of the largest peak velocities, one motion at least; empty if fewer than two would remain."""
     groups = same_motion(conditions, _MOTION_TOLERANCE) if conditions else []
     groups.sort(key=lambda group: -max(conditions[k].peak_velocity for k in group))
     if len(groups) < 3:
@@ -103,7 +103,7 @@ def _fastest(conditions: Sequence[Condition]) -> list[int]:
 
 
 def _sessions(pieces: Sequence[Run]) -> list[list[int]]:
-    """Runs of every session; none where a session is unknown, where there are fewer than three, or one a run."""
+    """Return runs of every session; none where a session is unknown, where there are fewer than three, or one a run."""
     try:
         named = [session_of(piece) for piece in pieces]
     except InputError:
@@ -136,7 +136,7 @@ def cross_validate_by_kind(
 
 
 def stretches(run: Run) -> list[Run]:
-    """A record that is no sine, cut into stretches of a dozen cycles or more, eight at most; a sine as it is."""
+    """Return a record that is no sine, cut into stretches of a dozen cycles or more, eight at most; a sine as it is."""
     motion = equivalent_sine(run)
     period = 1 / motion.condition.frequency_Hz
     begin, end = run.window or (float(run.time[0]), float(run.time[-1]))

@@ -12,7 +12,7 @@ _SESSIONS = 2  # so that a repeat tells how much they differ
 
 
 def first_matrix(limits: Limits, hours: float) -> list[Proposal]:
-    """A first test matrix, the most telling rows first.
+    """Return a first test matrix, the most telling rows first.
 
     Raises
     ------

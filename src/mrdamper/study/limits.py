@@ -125,7 +125,7 @@ class Limits:
 
     @classmethod
     def of(cls, damper: Damper) -> Limits:
-        """The ranges a damper was tested over."""
+        """Return the ranges a damper was tested over."""
         e = damper.envelope
         amplitudes = 1e3 * e.amplitude_m[0], 1e3 * e.amplitude_m[1]
         rate = min(cls.sample_rate_Hz, 0.5 * _MAX_SAMPLES * e.frequency_Hz[0] / cls.cycles)

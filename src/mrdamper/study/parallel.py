@@ -91,7 +91,7 @@ def _quietly(function: Callable[[T, Progress], R], item: T) -> R:
 
 @contextmanager
 def worker_pool(runs: Iterable[Run], workers: int) -> Iterator[WorkerPool]:
-    """Processes that hold these runs, of one thread each, so that their number changes no bit."""
+    """Yield processes that hold these runs, of one thread each, so that their number changes no bit."""
     held = {run.id: run for run in runs}.values()
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update(dict.fromkeys(_THREADS, "1"))
@@ -180,7 +180,7 @@ def identify_quickly(basis: Basis, run: Run) -> tuple[Identification | str, floa
 
 
 def shortened_method(basis: Basis, run: Run) -> tuple[Method, Problem]:
-    """The method where it is one of many, and what it sees of a run."""
+    """Return the method where it is one of many, and what it sees of a run."""
     method = (method_named(basis.method) if isinstance(basis.method, str) else basis.method).for_many_runs()
     if model_type(basis.model).integrated:
         method = Projection(refine_best=1)
@@ -196,7 +196,7 @@ def _follow_one(
 
 
 def shortened(run: Run) -> Run:
-    """The last cycles of a run's steady window, thinned: what costly identifications see."""
+    """Return the last cycles of a run's steady window, thinned: what costly identifications see."""
     steady = run.steady()
     frequency = analyse_motion(run).condition.frequency_Hz
     begin = int(np.searchsorted(steady.time, steady.time[-1] - (_CYCLES + 1) / frequency))

@@ -22,7 +22,7 @@ from mrdamper.errors import ResourceError
 def processes(
     count: int, begin: Callable[..., None] | None = None, arguments: tuple[Any, ...] = ()
 ) -> Iterator[ProcessPoolExecutor]:
-    """A pool of processes; an exception in the block ends them at once, the death of this process too.
+    """Yield a pool of processes; an exception in the block ends them at once, the death of this process too.
 
     Parameters
     ----------

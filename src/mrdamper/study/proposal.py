@@ -38,7 +38,7 @@ class Proposal:
     after: float = math.nan
 
     def record(self, limits: Limits, damper: Damper | None) -> tuple[Excitation, Floats]:
-        """The motion to play, eased in and out over a cycle, and the force to expect [N] for the load cell's range."""
+        """Return the motion to play, eased in and out over a cycle, and the expected force [N] for the load cell."""
         condition = self.condition
         per_cycle = max(20, round(limits.sample_rate_Hz / condition.frequency_Hz))
         motion = sine(condition, math.ceil(limits.cycles) + 2, per_cycle)

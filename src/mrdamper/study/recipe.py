@@ -369,7 +369,7 @@ def fit_global_model(runs: Sequence[Run], identifications: Sequence[Identificati
 
 
 def fit_published(cls: Published, runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
-    """The laws of a published damper, started from single runs and refined on all."""
+    """Return the laws of a published damper, started from single runs and refined on all."""
     about = {"identification runs": str(len(runs))}
 
     def refit(rows: Sequence[int]) -> Damper:
@@ -379,7 +379,7 @@ def fit_published(cls: Published, runs: Sequence[Run], identifications: Sequence
 
 
 def modified(name: str, method: str = "projection") -> Recipe:
-    """A model identified run by run, then functions through its parameters."""
+    """Return a model identified run by run, then functions through its parameters."""
     cls = model_type(name)
     stepped = "stepped, not closed; " if cls.integrated else ""
     plain = method == "projection"
@@ -395,14 +395,14 @@ def modified(name: str, method: str = "projection") -> Recipe:
 
 
 def jointly(name: str) -> Recipe:
-    """A model whose parameter functions are fitted to all forces at once."""
+    """Return a model whose parameter functions are fitted to all forces at once."""
     apart, cls = modified(name), model_type(name)
     title = f"{cls.title}, global fit"
     return Recipe(f"{name}:joint", apart.basis, fit_functions_jointly, "global fit", title, cls.source, apart.limits)
 
 
 def current_only(name: str) -> Recipe:
-    """A model whose parameters follow the current alone, fitted to all forces at once."""
+    """Return a model whose parameters follow the current alone, fitted to all forces at once."""
     apart, cls = modified(name), model_type(name)
     title = f"{cls.title}, functions of the current only"
     return Recipe(
@@ -411,7 +411,7 @@ def current_only(name: str) -> Recipe:
 
 
 def play_and_bypass() -> Recipe:
-    """The model whose one set of parameters holds for every condition."""
+    """Return the model whose one set of parameters holds for every condition."""
     cls = model_type(JOINTLY)
     return Recipe(
         JOINTLY,
@@ -425,7 +425,7 @@ def play_and_bypass() -> Recipe:
 
 
 def conditioned(cls: Published) -> Recipe:
-    """A published damper with its own laws over current, frequency and amplitude."""
+    """Return a published damper with its own laws over current, frequency and amplitude."""
     basis = Basis(cls.basis, free=cls.basis_free) if cls.basis else None
     return Recipe(cls.name, basis, partial(fit_published, cls), "", cls.heading, cls.source, cls.limits)
 

@@ -125,7 +125,7 @@ def _stated(text: str) -> Condition:
 
 
 def _stratified(condition_of: dict[str, Condition | None], where: str) -> tuple[set[str], str]:
-    """A fifth of the conditions, spread over currents and motions, all of which stay in the identification."""
+    """Return a fifth of the conditions, spread over currents and motions, all of which stay in the identification."""
     names = [name for name, c in condition_of.items() if c is not None]
     conditions = [c for c in condition_of.values() if c is not None]
     groups = same_condition(conditions)

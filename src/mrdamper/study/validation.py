@@ -98,7 +98,7 @@ class Validation(Displayable):
 
     @validate_arguments()
     def worst(self, name: str = "nrmse_pp") -> RunScore:
-        """The run with the largest magnitude of a score."""
+        """Return the run with the largest magnitude of a score."""
         magnitudes = self._magnitudes(name)
         if not magnitudes:
             raise RunError("no run was scored", where=self.title, remedy="see `refused`")
@@ -117,7 +117,7 @@ class Validation(Displayable):
 
     @validate_arguments()
     def only(self, run_ids: Collection[str]) -> Validation:
-        """The scores of some runs."""
+        """Return the scores of some runs."""
         return replace(self, runs=tuple(run for run in self.runs if run.run_id in run_ids))
 
 

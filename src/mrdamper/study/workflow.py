@@ -223,7 +223,7 @@ class Study(Displayable):
         return write(self, folder, **options)
 
     def rig(self, name: str) -> RigStudy:
-        """The study of one rig."""
+        """Return the study of one rig."""
         self.dataset.rig(name)
         return next(r for r in self.rigs if r.rig == name)
 
@@ -375,7 +375,7 @@ def study_rig(
 
 
 def _with_sessions(chosen: RecipeResult, dataset: Dataset) -> tuple[RecipeResult, float | str]:
-    """The candidate whose damper knows what sessions share, and its left-out error with them known, or why not."""
+    """Return the candidate with what sessions share, and its cross-validated error with them known, or a reason."""
     damper, own = chosen.damper, {score.run_id: score.reading for score in chosen.train.runs}
     left_out = [score for score in chosen.cross_validated.runs if own.get(score.run_id) is not None]
     runs = [dataset[score.run_id] for score in left_out]
@@ -491,7 +491,7 @@ def _are_one_test(run: Run, other: Run) -> bool:
 
 
 def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
-    """Runs whose force, stroke or current is so far from all others' that its unit must be another."""
+    """Return runs whose force, stroke or current is so far from all others' that its unit must be another."""
     reasons: dict[str, str] = {}
     for what, unit, most, size_of in _SIZES:
         sizes = {run.id: size_of(run) for run in runs}
@@ -512,7 +512,7 @@ def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
 
 
 def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
-    """The runs whose motion is a sine at one current, and why the others are not used."""
+    """Return the runs whose motion is a sine at one current, and why the others are not used."""
     sines = []
     kept, refused = accepted_runs(dataset)
     for run in kept:
@@ -540,7 +540,7 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
 def _steps(
     train: Sequence[Run], everything: Sequence[Run], method: StudyMethod | None, model: str | None
 ) -> list[tuple[Recipe, Sequence[Run]]]:
-    """The recipes of a study, and the runs each is followed on: sines run by run, everything at once."""
+    """Return the recipes of a study, and the runs each is followed on: sines run by run, everything at once."""
     pure = [run for run in train if analyse_motion(run).is_sine]  # published methods take no other
     if method is not None:
         return [(method.recipe(pure), train), *((modified(name), train) for name in STUDIED)]

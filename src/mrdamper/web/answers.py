@@ -55,7 +55,7 @@ def in_units(rows: Sequence[Mapping[str, Any]], force: str, length: str) -> list
 
 
 def number(value: float | None) -> float | None:
-    """A number JSON can hold: what is not finite becomes nothing."""
+    """Return a number JSON can hold: what is not finite becomes nothing."""
     return float(value) if value is not None and math.isfinite(value) else None
 
 

@@ -96,7 +96,7 @@ def create_app(
 
 
 def plotly_script() -> Path:
-    """The chart library's script inside the plotly package, found without importing it.
+    """Return the chart library's script inside the plotly package, found without importing it.
 
     Raises `MissingExtraError` if the package is not installed.
     """

@@ -17,7 +17,7 @@ _DECADES = 10.0  # a slider without bounds reaches this factor up and down, or t
 
 
 def held_model(damper: Damper, condition: Condition, held: Mapping[str, float]) -> ForceLaw:
-    """The model at a condition with some parameters held.
+    """Return the model at a condition with some parameters held.
 
     Raises `ParameterError` if the model has no such parameter, or the value is outside its bounds.
     """
@@ -43,7 +43,7 @@ def predict_held(damper: Damper, condition: Condition, held: Mapping[str, float]
 
 
 def as_damper(damper: Damper, held: Mapping[str, float]) -> Damper:
-    """The damper with the held parameters made its own.
+    """Return the damper with the held parameters made its own.
 
     Raises `InputError` if a held parameter is not one the damper is made of: a function of the condition gives
     another coordinate, from which it follows.
@@ -76,7 +76,7 @@ def sliders(damper: Damper) -> list[dict[str, Any]]:
 
 
 def reach(info: ParameterInfo, value: float) -> tuple[float, float]:
-    """Ends of a parameter's slider [its unit]: its bounds, or as far as a look makes sense."""
+    """Return ends of a parameter's slider [its unit]: its bounds, or as far as a look makes sense."""
     low, high = info.bounds
     if info.scale == "log" and value > 0:
         return max(low, value / _DECADES), min(high, value * _DECADES)

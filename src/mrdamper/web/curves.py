@@ -36,7 +36,7 @@ def on_screen(
 
 
 def measured_cycle(run: Run) -> dict[str, Floats]:
-    """The last whole cycle of a steady sine, from its way up through mid-stroke on."""
+    """Return the last whole cycle of a steady sine, from its way up through mid-stroke on."""
     return on_screen(_motion(run), run.force, *_last_cycle(run))
 
 
@@ -46,26 +46,26 @@ def measured_window(run: Run) -> dict[str, Floats]:
 
 
 def raw_record(run: Run) -> dict[str, Floats]:
-    """A whole record as it stands in the file, for runs without motion."""
+    """Return a whole record as it stands in the file, for runs without motion."""
     velocity = np.zeros(run.time.size) if run.velocity is None else run.velocity
     motion = Excitation(run.time, run.displacement, velocity, np.zeros(run.time.size), run.current)
     return on_screen(motion, run.force, most=_MOST_OF_WINDOW)
 
 
 def predicted_cycle(prediction: Prediction) -> dict[str, Floats]:
-    """A predicted closed loop."""
+    """Return a predicted closed loop."""
     return on_screen(prediction.motion, prediction.force)
 
 
 def modelled_cycle(model: Model, run: Run, delay: float = 0.0) -> dict[str, Floats]:
-    """The force of a model over the samples of `measured_cycle`, its force channel late by `delay` [s]."""
+    """Return the force of a model over the samples of `measured_cycle`, its force channel late by `delay` [s]."""
     motion = _motion(run)
     force = simulate(model, motion.delayed(delay) if delay else motion).force
     return on_screen(motion, force, *_last_cycle(run))
 
 
 def predicted_on_run(damper: Damper, run: Run) -> tuple[dict[str, Floats], tuple[str, ...]]:
-    """The force a damper predicts along the measured motion: last cycle of a sine, or the whole window."""
+    """Return the force a damper predicts along the measured motion: last cycle of a sine, or the whole window."""
     prediction = damper.predict_run(run)
     if equivalent_sine(run).is_sine:
         return on_screen(prediction.motion, prediction.force, *_last_cycle(run)), prediction.extrapolation
@@ -78,7 +78,7 @@ def _motion(run: Run) -> Excitation:
 
 
 def _last_cycle(run: Run) -> tuple[NDArray[np.intp], float]:
-    """Samples of the last cycle inside the steady window that begins on the way up, and its start [s]."""
+    """Return samples of the last cycle inside the steady window that begins on the way up, and its start [s]."""
     series = analyse_motion(run).series
     period = 1.0 / series.frequency
     crossing = series.origin - series.phase() * period / (2 * np.pi)

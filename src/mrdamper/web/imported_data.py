@@ -26,7 +26,7 @@ _READING = threading.Lock()
 
 
 def bundled() -> ImportedData:
-    """The bundled tests: read once, shared by every session, since runs are frozen."""
+    """Return the bundled tests: read once, shared by every session, since runs are frozen."""
     with _READING:  # the bench reads them ahead while a page may ask
         return _bundled()
 
@@ -69,7 +69,7 @@ def read_upload(
 
 
 def _dataset_parts(names: Mapping[Path, str]) -> dict[str, Path]:
-    """The files of a dataset folder by the names they must have; empty if this is none."""
+    """Return the files of a dataset folder by the names they must have; empty if this is none."""
     wanted = (RUNS_FILE, *SAMPLE_FILES)
     parts = {PurePosixPath(name).name: path for path, name in names.items() if PurePosixPath(name).name in wanted}
     return parts if RUNS_FILE in parts else {}

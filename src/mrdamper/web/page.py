@@ -27,14 +27,14 @@ class PageFiles:
         await self.answer(name)(scope, receive, send)
 
     def answer(self, name: str) -> Response:
-        """The file of that name, or that there is none."""
+        """Return the file of that name, or that there is none."""
         if name not in self.files:
             return PlainTextResponse("there is no such file", status_code=404)
         content, kind = self.files[name]
         return Response(content, media_type=kind, headers=_ASK_EACH_TIME)
 
     def page(self) -> bytes:
-        """The page, with every module announced: fetched at once instead of one import after the other."""
+        """Return the page, with every module announced: fetched at once instead of one import after the other."""
         links = "".join(
             f'  <link rel="modulepreload" href="/static/{name}">\n' for name in self.files if name.endswith(".js")
         )

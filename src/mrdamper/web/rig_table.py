@@ -76,7 +76,7 @@ class RigTable:
         return sorted(set(current_levels([condition.current_A for _, condition in self.steady])))
 
     def row(self, key: str) -> TableRow:
-        """The row of that key; raises `InputError` if there is none."""
+        """Return the row of that key; raises `InputError` if there is none."""
         for row in self.rows:
             if row.key == key:
                 return row
@@ -112,7 +112,7 @@ class RigTable:
 
 
 def rig_table(dataset: Dataset, rig: str) -> RigTable:
-    """The table of a rig, made once for as long as the data live."""
+    """Return the table of a rig, made once for as long as the data live."""
     tables = _TABLES.setdefault(dataset, {})
     if rig not in tables:
         with _MAKING:  # one at a time; tables that are there are found without waiting
@@ -122,7 +122,7 @@ def rig_table(dataset: Dataset, rig: str) -> RigTable:
 
 
 def describe(row: TableRow) -> dict[str, Any]:
-    """A row as the page shows it, in its units."""
+    """Return a row as the page shows it, in its units."""
     run, loop = row.run, row.loop
     return {
         "key": row.key,
@@ -144,7 +144,7 @@ def describe(row: TableRow) -> dict[str, Any]:
 
 
 def condition_on_screen(condition: Condition | None) -> dict[str, float] | None:
-    """A condition in the units of the screen."""
+    """Return a condition in the units of the screen."""
     if condition is None:
         return None
     return {

@@ -57,7 +57,7 @@ def read_rig_files(upload: Upload, toml: str, refused_only: bool, only: Path | N
 
 
 def split_again(dataset: Dataset, held_out: Collection[str] | None) -> Dataset:
-    """The dataset with those of its runs held out; as it is where nobody chose."""
+    """Return the dataset with those of its runs held out; as it is where nobody chose."""
     if held_out is None:
         return dataset
     runs = [replace(run, split="validate" if run.id in held_out else "train") for run in dataset]
@@ -65,7 +65,7 @@ def split_again(dataset: Dataset, held_out: Collection[str] | None) -> Dataset:
 
 
 def _table_of(upload: Upload) -> TestsTable | None:
-    """The table of tests that was dropped beside the files."""
+    """Return the table of tests that was dropped beside the files."""
     tables = [path for path, name in upload.names.items() if PurePosixPath(name).name == TESTS]
     return load_tests(tables[0]) if tables else None
 
@@ -73,7 +73,7 @@ def _table_of(upload: Upload) -> TestsTable | None:
 def _imported(
     upload: Upload, path: Path, profile: Profile | None, table: TestsTable | None, read: Callable[..., ImportResult]
 ) -> ImportResult:
-    """A file read with what the dropped table says of its tests, and the currents that the page states for them."""
+    """Read a file with what the dropped table states of its tests, and the currents that the page states for them."""
     rows = () if table is None else table.of_file(Path(upload.names[path]))
     stated = [StatedTest(0, "", run, current) for (file, run), current in upload.currents.items() if file == path]
     if not rows and not stated:
@@ -129,7 +129,7 @@ def _name(upload: Upload, count: int) -> str:
 
 
 def _guessed(paths: Sequence[Path]) -> str:
-    """The profile of the first file whose form can be guessed; a bare one where none can."""
+    """Return the profile of the first file whose form can be guessed; a bare one where none can."""
     from mrdamper.rig_files.preview import guess_profile
     from mrdamper.rig_files.profile import parse_profile, profile_text
 

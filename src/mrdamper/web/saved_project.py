@@ -66,7 +66,7 @@ class _List(BaseModel, extra="forbid", strict=True):
 
 
 def save_project(session: Session, state: str, shown: str | None, logo: str = "") -> bytes:
-    """A session as such a file.
+    """Return a session as such a file.
 
     Raises
     ------
@@ -164,7 +164,7 @@ def _read(archive: zipfile.ZipFile, place: Path) -> SavedProject:
 
 
 def _picture(logo: str) -> bytes:
-    """The bytes of a logo that a report can show; none where there is none."""
+    """Return the bytes of a logo that a report can show; none where there is none."""
     if logo:
         logo_of(logo)
     return base64.b64decode(logo)

@@ -83,7 +83,7 @@ class Session:
     _count: int = 0
 
     def key(self, kind: str) -> str:
-        """A name for something new; never taken from outside."""
+        """Return a name for something new; never taken from outside."""
         with self.lock:
             self._count += 1
             return f"{kind}{self._count}"
@@ -114,14 +114,14 @@ class Session:
         self.results.clear()
 
     def table(self, number: int) -> RigTable:
-        """The runs of the rig of that number, analysed once."""
+        """Return the runs of the rig of that number, analysed once."""
         rigs = self.dataset.rigs
         if not 0 <= number < len(rigs):
             raise UnknownNameError("no such rig on the bench", remedy="choose one from the list")
         return rig_table(self.dataset, rigs[number])
 
     def table_of(self, rig: str) -> RigTable | None:
-        """The runs of the rig of that name, where they are on the bench."""
+        """Return the runs of the rig of that name, where they are on the bench."""
         if self.imported is None or rig not in self.dataset.rigs:
             return None
         return rig_table(self.dataset, rig)
@@ -145,7 +145,7 @@ class Session:
         return self.add(result.damper, origin, note, error=error, selected=selected, learn=learn)
 
     def damper(self, key: str, sure: bool = False) -> Bench:
-        """A damper on the bench by its key, with its covariance where that is asked for and can be known."""
+        """Return a damper on the bench by its key, with its covariance where that is asked for and can be known."""
         if key not in self.dampers:
             raise UnknownNameError("that damper is no longer on the bench", remedy="choose another on the Model page")
         bench = self.dampers[key]
@@ -221,7 +221,7 @@ class BrowserSessions:
         return session
 
     def find(self, name: str) -> Session:
-        """The session of that name; raises `InputError` if it has ended."""
+        """Return the session of that name; raises `InputError` if it has ended."""
         session = self._open.get(name)
         if session is None:
             raise InputError("this session has ended", remedy="load the page again", code="E_SESSION_ENDED")

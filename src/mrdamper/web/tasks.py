@@ -39,7 +39,7 @@ RUN_BY_RUN = "functions"
 
 
 def study(tell: Tell, dataset: Dataset, folder: Path, about: About | None = None) -> tuple[Study, list[Path]]:
-    """The whole method, and its report, models, tables and figures in a folder."""
+    """Return the whole method, and its report, models, tables and figures in a folder."""
     from mrdamper.report.study import write_study
 
     result = run_study(dataset, lambda what, share: tell(what, 0.6 * share))
@@ -114,14 +114,14 @@ def compare_models(tell: Tell, dataset: Dataset, names: Sequence[str], jobs: int
 
 
 def write_compared(tell: Tell, comparison: Comparison, folder: Path) -> list[Path]:
-    """A comparison as page, tables, figures and models in a folder."""
+    """Return a comparison as page, tables, figures and models in a folder."""
     from mrdamper.report.comparison import write_comparison
 
     return write_comparison(comparison, folder, tell)
 
 
 def export_damper(tell: Tell, damper: Damper, form: str, folder: Path) -> tuple[list[Path], tuple[str, ...]]:
-    """A damper in an export format: files in a folder, and what to know about them."""
+    """Return a damper in an export format: files in a folder, and what to know about them."""
     from mrdamper.export import exporter
     from mrdamper.export.base import write_export
 
@@ -134,7 +134,7 @@ def export_damper(tell: Tell, damper: Damper, form: str, folder: Path) -> tuple[
 
 
 def export_name(rig: str) -> str:
-    """A name for files and symbols: of the rig, where its letters make one."""
+    """Return a name for files and symbols: of the rig, where its letters make one."""
     from mrdamper.export.base import identifier
 
     try:

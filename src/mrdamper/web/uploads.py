@@ -89,7 +89,7 @@ class Upload:
         return path
 
     def named(self, text: str) -> str:
-        """A message about stored files in the names they came with."""
+        """Return a message about stored files in the names they came with."""
         for path, name in self.names.items():
             text = text.replace(str(path), name)
         return text.replace(f"{self.folder}/", "").replace(str(self.folder), "the dropped files")

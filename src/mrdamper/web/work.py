@@ -149,7 +149,7 @@ class Job:
         return self._end("done")
 
     def _lose(self) -> None:
-        """The worker is gone without a word: its system ended it, or somebody did."""
+        """Report a worker that ended without a result: the system or a user ended it."""
         self._process.join()
         code = self._process.exitcode
         how = f"by signal {-code}" if code and code < 0 else f"with code {code}"
@@ -175,7 +175,7 @@ class Job:
 
 
 def refusal(error: InputError) -> dict[str, str]:
-    """An error of the input in the parts the page shows."""
+    """Return an error of the input in the parts the page shows."""
     return {
         "text": str(error),
         "found": error.found,

@@ -57,7 +57,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _inverse(damper: Damper, name: str, to: str, exporter: Exporter, out: Path) -> tuple[list[Path], tuple[str, ...]]:
-    """The current for a wanted force: files written, and what to know about them."""
+    """Return the current for a wanted force: files written, and what to know about them."""
     from mrdamper.errors import InputError
     from mrdamper.export.c import write_program
     from mrdamper.export.fmu import FMUExporter

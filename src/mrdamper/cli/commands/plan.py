@@ -79,7 +79,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _doubt(about: str | None):
-    """A condition where three numbers stand, else the name of a number."""
+    """Return a condition where three numbers stand, else the name of a number."""
     from mrdamper.data import Condition
     from mrdamper.errors import ConditionError
 

@@ -36,7 +36,10 @@ def register(app: typer.Typer) -> None:
         png: bool = typer.Option(False, "--png", help="Also write the figures as PNG."),
         as_json: bool = typer.Option(False, "--json", help="Print the verdicts and claims for a program."),
     ) -> None:
-        """Example: mrdamper reproduce --out result/"""
+        """Reproduce the study of Qian et al. (2024).
+
+        Example: mrdamper reproduce --out result/
+        """
         import os
 
         from mrdamper.cli.output import parse_gas, parse_pairs

@@ -80,7 +80,7 @@ def _about() -> dict:
 
 
 def _written(name: str) -> dict:
-    """Schema of the rows of plan.csv, or of made.json in the folder of a result."""
+    """Return schema of the rows of plan.csv, or of made.json in the folder of a result."""
     from pydantic import TypeAdapter
 
     from mrdamper.data.atomic import ResultRecord

@@ -129,7 +129,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _export_law(loop: SystemLoop, folder: Path | None, fmu: Path | None) -> None:
-    """The law of a loop as C99 in a folder, and as an FMU."""
+    """Return the law of a loop as C99 in a folder, and as an FMU."""
     from mrdamper.errors import InputError
     from mrdamper.export.c import write_program
     from mrdamper.export.fmu_program import write_program_fmu
@@ -146,7 +146,7 @@ def _export_law(loop: SystemLoop, folder: Path | None, fmu: Path | None) -> None
 
 
 def _all_of(names: list[str]) -> list[str]:
-    """The names, "all" as every law there is."""
+    """Return the names, "all" as every law there is."""
     from mrdamper.systems.controllers import controller_types
 
     laws = [name for name in controller_types() if name not in ("passive", "preview")]
@@ -163,7 +163,7 @@ def _controller(text: str) -> Controller:
 
 
 def _amperes(current: float | None, volts: float | None, dampers: dict[str, Damper]) -> float | None:
-    """The current asked for, straight or through the driver of the dampers [A]."""
+    """Return the current asked for, straight or through the driver of the dampers [A]."""
     from mrdamper.errors import InputError
 
     if current is not None and volts is not None:

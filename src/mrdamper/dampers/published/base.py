@@ -92,7 +92,7 @@ class ConditionedDamper(Damper):
 
     @abstractmethod
     def model_at(self, condition: Condition) -> Model:
-        """The model at a condition."""
+        """Return the model at a condition."""
 
     @classmethod
     def fit(
@@ -110,7 +110,7 @@ class ConditionedDamper(Damper):
 
     @classmethod
     def regressed(cls, identifications: Sequence[Identification], provenance: Mapping[str, str] | None = None) -> Self:
-        """The damper from the identifications alone."""
+        """Return the damper from the identifications alone."""
         if len(identifications) < 3:
             raise IdentificationError(
                 f"{len(identifications)} identifications",
@@ -151,7 +151,7 @@ class ConditionedDamper(Damper):
         return refined.stating_bounds([name for name, at_bound in zip(names, ended, strict=True) if at_bound])
 
     def stating_bounds(self, names: Sequence[str]) -> Self:
-        """The damper whose provenance names the coefficients that ended at a bound of the search."""
+        """Return the damper whose provenance names the coefficients that ended at a bound of the search."""
         return replace(self, provenance={**self.provenance, AT_BOUNDS: ", ".join(names)}) if names else self
 
     @property

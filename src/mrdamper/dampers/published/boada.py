@@ -64,7 +64,7 @@ class BoadaType(ConditionedDamper):
         return {f"{name}{i}": float(value) for name, values in named.items() for i, value in enumerate(values)}
 
     def refined(self, runs: Sequence[Run]) -> Self:
-        """The weights have no refinement; those at a bound of their search are named."""
+        """Name the weights at a bound of their search; they are not refined."""
         weights = {name: value for name, value in self.coefficients.items() if name.startswith("weight")}
         return self.stating_bounds([n for n, value in weights.items() if abs(value) > (1 - 1e-6) * _MAX_WEIGHT])
 

@@ -195,7 +195,7 @@ def _numbers(points: Floats) -> str:
 
 
 def _outline(mark: str, half: float) -> str:
-    """A mark as a path from its middle."""
+    """Return a mark as a path from its middle."""
     if mark not in _MARKS:
         r = half * _DOTS.get(mark, 1.0)
         return f"m{-r:g} 0a{r:g} {r:g} 0 1 0 {2 * r:g} 0a{r:g} {r:g} 0 1 0 {-2 * r:g} 0z"

@@ -53,7 +53,7 @@ class Axis:
         self.grid, self.labelled = True, True
 
     def limits(self, values: Sequence[Floats]) -> tuple[float, float]:
-        """Ends of the axis, where they are not given, a margin beyond the values."""
+        """Return ends of the axis, where they are not given, a margin beyond the values."""
         every = np.concatenate([np.zeros(0), *values])
         every = every[np.isfinite(every) & ((every > 0) | np.full(every.size, not self.log))]
         low, high = (float(every.min()), float(every.max())) if every.size else (0.1, 1.0)
@@ -248,7 +248,7 @@ class Axes:
         yield DrawnText(aside, middle[1], self.y.name, self.size, "middle", turned=True)
 
     def _listed(self, whole: tuple[float, float], curves: Sequence[Floats]) -> Iterator[DrawnPath | DrawnText]:
-        """The legend: a piece of each named curve, and its name."""
+        """Yield the legend: a piece of each named curve, and its name."""
         assert self._legend is not None
         place, size, columns = self._legend
         named = [one for one in self.series if one.label]

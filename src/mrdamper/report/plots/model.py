@@ -78,7 +78,7 @@ def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
 
 
 def parameter_curves(fit: ModifiedFit) -> Figure:
-    """Identified values over current, one colour a motion, and the functions through them."""
+    """Return identified values over current, one colour a motion, and the functions through them."""
     names = [name for name in fit.functions if np.ptp(fit.values[name]) > 0] or list(fit.functions)
     rows = -(-len(names) // 2)
     figure = Figure(rows, 2, 2.5 * rows, right=1.75)

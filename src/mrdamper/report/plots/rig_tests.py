@@ -128,7 +128,7 @@ def test_analysis(loops: Sequence[LoopAnalysis], ranges: Sequence[DynamicRange])
 
 
 def _over_current(loops: Sequence[LoopAnalysis]) -> dict[float, LoopAnalysis]:
-    """The motion tested at the most currents, by current."""
+    """Return the motion tested at the most currents, by current."""
     steps = levels([loop.condition.current_A for loop in loops])
     best = max(same_motion([loop.condition for loop in loops]), key=lambda g: len({steps[i] for i in g}))
     return dict(sorted({steps[i]: loops[i] for i in best}.items()))

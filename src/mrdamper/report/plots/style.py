@@ -36,7 +36,7 @@ def current_colours(values: Sequence[float]) -> dict[float, str]:
 
 
 def levels(currents: Sequence[float]) -> list[float]:
-    """The level of the test matrix of each current [A]: what differs by noise alone has one colour."""
+    """Return the level of the test matrix of each current [A]: what differs by noise alone has one colour."""
     return current_levels([abs(current) for current in currents])
 
 
@@ -49,7 +49,7 @@ def speed_colours(figure: Figure, speeds: Sequence[float], text: str = "Peak vel
 
 
 def powered(text: str, largest: float) -> tuple[str, float]:
-    """An axis title with its unit in a power of a thousand, and what to multiply by: no power floats above an axis."""
+    """Return an axis title with its unit in a power of a thousand, and the factor to multiply values by."""
     power = 3 * int(np.floor(np.log10(largest) / 3)) if largest >= 1e5 or 0 < largest < 1e-3 else 0
     if not power:
         return text, 1.0
@@ -93,7 +93,7 @@ class Picture:
 
 
 def figure_data(figure: Figure) -> str:
-    """The points of every curve and every cloud of marks of a figure as CSV, one row a point."""
+    """Return the points of every curve and every cloud of marks of a figure as CSV, one row a point."""
     names, rows = ("panel", "x_is", "y_is", "series"), ["panel,x_is,y_is,series,x,y\n"]
     head = csv_text([], names)
     for number, axes in enumerate(figure.axes, 1):

@@ -32,7 +32,7 @@ def profile_curves(profiles: Sequence[LikelihoodProfile]) -> Figure:
 
 
 def corner(samples: Samples) -> Figure:
-    """Samples of every pair of numbers, and each number's own distribution on the diagonal."""
+    """Return samples of every pair of numbers, and each number's own distribution on the diagonal."""
     size = len(samples.names)
     figure = Figure(size, size, WIDTH, left=0.4, right=0.1, top=0.1, bottom=0.4, gap=0.08, lettered=False)
     for number, axes in enumerate(figure.axes):

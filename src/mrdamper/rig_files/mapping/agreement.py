@@ -22,7 +22,7 @@ _Point = tuple[float, float, float, float]
 
 
 def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:
-    """The tests that contradict each other, by their place, and the refusal of each.
+    """Return the tests that contradict each other, by their place, and the refusal of each.
 
     Equal conditions whose forces differ several-fold; and the same samples under several currents.
     """
@@ -44,7 +44,7 @@ def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:
 
 
 def _copies(records: Sequence[Record], points: Sequence[_Point | None]) -> dict[int, QualityError]:
-    """The tests that hold the samples of another test and have another current than it."""
+    """Return the tests that hold the samples of another test and have another current than it."""
     groups: dict[tuple[int, bytes, bytes], list[int]] = defaultdict(list)
     for i, record in enumerate(records):
         samples = np.arange(0, record.time.size, max(1, record.time.size // _MOST_SAMPLES))

@@ -56,7 +56,7 @@ def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displaceme
 
 
 def with_time_stated(table: RawTable) -> RawTable:
-    """The table with a column of time, where it stands in parts beside each other, or a crank turns at a stated speed.
+    """Return the table with a column of time, where it stands in several columns, or a crank turns at a stated speed.
 
     Parts: a clock of whole seconds and thousandths; a clock of a day and its date.
     """
@@ -92,7 +92,7 @@ def _with_thousandths(table: RawTable, clock: int) -> RawTable:
 
 
 def _with_date(table: RawTable, clock: int) -> RawTable:
-    """A clock that goes back at midnight, with the dates beside it."""
+    """Return a clock that goes back at midnight, with the dates beside it."""
     beside = [i for i, name in enumerate(table.names) if name.strip().casefold() in _DATES]
     if len(beside) != 1 or table.units[clock] != "s" or table.words is None:
         return table
@@ -119,7 +119,7 @@ def _with_date(table: RawTable, clock: int) -> RawTable:
 
 
 def _with_crank(table: RawTable) -> RawTable:
-    """An angle of a crank as time, at the speed that a line or a number beside the columns states."""
+    """Return an angle of a crank as time, at the speed that a line or a number beside the columns states."""
     angles = [i for i, header in enumerate(table.headers) if header.dimension == "angle"]
     if len(angles) != 1:
         return table

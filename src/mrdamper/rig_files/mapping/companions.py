@@ -50,7 +50,7 @@ class Part:
 
 
 def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
-    """The channels with a time of a file that is no whole test; None if it has none, or several tables."""
+    """Return the channels with a time of a file that is no whole test; None if it has none, or several tables."""
     try:
         with raw_tables(path, profile.file) as tables:
             if len(tables) != 1:
@@ -72,7 +72,7 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
 
 
 def joined_columns(paths: Sequence[Path], profile: Profile) -> list[tuple[list[Record], tuple[Path, ...]]]:
-    """Tests of which every channel is a file of one column, named by its file or heading, and these files.
+    """Return tests of which every channel is a file of one column, named by its file or heading, and these files.
 
     Files of one test lie in one folder and have one name beside the channel's: force_N.txt and time_s.txt, or
     run7_force_N.txt and run7_time_s.txt. They hold as many samples as each other.
@@ -104,7 +104,7 @@ def joined_columns(paths: Sequence[Path], profile: Profile) -> list[tuple[list[R
 
 
 def _only_column(path: Path, profile: Profile) -> tuple[Header, Floats] | None:
-    """The heading and numbers of a file of one column that its heading or its name says to be a channel."""
+    """Return the heading and numbers of a file of one column that its heading or its name says to be a channel."""
     named = split_name(path.stem)
     try:
         with raw_tables(path, profile.file) as tables:
@@ -119,12 +119,12 @@ def _only_column(path: Path, profile: Profile) -> tuple[Header, Floats] | None:
 
 
 def number_of(path: Path) -> tuple[str, ...]:
-    """The numbers in a file's name, by which files of one test belong together."""
+    """Return the numbers in a file's name, by which files of one test belong together."""
     return str(path.parent), *(str(int(number)) for number in re.findall(r"[0-9]+", path.stem))
 
 
 def with_currents_of(pending: Sequence[tuple[Path, Record]], parts: Sequence[Part]) -> list[tuple[Record, Path]] | None:
-    """The records with the current of the other file of their number, and that file; None unless all have one."""
+    """Return the records with the current of the other file of their number, and that file; None if one has none."""
     holders = [part for part in parts if "current" in part.channels and "force" not in part.channels]
     by_number = {number_of(part.path): part for part in holders}
     numbers = [number_of(path) for path, _ in pending]
@@ -152,7 +152,7 @@ def _joined(record: Record, part: Part) -> Record:
 
 
 def joined_parts(parts: Sequence[Part], profile: Profile) -> list[tuple[Record, tuple[Path, ...]]]:
-    """Tests whose displacement and force lie in two files of one number and one clock, and these files."""
+    """Return tests whose displacement and force lie in two files of one number and one clock, and these files."""
     by_number: dict[tuple[str, ...], list[Part]] = defaultdict(list)
     for part in parts:
         by_number[part.key].append(part)
@@ -188,7 +188,7 @@ def joined_parts(parts: Sequence[Part], profile: Profile) -> list[tuple[Record, 
 
 
 def results_of(path: Path) -> Results | None:
-    """The table of results that a file holds; None if it holds none."""
+    """Return the table of results that a file holds; None if it holds none."""
     try:
         if path.suffix.lower() in _TEXTS:
             with path.open("rb") as file:
@@ -213,7 +213,7 @@ def _decoded(content: bytes) -> str:
 
 
 def with_results_of(pending: Sequence[tuple[Path, Record]], results: Results, path: Path) -> list[Record] | None:
-    """The records with the currents that a table of results states; None unless it names every one of them."""
+    """Return the records with the currents that a table of results states; None unless it names every one of them."""
     currents = results.by_test(_called(pending))
     if len(currents) < len(pending):
         return None
@@ -244,7 +244,7 @@ def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:
 
 
 def with_legend_of(pending: Sequence[tuple[Path, Record]], path: Path) -> list[Record] | None:
-    """The records with the currents that the codes in their names stand for, by a legend: I1 = 0.3 A.
+    """Return the records with the currents that the codes in their names stand for, by a legend: I1 = 0.3 A.
 
     None unless the name of every file holds one of the codes, between separators.
     """

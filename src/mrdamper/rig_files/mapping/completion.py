@@ -67,7 +67,7 @@ _LONGEST_LINE = 300
 
 
 def completed(table: RawTable) -> RawTable:
-    """The table with the names, units and scales that the file states above, below or beside its row of names."""
+    """Add the names, units and scales that the file states above, below or beside its row of names."""
     if not any(table.names):
         table = _with_indexed_names(_with_listed_names(table))
     if not any(table.names):
@@ -79,7 +79,7 @@ def completed(table: RawTable) -> RawTable:
 
 
 def _with_sense(table: RawTable) -> RawTable:
-    """A force recorded as a magnitude, with the sign that a column of two words beside it states."""
+    """Return a force recorded as a magnitude, with the sign that a column of two words beside it states."""
     forces = [i for i, header in enumerate(table.headers) if header.role == "force"]
     senses = [i for i, name in enumerate(table.names) if name.strip().casefold() in _SENSE_NAMES]
     if len(forces) != 1 or len(senses) != 1 or table.words is None:
@@ -201,7 +201,7 @@ def _with_indexed_names(table: RawTable) -> RawTable:
 
 
 def _with_keyed_axis(table: RawTable) -> RawTable:
-    """The x axis as time, where rows of headings begin with what they hold and one gives the axis a unit of time."""
+    """Take the x axis as time where rows of headings begin with their meaning and one gives the axis a unit of time."""
     if not table.names or table.names[0].casefold() != "name" or table.units[0].casefold() != "unit":
         return table
     stated = {m[1] for line in table.remarks if (m := _AXIS_UNIT.match(line[:_LONGEST_LINE])) and is_unit(m[1])}
@@ -266,7 +266,7 @@ def _with_listed_units(table: RawTable) -> RawTable:
 
 
 def _with_stated_time_unit(table: RawTable) -> RawTable:
-    """The unit of time that a line states: Horizontal Units,s; X-Unit: ms; HUnit."""
+    """Return the unit of time that a line states: Horizontal Units,s; X-Unit: ms; HUnit."""
     times = [i for i, header in enumerate(table.headers) if header.role == "time"]
     if len(times) != 1 or table.headers[times[0]].unit:
         return table
@@ -323,7 +323,7 @@ def _with_scales(table: RawTable) -> RawTable:
 
 
 def scaled_columns(table: RawTable) -> list[int]:
-    """The columns in volts or per cent, which mean something by a scale alone."""
+    """Return the columns in volts or per cent, which mean something by a scale alone."""
     percent = parse_unit("%")
     return [i for i, h in enumerate(table.headers) if h.dimension == "voltage" or (h.unit and h.known == percent)]
 
@@ -334,7 +334,7 @@ def states_scale(line: str) -> bool:
 
 
 def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[str, float, str] | None:
-    """Unit, its number per volt and the line of a scale that can only be meant for a column; else None."""
+    """Return unit, its number per volt and the line of a scale that can only be meant for a column; else None."""
     name = table.headers[column].name
     own = [table.names[column], *table.over[column : column + 1]]
     for lines in (own, [part for line in table.remarks for part in _parts(line[:_LONGEST_LINE])]):
@@ -358,12 +358,12 @@ def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[s
 
 
 def _parts(line: str) -> list[str]:
-    """A line, or its cells where it states several scales."""
+    """Return a line, or its cells where it states several scales."""
     return re.split(r"[,;|\t]\s*", line) if len(_scales(line)) > 1 else [line]
 
 
 def _scales(line: str) -> list[tuple[str, float]]:
-    """Unit and number per volt of every scale that a line states: 0.5 A/V, 100 mV/A, 1 V = 2 A."""
+    """Return unit and number per volt of every scale that a line states: 0.5 A/V, 100 mV/A, 1 V = 2 A."""
     scales = []
     for match in _SCALE.finditer(line):
         one, other = parse_unit(match["unit"]), parse_unit(match["volt"])
@@ -380,7 +380,7 @@ def _scales(line: str) -> list[tuple[str, float]]:
 
 
 def _scaled(table: RawTable, column: int, name: str, unit: str, factor: float, text: str) -> RawTable:
-    """The table with a column multiplied by a number, in another unit."""
+    """Return the table with a column multiplied by a number, in another unit."""
     inner = table.read
 
     def read(columns: Sequence[int]) -> Content:

@@ -20,7 +20,7 @@ _README = re.compile(
 
 
 def with_notes(table: RawTable, path: Path) -> RawTable:
-    """The table with the scales that a text for readers beside its file states, where it has columns that need one."""
+    """Add the scales that a text beside the file states for readers, where the table has columns that need one."""
     if not scaled_columns(table):
         return table
     texts = sorted(p for p in path.parent.iterdir() if _README.fullmatch(p.name) and p.is_file() and p != path)
@@ -32,7 +32,7 @@ def with_notes(table: RawTable, path: Path) -> RawTable:
 
 
 def with_description(table: RawTable, path: Path) -> RawTable:
-    """The table with what the XML file of its name, or the only other file of its folder, states."""
+    """Return the table with what the XML file of its name, or the only other file of its folder, states."""
     elements = _elements(path)
     if not elements:
         return table
@@ -57,7 +57,7 @@ def _unit(attributes: dict[str, str]) -> str:
 
 
 def _elements(path: Path) -> list[ElementTree.Element]:
-    """The elements of the description of a file; empty if it has none, or one that could be hostile."""
+    """Return the elements of the description of a file; empty if it has none, or one that could be hostile."""
     beside = path.with_suffix(".xml")
     if not beside.is_file():
         try:

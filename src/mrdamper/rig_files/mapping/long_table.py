@@ -24,7 +24,7 @@ _MOST_CHANNELS = 60
 
 
 def with_channels_as_columns(table: RawTable) -> RawTable:
-    """A long table with a column for each of its channels; any other table as it is.
+    """Return a long table with a column for each of its channels; any other table as it is.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def _pivoted(
 
 
 def _on_clock(clock: np.ndarray, own: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """A current recorded more rarely: the one that is held, else interpolated onto the force's clock."""
+    """Return a current recorded more rarely: the one that is held, else interpolated onto the force's clock."""
     there = np.isfinite(own) & np.isfinite(values)
     held, change = held_current(values[there])
     if not change:
@@ -100,7 +100,7 @@ def _on_clock(clock: np.ndarray, own: np.ndarray, values: np.ndarray) -> np.ndar
 
 
 def _units(table: RawTable, words: Words, column: list[int]) -> list[str] | None:
-    """The unit of every channel; None if a channel has two."""
+    """Return the unit of every channel; None if a channel has two."""
     if not column or table.words is None:
         return [""] * len(words.labels)
     stated = table.words(column[0])

@@ -36,7 +36,7 @@ class Candidate:
 
 
 def with_unit_of_time(table: RawTable) -> RawTable:
-    """The table with the unit of its time, where only one agrees with the frequency that the file states."""
+    """Return the table with the unit of its time, where only one agrees with the frequency that the file states."""
     times = [i for i, header in enumerate(table.headers) if header.role == "time"]
     moved = [i for i, header in enumerate(table.headers) if header.role == "displacement"]
     if len(times) != 1 or len(moved) != 1 or table.headers[times[0]].unit or table.source.size > _LARGEST:
@@ -59,7 +59,7 @@ def with_unit_of_time(table: RawTable) -> RawTable:
 
 
 def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -> RawTable:
-    """The table with the columns named that alone make a damper's loop, where names leave open which they are.
+    """Return the table with the columns named that alone make a damper's loop, where names leave open which they are.
 
     The columns that are `stated`, by channel, are not open.
     """
@@ -95,7 +95,7 @@ def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -
 
 
 def ranked_candidates(table: RawTable, open_roles: dict[str, list[int]]) -> list[Candidate]:
-    """The combinations of columns and how far each is a damper's test, the best first."""
+    """Return the combinations of columns and how far each is a damper's test, the best first."""
     wanted = sorted({column for columns in open_roles.values() for column in columns})
     try:
         values = table.read(wanted).values

@@ -30,7 +30,7 @@ class Answer:
     change: tuple[tuple[str, object], ...] = ()
 
     def applied(self, profile: Profile) -> Profile:
-        """The profile with this answer."""
+        """Return the profile with this answer."""
         if not self.channel:
             return profile.model_copy(update={"current": CurrentSource(**dict(self.change))})  # type: ignore[arg-type]
         settings = profile.channel(self.channel).model_dump(exclude_unset=True, exclude_none=True)
@@ -47,7 +47,7 @@ class Question:
 
 
 def question_of(error: InputError, columns: Sequence[str] = ()) -> Question | None:
-    """The question behind a refusal that a profile answers; None where the file itself must be corrected.
+    """Return the question behind a refusal that a profile answers; None where the file itself must be corrected.
 
     Parameters
     ----------

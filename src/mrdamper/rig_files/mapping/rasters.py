@@ -20,7 +20,7 @@ _TWO_STARTS = 1.0  # [s] between two clocks of all channels: more is a clock wit
 
 
 def with_one_clock(table: RawTable) -> RawTable:
-    """The table with every channel on the force's clock, where groups of columns have times of their own.
+    """Return the table with every channel on the force's clock, where groups of columns have times of their own.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
 
 
 def _named(table: RawTable) -> RawTable:
-    """A table of one channel with the name of its group, where its own name names nothing."""
+    """Return a table of one channel with the name of its group, where its own name names nothing."""
     title = table.label.rpartition("/")[2]
     names = [
         title if split_name(name).role is None and split_name(title).role is not None else name for name in table.names
@@ -194,7 +194,7 @@ def _with_clocks_compared(table: RawTable) -> RawTable:
 
 
 def _filled(values: Floats) -> Floats:
-    """The values down to the last: shorter columns end in empty cells."""
+    """Return the values down to the last: shorter columns end in empty cells."""
     there = np.flatnonzero(np.isfinite(values))
     return values[: there[-1] + 1] if there.size else values
 
@@ -216,7 +216,7 @@ def _covered(target: Floats, time: Floats) -> np.ndarray:
 
 
 def resampled(table: RawTable, name: str, target: Floats, time: Floats, values: Floats) -> Floats:
-    """A channel on another clock [s], by linear interpolation; its ends are held for one of its own steps.
+    """Return a channel on another clock [s], by linear interpolation; its ends are held for one of its own steps.
 
     Raises
     ------

@@ -34,7 +34,7 @@ class Results:
     keys: tuple[str, ...] = ()  # headings of the columns of `cells`; empty for the number of the row
 
     def by_test(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
-        """The current [A] of each test by its number, where one column of the table tells all of them apart.
+        """Return the current [A] of each test by its number, where one column of the table tells all of them apart.
 
         Parameters
         ----------
@@ -51,7 +51,7 @@ class Results:
         return {}
 
     def column_of_tests(self, table: RawTable) -> str | None:
-        """The column of a record that numbers its tests as a column of this table, of the same name, does."""
+        """Return the column of a record that numbers its tests as a column of this table, of the same name, does."""
         for i, name in enumerate(table.names if table.words is not None else ()):
             at = [
                 k
@@ -67,7 +67,7 @@ class Results:
 
 
 def results_in(lines: Sequence[str], decimal: str | None = None) -> Results | None:
-    """The table of results among lines of text; None if there is none or several."""
+    """Return the table of results among lines of text; None if there is none or several."""
     columns = {}
     for separator in _SEPARATORS:
         for results in _tables(lines[:_MOST_LINES], separator):
@@ -116,7 +116,7 @@ def _may_be_results(table: RawTable) -> bool:
 
 
 def lines_of(table: RawTable) -> list[str]:
-    """A small table as lines of text."""
+    """Return a small table as lines of text."""
     if table.words is None or len(table.names) > _MOST_COLUMNS:
         return []
     columns = [table.words(i) for i in range(len(table.names))]
@@ -134,7 +134,7 @@ def _without_current(constants: Mapping[str, float]) -> dict[str, float]:
 
 
 def _last_lines(table: RawTable, shared: set[str]) -> list[str]:
-    """The lines right above the columns of a table that name its test."""
+    """Return the lines right above the columns of a table that name its test."""
     own = [line for line in table.remarks if line not in shared or table.label.startswith("block")]
     filled = [len([cell for cell in re.split(r"[\t;,|]", line) if cell.strip(' "')]) for line in own]
     return [line for line, cells in zip(own[-4:], filled[-4:], strict=True) if cells <= 2]
@@ -210,14 +210,14 @@ def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:
 
 
 def _key(text: str) -> str:
-    """A name as it is compared: no case, spaces, or leading zeros of a plain number."""
+    """Return a name as it is compared: no case, spaces, or leading zeros of a plain number."""
     text = re.sub(r"\.(csv|txt|dat|asc|tra|mat|xlsx?|h5|tdms|json|parquet)$", "", text.casefold().strip())
     text = re.sub(r"[\s_]+", " ", text).removesuffix(".0")
     return str(int(text)) if text.isascii() and text.isdigit() else text
 
 
 def _match(column: Sequence[str], names: Sequence[tuple[set[str], set[str]]], exact: bool) -> dict[int, int] | None:
-    """The row of each test by one column; None unless every test has one row, and no row two."""
+    """Return the row of each test by one column; None unless every test has one row, and no row two."""
     keys = [_key(cell) for cell in column]
     if len(set(keys)) < len(keys) or "" in keys:
         return None

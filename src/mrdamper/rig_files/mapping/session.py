@@ -26,7 +26,7 @@ _Condition = tuple[float, float, float, bool]
 
 
 def stretches_of_session(time: Floats, displacement: Floats, current: Floats | None) -> list[slice]:
-    """The tests of a record that rests between them, with half of each rest; one stretch where it is one test.
+    """Return the tests of a record that rests between them, with half of each rest; one stretch where it is one test.
 
     A record is cut only if every part between two rests is a motion of several strokes at a constant
     current, or at currents that step from one to the next, and not all parts are of one condition: a
@@ -70,7 +70,7 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
 
 
 def _with_soft_ends(parts: list[slice], time: Floats, x: Floats) -> list[slice]:
-    """The parts, those of fewer strokes than a test joined with the one they lead to or come from without a gap."""
+    """Join parts of fewer strokes than a test has with the part they lead to or come from without a gap."""
     joined: list[slice] = []
     short = False
     for part in parts:
@@ -85,7 +85,7 @@ def _with_soft_ends(parts: list[slice], time: Floats, x: Floats) -> list[slice]:
 
 
 def _pieces(part: slice, time: Floats, displacement: Floats, current: Floats) -> list[slice]:
-    """The pieces of a part between changes of the current from one held value to another while the motion goes on.
+    """Split a part where the current changes from one held value to another while the motion goes on.
 
     Between two steps the motion turns back several times: a shorter stretch is a test of the coil's response.
     Pieces without motion, at the ends, are left out; the part itself where the current does not step.

@@ -39,7 +39,7 @@ class FileTree:
 
 
 def nodes_of(tables: Iterable[RawTable]) -> tuple[Node, ...]:
-    """The tables of a file as nodes of its tree."""
+    """Return the tables of a file as nodes of its tree."""
     nodes = []
     for table in tables:
         if table.fallback:
@@ -51,7 +51,7 @@ def nodes_of(tables: Iterable[RawTable]) -> tuple[Node, ...]:
 
 
 def tree_lines(trees: Sequence[FileTree]) -> list[str]:
-    """The trees as lines: files and tables that hold the same columns are one entry with a count."""
+    """Return the trees as lines: files and tables that hold the same columns are one entry with a count."""
     alike: dict[tuple, list[tuple[str, Node]]] = defaultdict(list)
     lines: list[str] = []
     for tree in trees:

@@ -62,7 +62,7 @@ def gaps_in_time(view: View) -> Iterator[Finding]:
 
 
 def _steps(view: View, odd: Callable[[Floats], np.ndarray]) -> Iterator[tuple[int, float, float]]:
-    """Steps of time that a test finds odd: sample after the step, time before and after it."""
+    """Yield steps of time that a test finds odd: sample after the step, time before and after it."""
     time = view.record.time
     last = None  # sample of the last time stamp that was there
     for start in range(0, time.size, _CHUNK):

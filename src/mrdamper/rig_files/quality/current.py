@@ -21,7 +21,7 @@ def changes(view: View) -> Iterator[Finding]:
 
 
 def change_of(record: Record, window: tuple[float, float] | None) -> Iterator[Finding]:
-    """The finding that a record's current changes within a window of time."""
+    """Yield the finding that a record's current changes within a window of time."""
     change = held_in(record, window)[1]
     if change:
         yield Finding(
@@ -37,7 +37,7 @@ def held_in(record: Record, window: tuple[float, float] | None) -> tuple[float, 
 
 
 def current_in(record: Record, window: tuple[float, float] | None) -> Floats:
-    """The current's samples that are there within a window of time, thinned where they are many."""
+    """Return the current's samples that are there within a window of time, thinned where they are many."""
     assert record.current is not None
     thinned = np.arange(0, record.time.size, max(1, record.time.size // _MOST))
     time, current = take(record.time, thinned), take(record.current, thinned)

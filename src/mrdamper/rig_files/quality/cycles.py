@@ -87,7 +87,7 @@ def every_cycle(view: View) -> Folded | None:
 
 @once_per_run
 def steady_cycles(view: View) -> Cycles | None:
-    """The steady cycles of a record beside each other; None under one cycle of a periodic motion.
+    """Return the steady cycles of a record beside each other; None under one cycle of a periodic motion.
 
     The first of three or more is left out: it may hold the way in from rest. A cycle with a gap is, too, and one
     before the window of a run that states one.

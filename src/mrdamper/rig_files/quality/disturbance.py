@@ -76,7 +76,7 @@ def motion_is_one(view: View) -> Iterator[Finding]:
 
 
 def _periodic_velocity(view: View, velocity: Floats) -> Floats:
-    """The velocity of the periodic motion at the steady samples: of its harmonics, or of its mean cycle if no sine."""
+    """Return the velocity of the periodic motion at the steady samples, by harmonics or by the mean cycle."""
     motion, cycles, time = view.motion, steady_cycles(view), view.steady.time
     assert motion is not None
     if cycles is None:
@@ -112,7 +112,7 @@ def force_lines(view: View) -> Iterator[Finding]:
 
 
 def strongest_line(time: Floats, rest: Floats, above: float) -> Line | None:
-    """The strongest line [Hz] of what is left of a channel, above a frequency; None where there are too few lines."""
+    """Return the strongest line [Hz] of what is left of a channel, above a frequency; None with too few lines."""
     size = rest.size
     length = float(time[-1] - time[0]) * size / (size - 1)
     window = np.hanning(size + 2)[1:-1]
@@ -127,7 +127,7 @@ def strongest_line(time: Floats, rest: Floats, above: float) -> Line | None:
 
 
 def _odd_harmonic(loop: Floats, frequency: float) -> Line | None:
-    """A harmonic of the loop that stands out of its neighbours: a line in step with the motion."""
+    """Return a harmonic of the loop that stands out of its neighbours: a line in step with the motion."""
     lines = np.abs(np.fft.rfft(loop)) * (2 / POINTS)
     order = np.arange(8, lines.size - 4)
     beside = np.max([lines[order + shift] for shift in (-4, -3, -2, -1, 1, 2, 3, 4)], axis=0)

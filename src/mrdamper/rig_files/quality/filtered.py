@@ -106,7 +106,7 @@ def noise_by_octave(view: View, name: str) -> tuple[Floats, float]:
 
 
 def _at_every_step(view: View, name: str) -> Floats:
-    """A channel's steady part, lines through missing samples; nothing where its clock is uneven."""
+    """Return a channel's steady part, lines through missing samples; nothing where its clock is uneven."""
     run, values = view.steady, getattr(view.steady, name)
     steps = np.diff(run.time) / view.step
     whole = np.round(steps)

@@ -76,7 +76,7 @@ class ForceLag:
         return min(near, key=lambda lag: ((lag.delay != 0) + 2 * (lag.constant != 0), self.tried[lag]))
 
     def alike(self, misfit: float) -> list[Lag]:
-        """The lags that explain the force nearly as well as one of this misfit."""
+        """Return the lags that explain the force nearly as well as one of this misfit."""
         enough = max(_AS_GOOD * misfit, _MODEL * self.tried[Lag()])
         return [lag for lag, left in self.tried.items() if left <= enough]
 
@@ -132,7 +132,7 @@ def force_channel(view: View) -> Iterator[Finding]:
 
 
 def _description(lag: ForceLag, cycles: Cycles) -> str:
-    """The best lag, with its intervals, in words."""
+    """Return the best lag, with its intervals, in words."""
     best, parts = lag.best, []
     if best.delay:
         low, high = sorted(abs(1e3 * cycles.period * end) for end in lag.interval("delay"))

@@ -83,7 +83,7 @@ def wraps(view: View) -> None:
 
 
 def leaps_in(values: Floats, of_range: float, *, against: bool) -> np.ndarray:
-    """Samples after which a channel leaps by a share of its range, ten times as far as it ever goes in a step.
+    """Return samples after which a channel leaps by a share of its range, ten times as far as it ever goes in a step.
 
     Maybe only leaps against the way the channel goes before and after them: friction leaps too.
     """

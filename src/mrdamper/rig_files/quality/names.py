@@ -41,6 +41,6 @@ def _contradiction(stated: str, measured: str, channel: str) -> Finding:
 
 
 def _stated(pattern: re.Pattern[str], name: str) -> float | None:
-    """The one value a name states; None for none, for several, and for zero."""
+    """Return the one value a name states; None for none, for several, and for zero."""
     values = {float(re.sub("[,x]", ".", number.lower())) for number in pattern.findall(name)}
     return values.pop() if len(values) == 1 and 0.0 not in values else None

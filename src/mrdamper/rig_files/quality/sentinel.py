@@ -50,7 +50,7 @@ def missing_value_codes(view: View) -> Iterator[Finding]:
 
 
 def code_in(values: Floats, coarsest: float) -> float | None:
-    """The value that stands for missing samples in a channel; None if there is none.
+    """Return the value that stands for missing samples in a channel; None if there is none.
 
     Leaps below `coarsest` are the channel's own, in its unit.
     """
@@ -194,7 +194,7 @@ def _are_known(values: Floats) -> np.ndarray:
 
 
 def _scattered(values: Floats, value: float, leap: float) -> tuple[int, float]:
-    """Number and share of a value's occurrences that stand off from the samples on both sides."""
+    """Return number and share of a value's occurrences that stand off from the samples on both sides."""
     starts, stops = runs_of(values == value)
     inner = (starts > 0) & (stops < values.size)
     starts, stops = starts[inner], stops[inner]

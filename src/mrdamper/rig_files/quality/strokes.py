@@ -36,7 +36,7 @@ def find_strokes(time: Floats, displacement: Floats) -> Strokes:
 
 
 def _reversals(x: Floats) -> np.ndarray:
-    """Turns that stand out on both sides: scipy.signal.find_peaks by prominence, which takes half a second to load."""
+    """Find reversals prominent on both sides, as scipy.signal.find_peaks does, which takes half a second to import."""
     least = _PROMINENCE * float(np.ptp(x))
     if not least > 0:
         return np.empty(0, dtype=int)

@@ -65,7 +65,7 @@ def quality_table(records: Iterable[Record]) -> tuple[Quality, ...]:
 
 
 def record_of(run: Run) -> Record:
-    """A stored run as a record to be judged again."""
+    """Return a stored run as a record to be judged again."""
     own = ("id", "time", "displacement", "force", "velocity", "current", "rig", "excitation", "split", "window")
     fields: dict[str, Any] = {name: getattr(run, name) for name in own}
     fields |= {name: run.further.get(f"{name}_{FURTHER[name]}") for name in ("temperature", "pressure")}
@@ -88,13 +88,13 @@ def check_run(run: Run) -> tuple[QualityError | None, tuple[Finding, ...]]:
 
 
 def with_findings(run: Run) -> Run:
-    """The run with the codes of what is noticed today: a dataset written elsewhere, or arrays, state none."""
+    """Return the run with the codes of what is noticed today: a dataset written elsewhere, or arrays, state none."""
     codes = dict.fromkeys([*run.findings, *(finding.code for finding in check_run(run)[1])])
     return replace(run, notes={**run.notes, "findings": " ".join(codes)}) if len(codes) > len(run.findings) else run
 
 
 def row(quality: Quality) -> dict[str, Any]:
-    """A verdict as a row of numbers and words, in engineers' units; None where there is no figure."""
+    """Return a verdict as a row of numbers and words, in engineers' units; None where there is no figure."""
     condition = quality.condition
     return {
         "run_id": quality.record.id,

@@ -44,7 +44,7 @@ class View:
         return self.record.provenance.get("file", "") or f"run {self.record.id}"
 
     def refused(self, code: str, problem: str, remedy: str) -> QualityError:
-        """The refusal of the record."""
+        """Return the refusal of the record."""
         return QualityError(problem, where=self.where, remedy=remedy, code=code)
 
     def place(self, sample: int) -> str:
@@ -171,7 +171,7 @@ class View:
 
 
 def sample_noise(signal: Floats) -> float:
-    """Standard deviation of white noise on a smooth signal, from its third differences.
+    """Return standard deviation of white noise on a smooth signal, from its third differences.
 
     The median keeps corners of the signal out; 20 is the sum of the squared coefficients
     1, 3, 3, 1, and 0.6745 the median of a standard normal's size.
@@ -185,7 +185,7 @@ def sample_noise(signal: Floats) -> float:
 
 
 def runs_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Starts and (excluded) stops of all runs of true values."""
+    """Return starts and (excluded) stops of all runs of true values."""
     edges = np.flatnonzero(mask[1:] != mask[:-1]) + 1
     bounds = np.concatenate([[0], edges, [mask.size]])
     first = 0 if mask.size and mask[0] else 1

@@ -69,7 +69,7 @@ def _renamed(tables: list[RawTable], form: FileForm | None) -> list[RawTable]:
 
 
 def reader_of(source: Source) -> Reader:
-    """The reader whose format the content is: E_FORMAT if none or not the suffix's, E_UNSAFE for pickles."""
+    """Return the reader whose format the content is: E_FORMAT if none or not the suffix's, E_UNSAFE for pickles."""
     head = source.head()
     if head.startswith(_PICKLE) and (len(head) < 11 or head[2:3] in b"\x95(]}cX\x8c" or b"\n" not in head[:2]):
         raise source.refuse("E_UNSAFE", "pickled Python objects, which run code when loaded", "export plain numbers")

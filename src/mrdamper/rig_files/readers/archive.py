@@ -106,7 +106,7 @@ def check_sizes(source: Source, members: list[zipfile.ZipInfo]) -> None:
 
 
 def bomb(source: Source) -> RigFileError:
-    """The refusal of a file that unpacks to too much."""
+    """Return the refusal of a file that unpacks to too much."""
     return source.refuse(
         "E_ARCHIVE_RATIO",
         f"unpacks to over {MOST_RATIO} times its size, or over {MOST_UNPACKED // 10**9} GB",

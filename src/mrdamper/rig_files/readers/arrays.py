@@ -54,7 +54,7 @@ def array_table(
     remarks: Sequence[str] = (),
     over: Sequence[str] = (),
 ) -> RawTable:
-    """A table whose columns are loaded as arrays, one by one; E_TOO_MANY_COLUMNS beyond a thousand."""
+    """Return a table whose columns are loaded as arrays, one by one; E_TOO_MANY_COLUMNS beyond a thousand."""
     if len(names) > MOST_COLUMNS:
         raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(names)} columns", "export only the channels needed")
 
@@ -84,7 +84,7 @@ def array_table(
 
 
 def words_of(cells: Sequence[str]) -> Words:
-    """A column of words from its cells."""
+    """Return a column of words from its cells."""
     indices: dict[str, int] = {}
     codes = np.fromiter((indices.setdefault(cell, len(indices)) for cell in cells), dtype=np.int32, count=len(cells))
     return Words(codes, tuple(indices))
@@ -97,7 +97,7 @@ def _word(item: object) -> str:
 
 
 def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floats:
-    """A loaded column as (N,) doubles; date and time as seconds after the first.
+    """Return a loaded column as (N,) doubles; date and time as seconds after the first.
 
     Objects are refused as E_UNSAFE, what else is no number as E_NUMBER, tables as E_FIELD_COUNT.
     """
@@ -132,7 +132,7 @@ def expand(name: str, shape: tuple[int, ...]) -> list[tuple[str, int | None]]:
 
 
 def pick(array: np.ndarray, part: int | None) -> np.ndarray:
-    """The column of an array that `expand` named."""
+    """Return the column of an array that `expand` named."""
     if part is None:
         return array
     return np.squeeze(array)[part] if part < 0 else np.squeeze(array)[:, part]
@@ -235,12 +235,12 @@ def refusing_damage(source: Source, title: str) -> Iterator[None]:
 
 
 def twice(source: Source, name: str) -> RigFileError:
-    """The refusal of a file that holds two things of one name, of which a library gives either."""
+    """Return the refusal of a file that holds two things of one name, of which a library gives either."""
     return source.refuse("E_DUPLICATE_COLUMN", f"{name!r} is stored twice", "save the file again, with one of them")
 
 
 def damaged(source: Source, title: str, why: str) -> RigFileError:
-    """The refusal of a file that starts as it should and does not go on so."""
+    """Return the refusal of a file that starts as it should and does not go on so."""
     early = any(word in why.lower() for word in _EARLY_END)
     why = re.sub(r"'?<[^<>]*>'?( is)? ?", "", why)  # objects of the library's own
     reason = "".join(c if c.isprintable() else " " for c in (why.strip().splitlines() or ["unreadable"])[0])[:120]

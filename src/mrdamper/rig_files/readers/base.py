@@ -82,7 +82,7 @@ class Source:
     keep: ExitStack = field(default_factory=ExitStack)  # closes what readers opened when the file is closed
 
     def head(self, size: int = 4096) -> bytes:
-        """The first bytes; the file stands at its start afterwards."""
+        """Return the first bytes; the file stands at its start afterwards."""
         self.file.seek(0)
         start = self.file.read(size)
         self.file.seek(0)
@@ -91,7 +91,7 @@ class Source:
     def refuse(
         self, code: str, problem: str, remedy: str = "", *, line: int | None = None, column: int | None = None
     ) -> RigFileError:
-        """A refusal that names this file."""
+        """Return a refusal that names this file."""
         return RigFileError(code, problem, file=self.name, line=line, column=column, remedy=remedy)
 
 
@@ -159,7 +159,7 @@ class Reader(ABC):
 
     @abstractmethod
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """The tables of the file.
+        """Return the tables of the file.
 
         Raises
         ------

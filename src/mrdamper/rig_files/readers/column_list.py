@@ -38,7 +38,7 @@ class ColumnList(DelimitedText):
         return re.search(self.mark, source.head().replace(b"\0", b"").decode("latin-1"), re.MULTILINE) is not None
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """The tables of the text with the listed columns named by their channels."""
+        """Return the tables of the text with the listed columns named by their channels."""
         stated = {**self.form.model_dump(exclude_defaults=True), **form.model_dump(exclude_defaults=True)}
         return [self.special(self._named(table)) for table in super().tables(source, FileForm(**stated))]
 

@@ -80,7 +80,7 @@ class DelimitedText(Reader):
 
 
 def _without_arrival(source: Source) -> Source:
-    """The text without the time of arrival that a serial monitor writes before every line: 16:05:12.005 -> ."""
+    """Return the text without the time of arrival that a serial monitor writes before every line: 16:05:12.005 -> ."""
     lines = [line for line in source.head(_FOOTER).splitlines()[:-1] if line.strip()]
     if len(lines) < 2 or not all(map(_ARRIVED.match, lines)):
         return source
@@ -92,7 +92,7 @@ def _without_arrival(source: Source) -> Source:
 
 
 def _with_whole_quotes(lines: list[str]) -> list[str]:
-    """The lines with a quoted cell of the header on one line, where it was broken: earlier lines become empty."""
+    """Join a quoted cell of the header that was broken over lines; the earlier lines become empty."""
     lines = list(lines)
     for i, line in enumerate(lines[:_HEADER_LINES]):
         if line.count('"') % 2 == 0 or is_comment(line):

@@ -54,7 +54,7 @@ class Hdf5(Reader):
 
 
 def hdf5_tables(source: Source, title: str) -> list[RawTable]:
-    """The groups of an HDF5 file as tables."""
+    """Return the groups of an HDF5 file as tables."""
     h5py = load("h5py", title)
     with refusing_damage(source, title):
         file = h5py.File(source.path, "r")
@@ -183,7 +183,7 @@ def _follow(references: Any, name: str, path: str, content: _Found) -> None:
 
 
 def _frame(columns: list[tuple]) -> list[tuple]:
-    """The columns of a group that holds a pandas frame in its fixed format; empty if it holds none."""
+    """Return the columns of a group that holds a pandas frame in its fixed format; empty if it holds none."""
     datasets = {dataset.name.rpartition("/")[2]: dataset for _, _, dataset, _ in columns if dataset is not None}
     if "axis1" not in datasets or "block0_items" not in datasets:
         return []
@@ -213,7 +213,7 @@ class _Clock:
 
 
 def _with_clocks(columns: list[Any]) -> list[Any]:
-    """The columns with the times that attributes of datasets state: one for all, or one before each channel."""
+    """Return the columns with the times that attributes of datasets state: one for all, or one before each channel."""
     if any(split_name(name).role == "time" for name, *_ in columns):
         return columns
     clocks: list[Any] = []
@@ -232,13 +232,13 @@ def _with_clocks(columns: list[Any]) -> list[Any]:
 
 
 def _numbers(says: Any) -> dict[str, float]:
-    """The attributes that are one number each."""
+    """Return the attributes that are one number each."""
     values = {key: np.asarray(says[key]) for key in list(says)[:MOST_COLUMNS]}
     return {k: float(v.reshape(-1)[0]) for k, v in values.items() if v.dtype.kind in "iuf" and v.size == 1}
 
 
 def _titled(columns: list[tuple], words: list[list[str]]) -> list[tuple]:
-    """The columns with the names and units that lists of words give those of a matrix."""
+    """Return the columns with the names and units that lists of words give those of a matrix."""
     named = []
     for dataset, across in ((d, list(group)) for d, group in groupby(columns, key=lambda column: column[2])):
         says = {} if dataset is None else dataset.attrs
@@ -260,7 +260,7 @@ def _file_marks(item: Any) -> set[str]:
 
 
 def _attributes(item: Any) -> list[str]:
-    """The attributes of a group or a dataset as lines: numbers and short texts."""
+    """Return the attributes of a group or a dataset as lines: numbers and short texts."""
     lines = []
     for name in list(item.attrs)[:MOST_COLUMNS]:
         value = np.asarray(item.attrs[name])
@@ -305,7 +305,7 @@ def _is_words(item: Any) -> bool:
 
 
 def _words(values: Any) -> list[str]:
-    """The texts of an attribute or a dataset; empty if it holds anything else."""
+    """Return the texts of an attribute or a dataset; empty if it holds anything else."""
     array = np.asarray(values).reshape(-1)
     texts = array.dtype.kind in "SU" or all(isinstance(item, str | bytes) for item in array[:MOST_COLUMNS])
     return [_text(item).strip() for item in array[:MOST_COLUMNS].tolist()] if texts else []

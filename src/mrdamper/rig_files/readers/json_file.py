@@ -79,7 +79,7 @@ def _parsed(source: Source, content: bytes) -> Any:
 
 
 def _with_header(lines: list[Any]) -> Any:
-    """The records of a text with one a line; below what its first line says, where that is no record as the others."""
+    """Return the records of a text with one a line, under the first line's entries where that is no such record."""
     head, *records = lines
     same = len(records) >= _FEWEST and all(isinstance(r, dict) and r.keys() == records[0].keys() for r in records)
     if not same or not isinstance(head, dict) or head.keys() == records[0].keys() or head.keys() & records[0].keys():
@@ -89,7 +89,7 @@ def _with_header(lines: list[Any]) -> Any:
 
 
 def _tree(value: Any) -> Any:
-    """The document with arrays for its lists of numbers; mappings from row numbers are lists."""
+    """Return the document with arrays for its lists of numbers; mappings from row numbers are lists."""
     if isinstance(value, dict):
         if len(value) >= _FEWEST and all(key.isdigit() for key in value):
             return _tree(list(value.values()))

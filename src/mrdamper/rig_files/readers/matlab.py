@@ -32,7 +32,7 @@ class Matlab(Reader):
         )
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """The variables as one table, and one more a struct."""
+        """Return the variables as one table, and one more a struct."""
         if source.head(520)[512:] == HDF5_MARK:
             return hdf5_tables(source, self.title)
         with refusing_damage(source, self.title):
@@ -62,7 +62,7 @@ class Matlab(Reader):
 
 
 def _tree(value: Any, depth: int = 0) -> Any:
-    """A variable as a nested structure: mappings for structs, lists for arrays of them and for cells."""
+    """Return a variable as a nested structure: mappings for structs, lists for arrays of them and for cells."""
     array = np.asarray(value)
     kind, size = array.dtype.kind, array.size
     if array.dtype.names:
@@ -88,7 +88,7 @@ def _tree(value: Any, depth: int = 0) -> Any:
 
 
 def _words(array: np.ndarray) -> list[str]:
-    """A cell array of texts, or the rows of a matrix of characters; empty if it is neither."""
+    """Return a cell array of texts, or the rows of a matrix of characters; empty if it is neither."""
     if array.dtype.kind == "U" and array.size <= MOST_COLUMNS:
         return [str(item).strip() for item in array.reshape(-1)]
     if array.dtype.kind != "O" or array.size > MOST_COLUMNS:

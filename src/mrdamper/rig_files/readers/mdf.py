@@ -26,7 +26,7 @@ class Mdf(Reader):
         return source.head(8) in (b"MDF     ", b"UnFinMF ")
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """The groups as tables."""
+        """Return the groups as tables."""
         if source.head(8) == b"UnFinMF ":
             raise source.refuse("E_TRUNCATED", "the measurement was not closed", "close it with its own program")
         asammdf = load("asammdf", self.title)

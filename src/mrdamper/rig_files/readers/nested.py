@@ -58,7 +58,7 @@ class _Node:
 
 
 def nested_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[RawTable]:
-    """The tables of a nested structure, in the order they appear; empty if it holds no array."""
+    """Return the tables of a nested structure, in the order they appear; empty if it holds no array."""
     nodes = [node for node in _walk(tree, _Node("")) if node.columns]
     return [_table(source, node, title) for node in nodes]
 
@@ -98,7 +98,7 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
 
 
 def _object_in(value: Any) -> Any:
-    """The object that a text holds as JSON; any other value as it is."""
+    """Return the object that a text holds as JSON; any other value as it is."""
     if not isinstance(value, str) or not value.lstrip().startswith("{"):
         return value
     try:
@@ -109,7 +109,7 @@ def _object_in(value: Any) -> Any:
 
 
 def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Recordings of real-time systems: every channel of Y with the axis of X whose number it states, if a time."""
+    """Give every channel of a real-time system's Y the axis of X whose number it states, if that is a time."""
     keys = {key.casefold(): key for key in tree}
     if not {"x", "y"} <= set(keys):
         return tree
@@ -131,7 +131,7 @@ def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A list of matrices as a node each, with its own of the numbers that vectors beside them hold, one a matrix."""
+    """Split a list of matrices into a node each, with its own of the numbers that vectors beside them hold."""
     lists = {
         key: value
         for key, value in tree.items()
@@ -161,7 +161,7 @@ def _stated_units(tree: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, Any]:
-    """The mapping with arrays joined to what describes them: Channel_1_Data to Channel_1_Header, units by name."""
+    """Join arrays to the entries that describe them: Channel_1_Data to Channel_1_Header, units by name."""
     heads = {_HEAD.sub("", key): key for key, value in tree.items() if _HEAD.search(key) and isinstance(value, Mapping)}
     pairs = {
         key: heads[stem]
@@ -219,7 +219,7 @@ def _records(items: list[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
-    """The columns of a mapping that is one channel: its data, and its own x before it; empty if it is none."""
+    """Return the columns of a mapping that is one channel: its data, and its own x before it; empty if it is none."""
     lower = {name.casefold(): value for name, value in says.items()}
     timed = any(name in lower for name in _TIME_UNITS)
     for name in ("points", *_DATA):  # [time, value] each
@@ -264,7 +264,7 @@ def _unit_of(lower: Mapping[str, Any], names: Sequence[str], inside: str) -> str
 
 
 def _title(stated: str) -> str:
-    """The part of a path in a model that names a channel: "Model Root"/"Load cell [N]"/"Out1"."""
+    """Return the part of a path in a model that names a channel: "Model Root"/"Load cell [N]"/"Out1"."""
     whole = '"/"' not in stated and (split_name(stated).unit or "/" not in stated)
     parts = [stated] if whole else stated.split("/")
     parts = [part.strip().strip('"').strip() for part in parts]
@@ -329,7 +329,7 @@ def _table(source: Source, node: _Node, title: str) -> RawTable:
 
 
 def _one_time(columns: list[_Column]) -> list[_Column]:
-    """The columns with one time in front, where every channel has the same."""
+    """Return the columns with one time in front, where every channel has the same."""
     times = [column for column in columns if column.over and column.name == "time"]
     same = len(times) > 1 and all(
         t.unit == times[0].unit and np.array_equal(t.array.reshape(-1), times[0].array.reshape(-1)) for t in times

@@ -22,7 +22,7 @@ class NetCdf(Reader):
         return source.head(4) in (b"CDF\x01", b"CDF\x02")
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """The one table: single numbers and attributes stand beside it."""
+        """Return the one table: single numbers and attributes stand beside it."""
         with refusing_damage(source, self.title):
             from scipy.io import netcdf_file
 
@@ -53,7 +53,7 @@ class NetCdf(Reader):
         return self._tests(source, arrays, units, column_of, arrays[across[0]].shape, single, remarks)
 
     def _tests(self, source, arrays, units, column_of, shape, single, remarks) -> list[RawTable]:
-        """A table for each row of the arrays of a shape, with its own of the numbers one a row."""
+        """Return a table for each row of the arrays of a shape, with its own of the numbers one a row."""
         variables = list(arrays.values())
         count, samples = shape
         kept = [i for i, variable in enumerate(variables) if samples in variable.shape]

@@ -21,7 +21,7 @@ class Npy(Reader):
         return source.head(6) == b"\x93NUMPY"
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """The one table."""
+        """Return the one table."""
         with refusing_damage(source, self.title):
             source.file.seek(0)
             version = np.lib.format.read_magic(source.file)

@@ -22,7 +22,7 @@ class Npz(Reader):
     suffixes = (".npz",)
 
     def recognises(self, source: Source) -> bool:
-        """A zip of arrays, or a damaged zip of that name."""
+        """Recognise a zip of arrays, or a damaged zip of that name."""
         if not source.head(4).startswith(b"PK"):
             return False
         try:
@@ -31,7 +31,7 @@ class Npz(Reader):
             return source.suffix in self.suffixes
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """The arrays as columns of one table; a matrix gives numbered ones, a structured array its fields."""
+        """Return the arrays as columns of one table; a matrix gives numbered ones, a structured array its fields."""
         with refusing_damage(source, self.title):
             fields = _check_headers(source)
             source.file.seek(0)
@@ -45,7 +45,7 @@ class Npz(Reader):
 
 
 def _value(array: np.ndarray) -> Any:
-    """An array, a number or a text for one of one item, a list for one of words."""
+    """Return an array, a number or a text for one of one item, a list for one of words."""
     kind = array.dtype.kind
     if array.size == 1 and kind in "iuf":
         return float(array.reshape(-1)[0])
@@ -56,7 +56,7 @@ def _value(array: np.ndarray) -> Any:
 
 
 def _check_headers(source: Source) -> dict[str, tuple[str, ...]]:
-    """The fields of structured arrays by name, after a look at the headers of all arrays alone."""
+    """Return the fields of structured arrays by name, after a look at the headers of all arrays alone."""
     try:
         archive = zipfile.ZipFile(source.file)
     except UNREADABLE_ZIP as error:

@@ -41,7 +41,7 @@ class _Frame:
         return source.head(len(self.magic)) == self.magic
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """The one table."""
+        """Return the one table."""
         import polars as pl
 
         source.file.seek(max(0, source.size - len(self.magic)))
@@ -92,7 +92,7 @@ def _warm() -> None:
 def _table(
     source: Source, title: str, schema: Mapping[str, pl.DataType], rows: int, loaded: Callable[[str], pl.Series]
 ) -> RawTable:
-    """A table of typed columns, each loaded by its name when it is asked for."""
+    """Return a table of typed columns, each loaded by its name when it is asked for."""
     import polars as pl
 
     if not rows:
@@ -116,7 +116,7 @@ def _table(
 
 
 def words_in(values: pl.Series) -> Words:
-    """The words of a column; a missing one is empty."""
+    """Return the words of a column; a missing one is empty."""
     import polars as pl
 
     if values.dtype.is_float():

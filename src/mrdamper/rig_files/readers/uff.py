@@ -67,7 +67,7 @@ class Uff(Reader):
 
 
 def _function(lines: list[str]) -> tuple[dict[str, object], dict[str, object]]:
-    """The texts above a function, and the function as a channel."""
+    """Return the texts above a function, and the function as a channel."""
     texts: dict[str, object] = {
         f"text {i}": line.strip() for i, line in enumerate(lines[:5], 1) if line.strip() not in ("", "NONE")
     }

@@ -31,7 +31,7 @@ class Workbook(Reader):
     seconds_per_byte = 5e-6  # a sheet is slow to read: some microseconds a cell of some bytes
 
     def recognises(self, source: Source) -> bool:
-        """A zip with sheets, or a damaged zip or an old compound file of that name."""
+        """Recognise a zip with sheets, or a damaged zip or an old compound file of that name."""
         if not source.head(4).startswith(b"PK"):
             return source.head(8) == _COMPOUND and source.suffix in self.suffixes
         try:

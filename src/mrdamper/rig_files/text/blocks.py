@@ -25,7 +25,7 @@ class Block:
 
 
 def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> list[Block]:
-    """The blocks between two places of a text; one where the header is not repeated."""
+    """Return the blocks between two places of a text; one where the header is not repeated."""
     if not layout.header.strip():
         return [Block(start, stop, layout.data_line)]
     header = layout.header.strip(" \t\r").encode(stream.encoding, "ignore")

@@ -61,7 +61,7 @@ def _even_lines(block: bytes, separator: int, count: int) -> np.ndarray | None:
 
 
 def _cleaned(block: bytes, form: RowFormat) -> bytes:
-    """The block in UTF-8, with decimal points and plain line feeds."""
+    """Return the block in UTF-8, with decimal points and plain line feeds."""
     if not block.isascii():
         block = block.decode(form.stream.encoding, "replace").encode("utf-8")
     if form.layout.decimal == ",":
@@ -72,7 +72,7 @@ def _cleaned(block: bytes, form: RowFormat) -> bytes:
 
 
 def _columns(block: bytes, form: RowFormat) -> list[np.ndarray]:
-    """The wanted columns; NaN where polars finds no number, which is at least where we find none."""
+    """Return the wanted columns; NaN where polars finds no number, which is at least where we find none."""
     import polars as pl
 
     width = form.layout.width + form.layout.trailing

@@ -73,13 +73,13 @@ def read_cells(block: bytes, line: int, form: RowFormat, *, final: bool = False)
 
 
 def read_row(text: str, line: int, form: RowFormat) -> list[float]:
-    """The wanted cells of one row; raises as `read_cells`."""
+    """Return the wanted cells of one row; raises as `read_cells`."""
     rows, lines = split_rows([text], line, form, False)
     return [float(_numbers([row[c] for row in rows], c, lines, form)[0]) for row in rows for c in form.wanted]
 
 
 def field_count(form: RowFormat, fields: int, line: int, final: bool) -> RigFileError:
-    """The refusal of a row with another number of cells than the others."""
+    """Return the refusal of a row with another number of cells than the others."""
     width = form.layout.width
     if final and fields < width:
         return form.stream.source.refuse(
@@ -100,7 +100,7 @@ def field_count(form: RowFormat, fields: int, line: int, final: bool) -> RigFile
 
 
 def split_rows(texts: Sequence[str], line: int, form: RowFormat, final: bool) -> tuple[list[list[str]], list[int]]:
-    """The cells of every row among lines of text, and the lines they stand in.
+    """Return the cells of every row among lines of text, and the lines they stand in.
 
     Raises at E_QUOTE; rows of another width are left out and kept by the form.
     """

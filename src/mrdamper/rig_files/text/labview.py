@@ -19,7 +19,7 @@ def is_labview(lines: Sequence[str]) -> bool:
 
 
 def stated_form(lines: Sequence[str], form: FileForm) -> FileForm:
-    """The form with what the headers say, where the profile says nothing."""
+    """Return the form with what the headers say, where the profile says nothing."""
     says = _entries(lines)
     names = next((i for i, line in enumerate(lines, 1) if line.startswith(_NAMES)), None)
     forms = {
@@ -31,7 +31,7 @@ def stated_form(lines: Sequence[str], form: FileForm) -> FileForm:
 
 
 def named(layout: Layout, lines: Sequence[str]) -> Layout:
-    """The layout with the time's name for every X_Value, and the units of the second header."""
+    """Return the layout with the time's name for every X_Value, and the units of the second header."""
     above = [line.split(layout.separator) for line in lines[: layout.header_line]]
     units = next((cells for cells in reversed(above) if cells[0] == "Y_Unit_Label"), [])
     dimension = next((cells[1:2] for cells in reversed(above) if cells[0] == "X_Dimension"), [])

@@ -143,12 +143,12 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
 
 
 def _below_names(lines: Sequence[str], header: int | None, units: int | None, first: int) -> list[str]:
-    """The lines between the names of columns and the first row that are no units: comments of a plotting program."""
+    """Return the comments between the names of columns and the first row: lines that are no units."""
     return [] if header is None else [lines[i] for i in range(header + 1, min(first, len(lines))) if i != units]
 
 
 def _levels(above: Sequence[str], separator: str, width: int) -> list[tuple[str, ...]]:
-    """The lines of cells right above the names of columns, one cell a column."""
+    """Return the lines of cells right above the names of columns, one cell a column."""
     levels: list[tuple[str, ...]] = []
     for line in reversed(above[-_MOST_LEVELS:]):
         if not line.strip() or is_comment(line) or separator == SPACES:
@@ -193,7 +193,7 @@ def _stated_for_all(above: Sequence[str], separator: str, width: int) -> list[st
 
 
 def _without_units(lines: Sequence[str]) -> Sequence[str]:
-    """The lines without the units behind their numbers, where no line is a row of plain numbers."""
+    """Return the lines without the units behind their numbers, where no line is a row of plain numbers."""
     last = list(islice((line for line in reversed(lines) if line.strip()), _SAMPLE))
     if any(_is_row(cells_of(line, mark)) for line in last for mark in _SEPARATORS):
         return lines
@@ -201,7 +201,7 @@ def _without_units(lines: Sequence[str]) -> Sequence[str]:
 
 
 def _bare_row(line: str, separator: str) -> str:
-    """A row of which at least two cells are numbers with units, without the units; empty if it is none."""
+    """Return a row of which at least two cells are numbers with units, without the units; empty if it is none."""
     matches = [_QUANTITY.fullmatch(cell) for cell in cells_of(line, separator) if cell]
     if len(matches) < 2 or not all(match and is_unit(match[2]) for match in matches):
         return ""
@@ -209,7 +209,7 @@ def _bare_row(line: str, separator: str) -> str:
 
 
 def _unit_behind(cells: Sequence[str]) -> str:
-    """The one unit that stands behind every number of a column, as it is written."""
+    """Return the one unit that stands behind every number of a column, as it is written."""
     units: set[str] = set()
     for match in (_QUANTITY.fullmatch(cell) for cell in cells if cell):
         units.add(match[2] if match else "")
@@ -244,7 +244,7 @@ def _below_preamble(lines: Sequence[str], first: int, separator: str) -> int:
 
 
 def _roles(cells: Sequence[str]) -> set[str | None]:
-    """The channels that cells name."""
+    """Return the channels that cells name."""
     return {split_name(cell.strip('"')).role for cell in cells[:MOST_COLUMNS] if cell} - {None}
 
 
@@ -278,7 +278,7 @@ def _titles(above: Sequence[str], separator: str, width: int) -> tuple[str, ...]
 
 
 def split(line: str, separator: str) -> list[str]:
-    """The stripped cells of a line; csv.Error if a quote is not closed."""
+    """Return the stripped cells of a line; csv.Error if a quote is not closed."""
     if separator == SPACES:
         return line.split()
     if '"' in line:
@@ -289,7 +289,7 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def units_in(line: str, layout: Layout) -> tuple[str, ...]:
-    """The units a line states, one a column; empty if it is no row of units."""
+    """Return the units a line states, one a column; empty if it is no row of units."""
     cells = _cells(line, layout.separator, layout.width)
     return tuple(map(_unbracket, cells)) if len(cells) == layout.width and _is_units(cells) else ()
 
@@ -300,7 +300,7 @@ def is_comment(line: str) -> bool:
 
 
 def cells_of(line: str, separator: str) -> list[str]:
-    """The stripped cells of a line, quotes or no quotes."""
+    """Return the stripped cells of a line, quotes or no quotes."""
     try:
         return split(line, separator)
     except csv.Error:
@@ -313,7 +313,7 @@ def _content(lines: Sequence[str]) -> list[tuple[int, str]]:
 
 
 def _separator(lines: Sequence[str], content: Sequence[tuple[int, str]], source: Source) -> str:
-    """The one under which the last lines at hand split into most numbers, evenly."""
+    """Return the one under which the last lines at hand split into most numbers, evenly."""
     last = [line for _, line in content[-_SAMPLE:]]
     if not last:
         raise source.refuse(
@@ -433,7 +433,7 @@ def _decimal(rows: Sequence[Sequence[str]], source: Source, first: int) -> str:
 def _header_lines(
     lines: Sequence[str], first: int, separator: str, width: int, source: Source, form: FileForm
 ) -> tuple[int | None, int | None]:
-    """Indices of the line of names and of the line of units above the data."""
+    """Return indices of the line of names and of the line of units above the data."""
     if form.header_line is not None:
         header = form.header_line - 1 if form.header_line else None
         units = form.units_line - 1 if form.units_line else None
@@ -477,7 +477,7 @@ def _header_lines(
 
 
 def _plain(lines: Sequence[str]) -> list[int]:
-    """Indices of the lines that are neither empty nor remarks."""
+    """Return indices of the lines that are neither empty nor remarks."""
     return [i for i, line in enumerate(lines) if line.strip() and not is_comment(line)]
 
 

@@ -43,13 +43,13 @@ class TextStream:
     original_encoding: str  # what the file itself is in
 
     def decode(self, line: bytes) -> str:
-        """A line as text; bytes that are no text become lone surrogates, which no number holds."""
+        """Return a line as text; bytes that are no text become lone surrogates, which no number holds."""
         if self.encoding == "utf-8":
             return line.decode("utf-8", "surrogateescape")
         return line.decode(self.encoding, "replace")
 
     def is_odd(self, block: bytes) -> bool:
-        """True where there are bytes that are not in the text's encoding."""
+        """Return True where there are bytes that are not in the text's encoding."""
         if block.isascii() or self.encoding != "utf-8":
             return not block.isascii() and self.original_encoding == "cp1252"
         try:
@@ -59,7 +59,7 @@ class TextStream:
         return False
 
     def head(self) -> bytes:
-        """The start of the text, whole lines where there is more."""
+        """Return the start of the text, whole lines where there is more."""
         self.file.seek(self.start)
         head = self.file.read(min(_HEAD, self.stop - self.start))
         if self.start + len(head) < self.stop:
@@ -72,7 +72,7 @@ class TextStream:
         return head
 
     def chunks(self, start: int, stop: int) -> Iterator[bytes]:
-        """The bytes between two places, cut after line feeds."""
+        """Yield the bytes between two places, cut after line feeds."""
         self.file.seek(start)
         rest, at = b"", start
         while at < stop:
@@ -120,7 +120,7 @@ class TextStream:
 
 
 def line_feeds(block: bytes) -> int:
-    """Number of line feeds: bytes.count takes three times as long where they are many."""
+    """Return number of line feeds: bytes.count takes three times as long where they are many."""
     return int(np.count_nonzero(np.frombuffer(block, dtype=np.uint8) == 10))
 
 
@@ -144,7 +144,7 @@ def open_text(source: Source, form: FileForm) -> TextStream:
 
 
 def too_long(source: Source, line: int | None) -> RigFileError:
-    """The refusal of an endless line."""
+    """Return the refusal of an endless line."""
     return source.refuse(
         "E_LINE_TOO_LONG",
         f"a line over {LONGEST_LINE // 1024} KiB",
@@ -202,7 +202,7 @@ def _telling_words(text: bytes, encoding: str) -> int:
 
 
 def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[IO[bytes], int]:
-    """The text in UTF-8 with line feeds, in memory or, if large, in a temporary file."""
+    """Return the text in UTF-8 with line feeds, in memory or, if large, in a temporary file."""
     source.file.seek(mark)
     decoder = codecs.getincrementaldecoder(encoding)()
     target = scratch(source.keep)

@@ -18,7 +18,7 @@ _TELLING = 2  # rows whose names tell what they are
 
 
 def turned_table(source: Source, lines: Sequence[str]) -> RawTable | None:
-    """The table of a text with its channels in rows; None if it is none.
+    """Return the table of a text with its channels in rows; None if it is none.
 
     Raises `RigFileError`, its code E_NUMBER, if a cell of such a row is no number.
     """

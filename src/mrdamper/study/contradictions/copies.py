@@ -128,7 +128,7 @@ def _largest_own(noise: Floats) -> float:
 
 
 def _noise(force: Floats) -> Floats:
-    """The highest frequencies of a force, without what stands out of them."""
+    """Return the highest frequencies of a force, without what stands out of them."""
     part = force[:_MAX_SAMPLES]
     if part.size < _MIN_OVERLAP:
         return np.zeros(0)

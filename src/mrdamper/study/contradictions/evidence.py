@@ -97,7 +97,7 @@ class RowProducts:
         return np.tile(np.eye(_ELEMENTS)[0], len(self.gram) // _ELEMENTS)
 
     def with_force(self, gain: float, offset: float) -> RowProducts:
-        """The same with another gain and offset of the force."""
+        """Return the same with another gain and offset of the force."""
         one = self.constant
         power = gain**2 * self.power + 2 * gain * offset * float(one @ self.moment) + self.rows * offset**2
         moment = gain * self.moment + offset * self.gram @ one
@@ -271,7 +271,7 @@ class Evidence:
         return np.column_stack([np.interp(current, self.nodes, hat) for hat in np.eye(self.nodes.size)])
 
     def total(self, members: Iterable[Moments]) -> tuple[Floats, Floats]:
-        """Sums of the moments of runs over all nodes."""
+        """Return sums of the moments of runs over all nodes."""
         gram, moment = np.zeros(self._root.shape), np.zeros(len(self._root))
         blocks = gram.reshape(self.nodes.size, _ELEMENTS, self.nodes.size, _ELEMENTS)
         for member in members:
@@ -288,7 +288,7 @@ class Evidence:
 
 
 def model_error(run: RowProducts) -> float:
-    """Standard deviation of the model error of a run, before the factor of all runs."""
+    """Return standard deviation of the model error of a run, before the factor of all runs."""
     return run.misfit * float(np.sqrt((_MISFIT * run.size) ** 2 + _MIN_MISFIT**2 * min(1.0, run.size)))
 
 

@@ -131,7 +131,7 @@ class ExplanationCandidate:
         return sorted(candidates, key=lambda e: -e.gain)
 
     def alone(self, others: Posterior) -> Explanation:
-        """The last resort: the run is of another damper."""
+        """Return the last resort: the run is of another damper."""
         prior = self.evidence.prior
         own = others.weigh(self.own)
         gain = prior.log_probability(own) - _ALONE_ODDS - others.log_probability(own)
@@ -167,7 +167,7 @@ class ExplanationCandidate:
                 yield trial, replace(products, misfit=self.own.misfit)
 
     def _of_the_force(self, others: Posterior) -> Iterator[Trial]:
-        """A factor or an offset of the force."""
+        """Yield a factor or an offset of the force."""
         expected, one = others.at(self.own.over)[0], self.own.constant
         mean = float(one @ self.own.gram @ expected) / self.own.rows
         measured = float(one @ self.own.moment) / self.own.rows
@@ -192,7 +192,7 @@ class ExplanationCandidate:
         )
 
     def _of_the_motion(self) -> Iterator[Trial]:
-        """A factor of displacement or time; both channels inverted."""
+        """Yield a factor of displacement or time; both channels inverted."""
         yield Trial("sign", -1.0, "", _SIGN_ODDS)
         kinds: tuple[tuple[Cause, dict[str, float]], ...] = (("displacement", LENGTH_UNITS), ("time", TIME_UNITS))
         for cause, units in kinds:

@@ -95,7 +95,7 @@ def _of_validation(validation: Sequence[Track], trusted: Sequence[Track]) -> dic
 
 
 def _in_amperes(tracks: Sequence[Track], keep: Collection[str]) -> tuple[list[Track], dict[str, Contradiction]]:
-    """The runs, those in amperes whose current is a thousand times the others', which are in milliamperes."""
+    """Return the runs, those in amperes whose current is a thousand times the others', which are in milliamperes."""
     sizes = [float(np.median(track.current)) for track in tracks]
     usual = float(np.median([size for size in sizes if size > 0] or [0.0]))
     kept, contradictions = [], {}
@@ -116,7 +116,7 @@ def _split(runs: Sequence[Run], name: str) -> str:
 
 
 def _disagreement(train: Sequence[Track], contradictions: dict[str, Contradiction]) -> ContradictionError:
-    """The refusal, with both groups of runs."""
+    """Return the refusal, with both groups of runs."""
     rest = [track.run.id for track in train if track.run.id not in contradictions]
     causes = sorted({one.code for one in contradictions.values()})
     first = next(iter(contradictions.values()))

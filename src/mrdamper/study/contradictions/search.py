@@ -100,7 +100,7 @@ class Search:
         return self.evidence.posterior([self._members[k] for k in self._agreeing(but)])
 
     def explain(self, track: Track) -> Explanation | None:
-        """The named explanation of a further run that is far better than none."""
+        """Return the named explanation of a further run that is far better than none."""
         candidate = ExplanationCandidate(
             len(self.tracks), [*self.tracks, track], self.evidence, *self.evidence.products([track])
         )
@@ -191,7 +191,7 @@ class Search:
                 yield self._refined_rows(best, posterior)
 
     def _of_one(self, i: int) -> JointExplanation:
-        """The best explanation of a run."""
+        """Return the best explanation of a run."""
         others = self.posterior([i])
         alone = self._candidates[i].alone(others)
         self._options[i] = self._candidates[i].explanations(others)
@@ -200,7 +200,7 @@ class Search:
         return JointExplanation({i: best}, best.gain)
 
     def _refined(self, proposal: JointExplanation) -> JointExplanation:
-        """A proposal for one run whose gain counts that all runs agree better afterwards."""
+        """Return a proposal for one run whose gain counts that all runs agree better afterwards."""
         ((i, explanation),) = proposal.explanations.items()
         rest = self._agreeing([i])
         others = self.evidence.posterior([self._members[k] for k in rest])
@@ -247,7 +247,7 @@ class Search:
         return np.mean([p.gram / p.rows for p in self._products if p.over is not None], axis=0)
 
     def _groups(self, order: Sequence[int], posterior: Posterior) -> list[tuple[int, ...]]:
-        """Sets of runs that may be wrong in the same way: the high or low runs of a current; a second group."""
+        """Return sets of runs that may be wrong in the same way: the high or low runs of a current; a second group."""
         gains = {k: self._gain(k, posterior) for k in order}
         sets: list[list[int]] = []
         low: list[int] = []
@@ -269,7 +269,7 @@ class Search:
         return list(dict.fromkeys(tuple(sorted(s)) for s in sets if 2 <= len(s) <= len(self.tracks) // 2))
 
     def _alike(self, order: Sequence[int]) -> list[tuple[int, ...]]:
-        """Sets of runs that one explanation makes more probable each."""
+        """Return sets of runs that one explanation makes more probable each."""
         sets = []
         for i in order[:_GROUP_SEEDS]:
             for explanation in self._options.get(i, [])[:_SHARED_EXPLANATIONS]:
@@ -287,7 +287,7 @@ class Search:
         return float(swing @ products.moment) / max(float(swing @ products.gram @ swing), 1e-12)
 
     def _grown(self, seeds: Sequence[int], posterior: Posterior) -> list[int]:
-        """The group of runs about some that follow a damper of their own rather than that of the others."""
+        """Return the group of runs about some that follow a damper of their own rather than that of the others."""
         every = [k for k in self._agreeing() if k not in self.found]
         spread = self.evidence.spread
         self.evidence.spread = replace(spread, misfit=max(spread.misfit / _GROUP_ERROR_RATIO, _MIN_MISFIT))
@@ -312,7 +312,7 @@ class Search:
         return sorted(group)
 
     def _of_group(self, group: tuple[int, ...]) -> JointExplanation:
-        """The best explanation that several runs have in common: one cause with one value, or another damper."""
+        """Return the best explanation that several runs have in common: one cause with one value, or another damper."""
         rest = self._agreeing(group)
         others = self.evidence.posterior([self._members[k] for k in rest])
         kept, own = [self._products[k] for k in rest], [self._products[k] for k in group]
@@ -362,7 +362,7 @@ class Search:
         return any(2 * inside.count(level) > levels.count(level) for level in inside)
 
     def _smaller(self, proposal: JointExplanation) -> JointExplanation:
-        """A proposal for a group without the runs that need no explanation once the others are explained."""
+        """Return a proposal for a group without the runs that need no explanation once the others are explained."""
         while len(proposal.explanations) > 2 and proposal.gain >= self._threshold(proposal.explanations.values()):
             members = tuple(proposal.explanations)
             subsets = [tuple(k for k in members if k != left) for left in members]

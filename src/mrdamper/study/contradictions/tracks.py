@@ -61,7 +61,7 @@ class Track:
     step: float
 
     def scaled(self, motion: float = 1.0, time: float = 1.0) -> Self:
-        """The same test with displacement and time multiplied by factors; a negative one inverts the motion."""
+        """Return the same test with displacement and time multiplied by factors; a negative one inverts the motion."""
         return replace(
             self,
             displacement=self.displacement * motion,

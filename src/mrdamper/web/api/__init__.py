@@ -10,6 +10,6 @@ from fastapi import APIRouter
 
 
 def routers() -> Iterator[APIRouter]:
-    """The routers of all modules here."""
+    """Yield the routers of all modules here."""
     for module in sorted(pkgutil.iter_modules(__path__), key=lambda m: m.name):
         yield importlib.import_module(f"{__name__}.{module.name}").router

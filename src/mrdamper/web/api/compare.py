@@ -80,7 +80,7 @@ def overlaid(rig: int, key: str, session: Current) -> Response:
 
 @router.get("/rigs/{rig}/comparison.csv")
 def table(rig: int, session: Current) -> Response:
-    """The ranking as CSV."""
+    """Return the ranking as CSV."""
     return download(csv_text(summary_rows(_whole(session, rig))).encode(), "comparison.csv", "text/csv; charset=utf-8")
 
 

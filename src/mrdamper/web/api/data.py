@@ -104,7 +104,7 @@ def overview(session: Current) -> dict[str, Any]:
 
 @router.get("/data/rigs/{number}")
 def rig(number: int, session: Current) -> dict[str, Any]:
-    """The runs of a rig and its test matrix."""
+    """Return the runs of a rig and its test matrix."""
     table = session.table(number)
     motions = table.motions()
     currents = sorted({round(row.condition.current_A, 3) for g in motions for row in g if row.condition})
@@ -117,7 +117,7 @@ def rig(number: int, session: Current) -> dict[str, Any]:
 
 @router.get("/data/rigs/{number}/quality")
 def quality(number: int, session: Current) -> dict[str, Any]:
-    """The verdict on every run of a rig."""
+    """Return the verdict on every run of a rig."""
     table = session.table(number)
     return {
         row.key: {"verdict": findings.verdict, "findings": _findings(findings)}
@@ -127,7 +127,7 @@ def quality(number: int, session: Current) -> dict[str, Any]:
 
 @router.get("/data/rigs/{number}/runs/{key}/{part}")
 def loop(number: int, key: str, part: str, session: Current) -> Response:
-    """A run's last whole cycle ("cycle") or its steady window ("window")."""
+    """Return a run's last whole cycle ("cycle") or its steady window ("window")."""
     row = session.table(number).row(key)
     if row.condition is None:
         arrays = raw_record(row.run)

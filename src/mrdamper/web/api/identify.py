@@ -208,7 +208,7 @@ def _identified(one: Identification) -> dict[str, Any]:
 
 
 def _joint_fit(scored: RecipeResult | str) -> JointFit:
-    """The fit of a model of one set of parameters: without identifications there is always one."""
+    """Return the fit of a model of one set of parameters: without identifications there is always one."""
     assert isinstance(scored, RecipeResult)
     assert isinstance(scored.fit, JointFit)
     return scored.fit

@@ -20,7 +20,7 @@ _SILENCE = 15.0  # seconds after which a comment keeps the connection open
 
 @router.get("")
 def newest(session: Current) -> list[dict[str, Any]]:
-    """The newest work of each kind on the data of now, the last begun last.
+    """Return the newest work of each kind on the data of now, the last begun last.
 
     A page that is loaded again finds its results here.
     """

@@ -58,7 +58,7 @@ def dampers(session: Current) -> list[dict[str, Any]]:
 
 @router.get("/{key}")
 def damper(key: str, session: Current) -> dict[str, Any]:
-    """A damper's sliders and tested envelope."""
+    """Return a damper's sliders and tested envelope."""
     bench = session.damper(key)
     chosen, e = bench.damper, bench.damper.envelope
     start = chosen.envelope.middle
@@ -130,7 +130,7 @@ def _predicted(damper: Damper, ask: PredictionRequest, session: Session) -> Resp
 
 
 def _loops(damper: Damper, ask: PredictionRequest, table: RigTable | None) -> list[tuple[str, Condition]]:
-    """The loop asked for, and where wished those at the currents of the tests."""
+    """Return the loop asked for, and where wished those at the currents of the tests."""
     loops = [("now", ask.condition)]
     if ask.family:
         currents = _tested_currents(damper, table)

@@ -24,7 +24,7 @@ async def _whole(request: Request) -> None:
 
 @router.post("", dependencies=[Depends(_whole)])
 def open_session(request: Request) -> dict[str, Any]:
-    """A new session and what the page must know of the bench."""
+    """Return a new session and what the page must know of the bench."""
     token, shown = request.app.state.token, request.headers.get("x-bench-token", "")
     if token is not None and not secrets.compare_digest(shown.encode(), token.encode()):
         raise HTTPException(403, "Open the address that the terminal shows: its token is missing or of an older bench.")

@@ -73,7 +73,7 @@ def bring(document: Document, session: Current) -> dict[str, Any]:
 
 @router.post("/dampers/{key}/document")
 def document(key: str, held: Held, session: Current) -> dict[str, str]:
-    """A damper as model.json, with held parameters made its own."""
+    """Return a damper as model.json, with held parameters made its own."""
     return {"text": dump_model(as_damper(session.damper(key).damper, held.held))}
 
 
@@ -92,7 +92,7 @@ class TableRequest(PredictionRequest):
 
 @router.post("/dampers/{key}/csv")
 def table(key: str, ask: TableRequest, session: Current) -> Response:
-    """The loop at a condition as CSV."""
+    """Return the loop at a condition as CSV."""
     prediction = predict_held(session.damper(key).damper, ask.condition, ask.held)
     text = csv_text(in_units(prediction_rows(prediction), ask.units.force, ask.units.length))
     return download(text.encode(), "prediction.csv", "text/csv; charset=utf-8")
@@ -100,7 +100,7 @@ def table(key: str, ask: TableRequest, session: Current) -> Response:
 
 @router.get("/exports")
 def exports(session: Current) -> list[dict[str, str]]:
-    """Formats a damper can leave in."""
+    """Return formats a damper can leave in."""
     return [{"name": name, "title": cls.title} for name, cls in all_exporters().items()]
 
 
@@ -135,7 +135,7 @@ class State(BaseModel, extra="forbid"):
 
 @router.post("/bench.zip")
 def keep_bench(shown: State, session: Current) -> Response:
-    """Data, dampers, logo and state of this bench in one file."""
+    """Return data, dampers, logo and state of this bench in one file."""
     return download(
         save_project(session, shown.state, shown.damper, shown.logo), "mrdamper-bench.zip", "application/zip"
     )
