@@ -18,7 +18,7 @@ def test_a_road_has_the_spectrum_of_its_class(letter):
     for seed in range(20):
         road = load_input(f"iso8608-{letter}", {"seed": seed, "length_s": 40})
         distance = np.arange(0, 800, 0.05)
-        spectra.append(welch(road.heights(distance)[0], 20.0, nperseg=4096)[1])
+        spectra.append(welch(road.profile(distance), 20.0, nperseg=4096)[1])
     n = welch(distance, 20.0, nperseg=4096)[0]
     inside = (n > 0.03) & (n < 2.5)
     wanted = {"a": 16e-6, "b": 64e-6, "c": 256e-6, "d": 1024e-6, "e": 4096e-6}[letter] * (n[inside] / 0.1) ** -2.0

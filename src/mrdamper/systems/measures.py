@@ -7,7 +7,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.physics.motion.lag import decaying_sum
 from mrdamper.systems.linear import aims
 from mrdamper.systems.result import Simulation
 from mrdamper.systems.weighting import frequency_weighted
@@ -24,7 +23,9 @@ def comfort(acceleration: Floats, step: float, weighting: str = "Wk") -> dict[st
     weighted = frequency_weighted(acceleration, step, weighting)
     squares = weighted**2
     keep = np.exp(-step / _WINDOW)
-    running = decaying_sum(float(keep), (1 - keep) * squares)
+    from scipy.signal import lfilter
+
+    running = np.asarray(lfilter([1 - keep], [1, -keep], squares))
     a_w = float(np.sqrt(squares.mean()))
     return {
         "a_w_m_s2": a_w,

@@ -65,9 +65,10 @@ def frequency_weighted(acceleration: Floats, step: float, weighting: str) -> Flo
     """
     if weighting not in WEIGHTINGS:
         raise UnknownNameError.of("weighting", weighting, WEIGHTINGS)
+    from scipy.fft import next_fast_len
+
     filters = WEIGHTINGS[weighting]
-    least = acceleration.size + int(_MEMORY / filters.f1 / step)
-    size = min(odd << (-(-least // odd) - 1).bit_length() for odd in (1, 3, 5, 9, 15, 27))  # fast to transform
+    size = int(next_fast_len(acceleration.size + int(_MEMORY / filters.f1 / step), real=True) or acceleration.size)
     frequency = np.fft.rfftfreq(size, step)
     gain = np.zeros(frequency.size, dtype=complex)
     gain[1:] = filters.response(frequency[1:])

@@ -86,13 +86,6 @@ def _summed(spans: Iterable[Floats], value: Floats) -> Floats:
     return value
 
 
-def decaying_sum(keep: float, value: Floats) -> Floats:
-    """Y with y_i = keep y_(i−1) + value_i, from y = 0 before the first sample."""
-    kept = np.full(value.size, keep)
-    kept[:1] = 0.0
-    return _summed(_spans(kept), value.copy())
-
-
 def load_step(tape: Tape, time: Any, path: Any, length: Any, leak: Any) -> Any:
     """`leaking_load` for one sample."""
     held = tape.remember("load", 1.0)

@@ -50,8 +50,10 @@ class Road(Input):
         return 1 / (_POINTS_A_WAVE * HIGHEST * self.speed_m_s)
 
     @cached_property
-    def profile(self) -> tuple[float, Floats, Floats]:
-        """Distance of points [m], their heights [m], and the curvatures [1/m] of the periodic cubic spline."""
+    def profile(self) -> Any:
+        """Height [m] over distance [m], a spline."""
+        from scipy.interpolate import CubicSpline
+
         length = self.speed_m_s * self.length_s
         points = 2 * math.ceil(length * HIGHEST * _POINTS_A_WAVE / 2)
         n = np.arange(points // 2 + 1) / length
@@ -60,32 +62,17 @@ class Road(Input):
         amplitude[inside] = np.sqrt(2 * self.roughness_m3 * (n[inside] / REFERENCE) ** -2.0 / length)
         phase = np.random.default_rng(int(self.seed)).uniform(0, 2 * np.pi, n.size)
         height = np.fft.irfft(amplitude * np.exp(1j * phase) * points / 2, points)
-        turn, apart = 2 * np.pi * np.arange(points // 2 + 1) / points, length / points
-        bend = np.fft.rfft(height) * 6 * (np.cos(turn) - 1) / (np.cos(turn) + 2) / apart**2
-        return apart, height, np.asarray(np.fft.irfft(bend, points), dtype=float)
-
-    def heights(self, distance: Floats) -> tuple[Floats, Floats]:
-        """Height [m] and slope of the road."""
-        apart, height, bend = self.profile
-        place = distance / apart
-        first = np.floor(place).astype(int)
-        b = place - first
-        a, first, after = 1 - b, first % height.size, (first + 1) % height.size
-        value = a * height[first] + b * height[after]
-        value += ((a**3 - a) * bend[first] + (b**3 - b) * bend[after]) * apart**2 / 6
-        slope = (height[after] - height[first]) / apart
-        slope += ((1 - 3 * a**2) * bend[first] + (3 * b**2 - 1) * bend[after]) * apart / 6
-        return value, slope
+        distance = np.linspace(0, length, points + 1)
+        return CubicSpline(distance, np.append(height, height[0]), bc_type="periodic")
 
     def value(self, time: Floats) -> Floats:
         distance = np.maximum(time, 0.0) * self.speed_m_s
-        return _fade(time)[0] * self.heights(distance)[0]
+        return _fade(time)[0] * self.profile(distance)
 
     def rate(self, time: Floats) -> Floats:
         distance = np.maximum(time, 0.0) * self.speed_m_s
         share, slope = _fade(time)
-        height, rise = self.heights(distance)
-        return share * self.speed_m_s * rise + slope * height
+        return share * self.speed_m_s * self.profile(distance, 1) + slope * self.profile(distance)
 
 
 def _fade(time: Floats, over: float = 0.5) -> tuple[Floats, Floats]:
