@@ -102,9 +102,9 @@ def test_parts_of_a_study_add_up_run_by_run():
 def test_a_missed_goal_says_why():
     rows = [commands.ProcessRow("mrdamper study, caches filled", 7.0, 12.0, 200.0)]
     text = page.page(page.Results(quick=True, processes=rows))
-    assert "| 7.00 | missed | each rig's fits" in text
+    assert "| 12.0 | missed | every fold of every candidate" in text
     met = page.page(page.Results(quick=True, processes=[commands.ProcessRow(rows[0].name, 4.0, 6.0, 200.0)]))
-    assert "| 4.00 | met |  |" in met
+    assert "| 6.00 | met |  |" in met
 
 
 def test_an_empty_page_says_what_was_not_measured():

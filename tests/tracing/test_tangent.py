@@ -79,10 +79,15 @@ def test_what_has_no_tangent_is_refused():
         with_tangents(tape, value * p, ["p"])
 
 
-def test_slopes_of_a_joint_fit_are_those_of_differences(bundled):
+@pytest.mark.parametrize("at_bound", [False, True])
+def test_slopes_of_a_joint_fit_are_those_of_differences(bundled, at_bound):
+    """At a bound, too, where the force may have a corner: there they are those from inside."""
     runs = [run for run in bundled.rig("utfsm").split("train") if run.excitation == "sine"][::4]
     problem = JointProblem(runs, "play-bypass", free=("leak", "qb", "Ic"))
     table, point = JointResiduals(problem, problem.parts), np.mean(problem.box(), axis=0)
+    if at_bound:
+        share = [axis.name for axis in problem.axes].index("seat_share")
+        point[share] = problem.box()[1][share]
     solved = table.solve(point)
     exact = table._moved(point, solved.model, solved.residual)
     weights = table.weights[table.owner]

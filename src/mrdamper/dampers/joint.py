@@ -494,13 +494,17 @@ class JointProblem:
     def force_slopes(self, point: Floats, model: Model, motion: Excitation, picked: NDArray[np.intp]) -> Floats | None:
         """(N, D) derivatives of the force at some samples of a motion by the search axes, the linear parameters held.
 
-        None where the coil's lags are searched, or where the model has no tangents.
+        At a bound they are those from inside: the force of a model may have a corner there. None where the coil's lags
+        are searched, or where the model has no tangents.
         """
         if any(axis.name in (RISE, FALL) for axis in self.axes):
             return None
         # One program for all problems of a model: the tangents of parameters that are held are not looked at.
         names = [info.name for info in self.model_type.parameters() if not info.linear]
-        tangents = force_tangents(model, motion, names)
+        lower, upper = self.box()
+        reach = _DIFFERENCE_RATIO * (upper - lower)
+        inside = self.without_linear(np.clip(point, lower + reach, upper - reach))
+        tangents = force_tangents(replace(model, **{name: getattr(inside, name) for name in names}), motion, names)
         if tangents is None:
             return None
         slopes = np.zeros((point.size, len(names)))
