@@ -40,6 +40,17 @@ def test_progress_is_told_on_the_way_and_the_result_at_the_end():
     assert len(set(shares)) > 2
 
 
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="no list of open descriptors here")
+def test_a_report_that_is_kept_holds_no_descriptor():
+    ended(run(slow_tasks.count, 1)).wait(30)  # opens what all workers share
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    jobs = [ended(run(slow_tasks.count, 1)) for _ in range(3)]
+    for job in jobs:
+        job.wait(30)
+        job.cancel()  # harmless
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+
+
 def test_a_refusal_keeps_what_where_and_remedy():
     job = ended(run(slow_tasks.refuse))
     assert job.state == "refused"

@@ -69,9 +69,8 @@ class Job:
         """Stop the process; harmless where it has ended."""
         self._stop.set()
         with self._starting:  # one that is half started cannot be ended, and would complain when left alone
-            process = self._process
-        if process is not None and process.is_alive():
-            _end_group(process)
+            if self._process is not None and self._process.is_alive():
+                _end_group(self._process)
 
     def report(self) -> dict[str, Any]:
         """Return the state of the work as the page shows it."""
@@ -119,6 +118,9 @@ class Job:
         finally:
             here.close()
             self._process.join()
+            with self._starting:  # its descriptors would stay for as long as the report is kept
+                self._process.close()
+                self._process = None
 
     def _listen(self, here: Connection) -> None:
         while True:
