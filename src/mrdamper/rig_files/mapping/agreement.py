@@ -58,7 +58,7 @@ def _copies(records: Sequence[Record], points: Sequence[_Point | None]) -> dict[
             if not others:
                 continue
             refused[i] = QualityError(
-                f"has the very samples of {others[0]} and another current: {current:.3g} A",
+                f"has the same samples as {others[0]} and another current: {current:.3g} A",
                 where=records[i].provenance.get("file", records[i].id),
                 remedy="one of them is a copy under a wrong name: leave it out, or export the test again",
                 code="E_CONDITIONS",

@@ -31,7 +31,7 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     A record is cut only if every part between two rests is a motion of several strokes at a constant
     current, or at currents that step from one to the next, and not all parts are of one condition: a
     pause within a test, the dwell of a trapezoidal motion, and a slow stretch of a random one at one
-    current are no borders. Time in which nothing was recorded is a rest.
+    current do not separate tests. Time in which nothing was recorded is a rest.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     current = np.zeros(time.size) if current is None else current
     if not there.all() or np.any(np.diff(time) <= 0):
         return whole
-    ends = [0, *_borders(time, displacement), time.size]
+    ends = [0, *_boundaries(time, displacement), time.size]
     parts = [slice(a, b) for a, b in pairwise(ends) if _moves(displacement[a:b], displacement)]
     parts = _with_soft_ends(parts, time, displacement)
     parts = [piece for part in parts for piece in _pieces(part, time, displacement, current)]
@@ -88,7 +88,7 @@ def _pieces(part: slice, time: Floats, displacement: Floats, current: Floats) ->
     """Split a part where the current changes from one held value to another while the motion goes on.
 
     Between two steps the motion turns back several times: a shorter stretch is a test of the coil's response.
-    Pieces without motion, at the ends, are left out; the part itself where the current does not step.
+    Pieces without motion at the ends are omitted; a part whose current does not step is returned whole.
     """
     t, x, i = time[part], displacement[part], current[part]
     if i.size < 3 or not np.isfinite(i).all() or not held_current(i)[1]:
@@ -113,7 +113,7 @@ def _pieces(part: slice, time: Floats, displacement: Floats, current: Floats) ->
     return [slice(part.start + a, part.start + b) for a, b in pieces]
 
 
-def _borders(time: Floats, x: Floats) -> list[int]:
+def _boundaries(time: Floats, x: Floats) -> list[int]:
     """Middles of the rests of a motion, and the gaps in its time."""
     steps = np.diff(time)
     step = float(np.median(steps))

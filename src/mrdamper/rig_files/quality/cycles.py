@@ -89,7 +89,7 @@ def every_cycle(view: View) -> Folded | None:
 def steady_cycles(view: View) -> Cycles | None:
     """Return the steady cycles of a record beside each other; None under one cycle of a periodic motion.
 
-    The first of three or more is left out: it may hold the way in from rest. A cycle with a gap is, too, and one
+    The first of three or more is omitted: it may contain the start from rest. A cycle with a gap is, too, and one
     before the window of a run that states one.
     """
     folded = every_cycle(view)

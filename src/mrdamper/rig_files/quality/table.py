@@ -65,7 +65,7 @@ def quality_table(records: Iterable[Record]) -> tuple[Quality, ...]:
 
 
 def record_of(run: Run) -> Record:
-    """Return a stored run as a record to be judged again."""
+    """Return a stored run as a record, to be checked again."""
     own = ("id", "time", "displacement", "force", "velocity", "current", "rig", "excitation", "split", "window")
     fields: dict[str, Any] = {name: getattr(run, name) for name in own}
     fields |= {name: run.further.get(f"{name}_{FURTHER[name]}") for name in ("temperature", "pressure")}
