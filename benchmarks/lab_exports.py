@@ -5,7 +5,7 @@
 
 Each laboratory is written by code that shares nothing with the readers. Right: every true test is a run,
 its channels are true. Wrong in silence: imported, but not so. Of `--models` of them a study is made; its
-damper is asked at the tested motions and at a current nobody tested, against the true damper. Accused: a
+damper is asked at the tested motions and at an untested current, against the true damper. Accused: a
 quality check reports more of a test than empty cells, though all are clean. Goals: 99 % right, none wrong in silence,
 99 % of the models within 3 % of the peak-to-peak force, at most 0.5 % of the tests accused. Seeded.
 Exit status 1 if a goal is missed.
