@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mrdamper.dampers.base import Envelope
 from mrdamper.dampers.covariance import estimate_uncertainty
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.joint import JointDamper, JointProblem
 from mrdamper.models import model_type
 from mrdamper.rig_files.dataset_folder import load_dataset

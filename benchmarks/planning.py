@@ -13,8 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.base import Damper
 from mrdamper.dampers.covariance import estimate_uncertainty
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.data import Condition, Run
 from mrdamper.models.play_bypass import PlayBypass

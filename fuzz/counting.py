@@ -100,7 +100,7 @@ def typed(count: Count, what: object, call: Callable[[], Any]) -> Any:
 
 
 def bench_damper() -> Any:
-    from mrdamper.dampers.base import Envelope
+    from mrdamper.dampers.envelope import Envelope
     from mrdamper.dampers.joint import JointDamper
     from mrdamper.models import model_type
 

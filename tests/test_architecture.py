@@ -46,7 +46,7 @@ def test_the_structure_keeps_its_limits():
     assert len(structure.layers()) <= 13
     assert structure.isinstance_over_dampers() == []
     assert structure.circles() == []
-    assert len(structure.longest_chain()) <= 22
+    assert len(structure.longest_chain()) <= 18
     assert len(structure.long_functions()) <= 19
     assert {place.split(".")[1] for place in structure.long_functions()} <= {"cli", "paper", "study"}
     assert structure.repeated_class_names() == {}
@@ -62,7 +62,7 @@ def test_local_variables_are_named_after_what_they_hold():
 
 def test_the_measures_find_what_they_look_for():
     assert "mrdamper.physics.motion.excitation" in structure.imports()["mrdamper.identification.problem"]
-    assert structure.longest_chain()[-1] == "mrdamper.errors"
+    assert structure.longest_chain()[-1] in ("mrdamper.errors", "mrdamper.tracing.expression")
     assert structure.long_functions(most=3)
     assert len(structure.modules()) > 300
 

@@ -14,8 +14,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mrdamper.dampers.base import Damper, Prediction
+    from mrdamper.dampers.base import Damper
     from mrdamper.dampers.model_file import load_model, save_model
+    from mrdamper.dampers.prediction import Prediction
     from mrdamper.dampers.streaming import stepper
     from mrdamper.data import Condition, Dataset, Run
     from mrdamper.discovery import register
@@ -46,7 +47,7 @@ _HOME = {
     "Excitation": "physics.motion",
     "GasSpring": "physics.gas_spring",
     "InputError": "errors",
-    "Prediction": "dampers.base",
+    "Prediction": "dampers.prediction",
     "Run": "data",
     "check": "study.check",
     "compare": "study.comparison",

@@ -13,7 +13,7 @@ import pytest
 from support.command import mrdamper
 
 from mrdamper.cli import application
-from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap

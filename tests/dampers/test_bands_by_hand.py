@@ -10,10 +10,10 @@ from scipy.stats import t as students_t
 
 from mrdamper.dampers import bands
 from mrdamper.dampers.bands import band, no_band, portable_band, session_band
-from mrdamper.dampers.base import Prediction
 from mrdamper.dampers.calibration import Growth
 from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.joint import JointDamper
+from mrdamper.dampers.prediction import Prediction
 from mrdamper.dampers.sessions import RecordingTime, RunScatter, SessionCorrection, Sessions
 from mrdamper.dampers.uncertainty import Uncertainty, uncertainty_warnings
 from mrdamper.data import Condition

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mrdamper.dampers.bands import band
-from mrdamper.dampers.base import UNTESTED
 from mrdamper.dampers.calibration import Calibration, PredictedRun, StandardizedErrors, model_error
 from mrdamper.dampers.covariance import estimate_uncertainty
+from mrdamper.dampers.envelope import UNTESTED
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.data import Condition, Run

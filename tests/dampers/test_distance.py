@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mrdamper.dampers.base import Envelope
 from mrdamper.dampers.distance import Distance
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.data import Condition
 
 LEVELS, MOTIONS = (0.0, 0.5, 2.0), ((0.5, 0.02), (1.0, 0.02), (2.0, 0.008))

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from support.dampers import joint_damper
 
 from mrdamper.dampers import joint
-from mrdamper.dampers.base import UNTESTED, Envelope
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.concatenated_runs import RunRows, concatenate
+from mrdamper.dampers.envelope import UNTESTED, Envelope
 from mrdamper.dampers.joint import FALL, RISE, JointDamper, JointFit, JointProblem, damper_of
 from mrdamper.dampers.model_file import dump_model, parse_model
 from mrdamper.dampers.uncertainty import FittedParameter

@@ -9,8 +9,8 @@ import pytest
 from support.dampers import modified_damper
 
 from mrdamper.dampers import modified
-from mrdamper.dampers.base import Envelope
 from mrdamper.dampers.causal import causal_force
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.modified import ModifiedModel, fit_modified
 from mrdamper.dampers.normal_equations import FormChoice
 from mrdamper.dampers.parameter_map import ParameterMap

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.synthetic import TRUTH, synthetic_run
 
-from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.modified import fit_modified, fit_modified_jointly
 from mrdamper.dampers.normal_equations import (
     _Design,

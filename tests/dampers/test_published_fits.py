@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.published import all_published
 from mrdamper.dampers.published.base import AT_BOUNDS, fit_quadratic
 from mrdamper.data import Condition, Run

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition
 

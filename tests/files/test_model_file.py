@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.model_file import dump_model, load_model, parse_model, save_model
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap

@@ -9,7 +9,7 @@ from mrdamper.data import Condition, Run
 from mrdamper.identification.harmonic_balance import ForceReading
 from mrdamper.paper import claims_on_fits, claims_on_tests
 from mrdamper.paper.claims import verdict_on
-from mrdamper.paper.recipes import ALI, CONSISTENT, LITERAL, TRADITIONAL
+from mrdamper.paper.options import ALI, CONSISTENT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import GeneticEnd
 from mrdamper.paper.sensitivity import OneAtATime
 from mrdamper.physics.motion import sine

@@ -11,7 +11,7 @@ from mrdamper.paper import claims, claims_on_fits, claims_on_tests
 from mrdamper.paper import results as found_module
 from mrdamper.paper.claims import check_claims
 from mrdamper.paper.claims_on_tests import Measured, friction_along, lost_length
-from mrdamper.paper.recipes import ALI, CONSISTENT, DIRECT, LITERAL
+from mrdamper.paper.options import ALI, CONSISTENT, DIRECT, LITERAL
 from mrdamper.paper.results import GeneticEnd, function_of
 from mrdamper.physics.motion import measured_motion, sine, triangle
 

@@ -13,9 +13,8 @@ from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper import output
 from mrdamper.paper.claims import Claim
 from mrdamper.paper.figures import Entry
-from mrdamper.paper.options import PaperOptions
+from mrdamper.paper.options import CONSISTENT, LITERAL, PaperOptions
 from mrdamper.paper.output import all_tables, method_rows
-from mrdamper.paper.recipes import CONSISTENT, LITERAL
 from mrdamper.paper.results import GeneticCheck, GeneticEnd
 from mrdamper.paper.sensitivity import OneAtATime, Sobol
 from mrdamper.paper.virtual_rig import VirtualRig

@@ -26,9 +26,8 @@ from mrdamper.paper.claims_on_tests import friction_along, lost_length
 from mrdamper.paper.direct_genetic import DirectGenetic
 from mrdamper.paper.figures import FIGURES
 from mrdamper.paper.genetic import GeneticSettings
-from mrdamper.paper.options import PaperOptions
+from mrdamper.paper.options import CONSISTENT, HALF, LITERAL, SAME_FORMS, PaperOptions
 from mrdamper.paper.output import NUMBERED, all_tables, method_rows, parameter_rows, write_reproduction
-from mrdamper.paper.recipes import CONSISTENT, HALF, LITERAL, SAME_FORMS
 from mrdamper.paper.study import reproduce
 from mrdamper.paper.virtual_rig import VirtualRig, friction_test, virtual_dataset
 from mrdamper.physics.gas_spring import GasSpring

@@ -5,8 +5,7 @@ import pytest
 
 from mrdamper.paper import study
 from mrdamper.paper.claims import ROWS
-from mrdamper.paper.options import PaperOptions
-from mrdamper.paper.recipes import CONSISTENT, HALF, JOINT, LITERAL
+from mrdamper.paper.options import CONSISTENT, HALF, JOINT, LITERAL, PaperOptions
 from mrdamper.paper.virtual_rig import VirtualRig
 
 

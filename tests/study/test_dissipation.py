@@ -3,7 +3,7 @@
 import pytest
 from support.dampers import joint_damper, modified_damper
 
-from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.data import Condition
 from mrdamper.models.bingham import Bingham

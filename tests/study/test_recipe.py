@@ -13,6 +13,7 @@ from mrdamper.dampers.distance import AT_TESTS
 from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
+from mrdamper.identification.basis import Basis
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.models import model_type
 from mrdamper.models.bingham import Bingham
@@ -27,15 +28,8 @@ from mrdamper.statistics.metrics import Scores
 from mrdamper.study import cross_validation
 from mrdamper.study import recipe as recipes
 from mrdamper.study.cross_validation import stretches
-from mrdamper.study.recipe import (
-    Basis,
-    FitResult,
-    Recipe,
-    fit_and_score,
-    fit_and_score_all,
-    fit_per_run,
-    identified,
-)
+from mrdamper.study.fit_result import FitResult
+from mrdamper.study.recipe import Recipe, fit_and_score, fit_and_score_all, fit_per_run, identified
 from mrdamper.study.validation import RunScore, Validation
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mrdamper.dampers.base import Envelope
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.errors import StepError
 from mrdamper.models import model_type

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.dampers.base import Damper, Prediction
 from mrdamper.dampers.calibration import QUANTITIES, Growth, Quantity
+from mrdamper.dampers.prediction import Prediction
+from mrdamper.dampers.protocols import DamperLike as Damper
 from mrdamper.dampers.sessions import SessionCorrection
 from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import Uncertainty

@@ -18,7 +18,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from mrdamper.dampers.distance import AT_TESTS, Distance
-from mrdamper.data import Floats, Run, session_of
+from mrdamper.data.arrays import Floats
+from mrdamper.data.runs import Run
+from mrdamper.data.sessions import session_of
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 
 Quantity = Literal["force", "peak", "energy"]

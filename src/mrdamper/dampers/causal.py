@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mrdamper.dampers.coil import field_step
+from mrdamper.dampers.envelope import SLACK
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.physics.motion.traced import TracedMotion, TracedStep
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from mrdamper.dampers.protocols import DamperLike as Damper
     from mrdamper.physics.motion.excitation import Excitation
 
-SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
 _STEADY = 1e-18  # mean square displacement under which nothing moves [m²]
 
 

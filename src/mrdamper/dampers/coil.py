@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.data import Floats
+from mrdamper.data.arrays import Floats
 from mrdamper.errors import ParameterError
 from mrdamper.tracing import Tape, choose
 

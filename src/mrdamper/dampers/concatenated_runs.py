@@ -19,8 +19,10 @@ from mrdamper.dampers.coil import Coil
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import RunError
 from mrdamper.identification.columns import bounds_of, linear_table
-from mrdamper.models import Model
-from mrdamper.physics.motion import Excitation, equivalent_sine, measured_motion
+from mrdamper.models.base import Model
+from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.motion.measured import measured_motion
+from mrdamper.physics.motion.sines import equivalent_sine
 from mrdamper.statistics.levenberg_marquardt import forward_differences, least_squares
 from mrdamper.statistics.linear import robust_weights, solve_bounded
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mrdamper.data.arrays import Floats
 from mrdamper.data.conditions import Condition, current_levels
-from mrdamper.data.runs import Floats
 from mrdamper.statistics.functions.motion_hull import MotionHull
 
 _CURRENT_TOLERANCE = 0.02  # of the largest current: sessions repeat a level to some per cent

@@ -19,15 +19,16 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.dampers.base import UNTESTED, Damper, Envelope, Saved, not_held
+from mrdamper.dampers.base import Damper, Saved, not_held
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.concatenated_runs import JointResiduals, Linearisation, RunRows
+from mrdamper.dampers.envelope import UNTESTED, Envelope
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
 from mrdamper.models.recorded import force_tangents
-from mrdamper.physics.motion import Excitation
+from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares, newton_refine
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.statistics.stop_reason import StopReason

@@ -16,9 +16,10 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from mrdamper.dampers import all_kinds
-from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import Calibration, Growth
 from mrdamper.dampers.coil import Coil, Driver
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.sessions import Sessions
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import require_name

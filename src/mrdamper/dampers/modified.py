@@ -13,8 +13,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from mrdamper.dampers.base import Damper, Envelope, Saved, not_held
+from mrdamper.dampers.base import Damper, Saved, not_held
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.normal_equations import ABSENT, Condensed, Law, choose_forms, condense, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty

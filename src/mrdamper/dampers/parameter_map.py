@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mrdamper.data import Condition
-from mrdamper.models import Model
+from mrdamper.models.base import Model
 from mrdamper.statistics.functions.forms import ParameterFunction, form_named
 from mrdamper.statistics.functions.motion_hull import MotionHull
 

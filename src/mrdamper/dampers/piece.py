@@ -8,7 +8,9 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.models import Model
-from mrdamper.physics.motion import Excitation, equivalent_sine, measured_motion
+from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.motion.measured import measured_motion
+from mrdamper.physics.motion.sines import equivalent_sine
 
 _SAMPLES = 150  # a cycle
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Protocol
 
+from mrdamper.data.arrays import Floats
 from mrdamper.data.conditions import Condition
 from mrdamper.data.parameters import ParameterInfo
-from mrdamper.data.runs import Floats, Run
+from mrdamper.data.runs import Run
 
 
 class DamperLike(Protocol):
@@ -56,6 +57,18 @@ class DamperLike(Protocol):
 
     def model_at(self, condition: Condition) -> Any:
         """Return the model at a condition."""
+        ...
+
+    def loop(self, condition: Condition) -> Any:
+        """Return the steady loop at a condition."""
+        ...
+
+    def with_field_current(self, motion: Any) -> Any:
+        """Return the motion with the current whose field is there."""
+        ...
+
+    def predict(self, condition: Condition) -> Any:
+        """Predict the steady loop at a condition."""
         ...
 
     def predict_run(self, run: Run) -> Any:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Floats, Run, session_of
 
 _MAX_SAMPLES = 400  # samples of a run that enter

@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import numpy as np
 
-from mrdamper.data import SESSIONS_NEEDED, Floats, Run, hour_of, session_of
+from mrdamper.data.arrays import Floats
+from mrdamper.data.runs import Run
+from mrdamper.data.sessions import SESSIONS_NEEDED, hour_of, session_of
 from mrdamper.errors import InputError
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.dampers.prediction import Prediction
+from mrdamper.dampers.protocols import DamperLike as Damper
 from mrdamper.data import Floats
 from mrdamper.identification.columns import linear_table
 from mrdamper.statistics.metrics import dissipated_power, peak_force

@@ -14,8 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from mrdamper.dampers.bands import PortableBand, portable_band
-from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.base import Damper
 from mrdamper.dampers.causal import trace
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, ParameterError, UnknownNameError, numbers, require, series

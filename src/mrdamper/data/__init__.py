@@ -1,9 +1,10 @@
 """Test data: a `Condition` of the test matrix, a recorded `Run`, a `Dataset` of runs; and how notebooks show them."""
 
+from mrdamper.data.arrays import Floats
 from mrdamper.data.conditions import Condition, current_levels, same_condition, same_motion
 from mrdamper.data.datasets import Dataset
 from mrdamper.data.displayable import Displayable
-from mrdamper.data.runs import Floats, Run, Split, held_current, once_per_run, require_name
+from mrdamper.data.runs import Run, Split, held_current, once_per_run, require_name
 from mrdamper.data.sessions import SESSIONS_NEEDED, hour_of, session_of
 
 __all__ = [

@@ -17,7 +17,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mrdamper.data.chunks import chunks, take
+from mrdamper.data.arrays import Floats, chunks, take
 from mrdamper.data.conditions import Condition
 from mrdamper.data.displayable import Displayable
 from mrdamper.errors import (
@@ -31,7 +31,6 @@ from mrdamper.errors import (
     validate_arguments,
 )
 
-Floats = NDArray[np.float64]
 K = TypeVar("K")
 T = TypeVar("T")
 Split = Literal["train", "validate"]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data.encoding import latex, markdown
 from mrdamper.data.parameters import latex_symbol

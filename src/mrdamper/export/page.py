@@ -11,7 +11,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mrdamper.dampers.base import SLACK, Damper, Envelope
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.envelope import SLACK, Envelope
 from mrdamper.dampers.joint import damper_of
 from mrdamper.dampers.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.export.base import Exporter, Written, identifier

@@ -12,7 +12,8 @@ from mrdamper.errors import IdentificationError, validate_arguments
 from mrdamper.identification.methods import all_methods, method_named
 from mrdamper.identification.problem import Identification, Method, Problem, Solution
 from mrdamper.identification.uncertainty import uncertainty_of_run
-from mrdamper.models import Model, model_type
+from mrdamper.models import model_type
+from mrdamper.models.base import Model
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.statistics.metrics import score

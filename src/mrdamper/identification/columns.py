@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrdamper.data import Floats
+from mrdamper.data.arrays import Floats
 from mrdamper.data.parameters import ParameterInfo
 from mrdamper.models.base import Model
 from mrdamper.physics.motion.excitation import Excitation

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.data import Floats
+from mrdamper.data.arrays import Floats
 
 _MIN_VARIANCE = 1e-200  # a variance of nothing, that shares of it can still be divided by
 _HIGHEST_ORDER = 12  # of the autoregression

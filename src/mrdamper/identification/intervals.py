@@ -8,7 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats
+from mrdamper.data.arrays import Floats
+from mrdamper.data.conditions import Condition
 from mrdamper.errors import InputError
 from mrdamper.physics.hysteresis.master_curve import gauss_legendre
 

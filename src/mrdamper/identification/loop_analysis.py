@@ -11,7 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run, current_levels, same_motion
-from mrdamper.physics.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.motion.measured import measured_motion
+from mrdamper.physics.motion.sines import MotionAnalysis, analyse_motion
 from mrdamper.statistics.linear import solve_linear
 from mrdamper.statistics.metrics import dissipated_power
 

@@ -11,7 +11,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from mrdamper.data import Condition, Displayable, Floats, Run
+from mrdamper.data.arrays import Floats
+from mrdamper.data.conditions import Condition
+from mrdamper.data.displayable import Displayable
+from mrdamper.data.runs import Run
 from mrdamper.errors import IdentificationError, UnknownNameError, validate_arguments
 from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, written
 from mrdamper.models.base import Model

@@ -13,7 +13,7 @@ from mrdamper.identification.columns import linear_table
 from mrdamper.identification.covariance import ParameterCovariance, spread
 from mrdamper.identification.intervals import weaknesses
 from mrdamper.identification.problem import DELAY, Problem, RunUncertainty, Solution
-from mrdamper.physics.motion import Excitation
+from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.statistics.linear import on_one_blas_thread
 
 _DIFFERENCE_STEP = 1e-6  # of a coordinate, for derivatives

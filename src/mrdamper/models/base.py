@@ -17,12 +17,12 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from mrdamper.data import Floats
+from mrdamper.data.arrays import Floats
 from mrdamper.data.parameters import ParameterInfo, is_number, parameters_of
 from mrdamper.errors import ParameterError, shown
 from mrdamper.physics.hysteresis.shape import Shape
 from mrdamper.physics.motion.excitation import Excitation
-from mrdamper.tracing import plain
+from mrdamper.tracing.expression import plain
 
 GENERAL_FORMS = (
     "constant",

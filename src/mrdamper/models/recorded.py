@@ -13,7 +13,7 @@ from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.path import memoize_per_path
 from mrdamper.physics.motion.traced import TracedMotion, TracedStep
 from mrdamper.tracing import Program, Tape, TraceError, program
-from mrdamper.tracing.compiled import RecordProgram
+from mrdamper.tracing.compiled.record import RecordProgram
 from mrdamper.tracing.tangent import with_tangents
 
 _CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", "turn", "turn_back", "move")

@@ -10,12 +10,12 @@ import numpy as np
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.identification import Method, identify
+from mrdamper.identification.basis import Basis
 from mrdamper.identification.harmonic_balance import separate_mass
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.physics.motion import analyse_motion
-from mrdamper.study.recipe import Basis
 
 HIGHEST_CURRENT, HIGHEST_FREQUENCY = 2.0, 2.0  # of the paper's tests [A], [Hz]
 _TOLERANCE = 1.05  # relative, of a measured current or frequency against its nominal value

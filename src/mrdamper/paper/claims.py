@@ -18,8 +18,7 @@ from typing import Literal
 
 from mrdamper.errors import UnknownNameError
 from mrdamper.paper import claims_on_fits, claims_on_tests
-from mrdamper.paper.claims_on_tests import Measured
-from mrdamper.paper.results import Reproduction
+from mrdamper.paper.results import Measured, Reproduction
 
 Verdict = Literal["agrees", "agrees in part", "differs", "not checked", "cannot be checked"]
 Kind = Literal["method", "damper", "built in"]  # claim on the method, on the authors' damper, on what the virtual has

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mrdamper.data import Condition, Floats
-from mrdamper.paper.claims_on_tests import Measured, unknown
-from mrdamper.paper.recipes import ALI, CONSISTENT, LITERAL, TRADITIONAL
-from mrdamper.paper.results import Reproduction, function_of, values
+from mrdamper.paper.options import ALI, CONSISTENT, LITERAL, TRADITIONAL
+from mrdamper.paper.results import Measured, Reproduction, function_of, unknown, values
 from mrdamper.study.recipe import RecipeResult
 
 _SEARCHED = 2  # parameters that the paper's method searches per run

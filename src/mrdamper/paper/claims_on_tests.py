@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -12,37 +11,12 @@ import numpy as np
 from mrdamper.data import Condition, Floats, Run, same_motion
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.harmonic_balance import SineRecord
-from mrdamper.paper.recipes import CONSISTENT
-from mrdamper.paper.results import SAME, Reproduction, motions, values
+from mrdamper.paper.options import CONSISTENT
+from mrdamper.paper.results import SAME, Measured, Reproduction, motions, unknown, values
 from mrdamper.physics.motion import equivalent_sine, measured_motion
 from mrdamper.statistics.functions.fitting import fit_function
 
 _FULL = 0.9  # share of the mid-stroke force that counts as back after a reversal
-
-
-@dataclass(frozen=True)
-class Measured:
-    """Values that a claim rests on, in the order of its limits; none where it could not be measured.
-
-    Attributes
-    ----------
-    values : tuple of float
-    evidence : str
-        Further values, or why there are none.
-    """
-
-    values: tuple[float, ...] = ()
-    evidence: str = ""
-
-    @classmethod
-    def of(cls, *values: float | np.floating, evidence: str = "") -> Measured:
-        """Take values in the order of the limits."""
-        return cls(tuple(map(float, values)), evidence)
-
-
-def unknown(why: str) -> Measured:
-    """Return no values, and the reason."""
-    return Measured(evidence=why)
 
 
 def gas_series(study: Reproduction) -> Measured:

@@ -18,7 +18,7 @@ from mrdamper.errors import IdentificationError
 from mrdamper.identification.loop_analysis import dynamic_ranges
 from mrdamper.paper.charts import FigureLayout, Panel, Series, draw
 from mrdamper.paper.claims_on_tests import friction_along
-from mrdamper.paper.recipes import CONSISTENT, LITERAL, TRADITIONAL
+from mrdamper.paper.options import CONSISTENT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import SAME, Reproduction, function_of, motions, rate_rows, values
 from mrdamper.physics.motion import equivalent_sine, measured_motion
 from mrdamper.physics.simulation import simulate

@@ -9,7 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.modified import ModifiedFit, ModifiedModel, functions_at_bounds
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition, Floats, Run
@@ -17,7 +18,7 @@ from mrdamper.errors import IdentificationError
 from mrdamper.identification import Identification
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.statistics.functions.fitting import FunctionFit, assess, fit_function
-from mrdamper.study.recipe import FitResult
+from mrdamper.study.fit_result import FitResult
 
 PAPER_FORMS = {
     "c": "viscous-paper", "m": "mass-exponential", "alpha": "plane", "beta": "current-decay-frequency",

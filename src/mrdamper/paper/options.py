@@ -20,6 +20,11 @@ from mrdamper.study.recipe import Recipe, StudyMethod, modified
 MassLaw = Literal["exponential", "inverse-square", "power"]
 FrictionTest = Literal["dry", "filled"]
 Search = Literal["genetic", "optimum"]
+# Titles of the methods that are compared.
+LITERAL, HALF, SAME_FORMS = "paper, literal", "paper, F0 half peak-to-peak", "consistent, the paper's functions"
+CONSISTENT, JOINT = "consistent", "joint"
+TRADITIONAL, SLOWEST = "traditional, nearest speed", "traditional, slowest motion"
+DIRECT, ALI = "direct genetic, nearest speed", "Ali-type (Spencer-based)"
 _TITLE, _SOURCE = "Method of Qian et al. 2024", "Qian et al. 2024"
 _LIMITS = "sines only; the parameter functions need the frequency and amplitude of a sine"
 

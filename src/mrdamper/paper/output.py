@@ -21,7 +21,7 @@ from mrdamper.models import Model, model_type
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper.claims import Claim, check_claims
 from mrdamper.paper.figures import FIGURES, caption, pictures
-from mrdamper.paper.recipes import ALI, CONSISTENT, DIRECT, LITERAL, TRADITIONAL
+from mrdamper.paper.options import ALI, CONSISTENT, DIRECT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import Reproduction, cost_per_run, rate_rows
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.style import Picture

@@ -9,34 +9,36 @@ from typing import ClassVar
 
 import numpy as np
 
-from mrdamper.dampers.base import Damper, Envelope
+from mrdamper.dampers.base import Damper
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.modified import ModifiedFit, fit_modified
 from mrdamper.dampers.published import all_published
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition, Run
 from mrdamper.identification import Identification
+from mrdamper.identification.basis import Basis
 from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper.assumptions import PaperAssumptions
 from mrdamper.paper.direct_genetic import DirectGenetic
 from mrdamper.paper.functions import fit_paper_functions
-from mrdamper.paper.options import PaperOptions
-from mrdamper.study.recipe import (
-    Basis,
-    FitResult,
-    Recipe,
-    conditioned,
-    fit_functions_jointly,
-    modified,
-    play_and_bypass,
+from mrdamper.paper.options import (
+    ALI,
+    CONSISTENT,
+    DIRECT,
+    HALF,
+    JOINT,
+    LITERAL,
+    SAME_FORMS,
+    SLOWEST,
+    TRADITIONAL,
+    PaperOptions,
 )
+from mrdamper.study.fit_result import FitResult
+from mrdamper.study.recipe import Recipe, conditioned, fit_functions_jointly, modified, play_and_bypass
 
-LITERAL, HALF, SAME_FORMS = "paper, literal", "paper, F0 half peak-to-peak", "consistent, the paper's functions"
-CONSISTENT, JOINT = "consistent", "joint"
-TRADITIONAL, SLOWEST = "traditional, nearest speed", "traditional, slowest motion"
-DIRECT, ALI = "direct genetic, nearest speed", "Ali-type (Spencer-based)"
 _MOST_CURRENTS = 5  # currents at which Ali's model is identified on every run
 
 Steps = list[tuple[Recipe, Sequence[Run]]]

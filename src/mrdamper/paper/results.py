@@ -14,8 +14,7 @@ from mrdamper.identification import Identification
 from mrdamper.identification.harmonic_balance import ForceReading
 from mrdamper.identification.loop_analysis import LoopAnalysis
 from mrdamper.paper.genetic import GeneticMinimum
-from mrdamper.paper.options import PaperOptions
-from mrdamper.paper.recipes import ALI, DIRECT, LITERAL, TRADITIONAL
+from mrdamper.paper.options import ALI, DIRECT, LITERAL, TRADITIONAL, PaperOptions
 from mrdamper.paper.sensitivity import OneAtATime, Sobol
 from mrdamper.paper.virtual_rig import VirtualRig
 from mrdamper.physics.gas_spring import GasSpring
@@ -212,3 +211,28 @@ def cost_per_run(study: Reproduction, method: RecipeResult) -> tuple[float, floa
         return float(np.median([e.forces for e in study.ended])), float(np.mean([e.seconds for e in study.ended]))
     counts = [i.evaluations for i in method.identifications]
     return float(np.median(counts)) if counts else float("nan"), method.seconds / max(len(counts), 1)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Values that a claim rests on, in the order of its limits; none where it could not be measured.
+
+    Attributes
+    ----------
+    values : tuple of float
+    evidence : str
+        Further values, or why there are none.
+    """
+
+    values: tuple[float, ...] = ()
+    evidence: str = ""
+
+    @classmethod
+    def of(cls, *values: float | np.floating, evidence: str = "") -> Measured:
+        """Take values in the order of the limits."""
+        return cls(tuple(map(float, values)), evidence)
+
+
+def unknown(why: str) -> Measured:
+    """Return no values, and the reason."""
+    return Measured(evidence=why)

@@ -18,6 +18,7 @@ import numpy as np
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import conclude
+from mrdamper.identification.basis import Basis
 from mrdamper.identification.harmonic_balance import SineRecord, read_force
 from mrdamper.identification.loop_analysis import analyse_loop
 from mrdamper.identification.methods.balance import Balance
@@ -27,25 +28,15 @@ from mrdamper.paper.assumptions import PaperAssumptions, missing_functions, outs
 from mrdamper.paper.claims import check_claims
 from mrdamper.paper.direct_genetic import DirectGenetic
 from mrdamper.paper.genetic import GeneticSettings
-from mrdamper.paper.options import PaperOptions
+from mrdamper.paper.options import CONSISTENT, DIRECT, HALF, JOINT, LITERAL, PaperOptions
 from mrdamper.paper.paper_method import Paper
-from mrdamper.paper.recipes import (
-    CONSISTENT,
-    DIRECT,
-    HALF,
-    JOINT,
-    LITERAL,
-    Steps,
-    comparators,
-    literature,
-    recipes_of_paper,
-)
+from mrdamper.paper.recipes import Steps, comparators, literature, recipes_of_paper
 from mrdamper.paper.results import GeneticCheck, GeneticEnd, Reproduction
 from mrdamper.paper.sensitivity import OneAtATime, Sobol, one_at_a_time, sobol
 from mrdamper.paper.virtual_rig import CURRENTS, VirtualRig, friction_test, virtual_dataset
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.study.parallel import IN_PROCESS, Processes, identify_quickly, shortened_method
-from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, RecipeResult, fit_and_score_all
+from mrdamper.study.recipe import IdentificationCache, Progress, Recipe, RecipeResult, fit_and_score_all
 from mrdamper.study.workflow import usable_sines
 
 SOBOL_SAMPLES = 512

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mrdamper.data import Floats
+from mrdamper.data.arrays import Floats
 from mrdamper.errors import ParameterError, shown, validate_arguments
 
 Direction = Literal["compression", "extension"]

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrdamper.dampers.base import NOT_A_SINE, Damper
+from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
+from mrdamper.dampers.prediction import NOT_A_SINE
 from mrdamper.dampers.uncertainty import uncertainty_warnings
 from mrdamper.identification import Identification
 from mrdamper.identification.loop_analysis import LoopAnalysis

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from mrdamper.dampers.bands import Band
-from mrdamper.dampers.base import Prediction
+from mrdamper.dampers.prediction import Prediction
 from mrdamper.identification import Identification
 from mrdamper.study.validation import RunScore
 

@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from mrdamper.data import Floats, held_current
-from mrdamper.data.chunks import chunks
+from mrdamper.data.arrays import chunks
 from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.conditions import (

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrdamper.data import Floats, held_current
+from mrdamper.data.arrays import Floats
+from mrdamper.data.runs import held_current
 from mrdamper.rig_files.column_names import names_coil, names_condition, split_name
 from mrdamper.rig_files.units import Unit, parse_unit
 

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mrdamper.data import Condition, Dataset, Floats, Run
+from mrdamper.data.arrays import chunks, drop_pages
 from mrdamper.data.atomic import path_of, write_file, write_folder
-from mrdamper.data.chunks import chunks, drop_pages
 from mrdamper.data.encoding import csv_text, csv_value
 from mrdamper.errors import ColumnError, DatasetError, OutputError, shown, validate_arguments
 from mrdamper.rig_files.dataset_samples import OPTIONAL, REQUIRED, SAMPLE_FILES, Channels, missing_column, read_samples

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrdamper.data.chunks import drop_pages
+from mrdamper.data.arrays import drop_pages
 from mrdamper.errors import InputError
 from mrdamper.rig_files.quality.current import change_of
 from mrdamper.rig_files.record import Finding, Record

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mrdamper.data.chunks import chunks
+from mrdamper.data.arrays import chunks
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import role_of, words_of
 from mrdamper.rig_files.conditions import currents_in, currents_in_cells

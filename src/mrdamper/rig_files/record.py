@@ -12,8 +12,8 @@ from typing import overload
 
 import numpy as np
 
-from mrdamper.data import Floats
-from mrdamper.data.chunks import chunks
+from mrdamper.data.arrays import Floats, chunks
+from mrdamper.errors import InputError
 
 REQUIRED = ("time", "displacement", "force")
 OPTIONAL = ("velocity", "acceleration", "current", "voltage", "temperature", "pressure")
@@ -160,3 +160,12 @@ class Record:
     def noticed(self, *findings: Finding) -> Record:
         """Return the same record with further findings."""
         return replace(self, findings=(*self.findings, *findings))
+
+
+@dataclass(frozen=True, eq=False)
+class Refusal:
+    """A file or a test of it that cannot be used, and why."""
+
+    file: str
+    error: InputError
+    run: str = ""  # of a test that could be read and not used, its name

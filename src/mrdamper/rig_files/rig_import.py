@@ -33,7 +33,7 @@ from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.packed_folder import unpacked
 from mrdamper.rig_files.profile import Profile, profile_of
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
-from mrdamper.rig_files.record import Record
+from mrdamper.rig_files.record import Record, Refusal
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests
 
@@ -48,15 +48,6 @@ _MAY_BE_PARTS = (
     "E_NUMBER",
     "E_FIELD_COUNT",
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Refusal:
-    """A file or a test of it that cannot be used, and why."""
-
-    file: str
-    error: InputError
-    run: str = ""  # of a test that could be read and not used, its name
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.data.chunks import chunks
+from mrdamper.data.arrays import chunks
 from mrdamper.errors import ColumnError, InputError
 from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import as_data, constant, current_of, without_gaps

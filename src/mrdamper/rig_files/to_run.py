@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data import Run
-from mrdamper.data.chunks import chunks, drop_pages
+from mrdamper.data.arrays import chunks, drop_pages
 from mrdamper.errors import ColumnError, RunError
 from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.quality.loop import steady_part

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrdamper.data.runs import Floats
+from mrdamper.data.arrays import Floats
 
 
 def rmse(measured: Floats, predicted: Floats) -> float:

@@ -17,9 +17,10 @@ import numpy as np
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import Identification
+from mrdamper.identification.basis import Basis
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.study.parallel import worker_pool
-from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, RecipeResult, StudyMethod, recipes
+from mrdamper.study.recipe import IdentificationCache, Progress, Recipe, RecipeResult, StudyMethod, recipes
 from mrdamper.study.workflow import (
     accepted_runs,
     runs_for_global_fit,

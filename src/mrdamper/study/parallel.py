@@ -15,13 +15,14 @@ import numpy as np
 from mrdamper.data import Run
 from mrdamper.errors import InputError
 from mrdamper.identification import Identification, Method, Problem, conclude
+from mrdamper.identification.basis import Basis
 from mrdamper.identification.methods import method_named
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.models import model_type
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.processes import processes
-from mrdamper.study.recipe import Basis, IdentificationCache, Progress, Recipe, RecipeResult, fit_and_score_all
+from mrdamper.study.recipe import IdentificationCache, Progress, Recipe, RecipeResult, fit_and_score_all
 
 _CYCLES = 2  # of a run that costly identifications see
 _PER_CYCLE = 200  # samples of a cycle they see

@@ -16,7 +16,8 @@ from itertools import count, takewhile
 
 import numpy as np
 
-from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.prediction import Prediction
 from mrdamper.dampers.slopes import force_slopes
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition, Floats

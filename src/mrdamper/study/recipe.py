@@ -25,12 +25,14 @@ from mrdamper.dampers.published import Published, all_published
 from mrdamper.data import Run
 from mrdamper.discovery import Registry
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
-from mrdamper.identification import Identification, Method, Problem, identify
+from mrdamper.identification import Identification
+from mrdamper.identification.basis import Basis
 from mrdamper.identification.methods import values_of_fields
 from mrdamper.models import Scale, all_models, model_type
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.study.cross_validation import all_folds, cross_validate, cross_validate_by_kind, stretches
+from mrdamper.study.fit_result import FitResult
 from mrdamper.study.validation import Validation, validate
 
 Progress = Callable[[str, float], None]
@@ -38,62 +40,7 @@ Progress = Callable[[str, float], None]
 JOINTLY = "play-bypass"  # the model whose parameters hold for a whole damper
 
 
-@dataclass(frozen=True)
-class Basis:
-    """Model, method and options of the identification of every single run.
-
-    Attributes
-    ----------
-    model : str
-    method : str or Method
-    free : tuple of str
-        Preset parameters to determine as well.
-    fixed : tuple of (str, float)
-        Parameters held at a value [SI].
-    gas : GasSpring or None
-        Known gas spring.
-    """
-
-    model: str
-    method: str | Method = "projection"
-    free: tuple[str, ...] = ()
-    fixed: tuple[tuple[str, float], ...] = ()
-    gas: GasSpring | None = None
-
-    def identify(self, run: Run) -> Identification:
-        """Identify it from one run."""
-        return identify(run, self.model, self.method, free=self.free, fixed=dict(self.fixed), gas=self.gas)
-
-    def problem(self, run: Run) -> Problem:
-        """Return the identification problem of a run, for a method of one's own."""
-        fixed = dict(self.fixed)
-        return Problem.of(run, model_type(self.model), free=self.free, fixed=fixed, gas=self.gas)
-
-    @property
-    def costly(self) -> bool:
-        """True where only a few cycles of a run are used in a comparison of many runs."""
-        return self.method != "projection" or model_type(self.model).integrated
-
-
 IdentificationCache = dict[tuple[Basis, str], tuple[Identification | str, float]]  # or why there is none; seconds
-
-
-@dataclass(frozen=True, eq=False)
-class FitResult:
-    """Damper that a recipe identified from runs.
-
-    Attributes
-    ----------
-    damper : Damper
-    refit : callable
-        Identifies the damper again from the runs at some indices only.
-    fit : ModifiedFit, JointFit or None
-        Details of its functions or its search.
-    """
-
-    damper: Damper
-    refit: Callable[[Sequence[int]], Damper]
-    fit: ModifiedFit | JointFit | None = None
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from mrdamper.dampers.bands import band, session_band
-from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import PredictedRun
+from mrdamper.dampers.prediction import Prediction
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, GainOffset, RecordingTime, SessionCorrection, Sessions
 from mrdamper.data import Condition, Displayable, Run
 from mrdamper.errors import InputError, RunError, UnknownNameError, require, validate_arguments

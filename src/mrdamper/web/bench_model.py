@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Condition
 from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import ParameterError

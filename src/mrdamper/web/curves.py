@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.dampers.base import Damper, Prediction
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Floats, Run
 from mrdamper.models import Model
 from mrdamper.physics.motion import Excitation, analyse_motion, equivalent_sine, measured_motion

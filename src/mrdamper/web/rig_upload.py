@@ -13,7 +13,8 @@ from pathlib import Path, PurePosixPath
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
 from mrdamper.rig_files.profile import Profile
-from mrdamper.rig_files.rig_import import ImportResult, Refusal
+from mrdamper.rig_files.record import Refusal
+from mrdamper.rig_files.rig_import import ImportResult
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import StatedTest, TestsTable, load_tests
 from mrdamper.web.uploads import ImportedData, NothingTakenError, Upload, Verdict

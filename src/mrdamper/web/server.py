@@ -9,23 +9,23 @@ import signal
 import socket
 import threading
 import webbrowser
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
 import uvicorn
+from starlette.applications import Starlette
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from mrdamper.errors import InputError
-from mrdamper.web.app import create_app
 
 HALF_SENT_S = 15.0  # that the head of a request may take
 LOOPBACK = "127.0.0.1"
 _ENDS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
-def serve(port: int, open_browser: bool = True) -> int:
-    """Serve until a signal ends it; then every file and process of the bench is gone. Gives the signal.
+def serve(create_app: Callable[..., Starlette], port: int, open_browser: bool = True) -> int:
+    """Serve an app until a signal ends it; then every file and process of the bench is gone. Gives the signal.
 
     Port 0 is any that is free. Raises `InputError` if the port is taken, `MissingExtraError` without the chart library.
     """

@@ -16,9 +16,9 @@ from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.data import Dataset
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import Identification
+from mrdamper.identification.basis import Basis
 from mrdamper.study.recipe import (
     JOINTLY,
-    Basis,
     RecipeResult,
     fit_and_score,
     fit_functions_jointly,

@@ -8,8 +8,7 @@ from pathlib import Path, PurePosixPath
 
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
-from mrdamper.rig_files.record import Record
-from mrdamper.rig_files.rig_import import Refusal
+from mrdamper.rig_files.record import Record, Refusal
 
 FILE_LIMIT = 20_000_000
 FILE_COUNT_LIMIT = 1000

@@ -10,8 +10,8 @@ import typer
 if TYPE_CHECKING:
     from mrdamper.data import Dataset
     from mrdamper.rig_files.profile import Profile
-    from mrdamper.rig_files.record import Record
-    from mrdamper.rig_files.rig_import import ImportResult, Refusal
+    from mrdamper.rig_files.record import Record, Refusal
+    from mrdamper.rig_files.rig_import import ImportResult
 
 
 _OF_FORM = ("W_NO_EOL", "W_FOOTER", "W_ENCODING")  # codes of notes that change nothing

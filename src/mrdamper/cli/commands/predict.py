@@ -10,7 +10,7 @@ import typer
 
 if TYPE_CHECKING:
     from mrdamper.dampers.bands import Band
-    from mrdamper.dampers.base import Prediction
+    from mrdamper.dampers.prediction import Prediction
 
 WARNINGS = {
     "not a sine": "the motion is not sinusoidal; frequency and amplitude are estimated along it",

@@ -26,9 +26,10 @@ def register(app: typer.Typer) -> None:
         missing = [name for name in _NEEDS if importlib.util.find_spec(name) is None]
         if missing:
             raise MissingExtraError(f"the app needs {', '.join(missing)}", remedy="pip install 'mrdamper[web]'")
+        from mrdamper.web.app import create_app
         from mrdamper.web.server import serve as run
 
-        ended_by = run(port, browser)
+        ended_by = run(create_app, port, browser)
         sys.stdout.flush()
         # Clean-up is complete; computing threads are not waited for.
         os._exit(0 if ended_by == signal.SIGINT else 128 + ended_by)  # Ctrl-C is the way to stop it

@@ -9,8 +9,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from mrdamper.dampers.base import Damper, Envelope, Saved
+from mrdamper.dampers.base import Damper, Saved
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.piece import Piece
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Condition, Floats, Run

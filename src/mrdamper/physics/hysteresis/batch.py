@@ -17,7 +17,7 @@ from mrdamper.data import Floats
 from mrdamper.physics.hysteresis.master_curve import master_curve
 from mrdamper.physics.hysteresis.response import _advance, _states, on_curve, starts_of_strokes
 from mrdamper.physics.hysteresis.shape import Shape
-from mrdamper.physics.motion import Path
+from mrdamper.physics.motion.path import Path
 from mrdamper.statistics.linear import FixedColumns
 
 _MAX_STATES = 2**17  # states held at a time

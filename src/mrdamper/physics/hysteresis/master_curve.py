@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.data.runs import Floats
+from mrdamper.data.arrays import Floats
 from mrdamper.tracing import functions
 from mrdamper.tracing.expression import Expression, choose, settled
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mrdamper.data import Floats
+from mrdamper.data.arrays import Floats
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.physics.hysteresis.master_curve import CEILING, STEEPEST, MasterCurve, master_curve
 from mrdamper.physics.hysteresis.shape import Shape

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from mrdamper.data.runs import Floats
+from mrdamper.data.arrays import Floats
 from mrdamper.errors import ParameterError
 from mrdamper.physics.hysteresis.master_curve import STEEPEST
 

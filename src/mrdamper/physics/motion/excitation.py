@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mrdamper.data.runs import Floats
+from mrdamper.data.arrays import Floats
 from mrdamper.errors import ExcitationError, validate_arguments
 from mrdamper.physics.motion.path import Path
 

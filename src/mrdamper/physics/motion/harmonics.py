@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mrdamper.data import Floats
+from mrdamper.data.arrays import Floats
 from mrdamper.statistics.linear import solve_linear
 
 _FEW = 250  # samples on which a frequency is found to begin with

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats
+from mrdamper.data.arrays import Floats
+from mrdamper.data.conditions import Condition
 from mrdamper.errors import ExcitationError, validate_arguments
 from mrdamper.physics.motion.excitation import Excitation
 

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mrdamper.data import Floats, Run, once_per_run
+from mrdamper.data.arrays import Floats
+from mrdamper.data.runs import Run, once_per_run
 from mrdamper.physics.motion.excitation import Excitation
 
 _UNIFORM = 1e-8  # spread of the sampling interval, relative, up to which it counts as one

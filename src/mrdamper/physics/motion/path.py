@@ -11,7 +11,7 @@ from weakref import ref
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mrdamper.data.runs import Floats
+from mrdamper.data.arrays import Floats
 from mrdamper.errors import ExcitationError
 
 LONG = 200_000  # samples from which what could be remembered is not worth its memory

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats, Run, once_per_run
+from mrdamper.data.arrays import Floats
+from mrdamper.data.conditions import Condition
+from mrdamper.data.runs import Run, once_per_run
 from mrdamper.errors import ExcitationError
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.harmonics import HarmonicSeries, fit_harmonics, fundamental_frequency

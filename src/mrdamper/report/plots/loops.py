@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from mrdamper.dampers.bands import Band
-from mrdamper.dampers.base import Prediction
+from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError, UnknownNameError, require, shown
 from mrdamper.physics.motion import measured_motion

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mrdamper.data import held_current
-from mrdamper.data.chunks import take
+from mrdamper.data.arrays import take
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality.strokes import find_strokes
 from mrdamper.rig_files.record import Record

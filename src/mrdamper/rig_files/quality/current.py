@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats, held_current
-from mrdamper.data.chunks import take
+from mrdamper.data.arrays import take
 from mrdamper.rig_files.quality.motion import steady_window
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding, Record

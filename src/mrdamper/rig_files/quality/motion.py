@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.physics.motion import SINE_DISTORTION_LIMIT
+from mrdamper.physics.motion.sines import SINE_DISTORTION_LIMIT
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 

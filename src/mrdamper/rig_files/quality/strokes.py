@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrdamper.data import Floats
+from mrdamper.data.arrays import Floats
 
 _PROMINENCE = 0.1  # of the peak-to-peak motion: smaller turns are noise or a ramp
 _ALIKE = 0.2  # strokes of a steady motion agree in length and duration to this share

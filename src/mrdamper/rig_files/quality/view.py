@@ -13,9 +13,11 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data import Floats, Run
-from mrdamper.data.chunks import take
+from mrdamper.data.arrays import take
 from mrdamper.errors import ExcitationError, QualityError
-from mrdamper.physics.motion import Excitation, MotionAnalysis, analyse_motion, measured_motion
+from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.motion.measured import measured_motion
+from mrdamper.physics.motion.sines import MotionAnalysis, analyse_motion
 from mrdamper.rig_files.quality.strokes import Strokes, find_strokes
 from mrdamper.rig_files.record import Finding, Record
 

@@ -17,7 +17,7 @@ from typing import IO, ClassVar
 
 import numpy as np
 
-from mrdamper.data import Floats
+from mrdamper.data.arrays import Floats
 from mrdamper.errors import InputError, printable
 from mrdamper.rig_files.column_names import Header, split_name
 from mrdamper.rig_files.file_form import FileForm

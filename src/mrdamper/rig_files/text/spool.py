@@ -14,7 +14,7 @@ from typing import IO
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.data.chunks import chunks
+from mrdamper.data.arrays import chunks
 
 LARGE = 16 * 2**20  # bytes
 

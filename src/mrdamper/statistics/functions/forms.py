@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats
+from mrdamper.data.arrays import Floats
+from mrdamper.data.conditions import Condition
 from mrdamper.errors import IdentificationError, UnknownNameError
 from mrdamper.tracing import Expression
 

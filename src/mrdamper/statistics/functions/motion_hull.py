@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.data.arrays import Floats
 from mrdamper.data.conditions import Condition, same_motion
-from mrdamper.data.runs import Floats
 
 _SLEEK = 0.05  # width of a hull in the logarithm below which it is a segment: tests repeat a motion to some per cent
 _ZERO_IN_LOGARITHM = 1e-12  # frequency [Hz] and amplitude [m] that stand for zero in the logarithm

@@ -14,7 +14,8 @@ import numpy as np
 
 from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError
-from mrdamper.physics.motion import equivalent_sine, measured_motion
+from mrdamper.physics.motion.measured import measured_motion
+from mrdamper.physics.motion.sines import equivalent_sine
 
 _CYCLES = 3  # cycles of a sine that are compared
 _SAMPLES_PER_CYCLE = 96  # samples of the motion

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+Floats = NDArray[np.float64]
 CHUNK = 2**20  # samples
 
 

@@ -1,0 +1,171 @@
+"""Tested ranges of a damper: flags of extrapolation, and the distance of a condition from the tests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from itertools import pairwise, product
+
+import numpy as np
+
+from mrdamper.dampers.distance import Distance, distance_from
+from mrdamper.data.conditions import Condition, same_condition
+from mrdamper.data.runs import Floats
+from mrdamper.physics.motion.excitation import Excitation
+
+SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
+COMBINATION = "combination"  # every quantity was tested, these together were not
+_SUM_WEIGHT = 10.0  # weight of the sum of shares, which is one, against distances in the hull
+SAME_CURRENT = 1e-3  # A; a current that varies less is one current
+_LOGARITHM_FLOOR = 1e-12  # frequency [Hz] and amplitude [m] that stand for zero in a logarithm
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Ranges of the tests a damper was identified from.
+
+    Attributes
+    ----------
+    current_A, frequency_Hz, amplitude_m, peak_velocity_m_s : (float, float)
+        Lowest and highest tested.
+    any_motion : bool
+        Motions that are no sine, or currents that change, were among the tests.
+    conditions : tuple of (float, float, float)
+        Tested currents [A] with their frequencies [Hz] and amplitudes [m]; empty where only the ranges are known.
+    """
+
+    current_A: tuple[float, float]
+    frequency_Hz: tuple[float, float]
+    amplitude_m: tuple[float, float]
+    peak_velocity_m_s: tuple[float, float]
+    any_motion: bool = False
+    conditions: tuple[tuple[float, float, float], ...] = ()
+
+    @classmethod
+    def of(cls, conditions: Sequence[Condition]) -> Envelope:
+        """Return the envelope of a set of tested conditions."""
+
+        def span(values: list[float]) -> tuple[float, float]:
+            return min(values), max(values)
+
+        return cls(
+            span([c.current_A for c in conditions]),
+            span([c.frequency_Hz for c in conditions]),
+            span([c.amplitude_m for c in conditions]),
+            span([c.peak_velocity for c in conditions]),
+            conditions=tuple(_point(conditions[group[0]]) for group in same_condition(conditions)),
+        )
+
+    def with_motion(self, current: Floats, displacement: Floats, velocity: Floats) -> Envelope:
+        """Return the envelope widened by the samples of a record that is no sine at one current."""
+
+        def wider(span: tuple[float, float], values: Floats) -> tuple[float, float]:
+            return min(span[0], float(np.min(values))), max(span[1], float(np.max(values)))
+
+        moved = np.array([np.ptp(displacement) / 2])
+        return replace(
+            self,
+            any_motion=True,
+            current_A=wider(self.current_A, np.abs(current)),
+            amplitude_m=wider(self.amplitude_m, moved),
+            peak_velocity_m_s=wider(self.peak_velocity_m_s, np.array([np.max(np.abs(velocity))])),
+        )
+
+    @property
+    def tested(self) -> bool:
+        """True where the tested ranges are known; a model without a damper has none."""
+        return bool(np.isfinite([*self.current_A, *self.amplitude_m]).all())
+
+    @property
+    def middle(self) -> Condition:
+        """The condition in the middle of the ranges."""
+        return Condition(*(0.5 * (low + high) for low, high in (self.current_A, self.frequency_Hz, self.amplitude_m)))
+
+    @property
+    def corners(self) -> list[Condition]:
+        """The conditions at the ends of the ranges."""
+        return [Condition(*ends) for ends in product(self.current_A, self.frequency_Hz, self.amplitude_m)]
+
+    @property
+    def farthest(self) -> list[Condition]:
+        """Combinations inside the ranges that may be far from any test: corners of the motions, currents between."""
+        levels = sorted({point[0] for point in self.conditions}) or list(self.current_A)
+        currents = [*levels, *((one + other) / 2 for one, other in pairwise(levels))]
+        fastest = self.peak_velocity_m_s[1]
+        motions = [
+            (f, min(A, fastest / (2 * np.pi * max(f, _LOGARITHM_FLOOR))))
+            for f, A in product(self.frequency_Hz, self.amplitude_m)
+        ]
+        return [Condition(current, *motion) for current in currents for motion in motions]
+
+    def flags(self, condition: Condition) -> tuple[str, ...]:
+        """List the quantities of a condition outside the tested ranges; empty inside the envelope."""
+        checks = (
+            ("current", abs(condition.current_A), self.current_A),
+            ("frequency", condition.frequency_Hz, self.frequency_Hz),
+            ("amplitude", condition.amplitude_m, self.amplitude_m),
+            ("velocity", condition.peak_velocity, self.peak_velocity_m_s),
+        )
+        outside = tuple(
+            name for name, value, (low, high) in checks if value < low - SLACK * high or value > high * (1 + SLACK)
+        )
+        return outside or (() if self._combined(condition) else (COMBINATION,))
+
+    def distance(self, condition: Condition, current: Floats) -> Distance:
+        """Distance of a condition and the currents (N,) [A] along its motion; zero where only ranges are known."""
+        if not self.conditions or condition.frequency_Hz <= 0 or condition.amplitude_m <= 0:
+            return Distance()
+        nearest = distance_from(self._tested, condition, current, swept_A=self.current_A if self.any_motion else None)
+        if not self.any_motion:
+            return nearest
+        larger = max(0.0, np.log(condition.amplitude_m / self.amplitude_m[1]))
+        faster = max(0.0, np.log(condition.peak_velocity / self.peak_velocity_m_s[1]))
+        return replace(nearest, motion=min(nearest.motion, float(np.hypot(larger, faster))))
+
+    def _combined(self, condition: Condition) -> bool:
+        """Tell if a condition lies in the convex hull of the tested ones, in I, log f and log A (and log f·A)."""
+        if not self.conditions or condition.frequency_Hz <= 0 or condition.amplitude_m <= 0:
+            return True
+        return _in_hull(self.conditions, max(self.current_A[1], SAME_CURRENT), _point(condition))
+
+    @cached_property
+    def _tested(self) -> tuple[Condition, ...]:
+        return tuple(Condition(*point) for point in self.conditions)
+
+    def motion_flags(self, motion: Excitation) -> tuple[str, ...]:
+        """List the quantities of a motion that is no sine outside the tested ranges."""
+        moved = float(np.ptp(motion.displacement) / 2)
+        checks = (
+            ("current", float(np.min(np.abs(motion.current))), float(np.max(np.abs(motion.current))), self.current_A),
+            ("amplitude", moved, moved, self.amplitude_m),
+            ("velocity", 0.0, float(np.max(np.abs(motion.velocity))), self.peak_velocity_m_s),
+        )
+        return tuple(
+            name
+            for name, lowest, highest, (low, high) in checks
+            if highest > high * (1 + SLACK) or (name != "velocity" and lowest < low - SLACK * high)
+        )
+
+
+@lru_cache(maxsize=4096)
+def _in_hull(tested: tuple[tuple[float, float, float], ...], scale: float, asked: tuple[float, float, float]) -> bool:
+    from scipy.optimize import nnls  # slow to import, and needed only here
+
+    corners = np.array([_features(point, scale) for point in tested]) - _features(asked, scale)
+    centred = np.column_stack([corners, np.full(len(corners), _SUM_WEIGHT)])
+    return bool(nnls(centred.T, np.array([0.0, 0.0, 0.0, _SUM_WEIGHT]))[1] < SLACK)
+
+
+def _point(condition: Condition) -> tuple[float, float, float]:
+    return abs(condition.current_A), condition.frequency_Hz, condition.amplitude_m
+
+
+def _features(point: tuple[float, float, float], current_scale: float) -> Floats:
+    return np.array(
+        [point[0] / current_scale, np.log(max(point[1], _LOGARITHM_FLOOR)), np.log(max(point[2], _LOGARITHM_FLOOR))]
+    )
+
+
+_ANY = (-np.inf, np.inf)
+UNTESTED = Envelope(_ANY, _ANY, _ANY, _ANY)

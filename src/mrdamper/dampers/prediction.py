@@ -1,0 +1,79 @@
+"""Predicted forces, with the motion they belong to and their flags of extrapolation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.dampers.distance import Distance
+from mrdamper.dampers.envelope import Envelope
+from mrdamper.data.conditions import Condition
+from mrdamper.data.displayable import Displayable
+from mrdamper.data.runs import Floats
+from mrdamper.physics.motion.excitation import Excitation
+
+NOT_A_SINE = "not a sine"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction(Displayable):
+    """A predicted force.
+
+    Attributes
+    ----------
+    motion : Excitation
+    force : (N,) array
+        [N]
+    condition : Condition
+        That the prediction was made for, or that the motion amounts to.
+    extrapolation : tuple of str
+        Quantities outside the tested envelope; empty inside.
+    steady : bool
+        One closed loop of the steady response, not a motion from rest.
+
+    Examples
+    --------
+    >>> from mrdamper import Condition, identify, load_dataset
+    >>> from mrdamper.dampers.modified import fit_modified
+    >>> runs = load_dataset().rig("utfsm").split("train")[:8]
+    >>> damper = fit_modified([identify(run, "bingham") for run in runs]).damper
+    >>> prediction = damper.predict(Condition(current_A=0.5, frequency_Hz=2.0, amplitude_m=0.01))
+    >>> prediction.force.shape == prediction.motion.time.shape
+    True
+    """
+
+    motion: Excitation
+    force: Floats
+    condition: Condition
+    extrapolation: tuple[str, ...]
+    steady: bool = False
+
+    def distance(self, tested: Envelope) -> Distance:
+        """Distance from tests."""
+        return tested.distance(self.condition, self.motion.current)
+
+    @property
+    def is_sine(self) -> bool:
+        """True where the motion is the sine of the condition."""
+        return NOT_A_SINE not in self.extrapolation
+
+    @property
+    def headline(self) -> str:
+        """Condition, peak forces and what is extrapolated."""
+        low, high = float(np.min(self.force)), float(np.max(self.force))
+        outside = f"; outside the tested range in {', '.join(self.extrapolation)}" if self.extrapolation else ""
+        return f"prediction at {self.condition}: {low:.4g} to {high:.4g} N{outside}"
+
+    @property
+    def table(self) -> Mapping[str, Floats]:
+        """A row a sample, SI."""
+        motion = self.motion
+        return {
+            "time_s": motion.time,
+            "displacement_m": motion.displacement,
+            "velocity_m_s": motion.velocity,
+            "current_A": motion.current,
+            "force_N": self.force,
+        }

@@ -1,0 +1,28 @@
+"""A damper identified from runs, and how it is identified again from some of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from mrdamper.dampers.base import Damper
+from mrdamper.dampers.joint import JointFit
+from mrdamper.dampers.modified import ModifiedFit
+
+
+@dataclass(frozen=True, eq=False)
+class FitResult:
+    """Damper that a recipe identified from runs.
+
+    Attributes
+    ----------
+    damper : Damper
+    refit : callable
+        Identifies the damper again from the runs at some indices only.
+    fit : ModifiedFit, JointFit or None
+        Details of its functions or its search.
+    """
+
+    damper: Damper
+    refit: Callable[[Sequence[int]], Damper]
+    fit: ModifiedFit | JointFit | None = None
