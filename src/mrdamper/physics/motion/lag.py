@@ -96,8 +96,9 @@ def load_step(tape: Tape, time: Any, path: Any, length: Any, leak: Any) -> Any:
     both = built + leaked
     settled = choose(both > 0, lambda: built / both, lambda: 1.0)
     moved = tape.select(tape.first, 1.0, settled + (held - settled) * np.exp(-both))
-    tape.update(held, moved)
-    return choose(leak > 0, lambda: moved, lambda: 1.0)
+    load = choose(leak > 0, lambda: moved, lambda: 1.0)
+    tape.update(held, load)
+    return load
 
 
 @streamed(load_step)

@@ -8,7 +8,7 @@ import re
 from mrdamper.tracing import Expression, Program
 from mrdamper.tracing.c_writer import CWriter
 from mrdamper.tracing.expression import SAMPLE
-from mrdamper.tracing.program import postorder
+from mrdamper.tracing.program import Branch, Let, Statement, postorder
 
 PREAMBLE = """\
 #include <math.h>
@@ -107,6 +107,7 @@ class ArrayWriter(CWriter):
         self._places |= {id(e): f"s[{i}]" for i, e in enumerate(tape.memory.values())}
         self._places |= {id(e): f"d[{i}]" for i, e in enumerate(program.derived)}
         self.kept = 0  # numbers that are kept
+        self._kept: set[int] = set()  # expressions whose values they are
         self.refresh = self._keep_slow() if keep else ""
 
     def _keep_slow(self) -> str:
@@ -130,7 +131,13 @@ class ArrayWriter(CWriter):
             changed = " || ".join(f"{place} != {value}" for place, value in zip(held, inputs, strict=True))
             text += f"    if ({changed}) {{\n" + "\n".join(lines) + "\n    }\n"
             self._places |= fresh
+            self._kept |= fresh.keys()
         return text
+
+    def _lines(self, statements: list[Statement], indent: int) -> list[str]:
+        """Write statements but those of kept numbers, which `refresh` computes."""
+        own = [s.expression if isinstance(s, Let) else s.select if isinstance(s, Branch) else None for s in statements]
+        return super()._lines([s for s, e in zip(statements, own, strict=True) if id(e) not in self._kept], indent)
 
     def _expanded(self, value: object) -> str:
         """Expand an expression down to what is available before any statement."""
