@@ -84,3 +84,13 @@ def test_every_decision_is_in_the_index_with_context_decision_and_consequences()
     for path in records:
         headings = re.findall(r"^## (.+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
         assert headings[:3] == ["Context", "Decision", "Consequences"], path.name
+
+
+def test_a_saved_model_is_read_without_the_other_kinds():
+    code = (
+        "import sys; from mrdamper.dampers import kind_named; kind = kind_named('joint').kind; "
+        "others = [m for m in ('modified', 'kernel') if 'mrdamper.dampers.' + m in sys.modules]; "
+        "print(kind, others, kind_named('conditioned').kind, kind_named('none'))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "joint [] conditioned None"

@@ -64,7 +64,7 @@ def distance_from(
     swept_A : (float, float), optional
         Lowest and highest current of tests in which it changed: none between them is far from the tests.
     """
-    levels = np.unique(swept_A or current_levels([abs(c.current_A) for c in tested]))
+    levels = np.array(sorted({*(swept_A or current_levels([abs(c.current_A) for c in tested]))}))
     between, beyond = _current_distances(np.abs(current[:: max(1, current.size // _MAX_SAMPLES)]), levels)
     frequency, amplitude = MotionHull.of(tested).nearest(at.frequency_Hz, at.amplitude_m)
     motion = np.hypot(np.log(at.frequency_Hz / frequency), np.log(at.amplitude_m / amplitude))

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from mrdamper.dampers import all_kinds
+from mrdamper.dampers import all_kinds, kind_named
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import Calibration, Growth
 from mrdamper.dampers.coil import Coil, Driver
@@ -281,12 +281,12 @@ def _checked(schema: Any, raw: dict[str, Any], prefix: str, where: str) -> Any:
 
 
 def _kind(described: dict[str, Any], where: str) -> tuple[type[Damper], dict[str, Any]]:
-    name, kinds = str(described.get("kind")), all_kinds()
-    if name not in kinds:
+    name = str(described.get("kind"))
+    if (kind := kind_named(name)) is None:
         raise ModelFileError(
-            f"damper.kind is {name!r}", where=where, remedy=f"known: {', '.join(kinds)}; write the model again"
+            f"damper.kind is {name!r}", where=where, remedy=f"known: {', '.join(all_kinds())}; write the model again"
         )
-    return kinds[name], {key: value for key, value in described.items() if key != "kind"}
+    return kind, {key: value for key, value in described.items() if key != "kind"}
 
 
 def _upgraded(raw: dict[str, Any]) -> dict[str, Any]:
