@@ -312,6 +312,11 @@ def test_a_fit_begins_where_another_problem_ended(problem, fit):
     assert held.without_linear(held.from_point(fit)).d == 3e-4
 
 
+def test_predictions_of_a_run_share_its_motion(runs, fit):
+    one, other = (fit.damper.predict_run(runs[2]).motion for _ in range(2))
+    assert one is other  # cut into strokes once
+
+
 def test_errors_of_left_out_runs_are_those_of_a_prediction(runs, problem, fit):
     found = problem.errors(fit, [2, 7])
     for error, i in zip(found, (2, 7), strict=True):

@@ -23,8 +23,7 @@ from mrdamper.data import Condition, Displayable, Floats, Run
 from mrdamper.errors import InputError, validate_arguments
 from mrdamper.models.base import Model
 from mrdamper.physics.motion.excitation import Excitation
-from mrdamper.physics.motion.measured import measured_motion
-from mrdamper.physics.motion.sines import equivalent_sine
+from mrdamper.physics.motion.sines import centred_motion, equivalent_sine
 from mrdamper.physics.simulation import ForceLaw, Response, simulate, steady_loop
 from mrdamper.statistics.functions.forms import ParameterFunction
 from mrdamper.statistics.functions.motion_hull import MotionHull
@@ -243,7 +242,7 @@ class Damper(Displayable):
         approximation, flagged as such, and the force that a stream of the damper gives.
         """
         sine = equivalent_sine(run)
-        motion = measured_motion(run).about(sine.centre)
+        motion = centred_motion(run)
         if sine.is_sine and not run.current_changes:
             flags = self.envelope.flags(sine.condition)
         else:

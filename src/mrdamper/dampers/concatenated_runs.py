@@ -21,8 +21,7 @@ from mrdamper.errors import RunError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.models.base import Model
 from mrdamper.physics.motion.excitation import Excitation
-from mrdamper.physics.motion.measured import measured_motion
-from mrdamper.physics.motion.sines import equivalent_sine
+from mrdamper.physics.motion.sines import centred_motion, equivalent_sine
 from mrdamper.statistics.levenberg_marquardt import forward_differences, least_squares
 from mrdamper.statistics.linear import robust_weights, solve_bounded
 
@@ -69,7 +68,7 @@ class RunRows:
     @classmethod
     def of(cls, run: Run) -> RunRows:
         sine = equivalent_sine(run)
-        motion = measured_motion(run).about(sine.centre)
+        motion = centred_motion(run)
         window = np.flatnonzero(run.in_window)
         first, last = int(window[0]), int(window[-1])
         scale = float(np.ptp(run.force[first : last + 1]))

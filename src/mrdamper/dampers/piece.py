@@ -9,8 +9,7 @@ import numpy as np
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.models import Model
 from mrdamper.physics.motion.excitation import Excitation
-from mrdamper.physics.motion.measured import measured_motion
-from mrdamper.physics.motion.sines import equivalent_sine
+from mrdamper.physics.motion.sines import centred_motion, equivalent_sine
 
 _SAMPLES = 150  # a cycle
 
@@ -35,7 +34,7 @@ class Piece:
         begin = int(np.searchsorted(run.time, run.time[last] - period))
         lead = int(np.searchsorted(run.time, run.time[last] - 1.75 * period))
         step = max(1, (last - begin) // _SAMPLES)
-        motion = measured_motion(run).about(sine.centre).part(slice(lead, last + 1, step))
+        motion = centred_motion(run).part(slice(lead, last + 1, step))
         force = run.force[lead : last + 1 : step]
         scored = slice((begin - lead) // step, None)
         scale = float(np.ptp(force[scored])) * np.sqrt(force[scored].size)

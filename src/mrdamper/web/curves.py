@@ -9,7 +9,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Floats, Run
 from mrdamper.models import Model
-from mrdamper.physics.motion import Excitation, analyse_motion, equivalent_sine, measured_motion
+from mrdamper.physics.motion import Excitation, analyse_motion, centred_motion, equivalent_sine
 from mrdamper.physics.simulation import simulate
 
 MM = 1e3
@@ -38,12 +38,12 @@ def on_screen(
 
 def measured_cycle(run: Run) -> dict[str, Floats]:
     """Return the last whole cycle of a steady sine, from its way up through mid-stroke on."""
-    return on_screen(_motion(run), run.force, *_last_cycle(run))
+    return on_screen(centred_motion(run), run.force, *_last_cycle(run))
 
 
 def measured_window(run: Run) -> dict[str, Floats]:
     """All of a run's steady window."""
-    return on_screen(_motion(run), run.force, np.flatnonzero(run.in_window), most=_MOST_OF_WINDOW)
+    return on_screen(centred_motion(run), run.force, np.flatnonzero(run.in_window), most=_MOST_OF_WINDOW)
 
 
 def raw_record(run: Run) -> dict[str, Floats]:
@@ -60,7 +60,7 @@ def predicted_cycle(prediction: Prediction) -> dict[str, Floats]:
 
 def modelled_cycle(model: Model, run: Run, delay: float = 0.0) -> dict[str, Floats]:
     """Return the force of a model over the samples of `measured_cycle`, its force channel late by `delay` [s]."""
-    motion = _motion(run)
+    motion = centred_motion(run)
     force = simulate(model, motion.delayed(delay) if delay else motion).force
     return on_screen(motion, force, *_last_cycle(run))
 
@@ -72,10 +72,6 @@ def predicted_on_run(damper: Damper, run: Run) -> tuple[dict[str, Floats], tuple
         return on_screen(prediction.motion, prediction.force, *_last_cycle(run)), prediction.extrapolation
     window = np.flatnonzero(run.in_window)
     return on_screen(prediction.motion, prediction.force, window, most=_MOST_OF_WINDOW), prediction.extrapolation
-
-
-def _motion(run: Run) -> Excitation:
-    return measured_motion(run).about(equivalent_sine(run).centre)
 
 
 def _last_cycle(run: Run) -> tuple[NDArray[np.intp], float]:

@@ -10,6 +10,7 @@ from mrdamper.physics.motion.sines import (
     EquivalentSine,
     MotionAnalysis,
     analyse_motion,
+    centred_motion,
     equivalent_sine,
     running_sine,
 )
@@ -22,6 +23,7 @@ __all__ = [
     "MotionAnalysis",
     "Path",
     "analyse_motion",
+    "centred_motion",
     "equivalent_sine",
     "measured_motion",
     "random_motion",

@@ -110,6 +110,14 @@ def equivalent_sine(run: Run) -> EquivalentSine:
     return EquivalentSine(condition, float(np.mean(motion.displacement)), False)
 
 
+@once_per_run
+def centred_motion(run: Run) -> Excitation:
+    """Return the measured motion about its mid-stroke, cut into strokes once for every model that follows it."""
+    motion = measured_motion(run).about(equivalent_sine(run).centre)
+    motion.path  # noqa: B018
+    return motion
+
+
 def running_sine(motion: Excitation) -> tuple[Floats, Floats]:
     """Frequency [Hz] and amplitude [m] of the sine a motion resembles, at every sample.
 

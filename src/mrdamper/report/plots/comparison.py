@@ -9,7 +9,7 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Run
-from mrdamper.physics.motion import equivalent_sine, measured_motion
+from mrdamper.physics.motion import centred_motion, equivalent_sine
 from mrdamper.report.plots.figure import Figure
 from mrdamper.report.plots.style import MEASURED, MM, PALETTE
 
@@ -50,7 +50,7 @@ def overlaid_loops(runs: Sequence[Run], dampers: Mapping[str, Damper]) -> Figure
     figure = Figure(len(runs), 2, 0.7 + 2.5 * len(runs))
     for row, run in enumerate(runs):
         sine = equivalent_sine(run)
-        motion = measured_motion(run).about(sine.centre)
+        motion = centred_motion(run)
         last = int(np.flatnonzero(run.in_window)[-1])
         first = int(np.searchsorted(run.time, run.time[last] - 1 / sine.condition.frequency_Hz))
         cycle = slice(max(first - 1, 0), last + 1, max(1, (last - first) // 400))
