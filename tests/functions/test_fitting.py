@@ -157,9 +157,10 @@ def fits(monkeypatch, errors):
         if errors[form.name] is None:
             raise IdentificationError(f"no {form.name}")
         function = SimpleNamespace(form=form.name)
-        return FunctionFit(function, 0.0, 0.0, {"condition": np.array(errors[form.name])})
+        folds = {"condition": np.array(errors[form.name])}
+        return SimpleNamespace(fit=FunctionFit(function, 0.0, 0.0), errors=folds)
 
-    monkeypatch.setattr(fitting, "fit_function", fit)
+    monkeypatch.setattr(fitting, "_fitted", fit)
     return choose_function(errors, CONDITIONS, VALUES).function.form
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -33,8 +33,6 @@ class FunctionFit:
     left_out : float
         RMS error at a condition left out of the fit, over the parameter's spread: under 1 the
         function knows more than the mean does; infinite where a term rests on one condition alone.
-    errors : mapping of str to (N,) array
-        Error of every value when it is left out, over the spread, by kind of fold.
     refused : mapping of str to str
         Forms that were no candidates, and why.
     """
@@ -42,8 +40,28 @@ class FunctionFit:
     function: ParameterFunction
     r2: float
     left_out: float
-    errors: Mapping[str, Floats] = field(default_factory=dict, compare=False)
     refused: Mapping[str, str] = field(default_factory=dict, compare=False)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """A fitted function with what its errors at values left out follow from."""
+
+    fit: FunctionFit
+    columns: Floats
+    target: Floats
+    weight: Floats
+    size: float
+    conditions: tuple[Condition, ...]
+
+    @cached_property
+    def errors(self) -> Mapping[str, Floats]:
+        """(N,) errors of values when they are left out, over the spread, by kind of fold."""
+        rates = len(self.fit.function.rates)
+        return {
+            kind: _fold_errors(self.columns, self.target, self.weight, groups, rates) / self.size
+            for kind, groups in _folds(self.conditions).items()
+        }
 
 
 def fit_function(
@@ -74,6 +92,12 @@ def fit_function(
         If the conditions cannot tell the form's terms apart: too few currents, frequencies or
         amplitudes.
     """
+    return _fitted(form, conditions, values, log, uncertainty).fit
+
+
+def _fitted(
+    form: str | Form, conditions: Sequence[Condition], values: ArrayLike, log: bool, uncertainty: ArrayLike | None
+) -> _Fitted:
     chosen = form_named(form) if isinstance(form, str) else form
     I, f, A = features(conditions)
     target = np.asarray(values, dtype=float)
@@ -91,15 +115,8 @@ def fit_function(
     spread = float(np.sum((target - target.mean()) ** 2))
     function = ParameterFunction(chosen.name, tuple(coefficients.tolist()), tuple(float(r) for r in rates), log)
     size = np.sqrt(spread / target.size) or 1.0
-    return FunctionFit(
-        function,
-        r2=1.0 - cost / spread if spread > 0 else 1.0,
-        left_out=left_out / size,
-        errors={
-            kind: _fold_errors(columns, target, weight, groups, len(rates)) / size
-            for kind, groups in _folds(tuple(conditions)).items()
-        },
-    )
+    fit = FunctionFit(function, r2=1.0 - cost / spread if spread > 0 else 1.0, left_out=left_out / size)
+    return _Fitted(fit, columns, target, weight, size, tuple(conditions))
 
 
 def choose_function(
@@ -127,7 +144,7 @@ def choose_function(
     IdentificationError
         If they can determine none.
     """
-    best: FunctionFit | None = None
+    best: _Fitted | None = None
     refusal: IdentificationError | None = None
     refused: dict[str, str] = {}
     ordered = sorted((form_named(name) for name in forms), key=lambda f: len(f.terms) + len(f.rate_bounds))
@@ -136,23 +153,23 @@ def choose_function(
             refused[form.name] = "too many parameters for the tested currents and motions"
             continue
         try:
-            fit = fit_function(form, conditions, values, log=log, uncertainty=uncertainty)
+            tried = _fitted(form, conditions, values, log, uncertainty)
         except IdentificationError as error:
             refusal = error
             refused[form.name] = str(error)
             continue
-        reason = broken_law(fit.function, conditions, dissipating) if dissipating else ""
+        reason = broken_law(tried.fit.function, conditions, dissipating) if dissipating else ""
         if reason and best is not None:
             refused[form.name] = reason
-        elif best is None or _replaces(fit, best, dissipating, conditions):
-            best = fit
+        elif best is None or _replaces(tried, best, dissipating, conditions):
+            best = tried
     if best is None:
         raise refusal or IdentificationError("no form to choose from", remedy="name at least one")
-    return replace(best, refused=refused)
+    return replace(best.fit, refused=refused)
 
 
-def _replaces(longer: FunctionFit, shorter: FunctionFit, dissipating: str, conditions: Sequence[Condition]) -> bool:
-    risen = rises(shorter.function, longer.function, dissipating, conditions)
+def _replaces(longer: _Fitted, shorter: _Fitted, dissipating: str, conditions: Sequence[Condition]) -> bool:
+    risen = rises(shorter.fit.function, longer.fit.function, dissipating, conditions)
     return risen or not smaller_wins(shorter.errors, longer.errors)
 
 
