@@ -530,7 +530,8 @@ class JointProblem:
         lower, upper = self.box()
         step = np.where(np.arange(point.size) == i, _DIFFERENCE_RATIO * (upper - lower), 0.0)
         ends = np.clip(point - step, lower, upper), np.clip(point + step, lower, upper)
-        low, high = (np.array([getattr(self.without_linear(end), name) for name in names]) for end in ends)
+        models = [self.without_linear(end) for end in ends]
+        low, high = (np.array([getattr(model, name) for name in names]) for model in models)
         return (high - low) / (ends[1][i] - ends[0][i])
 
     def without_linear(self, point: Floats) -> Model:

@@ -87,17 +87,17 @@ def least_squares(
     for _ in range(most_steps):
         jacobian = slopes(point) if slopes else forward_differences(residual, point, r, lower, upper)
         evaluations += point.size
-        gradient = jacobian.T @ r
+        gradient, normal = jacobian.T @ r, jacobian.T @ jacobian
         if curved and before is not None:
-            extra = _learnt_curvature(extra, point - before[0], gradient - before[1], jacobian)
+            extra = _learnt_curvature(extra, point - before[0], gradient - before[1], normal)
         held = ((point <= lower) & (gradient > 0)) | ((point >= upper) & (gradient < 0))
-        free = ~held & jacobian.any(axis=0)  # a coordinate that changes nothing has no step
+        free = ~held & (np.diag(normal) > 0)  # a coordinate that changes nothing has no step
         if not free.any():
             ending = StopReason.AT_BOUNDS
             break
         better = None
         while better is None and damping < _STIFFEST:
-            step, promised = _damped_step(jacobian, extra, gradient, free, damping)
+            step, promised = _damped_step(normal, extra, gradient, free, damping)
             if promised <= _WORTHLESS * tolerance * cost:
                 break
             trial = np.clip(point + step, lower, upper)
@@ -175,10 +175,10 @@ def forward_differences(
 
 
 def _damped_step(
-    jacobian: Floats, extra: Floats | None, gradient: Floats, free: NDArray[np.bool_], damping: float
+    normal: Floats, extra: Floats | None, gradient: Floats, free: NDArray[np.bool_], damping: float
 ) -> tuple[Floats, float]:
     """Step of the free coordinates, and what it would gain if the cost were as the matrices say."""
-    normal = jacobian[:, free].T @ jacobian[:, free]
+    normal = normal[free][:, free]
     stiff = np.diag(damping * np.maximum(np.diag(normal), 1e-300))
     if extra is not None:
         whole = normal + extra[free][:, free]
@@ -195,10 +195,10 @@ def _is_positive(matrix: Floats) -> bool:
     return bool(np.linalg.eigvalsh(matrix)[0] > 0)
 
 
-def _learnt_curvature(extra: Floats | None, moved: Floats, change: Floats, jacobian: Floats) -> Floats | None:
+def _learnt_curvature(extra: Floats | None, moved: Floats, change: Floats, normal: Floats) -> Floats | None:
     """Update what the second derivatives of the residual add to the normal matrix."""
     along = float(change @ moved)
-    missing = change - (jacobian @ moved) @ jacobian
+    missing = change - normal @ moved
     if not along > 1e-12 * float(np.linalg.norm(change) * np.linalg.norm(moved)):
         return None
     if extra is None:
