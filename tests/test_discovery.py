@@ -2,6 +2,7 @@
 
 import threading
 import time
+from importlib.metadata import Distribution
 
 from mrdamper import discovery
 from mrdamper.discovery import Registry
@@ -30,3 +31,12 @@ def test_threads_that_ask_at_once_see_every_class(monkeypatch):
         thread.join(10)
     assert len(seen) == 2
     assert seen[0] == seen[1] >= {"bouc-wen", "bingham"}
+
+
+def test_the_description_of_a_package_is_read_once_for_all_its_parts(monkeypatch):
+    read, metadata = [], Distribution.metadata.fget
+    monkeypatch.setattr(Distribution, "metadata", property(lambda self: read.append(self) or metadata(self)))
+    discovery.modules_with("mrdamper.checks", "check")
+    discovery.provided_modules.cache_clear()
+    discovery.modules_with("mrdamper.checks", "check")
+    assert len(read) <= 2 * len(set(map(id, read)))  # its name and its version

@@ -56,9 +56,15 @@ class ExtensionPart:
     own: bool = False  # it belongs to mrdamper, or to a script that registered it
 
 
+@cache
+def _named(distribution: Distribution | None) -> tuple[str, str]:
+    """Name and version of a distribution: reading either parses all of its description."""
+    return (distribution.name, distribution.version) if distribution else ("", "")
+
+
 def package_of(distribution: Distribution | None) -> str:
     """Name and version of a distribution."""
-    return f"{distribution.name} {distribution.version}" if distribution else "unknown package"
+    return " ".join(_named(distribution)) if distribution else "unknown package"
 
 
 @cache
@@ -88,16 +94,16 @@ def provided_modules(group: str) -> tuple[tuple[EntryPoint, tuple[ModuleType, ..
 
 
 def _order(point: EntryPoint) -> tuple[bool, str, str]:
-    return not _is_own(point), point.dist.name if point.dist else "", point.name
+    return not _is_own(point), _named(point.dist)[0], point.name
 
 
 def _is_own(point: EntryPoint) -> bool:
-    return point.dist is not None and point.dist.name == OWN
+    return _named(point.dist)[0] == OWN
 
 
 def _require_this_version(distribution: Distribution | None) -> None:
     """Refuse a package that is made for another version of mrdamper."""
-    if distribution is None or distribution.name == OWN:
+    if distribution is None or _named(distribution)[0] == OWN:
         return
     from packaging.requirements import Requirement
 
