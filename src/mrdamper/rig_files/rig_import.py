@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -351,11 +352,10 @@ def found_tests(
 def _with_folders(tests: Sequence[tuple[Path, Record]]) -> list[Record]:
     """Return records whose file is told with its folders, where files of several folders have one name."""
     paths = {path for path, _ in tests}
+    endings = Counter(path.parts[-depth:] for path in paths for depth in range(1, len(path.parts) + 1))
     records = []
     for path, record in tests:
-        depth = 1
-        while depth < len(path.parts) and any(p != path and p.parts[-depth:] == path.parts[-depth:] for p in paths):
-            depth += 1
+        depth = next((n for n in range(1, len(path.parts)) if endings[path.parts[-n:]] == 1), len(path.parts))
         file = as_data("/".join(path.parts[-depth:]))
         records.append(record if depth == 1 else replace(record, provenance={**record.provenance, "file": file}))
     return records

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -61,7 +63,9 @@ def _elements(path: Path) -> list[ElementTree.Element]:
     beside = path.with_suffix(".xml")
     if not beside.is_file():
         try:
-            others = [file for file in path.parent.iterdir() if file != path and not file.name.startswith(".")]
+            with os.scandir(path.parent) as folder:  # not read to its end: it may hold thousands of files
+                visible = (file.name for file in folder if not file.name.startswith(".") and file.name != path.name)
+                others = [path.with_name(name) for name in islice(visible, 2)]
         except OSError:
             return []
         beside = others[0] if len(others) == 1 and others[0].suffix.lower() == ".xml" and others[0].is_file() else path
