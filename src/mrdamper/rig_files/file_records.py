@@ -15,6 +15,7 @@ from mrdamper.rig_files.folder import is_left_out
 from mrdamper.rig_files.mapping.clocks import with_time_stated
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.description import with_description, with_notes
+from mrdamper.rig_files.mapping.integration import with_integrated_velocity
 from mrdamper.rig_files.mapping.long_table import with_channels_as_columns
 from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_unit_of_time
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
@@ -76,7 +77,8 @@ def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
     tables = [with_one_clock(table) for table in tables]
     parts = [part for table in tables for part in ([table] if table.fallback else tests_of(table, profile.file))]
     parts = [
-        with_channels_by_physics(with_unit_of_time(table), _stated_columns(profile)) for table in with_results(parts)
+        with_channels_by_physics(with_integrated_velocity(with_unit_of_time(table)), _stated_columns(profile))
+        for table in with_results(parts)
     ]
     return parts
 

@@ -51,6 +51,10 @@ _INDEXED = re.compile(
     r"\s*[=:]\s*(?P<value>.+?)\s*$",
     re.IGNORECASE,
 )
+_NUMBERED = re.compile(r"(?i)(?:ch(?:annel)?|kanal|canal|voie|canale)?[ ._]?([0-9]{1,3})")
+_CHANNEL_IS = re.compile(
+    r"(?i)(?<!\w)(?:ch(?:annel)?|kanal|canal|voie|canale)[ ._]?(?P<number>[0-9]{1,3})\s*[:=]\s*(?P<what>[^;|\t]{2,60})"
+)
 _FLOAT = re.compile(r"[+-]?[0-9]+(?:[.][0-9]*)?(?:[eE][+-]?[0-9]+)?")
 _AXIS_UNIT = re.compile(r"(?i)^[\s\"]*x[ _-]?axis[ _-]?unit\"?\s*[;,:=\t]\s*\"?([a-zµ]{1,12})\"?[\s;,\"]*$")
 _SENSE_NAMES = frozenset(("sense", "direction", "dir", "sign", "richtung", "vorzeichen", "sens", "sentido", "verso"))
@@ -59,8 +63,11 @@ _SENSES = {
     -1: ("compress", "push", "druck", "compres"),
 }
 _COUNTED = (  # force positive in compression; Force (compression positive)
-    re.compile(r"(?i)(?P<what>[^\W\d_]+):? (?:is |are )?posit?iv[eo]? (?:in|for|on|bei|für|en) (?P<sense>[^\W\d_]+)"),
-    re.compile(r"(?i)(?P<what>[^\W\d_]+)[ ,:(]{1,3}(?P<sense>[^\W\d_]+) (?:is )?posit?iv[eo]?\b"),
+    re.compile(
+        r"(?i)(?P<what>[^\W\d_]+(?: [^\W\d_]+)?):? (?:is |are )?posit?iv[eo]? (?:in|for|on|bei|für|en) "
+        r"(?P<sense>[^\W\d_]+)"
+    ),
+    re.compile(r"(?i)(?P<what>[^\W\d_]+(?: [^\W\d_]+)?)[ ,:(]{1,3}(?P<sense>[^\W\d_]+) (?:is )?posit?iv[eo]?\b"),
 )
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _LONGEST_LINE = 300
@@ -72,6 +79,7 @@ def completed(table: RawTable) -> RawTable:
         table = _with_indexed_names(_with_listed_names(table))
     if not any(table.names):
         return table
+    table = _with_numbered_channels(table)
     table = _with_titles(_with_keyed_units(_with_row_of_currents(table)))
     table = _with_stated_time_unit(_with_listed_units(_with_keyed_axis(table)))
     table = _with_stated_signs(_with_clocks_and_weights(table))
@@ -174,6 +182,20 @@ def _with_listed_names(table: RawTable) -> RawTable:
         return table
     names, units = (tuple(listed[i][key].strip() for i in sorted(listed)) for key in ("name", "unit"))
     return replace(table, names=names, units=units)
+
+
+def _with_numbered_channels(table: RawTable) -> RawTable:
+    """Names of columns that are called by their numbers, where a line says what each channel is: channel 2: LVDT."""
+    numbers = [match[1] if (match := _NUMBERED.fullmatch(name.strip())) else "" for name in table.names]
+    says: dict[str, set[str]] = {}
+    for line in table.remarks if any(numbers) else ():
+        for match in _CHANNEL_IS.finditer(line[:_LONGEST_LINE]):
+            says.setdefault(str(int(match["number"])), set()).add(match["what"].strip())
+    meant = [says.get(str(int(number)), set()) if number else set() for number in numbers]
+    if sum(map(bool, numbers)) < 2 or any(n and len(what) != 1 for n, what in zip(numbers, meant, strict=True)):
+        return table
+    names = tuple(next(iter(what), name) for name, what in zip(table.names, meant, strict=True))
+    return replace(table, names=names)
 
 
 def _with_indexed_names(table: RawTable) -> RawTable:

@@ -266,6 +266,8 @@ def _attributes(item: Any) -> list[str]:
         value = np.asarray(item.attrs[name])
         if value.size == 1 and value.dtype.kind in "iufSUO":
             shown = _text(item.attrs[name]) if value.dtype.kind in "SUO" else value.reshape(-1)[0]
+            unit = next((_text(item.attrs[f"{name}_{u}"]) for u in _UNIT_NAMES if f"{name}_{u}" in item.attrs), "")
+            shown = f"{shown} {unit}" if is_unit(unit) and value.dtype.kind in "iuf" else shown
             lines.append(f"{name}: {shown}"[:200])
     return lines
 

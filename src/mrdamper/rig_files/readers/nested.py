@@ -18,7 +18,7 @@ import numpy as np
 
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_clock
-from mrdamper.rig_files.readers.arrays import array_table, expand, pick, titles_of
+from mrdamper.rig_files.readers.arrays import array_table, expand, pick, tests_across, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Source
 from mrdamper.rig_files.units import is_unit
 
@@ -33,6 +33,7 @@ _UNITS = ("unit", "units", "einheit", "yunit", "y_unit", "dataunits", "yunits")
 _TIME_UNITS = ("xunit", "x_unit", "timeunit", "timeunits", "time_unit", "xunits")
 _HEAD = re.compile(r"_?(?:header|info|properties|attributes|meta(?:data)?)$", re.IGNORECASE)
 _BODY = re.compile(r"_?(?:data|values)$", re.IGNORECASE)
+_CLOCK = re.compile(r"(^|[_. ])time[_. ]", re.IGNORECASE)
 _PORTS = frozenset(("out1", "in1", "value", "out", "in", "signal", "outport", "inport", "model root", "y"))
 
 
@@ -65,7 +66,7 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[R
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
-    tree = _with_own_axes(_spread({key: _object_in(value) for key, value in tree.items()}))
+    tree = _with_own_axes(_tests_of_rows(_spread({key: _object_in(value) for key, value in tree.items()})))
     node.units = {**node.units, **_stated_units(tree)}
     for key, value in _paired(tree, node.units).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
@@ -154,6 +155,24 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**rest, **{f"{key}_{i}": node for i, node in enumerate(own, 1)}}
 
 
+def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Split tables whose rows are tests into a node each, with its own of the numbers of a vector of conditions."""
+    arrays = {k: np.squeeze(v) for k, v in tree.items() if isinstance(v, np.ndarray) and v.dtype.kind in "iuf"}
+    tables = tests_across({key: array.shape for key, array in arrays.items()})
+    count = len(arrays[tables[0]]) if tables else 0
+    conditions = [key for key, array in arrays.items() if array.shape == (count,)]
+    if not conditions:
+        return tree
+    rest = {key: value for key, value in tree.items() if key not in tables and key not in conditions}
+    clocks = {key: value for key, value in rest.items() if isinstance(value, np.ndarray)}
+    own = [
+        {**clocks, **{k: arrays[k][i] for k in tables}, **{k: float(arrays[k][i]) for k in conditions}}
+        for i in range(count)
+    ]
+    rest = {key: value for key, value in rest.items() if key not in clocks}
+    return {**rest, **{f"test_{i}": node for i, node in enumerate(own, 1)}}
+
+
 def _stated_units(tree: Mapping[str, Any]) -> dict[str, str]:
     """Units that a mapping called units gives the columns by their names."""
     stated = next((value for key, value in tree.items() if key.casefold() in _UNITS and isinstance(value, Mapping)), {})
@@ -161,18 +180,23 @@ def _stated_units(tree: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, Any]:
-    """Join arrays to the entries that describe them: Channel_1_Data to Channel_1_Header, units by name."""
+    """Join arrays to what describes them: Channel_1_Data to Channel_1_Header, F to time_F, units by name."""
     heads = {_HEAD.sub("", key): key for key, value in tree.items() if _HEAD.search(key) and isinstance(value, Mapping)}
     pairs = {
         key: heads[stem]
         for key in tree
         if (stem := _BODY.sub("", key)) in heads and _BODY.search(key) and isinstance(tree[key], np.ndarray)
     }
-    used = set(pairs.values())
+    clocks = {bare: key for key in tree if (bare := _CLOCK.sub(r"\1", key, count=1)) != key and bare in tree}
+    seconds = {"sample_rate", "start_time"} <= {key.casefold() for key in tree}  # exported by Dewesoft, in seconds
+    used = {*pairs.values(), *clocks.values()}
     partners = {}
     for key, value in tree.items():
         if key in pairs and isinstance(value, np.ndarray):
             partners[key] = {**tree[pairs[key]], "data": value}
+        elif isinstance(value, np.ndarray) and isinstance(tree.get(clocks.get(key, "")), np.ndarray):
+            own = {"name": key, "unit": units.get(key, ""), "data": value, "time": tree[clocks[key]]}
+            partners[key] = {**own, "timeunit": "s"} if seconds else own
         elif isinstance(value, np.ndarray) and key in units:
             partners[key] = {"name": key, "unit": units[key], "data": value}
         elif key not in used:

@@ -34,7 +34,7 @@ _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
 _MOST_LEVELS = 4  # lines of headings
 _TELLING = 2  # columns whose names tell what they are
-_WORD = re.compile(r"[^\W\d_]{3,}")
+_WORD = re.compile(r"(?:[^\W\d_]-)?[^\W\d_]{3,}")  # also x-axis
 _NAME_AND_UNIT = re.compile(r"[^\s\[(<{]+(?:\s*\[[^\[\]]*\]|\s*\([^()]*\))?")
 _QUANTITY = re.compile(
     r"([+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)[ \u00a0]?([^\W\d_]\S{0,6}|°\S)"
@@ -494,7 +494,8 @@ def _names_columns(line: str, separator: str) -> bool:
 
 def _fields(line: str, separator: str, width: int) -> list[str]:
     """Cells of a line of names; remark signs and one trailing separator are taken off."""
-    if is_comment(line):
+    listed = is_comment(line)
+    if listed:
         line = _LISTING.sub("", _COMMENT.sub("", line, count=1))
     if separator == SPACES:
         wide = re.split(r"\s{2,}|\t", line.strip())
@@ -502,6 +503,9 @@ def _fields(line: str, separator: str, width: int) -> list[str]:
         with_units = _NAME_AND_UNIT.findall(line.strip()) if len(narrow) != width else narrow
         return next((cells for cells in (wide, with_units) if len(cells) == width), narrow)
     cells = cells_of(line, separator)
+    if listed and len(cells) != width:  # a list of names has separators of its own: columns: time [s], load [N]
+        others = [other for mark in _SEPARATORS[:-1] if len(other := cells_of(line, mark)) == width]
+        cells = next((other for other in others if len(_roles(other)) >= _TELLING), cells)
     return cells[:-1] if len(cells) == width + 1 and (not cells[-1] or _names_notes(cells, width)) else cells
 
 

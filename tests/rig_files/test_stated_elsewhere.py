@@ -1,0 +1,94 @@
+"""Names, clocks, units and tests that a file states in another place than its row of names."""
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from mrdamper.rig_files.mapping.integration import displacement_of
+from mrdamper.rig_files.rig_import import import_files
+
+T = np.arange(0.0, 3.0, 0.002)
+X = 10 * np.sin(2 * np.pi * T + 0.3)  # [mm]
+
+
+def force(current):
+    return (150 + 400 * current) * np.tanh(8 * np.cos(2 * np.pi * T + 0.3))
+
+
+def table(path, head, *columns):
+    lines = [",".join(f"{value:.6g}" for value in row) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join([*head, *lines, ""]))
+
+
+def imported(path):
+    found = import_files([path])
+    assert not found.refusals, str(found.refusals[0].error)
+    return [
+        (record.current[0], np.ptp(record.displacement) / 2, np.max(np.abs(record.force))) for record in found.records
+    ]
+
+
+def expect(path, *currents):
+    assert imported(path) == [pytest.approx((i, 0.01, np.max(np.abs(force(i)))), rel=2e-3, abs=1e-9) for i in currents]
+
+
+def test_names_listed_in_a_remark_with_other_separators_and_the_sense_of_a_load_cell_count(tmp_path):
+    head = [
+        "% coil current: 0.50 A",
+        "% load cell: compression positive",
+        "% columns: time [s]; displacement [mm]; load [N]",
+    ]
+    table(tmp_path / "a.txt", head, T, X, -force(0.5))
+    expect(tmp_path, 0.5)
+
+
+def test_channels_called_by_numbers_have_the_names_and_scales_that_a_line_gives_them(tmp_path):
+    head = ["# channel 1: load cell 250 N/V; channel 2: LVDT 5 mm/V", "x-axis,1,2", "second,Volt,Volt"]
+    table(tmp_path / "test_0.5A.csv", head, T, force(0.5) / 250, X / 5)
+    expect(tmp_path, 0.5)
+
+
+def test_a_clock_named_after_each_channel_is_the_time_of_that_channel(tmp_path):
+    channels = {"Force_N": force(0.5), "Stroke_mm": X, "Current_A": np.full(T.shape, 0.5)}
+    clocks = {f"time_{name}": T for name in channels}
+    savemat(tmp_path / "a.mat", {**channels, **clocks, "Sample_rate": 500.0, "Start_time": "2023-04-12 09:11:00"})
+    expect(tmp_path, 0.5)
+
+
+def test_rows_of_tables_beside_a_vector_of_currents_are_tests(tmp_path):
+    currents = np.array([0.0, 0.5, 1.0])
+    forces = np.array([force(current) for current in currents])
+    np.savez(tmp_path / "a.npz", time_s=T, displacement_mm=np.tile(X, (3, 1)), force_N=forces, current_A=currents)
+    expect(tmp_path, *currents)
+
+
+def test_an_attribute_has_the_unit_that_another_attribute_states(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for i, (current, unit) in enumerate([(500, "mA"), (1.0, "A")]):
+            group = file.create_group(f"tests/T{i}")
+            group.attrs.update({"current": current, "current_unit": unit})
+            for name, unit_of, values in (
+                ("time", "s", T),
+                ("displacement", "mm", X),
+                ("force", "N", force(0.5 + 0.5 * i)),
+            ):
+                group.create_dataset(name, data=values).attrs["units"] = unit_of
+    expect(tmp_path, 0.5, 1.0)
+
+
+def test_a_recorded_velocity_is_integrated_and_said(tmp_path):
+    velocity = 2 * np.pi * np.cos(2 * np.pi * T + 0.3) / 100  # [m/s]
+    table(tmp_path / "test_0.5A.csv", ["time (s),velocity (m/s),force (N)"], T, velocity, force(0.5))
+    expect(tmp_path, 0.5)
+    assert any("integral" in finding.text for finding in import_files([tmp_path]).records[0].findings)
+
+
+@pytest.mark.parametrize("zero", [0.0, 0.02, -0.1])
+def test_the_zero_of_a_transducer_of_velocity_is_no_drift(zero):
+    slope = 2 * np.pi * 0.01 * np.cos(2 * np.pi * T + 0.3) + zero
+    np.testing.assert_allclose(displacement_of(T, slope), X / 1000, atol=1.2e-4)  # one step of 0.002 s at 0.06 m/s
+
+
+def test_a_velocity_under_one_cycle_has_no_stated_position():
+    assert displacement_of(T, T) is None
