@@ -11,7 +11,7 @@ from mrdamper.errors import ColumnError, ExcitationError, QualityError
 from mrdamper.identification import identify
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
-from mrdamper.rig_files.quality import check_record
+from mrdamper.rig_files.quality import check_record, view
 from mrdamper.rig_files.quality.table import quality_table, record_of, row
 from mrdamper.rig_files.to_run import to_run
 
@@ -144,3 +144,13 @@ def test_the_table_measures_and_does_not_stop_at_a_refusal(record):
     step = record.time[1] - record.time[0]
     assert row(good)["sample_rate_Hz"] == pytest.approx(1 / step, rel=1e-4)
     assert row(good)["frequency_Hz"] == pytest.approx(1 / (200 * step), rel=1e-3)
+
+
+def test_the_table_measures_what_the_checks_have_analysed(record, monkeypatch):
+    analysed = []
+    monkeypatch.setattr(view, "analyse_motion", lambda run: analysed.append(run) or analyse_motion(run))
+    (verdict,) = quality_table([record])
+    assert verdict.verdict == "good"
+    assert len(analysed) == 1
+    (again,) = quality_table([verdict.record])
+    assert row(again) == row(verdict)

@@ -113,7 +113,12 @@ def check_record(record: Record, without: Collection[Check] = ()) -> Record:
         E_SPIKE, E_LEAP, E_NOISE, E_UNRESOLVED, E_DISSIPATION_SIGN, E_RECTIFIED, E_NO_ENERGY,
         E_UNRELATED, E_CHANNEL_LAG, E_DISTURBED, E_SAMPLES_LOST, E_COPIED.
     """
-    view = View(record)
+    return checked(View(record), without)
+
+
+def checked(view: View, without: Collection[Check] = ()) -> Record:
+    """Run every check on a view of a record, which goes on to hold what they have analysed; else `check_record`."""
+    record = view.record
     for check in (*CHECKS, *_dropped_in()):
         view.found.extend((check(view) if check not in without else None) or ())
     findings = (*record.findings, *view.found)

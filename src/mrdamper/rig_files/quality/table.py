@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Run, once_per_run
 from mrdamper.errors import QualityError
-from mrdamper.rig_files.quality import check_record
+from mrdamper.rig_files.quality import check_record, checked
 from mrdamper.rig_files.quality.current import held_in
 from mrdamper.rig_files.quality.follow import force_follows
 from mrdamper.rig_files.quality.force_lag import force_channel
@@ -115,20 +115,20 @@ def row(quality: Quality) -> dict[str, Any]:
 
 
 def _quality(record: Record) -> Quality:
+    view = View(replace(record, findings=()) if record.segments else record)
     try:
-        check_run = record if record.segments else check_record(record)
+        judged = record if record.segments else checked(view)
     except QualityError as refusal:
         return Quality(record, refusal=refusal)
-    view = View(replace(check_run, findings=()))
     motion, scatter = view.motion, repeatability(view)
-    current, change = held_in(check_run, steady_window(view))
+    current, change = held_in(judged, steady_window(view))
     steady = view.steady
     whole = slice(None)
     if motion is not None:
         count = max(1, int(motion.cycles + 0.02))
         whole = steady.time >= steady.time[-1] - count / motion.condition.frequency_Hz
     return Quality(
-        check_run,
+        judged,
         condition=None if motion is None else motion.condition,
         current=np.nan if change else abs(current),
         cycles=cycles_of(view),
