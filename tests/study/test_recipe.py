@@ -13,6 +13,7 @@ from mrdamper.dampers.distance import AT_TESTS
 from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
+from mrdamper.identification import basis as bases
 from mrdamper.identification.basis import Basis
 from mrdamper.identification.methods.balance import Balance
 from mrdamper.models import model_type
@@ -248,7 +249,7 @@ def test_a_basis_asks_for_what_it_names(monkeypatch):
     assert "n" in problem.free
     assert problem.model_type is BoucWen
     asked = {}
-    monkeypatch.setattr(recipes, "identify", lambda *given, **more: asked.update(more, given=given))
+    monkeypatch.setattr(bases, "identify", lambda *given, **more: asked.update(more, given=given))
     basis.identify(TRAIN[3])
     assert asked == {"given": (TRAIN[3], "bouc-wen", basis.method), "free": ("n",), "fixed": {"m": 2.0},
                      "gas": basis.gas}  # fmt: skip
