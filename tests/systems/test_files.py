@@ -123,7 +123,7 @@ def test_options_that_contradict_each_other(tmp_path):
         (["--without-damper", "--step", "nan"], "E_STEP"),
         (["--without-damper", "--step", "0"], "E_STEP"),
         (["--without-damper", "--step", "1e-12"], "E_STEP"),
-        (["--without-damper", "--draws", "10"], "draws without a damper"),
+        (["--without-damper", "--draws", "10"], "--draws without a damper"),
         (["--damper", str(tmp_path / "model.json"), "--draws", "10"], "E_CERTAINTY"),
         (["--damper", str(tmp_path / "model.json"), "--fmu", str(tmp_path / "law.fmu")], "no law to export"),
         (["--without-damper", "--compare", "all"], "--out"),

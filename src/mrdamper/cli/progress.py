@@ -66,6 +66,14 @@ def progress_soon(what: str) -> Iterator[Progress]:
                 over = True
 
 
+def in_two(progress: Progress, share: float) -> tuple[Progress, Progress]:
+    """Split progress between two tasks, the first of which takes this share of the time."""
+    return (
+        lambda what, done: progress(what, share * done),
+        lambda what, done: progress(what, share + (1 - share) * done),
+    )
+
+
 def watched(items: Sequence[Item], what: str) -> Iterator[Item]:
     """Items one after the other, with progress from the second second on."""
     with progress_soon(what) as tell:

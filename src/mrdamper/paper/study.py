@@ -17,7 +17,7 @@ import numpy as np
 
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, InputError
-from mrdamper.identification import conclude
+from mrdamper.identification import Identification, conclude
 from mrdamper.identification.basis import Basis
 from mrdamper.identification.harmonic_balance import SineRecord, read_force
 from mrdamper.identification.loop_analysis import analyse_loop
@@ -97,9 +97,8 @@ def reproduce(
     searches: dict[str, Basis] = {}
     if with_comparators:
         steps += comparators(train, held_out, assumptions)
-        methods = [
-            Paper(bounds=chosen.bounds, genetic=GeneticSettings(seed=n), explain=False) for n in range(len(train))
-        ]
+        settings = [GeneticSettings(seed=n) for n in range(len(train))]
+        methods = [Paper(bounds=chosen.bounds, genetic=each, explain=False) for each in settings]
         searches = {run.id: assumptions.basis(method) for run, method in zip(train, methods, strict=True)}
     work = [(_SENSITIVITY, partial(_sensitivities, assumptions, train))]
     work += [(_CHECK, partial(_genetic_check, assumptions, chosen, *pick)) for pick in _weak_and_strong(train)]
@@ -114,23 +113,16 @@ def reproduce(
         name, why = next(iter(refused.items()))
         raise IdentificationError(f"no method could be followed; {name}: {why}", where=study.dataset.name)
     bases = {recipe.title: recipe.basis for recipe, _ in steps}
-    by_seed = [part for part in done if isinstance(part, _Seed)]
     one_by_one, indices, left_out = done[0]
     progress("reproduced", 1.0)
     return replace(
         study,
         contenders=tuple(contenders),
-        there={
-            (title, run.id): cache.runs[basis, run.id][0]
-            for title in (LITERAL, CONSISTENT)
-            for run in held_out
-            if (basis := bases[title])
-        },
+        there=_identified_there({title: bases[title] for title in (LITERAL, CONSISTENT)}, held_out, cache),
         genetic=tuple(part for part in done if isinstance(part, GeneticCheck)),
         ended=_genetic_ends(searches, bases[LITERAL], cache),
         direct={run: n for (basis, run), n in cache.to_settle.items() if basis == bases.get(DIRECT)},
-        seed_errors={t: np.array([s.errors[t] for s in by_seed]) for t in (by_seed[0].errors if by_seed else ())},
-        seed_verdicts={k: tuple(s.verdicts[k] for s in by_seed) for k in (by_seed[0].verdicts if by_seed else ())},
+        **_over_seeds([part for part in done if isinstance(part, _Seed)]),
         sensitivity=one_by_one,
         sobol=indices,
         notes=(
@@ -142,6 +134,24 @@ def reproduce(
         ),
         seconds=time.perf_counter() - begin,
     )
+
+
+def _identified_there(
+    bases: Mapping[str, Basis | None], held_out: Sequence[Run], cache: _Identified
+) -> dict[tuple[str, str], Identification | str]:
+    """Return the identifications of the runs held out, by title of the recipe and id of the run."""
+    by_title = [(title, basis) for title, basis in bases.items() if basis]
+    return {(title, run.id): cache.runs[basis, run.id][0] for title, basis in by_title for run in held_out}
+
+
+def _over_seeds(seeds: Sequence[_Seed]) -> dict[str, Any]:
+    """Return errors and verdicts over the noise seeds, as the fields of the study."""
+    if not seeds:
+        return {}
+    return {
+        "seed_errors": {title: np.array([seed.errors[title] for seed in seeds]) for title in seeds[0].errors},
+        "seed_verdicts": {key: tuple(seed.verdicts[key] for seed in seeds) for key in seeds[0].verdicts},
+    }
 
 
 def _tests(

@@ -308,7 +308,6 @@ def study_rig(
     rig = dataset.rigs[0]
     progress(f"{rig or 'rig'}: loops", 0.0)
     dataset, contradictions = without_contradictions(dataset, keep)
-    aside = {one.run_id: str(one) for one in contradictions}
     sines, refused = usable_sines(dataset)
     loops = at_levels([analyse_loop(run) for run in sines])
     train = [run for run in sines if run.split == "train"]
@@ -316,19 +315,8 @@ def study_rig(
     everything, unusable = runs_for_global_fit(run for run in trusted if run.split == "train")
     unusable |= distrusted
     refused = {name: unusable.get(name, f"{why}; the global model uses it") for name, why in refused.items()}
-    refused = aside | refused
-    if not everything:
-        raise IdentificationError(
-            "no identification run passes the checks",
-            where=f"rig {rig or dataset.name}",
-            remedy="check the split column of runs.csv" if not unusable else next(iter(unusable.values())),
-        )
-    if len(everything) == len(train) < 2:
-        raise IdentificationError(
-            f"{len(train)} identification runs with a steady sine",
-            where=f"rig {rig or dataset.name}",
-            remedy="a model over conditions needs at least two, or a record of other motion; check the split column",
-        )
+    refused = {one.run_id: str(one) for one in contradictions} | refused
+    _require_runs(train, everything, unusable, f"rig {rig or dataset.name}")
     candidates, impossible = fit_and_score_all(
         _steps(train, everything, method, model if method is None else None),
         [run for run in trusted if run.split == "validate"],
@@ -344,34 +332,57 @@ def study_rig(
             where=f"rig {rig or dataset.name}",
             remedy="test more conditions, or leave this rig out of the dataset",
         )
+    unphysical = {c.recipe.name: why for c in candidates if (why := gains_energy(c.damper))}
+    eligible = [c for c in eligible if c.recipe.name not in unphysical] or eligible
+    candidates = _chosen_first(candidates, eligible)
+    chosen = _with_uncertainty(candidates[0], train if candidates[0].recipe.basis else everything)
+    candidates[0], sessions_note = _with_sessions(chosen, dataset)
+    impossible |= unphysical
+    return RigStudy(
+        rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None,
+        sessions_note, contradictions,
+    )  # fmt: skip
+
+
+def _require_runs(sines: Sequence[Run], usable: Sequence[Run], unusable: Mapping[str, str], where: str) -> None:
+    """Raise `IdentificationError` where no identification run is usable, or one sine is all there is."""
+    if not usable:
+        raise IdentificationError(
+            "no identification run passes the checks",
+            where=where,
+            remedy="check the split column of runs.csv" if not unusable else next(iter(unusable.values())),
+        )
+    if len(usable) == len(sines) < 2:
+        raise IdentificationError(
+            f"{len(sines)} identification runs with a steady sine",
+            where=where,
+            remedy="a model over conditions needs at least two, or a record of other motion; check the split column",
+        )
+
+
+def _chosen_first(candidates: Sequence[RecipeResult], eligible: Sequence[RecipeResult]) -> list[RecipeResult]:
+    """Rank candidates by their mean error over the kinds of folds; the one that `smaller_wins` chooses comes first."""
     errors = {
         id(c): {kind: values for kind, values in each.items() if kind != NO_CURRENT}
         for c, each in zip(candidates, errors_by_kind(candidates), strict=True)
     }
-    candidates.sort(key=lambda c: mean_error(errors[id(c)]))
-    unphysical = {c.recipe.name: why for c in candidates if (why := gains_energy(c.damper))}
-    eligible = [c for c in eligible if c.recipe.name not in unphysical] or eligible
-    impossible |= unphysical
-    best = next(c for c in candidates if c in eligible)
+    ranked = sorted(candidates, key=lambda c: mean_error(errors[id(c)]))
+    best = next(c for c in ranked if c in eligible)
     smaller = sorted(eligible, key=lambda c: c.damper.parameter_count)
     chosen = next(c for c in smaller if c is best or smaller_wins(errors[id(c)], errors[id(best)]))
-    candidates.sort(key=lambda c: c is not chosen)
+    return sorted(ranked, key=lambda c: c is not chosen)
+
+
+def _with_uncertainty(chosen: RecipeResult, taken: Sequence[Run]) -> RecipeResult:
+    """Return the candidate with the uncertainty that the runs it is fitted to and its left-out runs show."""
     held = chosen.fit.at_bounds if isinstance(chosen.fit, JointFit | ModifiedFit) else ()
     beside = [score.predicted for score in chosen.cross_validated.runs if score.predicted is not None]
     away, other_sessions = (
         [score.predicted for kind in kinds for score in _runs(chosen, kind) if score.predicted is not None]
         for kinds in (AWAY, ("session",))
     )
-    taken = train if chosen.recipe.basis else everything
-    chosen = replace(
-        chosen,
-        damper=estimate_uncertainty(chosen.damper, taken, beside, held, away=away, other_sessions=other_sessions),
-    )
-    candidates[0], sessions_note = _with_sessions(chosen, dataset)
-    return RigStudy(
-        rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None,
-        sessions_note, contradictions,
-    )  # fmt: skip
+    damper = estimate_uncertainty(chosen.damper, taken, beside, held, away=away, other_sessions=other_sessions)
+    return replace(chosen, damper=damper)
 
 
 def _with_sessions(chosen: RecipeResult, dataset: Dataset) -> tuple[RecipeResult, float | str]:

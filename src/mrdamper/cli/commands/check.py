@@ -31,47 +31,46 @@ _HEADINGS = {
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: mrdamper check rig/ --figure loops.png")(check)
 
-    @app.command(epilog="Example: mrdamper check rig/ --figure loops.png")
-    def check(
-        data: Path | None = typer.Argument(None, help="Dataset folder, or an .fmu; default: the bundled tests."),
-        figure: Path | None = typer.Option(
-            None, "--figure", help="Draw the loops with flagged samples: PNG, SVG or PDF."
-        ),
-        as_json: bool = typer.Option(False, "--json", help="Print JSON instead of a table."),
-    ) -> None:
-        """Check the quality of every run of a dataset.
 
-        Sign, lag, clipping, distortion and drift are checked; the exit status is 2 if a run is refused.
+def check(
+    data: Path | None = typer.Argument(None, help="Dataset folder, or an .fmu; default: the bundled tests."),
+    figure: Path | None = typer.Option(None, "--figure", help="Draw the loops with flagged samples: PNG, SVG or PDF."),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON instead of a table."),
+) -> None:
+    """Check the quality of every run of a dataset.
 
-        An exported FMU is loaded and compared with its reference force.
-        """
-        from mrdamper.cli.output import put
-        from mrdamper.cli.progress import watched
-        from mrdamper.data.atomic import require_writable
-        from mrdamper.errors import InputError
-        from mrdamper.rig_files.dataset_folder import load_dataset
-        from mrdamper.rig_files.quality.table import quality_table, record_of, row
+    Sign, lag, clipping, distortion and drift are checked; the exit status is 2 if a run is refused.
 
-        if data is not None and data.suffix.lower() == ".fmu":
-            if figure is not None:
-                raise InputError("--figure for an FMU", remedy="omit --figure, which draws test runs", code="E_OPTION")
-            _check_fmu(data, as_json)
-            return
+    An exported FMU is loaded and compared with its reference force.
+    """
+    from mrdamper.cli.output import put
+    from mrdamper.cli.progress import watched
+    from mrdamper.data.atomic import require_writable
+    from mrdamper.errors import InputError
+    from mrdamper.rig_files.dataset_folder import load_dataset
+    from mrdamper.rig_files.quality.table import quality_table, record_of, row
+
+    if data is not None and data.suffix.lower() == ".fmu":
         if figure is not None:
-            require_writable(figure)
-            _require_format(figure)
-        verdicts = quality_table(record_of(run) for run in watched(load_dataset(data).runs, "run"))
-        put([row(verdict) for verdict in verdicts], None, as_json, _text_table)
-        for verdict in verdicts:
-            if verdict.refusal is not None:
-                typer.echo(f"refused: {verdict.refusal}", err=True)
-            for finding in verdict.findings:
-                typer.echo(f"{verdict.record.id}: {finding}", err=True)
-        if figure is not None:
-            _draw(verdicts, figure)
-        if any(verdict.refusal is not None for verdict in verdicts):
-            raise typer.Exit(2)
+            raise InputError("--figure for an FMU", remedy="omit --figure, which draws test runs", code="E_OPTION")
+        _check_fmu(data, as_json)
+        return
+    if figure is not None:
+        require_writable(figure)
+        _require_format(figure)
+    verdicts = quality_table(record_of(run) for run in watched(load_dataset(data).runs, "run"))
+    put([row(verdict) for verdict in verdicts], None, as_json, _text_table)
+    for verdict in verdicts:
+        if verdict.refusal is not None:
+            typer.echo(f"refused: {verdict.refusal}", err=True)
+        for finding in verdict.findings:
+            typer.echo(f"{verdict.record.id}: {finding}", err=True)
+    if figure is not None:
+        _draw(verdicts, figure)
+    if any(verdict.refusal is not None for verdict in verdicts):
+        raise typer.Exit(2)
 
 
 def _check_fmu(path: Path, as_json: bool) -> None:

@@ -16,61 +16,62 @@ _NOTES, _ROWS = 3, 12  # lines of notes, and of the tables of all rigs together,
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: mrdamper compare rig/ --out comparison/ --models bouc-wen --models kwok")(compare)
 
-    @app.command(epilog="Example: mrdamper compare rig/ --out comparison/ --models bouc-wen --models kwok")
-    def compare(
-        data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
-        out: Path = typer.Option(..., "--out", help="Folder for comparison.html, tables and figures."),
-        models: list[str] = typer.Option([], "--models", help="Only this model; may be repeated. Default: all."),
-        genetic: bool = typer.Option(
-            False, "--genetic", help="Also identify by genetic algorithm, 60 generations (minutes)."
-        ),
-        gas: str | None = typer.Option(
-            None,
-            "--gas",
-            help="Known gas spring, for the model paper: pressure MPa, volume cm3, rod area mm2 as P,V,A.",
-        ),
-        setting: list[str] = typer.Option(
-            [], "--set", help="OPTION=VALUE of the model paper, as for study --model paper; may be repeated."
-        ),
-        jobs: int | None = typer.Option(None, "--jobs", min=1, help="Number of processes; default: one per core."),
-        png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
-        verbose: bool = typer.Option(False, "--verbose", help="Print every model, and why one was not determined."),
-        as_json: bool = typer.Option(False, "--json", help="Print the table as JSON."),
-    ) -> None:
-        """Compare models identified from the same data.
 
-        Reported per model: cross-validated and validation error, number of parameters, number of
-        runs needed, computing time.
-        """
-        from mrdamper.cli.output import parse_gas, parse_pairs
-        from mrdamper.cli.progress import progress_on_stderr
-        from mrdamper.data.atomic import require_writable
-        from mrdamper.report.comparison import summary_rows, write_comparison
-        from mrdamper.rig_files.dataset_folder import load_dataset
-        from mrdamper.study import comparison as comparing
-        from mrdamper.study.recipe import recipes, study_method
+def compare(
+    data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
+    out: Path = typer.Option(..., "--out", help="Folder for comparison.html, tables and figures."),
+    models: list[str] = typer.Option([], "--models", help="Only this model; may be repeated. Default: all."),
+    genetic: bool = typer.Option(
+        False, "--genetic", help="Also identify by genetic algorithm, 60 generations (minutes)."
+    ),
+    gas: str | None = typer.Option(
+        None,
+        "--gas",
+        help="Known gas spring, for the model paper: pressure MPa, volume cm3, rod area mm2 as P,V,A.",
+    ),
+    setting: list[str] = typer.Option(
+        [], "--set", help="OPTION=VALUE of the model paper, as for study --model paper; may be repeated."
+    ),
+    jobs: int | None = typer.Option(None, "--jobs", min=1, help="Number of processes; default: one per core."),
+    png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
+    verbose: bool = typer.Option(False, "--verbose", help="Print every model, and why one was not determined."),
+    as_json: bool = typer.Option(False, "--json", help="Print the table as JSON."),
+) -> None:
+    """Compare models identified from the same data.
 
-        require_writable(out)
-        names = [name.strip() for entry in models for name in entry.split(",") if name.strip()]
-        recipes(names)  # refuses unknown names before anything is read
-        dataset = load_dataset(data)
-        with progress_on_stderr() as progress:
-            result = comparing.compare(
-                dataset,
-                names,
-                genetic=genetic,
-                method=study_method("paper", parse_pairs(setting, "--set"), parse_gas(gas)),
-                jobs=jobs,
-                progress=lambda what, share: progress(what, 0.9 * share),
-            )
-            written = write_comparison(result, out, lambda what, share: progress(what, 0.9 + 0.1 * share), png=png)
-        rows = summary_rows(result)
-        if as_json:
-            print(json.dumps({"rows": rows, "files": [str(p) for p in written], "seconds": result.seconds}, indent=1))
-            return
-        _print(result, rows, dataset.name, verbose)
-        print(f"report: {written[0]}")
+    Reported per model: cross-validated and validation error, number of parameters, number of
+    runs needed, computing time.
+    """
+    from mrdamper.cli.output import parse_gas, parse_pairs
+    from mrdamper.cli.progress import progress_on_stderr
+    from mrdamper.data.atomic import require_writable
+    from mrdamper.report.comparison import summary_rows, write_comparison
+    from mrdamper.rig_files.dataset_folder import load_dataset
+    from mrdamper.study import comparison as comparing
+    from mrdamper.study.recipe import recipes, study_method
+
+    require_writable(out)
+    names = [name.strip() for entry in models for name in entry.split(",") if name.strip()]
+    recipes(names)  # refuses unknown names before anything is read
+    dataset = load_dataset(data)
+    with progress_on_stderr() as progress:
+        result = comparing.compare(
+            dataset,
+            names,
+            genetic=genetic,
+            method=study_method("paper", parse_pairs(setting, "--set"), parse_gas(gas)),
+            jobs=jobs,
+            progress=lambda what, share: progress(what, 0.9 * share),
+        )
+        written = write_comparison(result, out, lambda what, share: progress(what, 0.9 + 0.1 * share), png=png)
+    rows = summary_rows(result)
+    if as_json:
+        print(json.dumps({"rows": rows, "files": [str(p) for p in written], "seconds": result.seconds}, indent=1))
+        return
+    _print(result, rows, dataset.name, verbose)
+    print(f"report: {written[0]}")
 
 
 def _print(result: Comparison, rows: list[dict[str, Any]], name: str, verbose: bool) -> None:

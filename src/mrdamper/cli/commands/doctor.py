@@ -10,42 +10,44 @@ import typer
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
+    app.command(epilog="Example: mrdamper doctor")(doctor)
+    app.command(epilog="Example: mrdamper cache --clear")(cache)
 
-    @app.command(epilog="Example: mrdamper doctor")
-    def doctor(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
-        """Show versions, the C compiler in use and what it gains.
 
-        Integrated models (Spencer, LuGre), play and bypass, and simulated systems are compiled with the C compiler of
-        this machine. Without one they run in the interpreter, more slowly, with the same results.
-        """
-        facts = _facts()
-        if as_json:
-            print(json.dumps(facts, indent=1))
-            return
-        for name, value in facts.items():
-            print(f"{name.replace('_', ' '):24} {value}")
-        if not facts["compiled"]:
-            print(
-                "remedy: install a C compiler (gcc, clang, Visual C++), or pip install 'mrdamper[compiler]';\n"
-                "  after a repair: mrdamper cache --clear"
-            )
+def doctor(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
+    """Show versions, the C compiler in use and what it gains.
 
-    @app.command(epilog="Example: mrdamper cache --clear")
-    def cache(
-        clear: bool = typer.Option(False, "--clear", help="Remove all compiled programs."),
-        as_json: bool = typer.Option(False, "--json", help="Print JSON."),
-    ) -> None:
-        """Show or remove the compiled programs kept on disk."""
-        from mrdamper.tracing.compiled.cache import cache_folder, cache_size, clear_cache
+    Integrated models (Spencer, LuGre), play and bypass, and simulated systems are compiled with the C compiler of
+    this machine. Without one they run in the interpreter, more slowly, with the same results.
+    """
+    facts = _facts()
+    if as_json:
+        print(json.dumps(facts, indent=1))
+        return
+    for name, value in facts.items():
+        print(f"{name.replace('_', ' '):24} {value}")
+    if not facts["compiled"]:
+        print(
+            "remedy: install a C compiler (gcc, clang, Visual C++), or pip install 'mrdamper[compiler]';\n"
+            "  after a repair: mrdamper cache --clear"
+        )
 
-        removed = clear_cache() if clear else 0
-        count, size = cache_size()
-        if as_json:
-            print(json.dumps({"folder": str(cache_folder()), "programs": count, "bytes": size, "removed": removed}))
-            return
-        print(f"{cache_folder()}: {count} compiled programs, {size / 1e6:.1f} MB")
-        if clear:
-            print(f"removed {removed}")
+
+def cache(
+    clear: bool = typer.Option(False, "--clear", help="Remove all compiled programs."),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Show or remove the compiled programs kept on disk."""
+    from mrdamper.tracing.compiled.cache import cache_folder, cache_size, clear_cache
+
+    removed = clear_cache() if clear else 0
+    count, size = cache_size()
+    if as_json:
+        print(json.dumps({"folder": str(cache_folder()), "programs": count, "bytes": size, "removed": removed}))
+        return
+    print(f"{cache_folder()}: {count} compiled programs, {size / 1e6:.1f} MB")
+    if clear:
+        print(f"removed {removed}")
 
 
 def _facts() -> dict[str, Any]:

@@ -14,46 +14,45 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: mrdamper export model.json --to fmu --out damper.fmu")(export)
 
-    @app.command(epilog="Example: mrdamper export model.json --to fmu --out damper.fmu")
-    def export(
-        model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
-        to: str = typer.Option(..., "--to", help="c, fmu, page, latex, markdown, table, adams, tydex, dyna4."),
-        out: Path = typer.Option(..., "--out", help="Folder; for fmu, page, latex and markdown a file."),
-        name: str | None = typer.Option(None, "--name", help="Name of files and symbols; default: the rig."),
-        inverse: bool = typer.Option(
-            False, "--inverse", help="For c and fmu: the inverse model, current from demanded force."
-        ),
-        fmi: int | None = typer.Option(None, "--fmi", help="For fmu: FMI version, 2 (default) or 3."),
-    ) -> None:
-        """Export a model as C, FMU, web page, equations or tables."""
-        from mrdamper.cli.progress import progress_soon
-        from mrdamper.dampers.model_file import load_model
-        from mrdamper.data.atomic import require_writable
-        from mrdamper.errors import InputError
-        from mrdamper.export import exporter
-        from mrdamper.export.base import identifier, write_export
 
-        kind = exporter(to)
-        if fmi is not None and to != "fmu":
-            raise InputError(
-                f"--fmi {fmi} with --to {to}", remedy="leave --fmi out, or export --to fmu", code="E_OPTION"
-            )
-        options = {} if fmi is None else {"fmi": fmi}
-        format_writer = kind(**options)
-        require_writable(out)
-        damper = load_model(model)
-        called = identifier(name or damper.rig or "damper")
-        with progress_soon(f"making {to}{' and checking it' if to == 'fmu' else ''}"):
-            if inverse:
-                paths, notes = _inverse(damper, f"{called}_inverse", to, format_writer, out)
-            else:
-                written = format_writer.export(damper, called)
-                paths, notes = write_export(written, out, kind.suffix), written.notes
-        for path in paths:
-            typer.echo(path)
-        for note in notes:
-            typer.echo(f"note: {note}", err=True)
+def export(
+    model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
+    to: str = typer.Option(..., "--to", help="c, fmu, page, latex, markdown, table, adams, tydex, dyna4."),
+    out: Path = typer.Option(..., "--out", help="Folder; for fmu, page, latex and markdown a file."),
+    name: str | None = typer.Option(None, "--name", help="Name of files and symbols; default: the rig."),
+    inverse: bool = typer.Option(
+        False, "--inverse", help="For c and fmu: the inverse model, current from demanded force."
+    ),
+    fmi: int | None = typer.Option(None, "--fmi", help="For fmu: FMI version, 2 (default) or 3."),
+) -> None:
+    """Export a model as C, FMU, web page, equations or tables."""
+    from mrdamper.cli.progress import progress_soon
+    from mrdamper.dampers.model_file import load_model
+    from mrdamper.data.atomic import require_writable
+    from mrdamper.errors import InputError
+    from mrdamper.export import exporter
+    from mrdamper.export.base import identifier, write_export
+
+    kind = exporter(to)
+    if fmi is not None and to != "fmu":
+        raise InputError(f"--fmi {fmi} with --to {to}", remedy="leave --fmi out, or export --to fmu", code="E_OPTION")
+    options = {} if fmi is None else {"fmi": fmi}
+    format_writer = kind(**options)
+    require_writable(out)
+    damper = load_model(model)
+    called = identifier(name or damper.rig or "damper")
+    with progress_soon(f"making {to}{' and checking it' if to == 'fmu' else ''}"):
+        if inverse:
+            paths, notes = _inverse(damper, f"{called}_inverse", to, format_writer, out)
+        else:
+            written = format_writer.export(damper, called)
+            paths, notes = write_export(written, out, kind.suffix), written.notes
+    for path in paths:
+        typer.echo(path)
+    for note in notes:
+        typer.echo(f"note: {note}", err=True)
 
 
 def _inverse(damper: Damper, name: str, to: str, exporter: Exporter, out: Path) -> tuple[list[Path], tuple[str, ...]]:

@@ -11,65 +11,66 @@ _MAX_WARNINGS = 10  # number of lines on the terminal
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: mrdamper identify rig/ --model bouc-wen --free n --out identifications.csv")(identify)
 
-    @app.command(epilog="Example: mrdamper identify rig/ --model bouc-wen --free n --out identifications.csv")
-    def identify(
-        data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
-        model: str = typer.Option("bouc-wen", "--model", help="Name of the model."),
-        method: str = typer.Option("projection", "--method", help="Name of the identification method."),
-        free: list[str] = typer.Option([], "--free", help="Also identify this preset parameter; may be repeated."),
-        fix: list[str] = typer.Option([], "--fix", help="NAME=VALUE [SI]: fix a parameter; may be repeated."),
-        setting: list[str] = typer.Option([], "--set", help="SETTING=VALUE of the method; may be repeated."),
-        gas: str | None = typer.Option(
-            None, "--gas", help="Gas spring as P,V,A: pressure [MPa], volume [cm3], rod area [mm2]."
-        ),
-        delay: bool = typer.Option(False, "--delay", help="Also identify a delay of the force up to 3 ms."),
-        clipped: bool = typer.Option(False, "--clipped", help="Also use runs with a clipped channel."),
-        run: list[str] = typer.Option([], "--run", help="Identify only this run; may be repeated."),
-        out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
-        as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
-    ) -> None:
-        """Identify one model from every sine run, one run at a time."""
-        from mrdamper import identification
-        from mrdamper.cli.output import parse_fixed, parse_gas, parse_pairs, put
-        from mrdamper.cli.progress import progress_on_stderr
-        from mrdamper.data.atomic import require_writable
-        from mrdamper.data.encoding import csv_text
-        from mrdamper.identification.methods import method_named
-        from mrdamper.models import model_type
-        from mrdamper.report.tables import identification_rows
-        from mrdamper.rig_files.dataset_folder import load_dataset
-        from mrdamper.study import workflow
 
-        chosen_model, chosen_method = model_type(model), method_named(method, parse_pairs(setting, "--set"))
-        fixed, spring = parse_fixed(fix), parse_gas(gas)
-        require_writable(out)
-        dataset = load_dataset(data)
-        if run:
-            dataset = dataset.only([dataset[name] for name in run])
-        sines, refused = workflow.usable_sines(dataset, clipped)
-        identifications = []
-        with progress_on_stderr() as progress:
-            for number, entry in enumerate(sines):
-                progress(f"run {entry.id}", number / len(sines))
-                identifications.append(
-                    identification.identify(
-                        entry,
-                        chosen_model,
-                        chosen_method,
-                        free=free,
-                        fixed=fixed,
-                        gas=spring,
-                        with_delay=delay,
-                        clipped=clipped,
-                    )
+def identify(
+    data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
+    model: str = typer.Option("bouc-wen", "--model", help="Name of the model."),
+    method: str = typer.Option("projection", "--method", help="Name of the identification method."),
+    free: list[str] = typer.Option([], "--free", help="Also identify this preset parameter; may be repeated."),
+    fix: list[str] = typer.Option([], "--fix", help="NAME=VALUE [SI]: fix a parameter; may be repeated."),
+    setting: list[str] = typer.Option([], "--set", help="SETTING=VALUE of the method; may be repeated."),
+    gas: str | None = typer.Option(
+        None, "--gas", help="Gas spring as P,V,A: pressure [MPa], volume [cm3], rod area [mm2]."
+    ),
+    delay: bool = typer.Option(False, "--delay", help="Also identify a delay of the force up to 3 ms."),
+    clipped: bool = typer.Option(False, "--clipped", help="Also use runs with a clipped channel."),
+    run: list[str] = typer.Option([], "--run", help="Identify only this run; may be repeated."),
+    out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
+) -> None:
+    """Identify one model from every sine run, one run at a time."""
+    from mrdamper import identification
+    from mrdamper.cli.output import parse_fixed, parse_gas, parse_pairs, put
+    from mrdamper.cli.progress import progress_on_stderr
+    from mrdamper.data.atomic import require_writable
+    from mrdamper.data.encoding import csv_text
+    from mrdamper.identification.methods import method_named
+    from mrdamper.models import model_type
+    from mrdamper.report.tables import identification_rows
+    from mrdamper.rig_files.dataset_folder import load_dataset
+    from mrdamper.study import workflow
+
+    chosen_model, chosen_method = model_type(model), method_named(method, parse_pairs(setting, "--set"))
+    fixed, spring = parse_fixed(fix), parse_gas(gas)
+    require_writable(out)
+    dataset = load_dataset(data)
+    if run:
+        dataset = dataset.only([dataset[name] for name in run])
+    sines, refused = workflow.usable_sines(dataset, clipped)
+    identifications = []
+    with progress_on_stderr() as progress:
+        for number, entry in enumerate(sines):
+            progress(f"run {entry.id}", number / len(sines))
+            identifications.append(
+                identification.identify(
+                    entry,
+                    chosen_model,
+                    chosen_method,
+                    free=free,
+                    fixed=fixed,
+                    gas=spring,
+                    with_delay=delay,
+                    clipped=clipped,
                 )
-            progress("identified", 1.0)
-        for name, why in refused.items():
-            typer.echo(f"not identified: {name}: {why}", err=True)
-        put(identification_rows(identifications), out, as_json, csv_text)
-        doubts = [f"warning: run {one.run_id}: {doubt}" for one in identifications for doubt in one.doubts]
-        for line in doubts[:_MAX_WARNINGS]:
-            typer.echo(line, err=True)
-        if len(doubts) > _MAX_WARNINGS:
-            typer.echo(f"warning: {len(doubts) - _MAX_WARNINGS} more of this kind in the column notes", err=True)
+            )
+        progress("identified", 1.0)
+    for name, why in refused.items():
+        typer.echo(f"not identified: {name}: {why}", err=True)
+    put(identification_rows(identifications), out, as_json, csv_text)
+    doubts = [f"warning: run {one.run_id}: {doubt}" for one in identifications for doubt in one.doubts]
+    for line in doubts[:_MAX_WARNINGS]:
+        typer.echo(line, err=True)
+    if len(doubts) > _MAX_WARNINGS:
+        typer.echo(f"warning: {len(doubts) - _MAX_WARNINGS} more of this kind in the column notes", err=True)

@@ -20,72 +20,71 @@ _MOST_QUESTIONS = 12  # of one import
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-
-    @app.command(
+    app.command(
         "import",
         epilog="Example: mrdamper import tests/*.csv --profile rig.toml --out DATASET; "
         "mrdamper import tests/a.csv --write-profile rig.toml; mrdamper import tests --write-tests tests/tests.csv",
-    )
-    def import_(
-        files: list[Path] = typer.Argument(..., help="Test-rig files, or folders of them."),
-        out: Path | None = typer.Option(None, "--out", help="Dataset folder to write."),
-        add: bool = typer.Option(False, "--add", help="Add to the dataset there instead of writing a new one."),
-        profile: Path | None = typer.Option(
-            None, "--profile", help="Rig profile (TOML): columns and units (mrdamper init profile)."
-        ),
-        tests: Path | None = typer.Option(
-            None, "--tests", help="Table of tests: current, split, session of each; default: tests.csv of the folder."
-        ),
-        write_profile: Path | None = typer.Option(
-            None, "--write-profile", help="Write how the first file was read as a profile; - for standard output."
-        ),
-        write_tests: Path | None = typer.Option(
-            None, "--write-tests", help="Write the tests found as a table to be completed; - for standard output."
-        ),
-        skip_refused: bool = typer.Option(
-            False, "--skip-refused", help="Write the accepted files, list the refused ones."
-        ),
-        ask: bool | None = typer.Option(
-            None, "--ask/--no-ask", help="Ask for information missing in the files; default: on a terminal."
-        ),
-        verbose: bool = typer.Option(False, "--verbose", help="Print every test and all findings."),
-        quiet: bool = typer.Option(False, "--quiet", help="No progress."),
-        as_json: bool = typer.Option(False, "--json", help="Print JSON a program can read."),
-    ) -> None:
-        """Read test-rig files, check every test and write a dataset.
+    )(import_)
 
-        Without --skip-refused nothing is written if one test is refused.
-        """
-        from mrdamper.cli.progress import progress_on_stderr
-        from mrdamper.rig_files.profile import Profile, load_profile
-        from mrdamper.rig_files.rig_import import import_files
 
-        _refuse_taken(out, add)
-        settings = load_profile(profile) if profile is not None else Profile()
-        if write_profile is not None:
-            _write_profile(files, settings, write_profile)
-        if write_tests is not None:
-            _write_tests(files, settings, write_tests)
-        dry = out is None
-        if dry and (write_profile is not None or write_tests is not None):
-            return
-        if dry and not as_json:
-            _print_tree(files, settings)
-        with progress_on_stderr(quiet or as_json) as progress:
-            result = import_files(files, settings, tests=tests, progress=progress)
-            if (_on_terminal() if ask is None else ask) and not as_json:
-                settings, result = _asked(files, settings, result, tests)
-        wrong = bool(result.refusals) and not skip_refused
-        written = bool(result.records) and not wrong and out is not None
-        total = _write_dataset(result, settings, out, add) if written and out is not None else 0
-        if as_json:
-            import json
+def import_(
+    files: list[Path] = typer.Argument(..., help="Test-rig files, or folders of them."),
+    out: Path | None = typer.Option(None, "--out", help="Dataset folder to write."),
+    add: bool = typer.Option(False, "--add", help="Add to the dataset there instead of writing a new one."),
+    profile: Path | None = typer.Option(
+        None, "--profile", help="Rig profile (TOML): columns and units (mrdamper init profile)."
+    ),
+    tests: Path | None = typer.Option(
+        None, "--tests", help="Table of tests: current, split, session of each; default: tests.csv of the folder."
+    ),
+    write_profile: Path | None = typer.Option(
+        None, "--write-profile", help="Write how the first file was read as a profile; - for standard output."
+    ),
+    write_tests: Path | None = typer.Option(
+        None, "--write-tests", help="Write the tests found as a table to be completed; - for standard output."
+    ),
+    skip_refused: bool = typer.Option(False, "--skip-refused", help="Write the accepted files, list the refused ones."),
+    ask: bool | None = typer.Option(
+        None, "--ask/--no-ask", help="Ask for information missing in the files; default: on a terminal."
+    ),
+    verbose: bool = typer.Option(False, "--verbose", help="Print every test and all findings."),
+    quiet: bool = typer.Option(False, "--quiet", help="No progress."),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON a program can read."),
+) -> None:
+    """Read test-rig files, check every test and write a dataset.
 
-            print(json.dumps(_summary(result, out if written else None), indent=1, ensure_ascii=False))
-        else:
-            _print(result, out if written else None, total, dry=dry, verbose=verbose)
-        if not dry and (wrong or not result.records):
-            raise typer.Exit(2)
+    Without --skip-refused nothing is written if one test is refused.
+    """
+    from mrdamper.cli.progress import progress_on_stderr
+    from mrdamper.rig_files.profile import Profile, load_profile
+    from mrdamper.rig_files.rig_import import import_files
+
+    _refuse_taken(out, add)
+    settings = load_profile(profile) if profile is not None else Profile()
+    if write_profile is not None:
+        _write_profile(files, settings, write_profile)
+    if write_tests is not None:
+        _write_tests(files, settings, write_tests)
+    dry = out is None
+    if dry and (write_profile is not None or write_tests is not None):
+        return
+    if dry and not as_json:
+        _print_tree(files, settings)
+    with progress_on_stderr(quiet or as_json) as progress:
+        result = import_files(files, settings, tests=tests, progress=progress)
+        if (_on_terminal() if ask is None else ask) and not as_json:
+            settings, result = _asked(files, settings, result, tests)
+    wrong = bool(result.refusals) and not skip_refused
+    written = bool(result.records) and not wrong and out is not None
+    total = _write_dataset(result, settings, out, add) if written and out is not None else 0
+    if as_json:
+        import json
+
+        print(json.dumps(_summary(result, out if written else None), indent=1, ensure_ascii=False))
+    else:
+        _print(result, out if written else None, total, dry=dry, verbose=verbose)
+    if not dry and (wrong or not result.records):
+        raise typer.Exit(2)
 
 
 def _refuse_taken(out: Path | None, add: bool) -> None:

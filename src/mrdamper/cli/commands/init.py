@@ -11,29 +11,30 @@ _FILES = {"about": "about.toml", "limits": "limits.toml", "profile": "profile.to
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: mrdamper init limits --out limits.toml")(init)
 
-    @app.command(epilog="Example: mrdamper init limits --out limits.toml")
-    def init(
-        kind: str = typer.Argument(..., help=f"Kind of file: {', '.join(_FILES)}."),
-        out: Path | None = typer.Option(None, "--out", help="File to write; default: standard output."),
-    ) -> None:
-        """Write a commented template: about, limits, profile or tests.
 
-        about: head of a report. limits: force limits, limits of the test rig, limits of fleet columns.
-        profile: columns and units of rig files. tests: table of tests with their currents.
-        """
-        from mrdamper.data.atomic import write_file
-        from mrdamper.errors import OutputError
+def init(
+    kind: str = typer.Argument(..., help=f"Kind of file: {', '.join(_FILES)}."),
+    out: Path | None = typer.Option(None, "--out", help="File to write; default: standard output."),
+) -> None:
+    """Write a commented template: about, limits, profile or tests.
 
-        text = template(kind)
-        if out is None:
-            print(text, end="")
-            return
-        if out.exists():
-            raise OutputError("this file exists", where=str(out), remedy="choose another name, or delete it first")
-        with write_file(out) as target:
-            target.write_text(text, encoding="utf-8")
-        typer.echo(f"template: {out}")
+    about: head of a report. limits: force limits, limits of the test rig, limits of fleet columns.
+    profile: columns and units of rig files. tests: table of tests with their currents.
+    """
+    from mrdamper.data.atomic import write_file
+    from mrdamper.errors import OutputError
+
+    text = template(kind)
+    if out is None:
+        print(text, end="")
+        return
+    if out.exists():
+        raise OutputError("this file exists", where=str(out), remedy="choose another name, or delete it first")
+    with write_file(out) as target:
+        target.write_text(text, encoding="utf-8")
+    typer.echo(f"template: {out}")
 
 
 def template(kind: str) -> str:

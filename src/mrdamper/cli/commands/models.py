@@ -9,28 +9,29 @@ import typer
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: mrdamper models spencer")(models)
 
-    @app.command(epilog="Example: mrdamper models spencer")
-    def models(
-        name: str | None = typer.Argument(None, help="Show this model in full; default: list all."),
-        as_json: bool = typer.Option(False, "--json", help="Print JSON."),
-    ) -> None:
-        """List the models, or show equation, parameters and source of one."""
-        from mrdamper.dampers.published import all_published
-        from mrdamper.errors import UnknownNameError
-        from mrdamper.models import all_models
 
-        types = {**all_models(), **all_published()}
-        if name and name not in types:
-            raise UnknownNameError.of("model", name, types)
-        chosen = [types[name]] if name else list(types.values())
-        if as_json:
-            print(json.dumps([_entry(model) for model in chosen], indent=1, ensure_ascii=False))
-        elif name:
-            print(_page(chosen[0]))
-        else:
-            print("\n".join(_line(model) for model in chosen))
-            print("\nmrdamper models NAME shows the equation, the parameters and the source.")
+def models(
+    name: str | None = typer.Argument(None, help="Show this model in full; default: list all."),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """List the models, or show equation, parameters and source of one."""
+    from mrdamper.dampers.published import all_published
+    from mrdamper.errors import UnknownNameError
+    from mrdamper.models import all_models
+
+    types = {**all_models(), **all_published()}
+    if name and name not in types:
+        raise UnknownNameError.of("model", name, types)
+    chosen = [types[name]] if name else list(types.values())
+    if as_json:
+        print(json.dumps([_entry(model) for model in chosen], indent=1, ensure_ascii=False))
+    elif name:
+        print(_page(chosen[0]))
+    else:
+        print("\n".join(_line(model) for model in chosen))
+        print("\nmrdamper models NAME shows the equation, the parameters and the source.")
 
 
 def _line(model) -> str:

@@ -10,72 +10,73 @@ import typer
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: mrdamper plan model.json --limits limits.toml --hours 2 --out next")(plan)
 
-    @app.command(epilog="Example: mrdamper plan model.json --limits limits.toml --hours 2 --out next")
-    def plan(
-        model: Path | None = typer.Argument(
-            None, help="model.json written by mrdamper study; omit for a first test matrix."
-        ),
-        limits: Path | None = typer.Option(
-            None, "--limits", help="TOML file with limits of the test rig (mrdamper init limits)."
-        ),
-        hours: float = typer.Option(..., "--hours", help="Rig time [h], including setting up."),
-        about: str | None = typer.Option(
-            None, "--about", help="Parameter, or condition A,Hz,mm, to be determined best; default: all conditions."
-        ),
-        out: Path = typer.Option(..., "--out", help="Folder for plan.csv and one motion file per test."),
-    ) -> None:
-        """Propose the tests that reduce the uncertainty most.
 
-        Without a model a first test matrix within the limits of the rig is proposed.
-        """
-        import numpy as np
+def plan(
+    model: Path | None = typer.Argument(
+        None, help="model.json written by mrdamper study; omit for a first test matrix."
+    ),
+    limits: Path | None = typer.Option(
+        None, "--limits", help="TOML file with limits of the test rig (mrdamper init limits)."
+    ),
+    hours: float = typer.Option(..., "--hours", help="Rig time [h], including setting up."),
+    about: str | None = typer.Option(
+        None, "--about", help="Parameter, or condition A,Hz,mm, to be determined best; default: all conditions."
+    ),
+    out: Path = typer.Option(..., "--out", help="Folder for plan.csv and one motion file per test."),
+) -> None:
+    """Propose the tests that reduce the uncertainty most.
 
-        from mrdamper.cli.progress import progress_soon
-        from mrdamper.dampers.model_file import load_model
-        from mrdamper.data.atomic import require_writable, write_result
-        from mrdamper.data.encoding import csv_text
-        from mrdamper.errors import InputError
-        from mrdamper.study.first_matrix import first_matrix
-        from mrdamper.study.limits import Limits
-        from mrdamper.study.plan import least_informative_runs, plan_tests
-        from mrdamper.study.proposal import PlanRow
+    Without a model a first test matrix within the limits of the rig is proposed.
+    """
+    import numpy as np
 
-        require_writable(out)
-        damper = load_model(model) if model else None
-        if limits is None and damper is None:
-            raise InputError("neither a model nor limits is given", remedy="give --limits limits.toml", code="E_LIMITS")
-        if about is not None and damper is None:
-            raise InputError("--about without a model", remedy="give a model.json")
-        allowed = Limits.read(limits) if limits else Limits.of(damper)  # type: ignore[arg-type]
-        rows = []
-        with progress_soon("planning") as tell, write_result(out) as folder:
-            if damper:
-                chosen, reckoning = plan_tests(damper, allowed, hours, _doubt(about), tell)
-            else:
-                chosen, reckoning = first_matrix(allowed, hours), None
-            for number, item in enumerate(chosen, start=1):
-                c = item.condition
-                name = f"plan_{number:02d}_{c.current_A:.3g}A_{c.frequency_Hz:.3g}Hz_{1e3 * c.amplitude_m:.3g}mm.csv"
-                motion, force = item.record(allowed, damper)
-                table = np.column_stack([motion.time, motion.displacement, force, motion.current])
-                text = "time_s,displacement_m,force_N,current_A\n"
-                text += "".join(",".join(f"{v:.9g}" for v in row) + "\n" for row in table.tolist())
-                (folder / name).write_text(text, encoding="utf-8")
-                rows.append(asdict(PlanRow.of(number, item, name)))
-            (folder / "plan.csv").write_text(csv_text(rows), encoding="utf-8")
-        sessions = len({item.session for item in chosen})
-        minutes = sessions * allowed.opening + sum(item.minutes for item in chosen)
-        typer.echo(
-            f"{out / 'plan.csv'}\n{len(chosen)} records in {sessions} sessions, {minutes:.0f} of {60 * hours:.0f} "
-            "minutes; force_N is the predicted force"
-        )
-        if damper is None or reckoning is None:
-            return
-        typer.echo(reckoning.summary(chosen))
-        if least := least_informative_runs(damper):
-            runs = ", ".join(f"{name} ({100 * share:.1f} %)" for name, share in least)
-            typer.echo(f"least informative runs: {runs} of the information")
+    from mrdamper.cli.progress import progress_soon
+    from mrdamper.dampers.model_file import load_model
+    from mrdamper.data.atomic import require_writable, write_result
+    from mrdamper.data.encoding import csv_text
+    from mrdamper.errors import InputError
+    from mrdamper.study.first_matrix import first_matrix
+    from mrdamper.study.limits import Limits
+    from mrdamper.study.plan import least_informative_runs, plan_tests
+    from mrdamper.study.proposal import PlanRow
+
+    require_writable(out)
+    damper = load_model(model) if model else None
+    if limits is None and damper is None:
+        raise InputError("neither a model nor limits is given", remedy="give --limits limits.toml", code="E_LIMITS")
+    if about is not None and damper is None:
+        raise InputError("--about without a model", remedy="give a model.json")
+    allowed = Limits.read(limits) if limits else Limits.of(damper)  # type: ignore[arg-type]
+    rows = []
+    with progress_soon("planning") as tell, write_result(out) as folder:
+        if damper:
+            chosen, reckoning = plan_tests(damper, allowed, hours, _doubt(about), tell)
+        else:
+            chosen, reckoning = first_matrix(allowed, hours), None
+        for number, item in enumerate(chosen, start=1):
+            c = item.condition
+            name = f"plan_{number:02d}_{c.current_A:.3g}A_{c.frequency_Hz:.3g}Hz_{1e3 * c.amplitude_m:.3g}mm.csv"
+            motion, force = item.record(allowed, damper)
+            table = np.column_stack([motion.time, motion.displacement, force, motion.current])
+            text = "time_s,displacement_m,force_N,current_A\n"
+            text += "".join(",".join(f"{v:.9g}" for v in row) + "\n" for row in table.tolist())
+            (folder / name).write_text(text, encoding="utf-8")
+            rows.append(asdict(PlanRow.of(number, item, name)))
+        (folder / "plan.csv").write_text(csv_text(rows), encoding="utf-8")
+    sessions = len({item.session for item in chosen})
+    minutes = sessions * allowed.opening + sum(item.minutes for item in chosen)
+    typer.echo(
+        f"{out / 'plan.csv'}\n{len(chosen)} records in {sessions} sessions, {minutes:.0f} of {60 * hours:.0f} "
+        "minutes; force_N is the predicted force"
+    )
+    if damper is None or reckoning is None:
+        return
+    typer.echo(reckoning.summary(chosen))
+    if least := least_informative_runs(damper):
+        runs = ", ".join(f"{name} ({100 * share:.1f} %)" for name, share in least)
+        typer.echo(f"least informative runs: {runs} of the information")
 
 
 def _doubt(about: str | None):

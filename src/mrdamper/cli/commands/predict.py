@@ -10,6 +10,7 @@ import typer
 
 if TYPE_CHECKING:
     from mrdamper.dampers.bands import Band
+    from mrdamper.dampers.base import Damper
     from mrdamper.dampers.prediction import Prediction
 
 WARNINGS = {
@@ -20,101 +21,120 @@ WARNINGS = {
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-
-    @app.command(
+    app.command(
         epilog="Example: mrdamper predict model.json --current 0.5 --frequency 2 --amplitude 10 --out force.csv"
-    )
-    def predict(
-        model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
-        current: float | None = typer.Option(None, "--current", help="Coil current [A]."),
-        frequency: float | None = typer.Option(None, "--frequency", help="Frequency of a sine [Hz]."),
-        amplitude: float | None = typer.Option(None, "--amplitude", help="Amplitude of a sine [mm]."),
-        motion: Path | None = typer.Option(
-            None, "--motion", help="CSV with time_s, displacement_m and optionally current_A."
-        ),
-        coil_lag: float | None = typer.Option(
-            None, "--coil-lag", help="Time constant of the coil [ms]; default: the model's value."
-        ),
-        check_run: list[str] = typer.Option(
-            [], "--check-run", help="Check run of --data: correct gain and offset for its test session."
-        ),
-        data: Path | None = typer.Option(None, "--data", help="Dataset with the check runs; default: bundled tests."),
-        level: float = typer.Option(0.9, "--level", help="Coverage of the prediction interval."),
-        out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
-        plot: Path | None = typer.Option(None, "--plot", help="Figure of the force to write (.png, .svg or .pdf)."),
-        as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
-    ) -> None:
-        """Predict the force at a test condition or along a motion.
+    )(predict)
 
-        The prediction interval of the peak force, the dissipated energy and the equivalent damping
-        are printed on standard error.
-        """
-        from dataclasses import replace
 
-        from mrdamper.cli.output import put
-        from mrdamper.dampers.bands import band, no_band, scope
-        from mrdamper.dampers.coil import Coil
-        from mrdamper.dampers.model_file import load_model
-        from mrdamper.data import Condition
-        from mrdamper.data.atomic import require_writable
-        from mrdamper.data.encoding import csv_text
-        from mrdamper.errors import ConditionError, InputError
-        from mrdamper.identification.intervals import student
-        from mrdamper.report.tables import prediction_rows
+def predict(
+    model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
+    current: float | None = typer.Option(None, "--current", help="Coil current [A]."),
+    frequency: float | None = typer.Option(None, "--frequency", help="Frequency of a sine [Hz]."),
+    amplitude: float | None = typer.Option(None, "--amplitude", help="Amplitude of a sine [mm]."),
+    motion: Path | None = typer.Option(
+        None, "--motion", help="CSV with time_s, displacement_m and optionally current_A."
+    ),
+    coil_lag: float | None = typer.Option(
+        None, "--coil-lag", help="Time constant of the coil [ms]; default: the model's value."
+    ),
+    check_run: list[str] = typer.Option(
+        [], "--check-run", help="Check run of --data: correct gain and offset for its test session."
+    ),
+    data: Path | None = typer.Option(None, "--data", help="Dataset with the check runs; default: bundled tests."),
+    level: float = typer.Option(0.9, "--level", help="Coverage of the prediction interval."),
+    out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
+    plot: Path | None = typer.Option(None, "--plot", help="Figure of the force to write (.png, .svg or .pdf)."),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
+) -> None:
+    """Predict the force at a test condition or along a motion.
 
-        for name, value in (("--current", current), ("--frequency", frequency), ("--amplitude", amplitude)):
-            if value is not None and not 0 <= value < math.inf:
-                raise ConditionError(
-                    f"{name} {value:g}", remedy="give zero or more; the force depends on the magnitude only"
-                )
-        student(level, 1.0)  # refuses a level that is none
-        require_writable(out)
-        require_writable(plot)
-        damper = load_model(model)
-        if coil_lag is not None:
-            driver = damper.coil.driver if damper.coil else None
-            damper = replace(damper, coil=Coil(1e-3 * coil_lag, 1e-3 * coil_lag, driver))  # type: ignore[type-var]
-        if motion is not None:
-            from mrdamper.rig_files.motion_file import load_motion
+    The prediction interval of the peak force, the dissipated energy and the equivalent damping
+    are printed on standard error.
+    """
+    from mrdamper.cli.output import put
+    from mrdamper.dampers.bands import band, no_band, scope
+    from mrdamper.data.atomic import require_writable
+    from mrdamper.data.encoding import csv_text
+    from mrdamper.errors import ConditionError
+    from mrdamper.identification.intervals import student
+    from mrdamper.report.tables import prediction_rows
 
-            if frequency is not None or amplitude is not None:
-                raise InputError("--motion together with --frequency or --amplitude", remedy="give one of them")
-            prediction = damper.predict_run(load_motion(motion, current))
-        else:
-            if current is None or frequency is None or amplitude is None:
-                raise InputError(
-                    "no condition", remedy="give --current A --frequency Hz --amplitude mm, or --motion FILE"
-                )
-            prediction = damper.predict(Condition(current, frequency, 1e-3 * amplitude))
-        for flag in prediction.extrapolation:
-            typer.echo(
-                f"warning: {WARNINGS.get(flag, f'{flag} lies outside the tested range (extrapolation)')}",
-                err=True,
+    for name, value in (("--current", current), ("--frequency", frequency), ("--amplitude", amplitude)):
+        if value is not None and not 0 <= value < math.inf:
+            raise ConditionError(
+                f"{name} {value:g}", remedy="give zero or more; the force depends on the magnitude only"
             )
-        interval = band(damper, prediction, level)
-        if check_run:
-            from mrdamper.dampers.bands import session_band
-            from mrdamper.dampers.sessions import RecordingTime, sessions_known
-            from mrdamper.rig_files.dataset_folder import load_dataset
-
-            dataset = load_dataset(data)
-            runs = [dataset[name] for name in check_run]
-            expected = sessions_known(damper, runs).expected(RecordingTime.of(runs[-1]))
-            assert expected is not None  # the last check run's own session
-            interval = session_band(expected, damper, prediction, level)
-            prediction = expected.corrected(prediction)
-            typer.echo(
-                f"session known by {', '.join(check_run)}: gain {expected.gain:.3f} ± {expected.gain_spread:.3f}, "
-                f"offset {expected.offset:.3g} ± {expected.offset_spread:.2g} N",
-                err=True,
-            )
+    student(level, 1.0)  # refuses a level that is none
+    require_writable(out)
+    require_writable(plot)
+    damper = _load(model, coil_lag)
+    prediction = _predict(damper, motion, current, frequency, amplitude)
+    for flag in prediction.extrapolation:
         typer.echo(
-            _said(prediction, interval, level, scope(damper, level)) if interval else f"note: {no_band(damper)}",
+            f"warning: {WARNINGS.get(flag, f'{flag} lies outside the tested range (extrapolation)')}",
             err=True,
         )
-        if plot is not None:
-            _write_figure(plot, prediction, interval, level)
-        put(prediction_rows(prediction, interval), out, as_json, csv_text)
+    interval = band(damper, prediction, level)
+    if check_run:
+        prediction, interval = _session_known(damper, prediction, check_run, data, level)
+    typer.echo(
+        _said(prediction, interval, level, scope(damper, level)) if interval else f"note: {no_band(damper)}",
+        err=True,
+    )
+    if plot is not None:
+        _write_figure(plot, prediction, interval, level)
+    put(prediction_rows(prediction, interval), out, as_json, csv_text)
+
+
+def _load(model: Path, coil_lag: float | None) -> Damper:
+    """Load the model; a coil lag [ms] replaces its own."""
+    from dataclasses import replace
+
+    from mrdamper.dampers.coil import Coil
+    from mrdamper.dampers.model_file import load_model
+
+    damper = load_model(model)
+    if coil_lag is None:
+        return damper
+    driver = damper.coil.driver if damper.coil else None
+    return replace(damper, coil=Coil(1e-3 * coil_lag, 1e-3 * coil_lag, driver))  # type: ignore[type-var]
+
+
+def _predict(
+    damper: Damper, motion: Path | None, current: float | None, frequency: float | None, amplitude: float | None
+) -> Prediction:
+    """Predict along the motion of a file, or at a condition [A, Hz, mm]."""
+    from mrdamper.data import Condition
+    from mrdamper.errors import InputError
+    from mrdamper.rig_files.motion_file import load_motion
+
+    if motion is not None:
+        if frequency is not None or amplitude is not None:
+            raise InputError("--motion together with --frequency or --amplitude", remedy="give one of them")
+        return damper.predict_run(load_motion(motion, current))
+    if current is None or frequency is None or amplitude is None:
+        raise InputError("no condition", remedy="give --current A --frequency Hz --amplitude mm, or --motion FILE")
+    return damper.predict(Condition(current, frequency, 1e-3 * amplitude))
+
+
+def _session_known(
+    damper: Damper, prediction: Prediction, check_run: list[str], data: Path | None, level: float
+) -> tuple[Prediction, Band | None]:
+    """Correct gain and offset of a prediction for the session of the check runs; its band."""
+    from mrdamper.dampers.bands import session_band
+    from mrdamper.dampers.sessions import RecordingTime, sessions_known
+    from mrdamper.rig_files.dataset_folder import load_dataset
+
+    dataset = load_dataset(data)
+    runs = [dataset[name] for name in check_run]
+    expected = sessions_known(damper, runs).expected(RecordingTime.of(runs[-1]))
+    assert expected is not None  # the last check run's own session
+    typer.echo(
+        f"session known by {', '.join(check_run)}: gain {expected.gain:.3f} ± {expected.gain_spread:.3f}, "
+        f"offset {expected.offset:.3g} ± {expected.offset_spread:.2g} N",
+        err=True,
+    )
+    return expected.corrected(prediction), session_band(expected, damper, prediction, level)
 
 
 def _write_figure(path: Path, prediction: Prediction, interval: Band | None, level: float) -> None:

@@ -11,17 +11,18 @@ _FORMATS = ("model", "profile", "limits", "about", "fleet", "system", "plan", "r
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: mrdamper schema model > model.schema.json")(schema)
 
-    @app.command(epilog="Example: mrdamper schema model > model.schema.json")
-    def schema(
-        name: str = typer.Argument(..., help=f"File format: {', '.join(_FORMATS)}."),
-    ) -> None:
-        """Print the JSON Schema of a file format."""
-        from mrdamper.errors import UnknownNameError
 
-        if name not in _FORMATS:
-            raise UnknownNameError.of("file format", name, _FORMATS)
-        print(json.dumps(_schema(name), indent=1, ensure_ascii=False))
+def schema(
+    name: str = typer.Argument(..., help=f"File format: {', '.join(_FORMATS)}."),
+) -> None:
+    """Print the JSON Schema of a file format."""
+    from mrdamper.errors import UnknownNameError
+
+    if name not in _FORMATS:
+        raise UnknownNameError.of("file format", name, _FORMATS)
+    print(json.dumps(_schema(name), indent=1, ensure_ascii=False))
 
 
 def _schema(name: str) -> dict:

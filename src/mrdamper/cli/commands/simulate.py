@@ -12,120 +12,109 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 if TYPE_CHECKING:
+    from mrdamper.cli.progress import Progress
     from mrdamper.dampers.base import Damper
+    from mrdamper.systems.controller_comparison import ControllerComparison
     from mrdamper.systems.controllers import Controller
     from mrdamper.systems.monte_carlo import Bands
     from mrdamper.systems.result import Simulation
     from mrdamper.systems.simulate import SystemLoop
+    from mrdamper.systems.system_file import SystemFile
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: mrdamper simulate dyke1996 --input elcentro --time-scale 5 --volts 2.25 --json")(
+        simulate
+    )
 
-    @app.command(epilog="Example: mrdamper simulate dyke1996 --input elcentro --time-scale 5 --volts 2.25 --json")
-    def simulate(
-        system: str = typer.Argument(..., help="dyke1996, quarter-car, half-car, or a TOML file of the system."),
-        source: str = typer.Option(
-            ...,
-            "--input",
-            help="CSV with time_s and acceleration_m_s2, acceleration_g or height_m; or NAME[:KEY=VALUE,…].",
-        ),
-        damper: Path | None = typer.Option(None, "--damper", help="model.json for every damper."),
-        control: str = typer.Option("passive", "--control", help="Controller, NAME[:KEY=VALUE,…]."),
-        current: float | None = typer.Option(
-            None, "--current", help="Constant current [A]; with a controller, the largest."
-        ),
-        volts: float | None = typer.Option(
-            None, "--volts", help="Command voltage of the current driver [V], instead of --current."
-        ),
-        without: bool = typer.Option(False, "--without-damper", help="Simulate the system without dampers."),
-        time_scale: float = typer.Option(
-            1.0, "--time-scale", help="Factor by which the input record is played faster."
-        ),
-        step: float | None = typer.Option(
-            None, "--step", help="Time step [s]; default: halved until peak values converge."
-        ),
-        compare: list[str] | None = typer.Option(
-            None, "--compare", help="Controllers to compare in the report, or all; may be repeated."
-        ),
-        draws: int | None = typer.Option(
-            None, "--draws", help="Monte Carlo runs over the parameter uncertainty: 5 to 95 % intervals."
-        ),
-        seed: int = typer.Option(1, "--seed", help="Random seed of --draws."),
-        out: Path | None = typer.Option(None, "--out", help="Folder for simulation.html, time histories and results."),
-        law_out: Path | None = typer.Option(None, "--c", help="Folder for the controller as C99 source."),
-        law_fmu: Path | None = typer.Option(None, "--fmu", help="File for the controller as FMU."),
-        verbose: bool = typer.Option(False, "--verbose", help="Print every file written."),
-        as_json: bool = typer.Option(False, "--json", help="Print JSON, SI units."),
-    ) -> None:
-        """Simulate a vehicle or building with dampers and a controller."""
-        from mrdamper.cli.output import parse_named, shortened
-        from mrdamper.cli.progress import progress_soon
-        from mrdamper.dampers.model_file import load_model
-        from mrdamper.data.atomic import require_writable
-        from mrdamper.data.parameters import with_values
-        from mrdamper.errors import InputError
-        from mrdamper.systems.controllers import controller_type
-        from mrdamper.systems.inputs import load_input
-        from mrdamper.systems.monte_carlo import draw, monte_carlo
-        from mrdamper.systems.simulate import SystemLoop, simulate_system
-        from mrdamper.systems.system_file import load_system
 
-        if out is not None:
-            require_writable(out)
-        elif compare:
-            raise InputError("--compare without --out", remedy="give a folder for the report")
-        loaded = load_system(system)
-        shaken_by = load_input(*parse_named(source, "--input"), time_scale=time_scale)
-        dampers: dict[str, Damper] = {} if without else dict(loaded.dampers)
-        if damper is not None and not without:
-            dampers = dict.fromkeys((link.name for link in loaded.system.dampers), load_model(damper))
-        empty = [link.name for link in loaded.system.dampers if link.name not in dampers]
-        if empty and not without:
-            raise InputError(
-                f"no model for the damper {', '.join(empty)}",
-                where=system,
-                remedy="give --damper model.json, or --without-damper",
-                code="E_NO_DAMPER",
-            )
-        highest = _amperes(current, volts, dampers)
-        controller = _controller(control)
-        if control == "passive" and highest is not None:
-            controller = with_values(controller_type("passive"), {"current_A": highest})
-        others = [_controller(text) for text in _all_of(compare or [])]
-        if others and not dampers:
-            raise InputError("controllers without a damper", remedy="omit --without-damper or --compare")
-        if law_out is not None or law_fmu is not None:
-            _export_law(SystemLoop(loaded.system, shaken_by, dampers, controller, highest), law_out, law_fmu)
-        drawn = None
-        if draws is not None:
-            if not dampers:
-                raise InputError("draws without a damper", remedy="omit --without-damper or --draws")
-            drawn = draw(dampers, draws, seed)
+def simulate(
+    system: str = typer.Argument(..., help="dyke1996, quarter-car, half-car, or a TOML file of the system."),
+    source: str = typer.Option(
+        ..., "--input", help="CSV with time_s and acceleration_m_s2, acceleration_g or height_m; or NAME[:KEY=VALUE,…]."
+    ),
+    damper: Path | None = typer.Option(None, "--damper", help="model.json for every damper."),
+    control: str = typer.Option("passive", "--control", help="Controller, NAME[:KEY=VALUE,…]."),
+    current: float | None = typer.Option(
+        None, "--current", help="Constant current [A]; the largest with a controller."
+    ),
+    volts: float | None = typer.Option(
+        None, "--volts", help="Voltage of the current driver [V], instead of --current."
+    ),
+    without: bool = typer.Option(False, "--without-damper", help="Simulate the system without dampers."),
+    time_scale: float = typer.Option(1.0, "--time-scale", help="Factor by which the input record is played faster."),
+    step: float | None = typer.Option(None, "--step", help="Time step [s]; default: halved until peaks converge."),
+    compare: list[str] | None = typer.Option(None, "--compare", help="Controller to compare, or all; may be repeated."),
+    draws: int | None = typer.Option(None, "--draws", help="Monte Carlo runs over the uncertainty: 5 to 95 % ranges."),
+    seed: int = typer.Option(1, "--seed", help="Random seed of --draws."),
+    out: Path | None = typer.Option(None, "--out", help="Folder for simulation.html, time histories and results."),
+    law_out: Path | None = typer.Option(None, "--c", help="Folder for the controller as C99 source."),
+    law_fmu: Path | None = typer.Option(None, "--fmu", help="File for the controller as FMU."),
+    verbose: bool = typer.Option(False, "--verbose", help="Print every file written."),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON, SI units."),
+) -> None:
+    """Simulate a vehicle or building with dampers and a controller."""
+    from mrdamper.cli.output import parse_named, shortened
+    from mrdamper.cli.progress import progress_soon
+    from mrdamper.data.atomic import require_writable
+    from mrdamper.errors import InputError
+    from mrdamper.systems.controller_comparison import compare_controllers
+    from mrdamper.systems.inputs import load_input
+    from mrdamper.systems.monte_carlo import draw, monte_carlo
+    from mrdamper.systems.simulate import SystemLoop, simulate_system
+    from mrdamper.systems.system_file import load_system
+
+    if out is None and compare:
+        raise InputError("--compare without --out", remedy="give a folder for the report")
+    require_writable(out)
+    loaded, shaken_by = load_system(system), load_input(*parse_named(source, "--input"), time_scale=time_scale)
+    dampers = {} if without else _dampers(loaded, damper, system)
+    highest = _amperes(current, volts, dampers)
+    controller, others = _controller(control, highest), [_controller(text) for text in _all_of(compare or [])]
+    if not dampers and (others or draws is not None):
+        raise InputError("--compare or --draws without a damper", remedy="omit them, or omit --without-damper")
+    given = (loaded.system, shaken_by, dampers)
+    if law_out or law_fmu:
+        _export_law(SystemLoop(*given, controller, highest), law_out, law_fmu)
+    drawn = None if draws is None else draw(dampers, draws, seed)
+    with progress_soon(f"{loaded.system.title}, time step halved until peaks converge") as tell:
+        done = simulate_system(*given, controller, step, highest)
         bands, paths = None, []
-        with progress_soon(f"{loaded.system.title}, time step halved until peaks converge") as tell:
-            done = simulate_system(loaded.system, shaken_by, dampers, controller, step, highest)
-            if drawn is not None:
-                loop = SystemLoop(loaded.system, shaken_by, dampers, controller, highest, free=True)
-                bands = monte_carlo(loop, drawn, done, tell)
-            if out is not None:
-                from mrdamper.report.simulation import write_simulation
-                from mrdamper.systems.controller_comparison import compare_controllers
+        if drawn is not None:
+            bands = monte_carlo(SystemLoop(*given, controller, highest, free=True), drawn, done, tell)
+        if out is not None:
+            compared = compare_controllers(*given, others, done.step, highest, tell) if others else None
+            paths = _write(done, out, compared, bands, tell)
+    for line in shortened([f"{path}" for path in paths], 2, verbose):
+        typer.echo(line, err=True)
+    _print(done, bands, dampers, as_json)
 
-                table = (
-                    compare_controllers(loaded.system, shaken_by, dampers, others, done.step, highest, tell)
-                    if others
-                    else None
-                )
-                tell("writing", 1.0)
-                paths = write_simulation(done, out, table, bands)
-        for line in shortened([f"{path}" for path in paths], 2, verbose):
-            typer.echo(line, err=True)
-        if as_json:
-            print(json.dumps(_figures(done, dampers) | _banded(bands), indent=1))
-        else:
-            _print(done)
-            _print_bands(done, bands, dampers)
+
+def _dampers(loaded: SystemFile, model: Path | None, where: str) -> dict[str, Damper]:
+    """Return the damper of every link: the model given, or the system's own."""
+    from mrdamper.dampers.model_file import load_model
+    from mrdamper.errors import InputError
+
+    links = [link.name for link in loaded.system.dampers]
+    dampers = dict(loaded.dampers) if model is None else dict.fromkeys(links, load_model(model))
+    if empty := [name for name in links if name not in dampers]:
+        raise InputError(
+            f"no model for the damper {', '.join(empty)}",
+            where=where,
+            remedy="give --damper model.json, or --without-damper",
+            code="E_NO_DAMPER",
+        )
+    return dampers
+
+
+def _write(
+    done: Simulation, folder: Path, compared: ControllerComparison | None, bands: Bands | None, tell: Progress
+) -> list[Path]:
+    from mrdamper.report.simulation import write_simulation
+
+    tell("writing", 1.0)
+    return write_simulation(done, folder, compared, bands)
 
 
 def _export_law(loop: SystemLoop, folder: Path | None, fmu: Path | None) -> None:
@@ -153,12 +142,15 @@ def _all_of(names: list[str]) -> list[str]:
     return list(dict.fromkeys(name for given in names for name in (laws if given == "all" else [given])))
 
 
-def _controller(text: str) -> Controller:
+def _controller(text: str, current: float | None = None) -> Controller:
+    """Return a controller by name; the current, where one is given, is the constant one's [A]."""
     from mrdamper.cli.output import parse_named
     from mrdamper.data.parameters import with_values
     from mrdamper.systems.controllers import controller_type
 
     name, values = parse_named(text, "--control")
+    if name == text == "passive" and current is not None:
+        values = {"current_A": current}
     return with_values(controller_type(name), values)
 
 
@@ -250,8 +242,16 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
             typer.echo(f"not included: model error of {name}, {share:.2g} % of half the peak-to-peak force")
 
 
-def _print(done: Simulation) -> None:
-    from mrdamper.dampers.streaming import FLAGS
+def _print(done: Simulation, bands: Bands | None, dampers: Mapping[str, Damper], as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(_figures(done, dampers) | _banded(bands), indent=1))
+    else:
+        _print_peaks(done)
+        _print_warnings(done)
+        _print_bands(done, bands, dampers)
+
+
+def _print_peaks(done: Simulation) -> None:
 
     peaks = done.peaks
     typer.echo(f"{done.system.title}, {type(done.controller).title}")
@@ -267,6 +267,11 @@ def _print(done: Simulation) -> None:
         f"step {1e3 * done.step:.3g} ms; the last halving changed a peak value by {100 * done.halving:.2g} %; "
         f"relative error of the energy balance {done.energy_gap:.1g}"
     )
+
+
+def _print_warnings(done: Simulation) -> None:
+    from mrdamper.dampers.streaming import FLAGS
+
     if not done.settled:
         typer.echo(
             "warning: the peak values have not converged with the step size; the motion is sensitive to small changes "

@@ -10,107 +10,105 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
+    from mrdamper.data import Dataset
+    from mrdamper.study.recipe import StudyMethod
     from mrdamper.study.workflow import Study
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: mrdamper study rig/ --out result/")(study)
 
-    @app.command(epilog="Example: mrdamper study rig/ --out result/")
-    def study(
-        data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
-        out: Path = typer.Option(..., "--out", help="Folder for report.html, model.json, tables and figures."),
-        model: str | None = typer.Option(
-            None, "--model", help="Save this model instead of the best one; paper: the method of Qian et al. 2024."
-        ),
-        gas: str | None = typer.Option(
-            None, "--gas", help="Known gas spring for --model paper: pressure MPa, volume cm3, rod area mm2, as P,V,A."
-        ),
-        setting: list[str] = typer.Option(
-            [], "--set", help="OPTION=VALUE of --model paper (n, gamma, mass_law, search, ...); may be repeated."
-        ),
-        about: Path | None = typer.Option(
-            None, "--about", help="TOML file with customer, type, serial, logo (mrdamper init about)."
-        ),
-        limits: Path | None = typer.Option(
-            None, "--limits", help="TOML file with force limits (mrdamper init limits)."
-        ),
-        pdf: bool = typer.Option(False, "--pdf", help="Also write report.pdf and every figure as PDF."),
-        paper: str = typer.Option("a4", "--paper", help="Page size of report.pdf: a4 or letter."),
-        png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
-        lag: bool = typer.Option(False, "--lag", help="Require tests from which the coil lag can be identified."),
-        keep: list[str] = typer.Option(
-            [], "--keep", help="Use this run although it contradicts the others; may be repeated."
-        ),
-        verbose: bool = typer.Option(False, "--verbose", help="Print every model, parameter and limitation."),
-        as_json: bool = typer.Option(False, "--json", help="Print the summary as JSON."),
-    ) -> None:
-        """Identify, validate and report a dataset in one step.
 
-        Every run is identified, models of the whole damper are fitted and cross-validated, and the
-        best is saved with a report.
-        """
-        from mrdamper.cli.output import parse_gas, parse_pairs
-        from mrdamper.cli.progress import progress_on_stderr
-        from mrdamper.data.atomic import require_writable
-        from mrdamper.errors import IdentificationError, InputError
-        from mrdamper.report.about import load_about, load_limits
-        from mrdamper.report.study import study_and_draw, write_study
-        from mrdamper.report.summary import study_lines
-        from mrdamper.rig_files.dataset_folder import load_dataset
-        from mrdamper.study.parallel import several
-        from mrdamper.study.recipe import study_method, study_methods
+def study(
+    data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
+    out: Path = typer.Option(..., "--out", help="Folder for report.html, model.json, tables and figures."),
+    model: str | None = typer.Option(
+        None, "--model", help="Save this model instead of the best one; paper: the method of Qian et al. 2024."
+    ),
+    gas: str | None = typer.Option(
+        None, "--gas", help="Known gas spring for --model paper: pressure MPa, volume cm3, rod area mm2, as P,V,A."
+    ),
+    setting: list[str] = typer.Option(
+        [], "--set", help="OPTION=VALUE of --model paper (n, gamma, mass_law, search, ...); may be repeated."
+    ),
+    about: Path | None = typer.Option(
+        None, "--about", help="TOML file with customer, type, serial, logo (mrdamper init about)."
+    ),
+    limits: Path | None = typer.Option(None, "--limits", help="TOML file with force limits (mrdamper init limits)."),
+    pdf: bool = typer.Option(False, "--pdf", help="Also write report.pdf and every figure as PDF."),
+    paper: str = typer.Option("a4", "--paper", help="Page size of report.pdf: a4 or letter."),
+    png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
+    lag: bool = typer.Option(False, "--lag", help="Require tests from which the coil lag can be identified."),
+    keep: list[str] = typer.Option(
+        [], "--keep", help="Use this run although it contradicts the others; may be repeated."
+    ),
+    verbose: bool = typer.Option(False, "--verbose", help="Print every model, parameter and limitation."),
+    as_json: bool = typer.Option(False, "--json", help="Print the summary as JSON."),
+) -> None:
+    """Identify, validate and report a dataset in one step.
 
-        chosen = model
-        if model in study_methods():
-            chosen = study_method(str(model), parse_pairs(setting, "--set"), parse_gas(gas))
-        elif gas or setting:
-            raise InputError(
-                "--gas and --set are options of a published method", remedy="add --model paper, or omit them"
-            )
-        head, bands = load_about(about) if about else None, load_limits(limits) if limits else ()
-        also = [kind for kind, wanted in (("pdf", pdf or about is not None), ("png", png)) if wanted]
-        require_writable(out)
-        page_size = _paper_size(paper)
-        dataset = load_dataset(data)
-        if lag and not any(run.current_changes for run in dataset.split("train")):
-            raise IdentificationError(
-                "the current is constant in every identification run, so the coil lag cannot be identified",
-                remedy="add a run in which the current is switched, or omit --lag",
-                code="E_LAG",
-            )
-        workers = min(os.cpu_count() or 1, len(dataset.rigs))
-        with progress_on_stderr() as progress, several(workers) as processes:
-            result, drawn = study_and_draw(
-                dataset,
-                lambda what, share: progress(what, 0.97 * share),
-                model=chosen,
-                keep=keep,
-                also=also,
-                limits=bands,
-                processes=processes,
-            )
-            written = write_study(
-                result,
-                out,
-                lambda what, share: progress(what, 0.97 + 0.03 * share),
-                about=head,
-                limits=bands,
-                also=also,
-                drawn=drawn,
-                paper=page_size,
-            )
-        for line in _not_identified(result, verbose):
-            typer.echo(line, err=True)
-        for rig in result.rigs:
-            for note in rig.chosen.recipe.notes:
-                typer.echo(f"note: {note}", err=True)
-        if as_json:
-            print(json.dumps(_summary(result, [str(p) for p in written]), indent=1))
-            return
-        models = ", ".join(str(path) for path in written if path.name.startswith("model"))
-        files = [f"model: {models}", f"report: {written[0]}"]
-        print("\n".join(study_lines(result, files, verbose=verbose)))
+    Every run is identified, models of the whole damper are fitted and cross-validated, and the
+    best is saved with a report.
+    """
+    from mrdamper.cli.progress import in_two, progress_on_stderr
+    from mrdamper.data.atomic import require_writable
+    from mrdamper.report.about import load_about, load_limits
+    from mrdamper.report.study import study_and_draw, write_study
+    from mrdamper.report.summary import study_lines
+    from mrdamper.rig_files.dataset_folder import load_dataset
+    from mrdamper.study.parallel import several
+
+    chosen = _model(model, gas, setting)
+    head, bands = load_about(about) if about else None, load_limits(limits) if limits else ()
+    also = [kind for kind, wanted in (("pdf", pdf or about is not None), ("png", png)) if wanted]
+    require_writable(out)
+    page_size = _paper_size(paper)
+    dataset = load_dataset(data)
+    if lag:
+        _require_switched_current(dataset)
+    workers = min(os.cpu_count() or 1, len(dataset.rigs))
+    with progress_on_stderr() as progress, several(workers) as processes:
+        studying, writing = in_two(progress, 0.97)
+        result, drawn = study_and_draw(
+            dataset, studying, model=chosen, keep=keep, also=also, limits=bands, processes=processes
+        )
+        written = write_study(result, out, writing, about=head, limits=bands, also=also, drawn=drawn, paper=page_size)
+    for line in _not_identified(result, verbose):
+        typer.echo(line, err=True)
+    for rig in result.rigs:
+        for note in rig.chosen.recipe.notes:
+            typer.echo(f"note: {note}", err=True)
+    if as_json:
+        print(json.dumps(_summary(result, [str(p) for p in written]), indent=1))
+        return
+    models = ", ".join(str(path) for path in written if path.name.startswith("model"))
+    files = [f"model: {models}", f"report: {written[0]}"]
+    print("\n".join(study_lines(result, files, verbose=verbose)))
+
+
+def _model(name: str | None, gas: str | None, setting: list[str]) -> str | StudyMethod | None:
+    """Return the model asked for; a published method with its options."""
+    from mrdamper.cli.output import parse_gas, parse_pairs
+    from mrdamper.errors import InputError
+    from mrdamper.study.recipe import study_method, study_methods
+
+    if name in study_methods():
+        return study_method(str(name), parse_pairs(setting, "--set"), parse_gas(gas))
+    if gas or setting:
+        raise InputError("--gas and --set are options of a published method", remedy="add --model paper, or omit them")
+    return name
+
+
+def _require_switched_current(dataset: Dataset) -> None:
+    from mrdamper.errors import IdentificationError
+
+    if not any(run.current_changes for run in dataset.split("train")):
+        raise IdentificationError(
+            "the current is constant in every identification run, so the coil lag cannot be identified",
+            remedy="add a run in which the current is switched, or omit --lag",
+            code="E_LAG",
+        )
 
 
 def _paper_size(name: str) -> str:

@@ -3,95 +3,104 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
+
+if TYPE_CHECKING:
+    from mrdamper.cli.output import Rows
+    from mrdamper.dampers.likelihood import LikelihoodProfile
+    from mrdamper.dampers.posterior import Samples
+    from mrdamper.data import Run
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: mrdamper uncertainty model.json rig/ --profile c1 --out uncertainty/")(uncertainty)
 
-    @app.command(epilog="Example: mrdamper uncertainty model.json rig/ --profile c1 --out uncertainty/")
-    def uncertainty(
-        model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
-        data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
-        level: float = typer.Option(0.95, "--level", help="Confidence level of the intervals."),
-        profile: list[str] = typer.Option(
-            [], "--profile", help="Parameter whose profile likelihood is computed; may be repeated."
-        ),
-        samples: bool = typer.Option(
-            False, "--samples", help="Sample the posterior by Markov chains; needs mrdamper[uq]."
-        ),
-        steps: int = typer.Option(4000, "--steps", help="Steps of each Markov chain."),
-        out: Path | None = typer.Option(None, "--out", help="Folder for parameters.csv, profile.svg, corner.svg."),
-    ) -> None:
-        """Print confidence intervals and limitations of a model.
 
-        Options add profile likelihoods of single parameters and samples of the posterior.
-        """
-        from mrdamper.dampers.covariance import estimate_uncertainty
-        from mrdamper.dampers.model_file import load_model
-        from mrdamper.dampers.uncertainty import table, uncertainty_warnings
-        from mrdamper.data.atomic import require_writable, write_result
-        from mrdamper.data.encoding import csv_text
-        from mrdamper.errors import InputError
-        from mrdamper.identification.intervals import student
-        from mrdamper.rig_files.dataset_folder import load_dataset
+def uncertainty(
+    model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
+    data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
+    level: float = typer.Option(0.95, "--level", help="Confidence level of the intervals."),
+    profile: list[str] = typer.Option(
+        [], "--profile", help="Parameter whose profile likelihood is computed; may be repeated."
+    ),
+    samples: bool = typer.Option(False, "--samples", help="Sample the posterior by Markov chains; needs mrdamper[uq]."),
+    steps: int = typer.Option(4000, "--steps", help="Steps of each Markov chain."),
+    out: Path | None = typer.Option(None, "--out", help="Folder for parameters.csv, profile.svg, corner.svg."),
+) -> None:
+    """Print confidence intervals and limitations of a model.
 
-        student(level, 1.0)  # refuses a level that is none
-        if steps < 10:
-            raise InputError(f"--steps {steps}", remedy="give at least 10, usually some thousands")
-        require_writable(out)
-        damper = load_model(model)
-        runs = []
-        if damper.uncertainty is None or profile or samples:
-            dataset = load_dataset(data)
-            if damper.rig not in dataset.rigs:
-                raise InputError(f"the dataset has no rig {damper.rig!r}", remedy=f"rigs: {', '.join(dataset.rigs)}")
-            runs = _used(dataset.rig(damper.rig))
-        if damper.uncertainty is None:
-            damper = estimate_uncertainty(damper, runs)
-        rows = table(damper, level)
-        for row in rows:
-            print(f"{row['name']} = {row['written']}")
-        for doubt in uncertainty_warnings(damper):
-            print(doubt)
-        curves, drawn = [], None
-        if profile or samples:
-            from mrdamper.dampers.likelihood import Likelihood
-            from mrdamper.dampers.likelihood import profile as profiled
-            from mrdamper.dampers.posterior import posterior
+    Options add profile likelihoods of single parameters and samples of the posterior.
+    """
+    from mrdamper.dampers.covariance import estimate_uncertainty
+    from mrdamper.dampers.model_file import load_model
+    from mrdamper.dampers.uncertainty import table, uncertainty_warnings
+    from mrdamper.data.atomic import require_writable
+    from mrdamper.errors import InputError
+    from mrdamper.identification.intervals import student
 
-            likelihood = Likelihood.of(damper, runs)
-            for name in profile:
-                curves.append(profiled(likelihood, name))
-                low, high = curves[-1].interval
-                print(
-                    f"profile of {name}: {curves[-1].kind}, 95 % from {low:.4g} to {high:.4g} {curves[-1].unit}".strip()
-                )
-            if samples:
-                drawn = posterior(likelihood, steps)
-                print(f"{drawn.steps} steps, autocorrelation time {drawn.time:.0f}, split-R̂ {drawn.split_rhat:.3f}")
-        if out is None:
-            return
-        from mrdamper.report.plots.style import save_figure
-        from mrdamper.report.plots.uncertainty import corner, profile_curves, quantiles
+    student(level, 1.0)  # refuses a level that is none
+    if steps < 10:
+        raise InputError(f"--steps {steps}", remedy="give at least 10, usually some thousands")
+    require_writable(out)
+    damper = load_model(model)
+    runs = []
+    if damper.uncertainty is None or profile or samples:
+        runs = _used(data, damper.rig)
+    if damper.uncertainty is None:
+        damper = estimate_uncertainty(damper, runs)
+    rows = table(damper, level)
+    for row in rows:
+        print(f"{row['name']} = {row['written']}")
+    for doubt in uncertainty_warnings(damper):
+        print(doubt)
+    curves, drawn = [], None
+    if profile or samples:
+        from mrdamper.dampers.likelihood import Likelihood
+        from mrdamper.dampers.likelihood import profile as profiled
+        from mrdamper.dampers.posterior import posterior
 
-        with write_result(out) as folder:
-            (folder / "parameters.csv").write_text(csv_text(rows), encoding="utf-8")
-            if curves:
-                save_figure(profile_curves(curves), folder / "profile")
-            if drawn is not None:
-                save_figure(corner(drawn), folder / "corner")
-                (folder / "samples.csv").write_text(csv_text(quantiles(drawn, level)), encoding="utf-8")
+        likelihood = Likelihood.of(damper, runs)
+        for name in profile:
+            curves.append(profiled(likelihood, name))
+            low, high = curves[-1].interval
+            print(f"profile of {name}: {curves[-1].kind}, 95 % from {low:.4g} to {high:.4g} {curves[-1].unit}".strip())
+        if samples:
+            drawn = posterior(likelihood, steps)
+            print(f"{drawn.steps} steps, autocorrelation time {drawn.time:.0f}, split-R̂ {drawn.split_rhat:.3f}")
+    if out is not None:
+        _write(out, rows, curves, drawn, level)
         print(out)
 
 
-def _used(dataset) -> list:
-    """Select the runs a study identifies from: identification runs with a steady sine."""
+def _write(out: Path, rows: Rows, curves: list[LikelihoodProfile], drawn: Samples | None, level: float) -> None:
+    """Write the table of parameters, and the figures that were asked for."""
+    from mrdamper.data.atomic import write_result
+    from mrdamper.data.encoding import csv_text
+    from mrdamper.report.plots.style import save_figure
+    from mrdamper.report.plots.uncertainty import corner, profile_curves, quantiles
+
+    with write_result(out) as folder:
+        (folder / "parameters.csv").write_text(csv_text(rows), encoding="utf-8")
+        if curves:
+            save_figure(profile_curves(curves), folder / "profile")
+        if drawn is not None:
+            save_figure(corner(drawn), folder / "corner")
+            (folder / "samples.csv").write_text(csv_text(quantiles(drawn, level)), encoding="utf-8")
+
+
+def _used(data: Path | None, rig: str) -> list[Run]:
+    """Select the runs of the rig that a study identifies from: identification runs with a steady sine."""
     from mrdamper.errors import InputError
+    from mrdamper.rig_files.dataset_folder import load_dataset
     from mrdamper.study.workflow import usable_sines
 
-    runs = [run for run in usable_sines(dataset)[0] if run.split == "train"]
+    dataset = load_dataset(data)
+    if rig not in dataset.rigs:
+        raise InputError(f"the dataset has no rig {rig!r}", remedy=f"rigs: {', '.join(dataset.rigs)}")
+    runs = [run for run in usable_sines(dataset.rig(rig))[0] if run.split == "train"]
     if not runs:
         raise InputError("no identification run with a steady sine", remedy="check the split column of runs.csv")
     return runs

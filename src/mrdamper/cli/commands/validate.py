@@ -2,100 +2,121 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
+
+if TYPE_CHECKING:
+    from mrdamper.dampers.base import Damper
+    from mrdamper.data import Dataset
+    from mrdamper.study.validation import Validation
 
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
+    app.command(epilog="Example: mrdamper validate model.json rig/ --out scores.csv")(validate)
 
-    @app.command(epilog="Example: mrdamper validate model.json rig/ --out scores.csv")
-    def validate(
-        model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
-        data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
-        rig: str | None = typer.Option(None, "--rig", help="Use the runs of this rig instead."),
-        split: str | None = typer.Option(
-            None, "--split", help="Only identification (train) or only validation (validate) runs."
-        ),
-        check_run: list[str] = typer.Option(
-            [], "--check-run", help="Check run that corrects its session; may be repeated."
-        ),
-        own_sessions: bool = typer.Option(
-            False, "--own-sessions", help="Correct for the sessions of the identification runs."
-        ),
-        level: float = typer.Option(0.9, "--level", help="Coverage of the prediction interval of the peak force."),
-        out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
-        as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
-    ) -> None:
-        """Calculate the errors of a saved model on measured runs.
 
-        Per run: nrmse_pp, nrmse_std, wape, errors of peak force and dissipated energy.
-        """
-        from mrdamper.cli.output import put
-        from mrdamper.cli.progress import watched
-        from mrdamper.dampers.model_file import load_model
-        from mrdamper.dampers.sessions import KNOWN, RecordingTime, sessions_known
-        from mrdamper.data.atomic import require_writable
-        from mrdamper.data.encoding import csv_text
-        from mrdamper.errors import InputError, UnknownNameError
-        from mrdamper.identification.intervals import student
-        from mrdamper.report.tables import score_row
-        from mrdamper.rig_files.dataset_folder import load_dataset
-        from mrdamper.study.validation import peak_band
-        from mrdamper.study.validation import validate as score
+def validate(
+    model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
+    data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
+    rig: str | None = typer.Option(None, "--rig", help="Use the runs of this rig instead."),
+    split: str | None = typer.Option(
+        None, "--split", help="Only identification (train) or only validation (validate) runs."
+    ),
+    check_run: list[str] = typer.Option(
+        [], "--check-run", help="Check run that corrects its session; may be repeated."
+    ),
+    own_sessions: bool = typer.Option(
+        False, "--own-sessions", help="Correct for the sessions of the identification runs."
+    ),
+    level: float = typer.Option(0.9, "--level", help="Coverage of the prediction interval of the peak force."),
+    out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
+) -> None:
+    """Calculate the errors of a saved model on measured runs.
 
-        if split not in (None, "train", "validate"):
-            raise UnknownNameError.of("split", str(split), ("train", "validate"))
-        student(level, 1.0)  # refuses a level that is none
-        require_writable(out)
-        damper = load_model(model)
-        dataset = load_dataset(data)
-        wanted = rig if rig is not None else damper.rig
-        if rig is None and wanted not in dataset.rigs and len(dataset.rigs) == 1:
-            wanted = dataset.rigs[0]
-            typer.echo(f"the model is of rig {damper.rig!r}; scoring the dataset's one rig {wanted!r}", err=True)
-        runs = [run for run in dataset.rig(wanted) if split in (None, run.split)]
-        if not runs:
-            raise InputError(f"no {split} runs", where=f"rig {wanted}", remedy="leave out --split")
-        whole = dataset.rig(wanted)
-        sessions = (
-            sessions_known(damper, [whole[n] for n in check_run], own_sessions) if check_run or own_sessions else None
+    Per run: nrmse_pp, nrmse_std, wape, errors of peak force and dissipated energy.
+    """
+    from mrdamper.cli.output import put
+    from mrdamper.cli.progress import watched
+    from mrdamper.dampers.model_file import load_model
+    from mrdamper.dampers.sessions import RecordingTime, sessions_known
+    from mrdamper.data.atomic import require_writable
+    from mrdamper.data.encoding import csv_text
+    from mrdamper.errors import InputError, UnknownNameError
+    from mrdamper.identification.intervals import student
+    from mrdamper.report.tables import score_row
+    from mrdamper.rig_files.dataset_folder import load_dataset
+    from mrdamper.study.validation import peak_band
+    from mrdamper.study.validation import validate as score
+
+    if split not in (None, "train", "validate"):
+        raise UnknownNameError.of("split", str(split), ("train", "validate"))
+    student(level, 1.0)  # refuses a level that is none
+    require_writable(out)
+    damper = load_model(model)
+    whole = _rig(load_dataset(data), rig, damper.rig)
+    wanted = whole.rigs[0]
+    runs = [run for run in whole if split in (None, run.split)]
+    if not runs:
+        raise InputError(f"no {split} runs", where=f"rig {wanted}", remedy="leave out --split")
+    sessions = (
+        sessions_known(damper, [whole[n] for n in check_run], own_sessions) if check_run or own_sessions else None
+    )
+    validation = score(damper, watched([run for run in runs if run.id not in check_run], "run"), sessions=sessions)
+    for name, why in validation.refused.items():
+        typer.echo(f"not scored: {name}: {why}", err=True)
+    if not validation.runs:
+        raise InputError("no run could be scored", where=f"rig {wanted}", remedy="see the lines above")
+    by_id = {run.id: run for run in runs}
+    peaks = {
+        run.run_id: peak_band(
+            damper,
+            by_id[run.run_id],
+            level,
+            sessions and sessions.expected(RecordingTime.of(by_id[run.run_id]), run.run_id),
         )
-        validation = score(damper, watched([run for run in runs if run.id not in check_run], "run"), sessions=sessions)
-        for name, why in validation.refused.items():
-            typer.echo(f"not scored: {name}: {why}", err=True)
-        if not validation.runs:
-            raise InputError("no run could be scored", where=f"rig {wanted}", remedy="see the lines above")
-        by_id = {run.id: run for run in runs}
-        peaks = {
-            run.run_id: peak_band(
-                damper,
-                by_id[run.run_id],
-                level,
-                sessions and sessions.expected(RecordingTime.of(by_id[run.run_id]), run.run_id),
-            )
-            for run in validation.runs
-        }
-        put([{**score_row(run), **peaks[run.run_id]} for run in validation.runs], out, as_json, csv_text)
-        inside = [
-            p["peak_force_low_N"] <= p["peak_force_measured_N"] <= p["peak_force_high_N"]
-            for p in peaks.values()
-            if "peak_force_low_N" in p
-        ]
-        if inside:
-            few = " (too few runs to tell a share)" if len(inside) < 20 else ""
-            typer.echo(
-                f"peak force inside its {100 * level:g} % band in {sum(inside)} of {len(inside)} runs{few}", err=True
-            )
-        floors = [run.floor for run in validation.runs if run.floor is not None]
-        outside = sum(bool(run.extrapolation) for run in validation.runs)
+        for run in validation.runs
+    }
+    put([{**score_row(run), **peaks[run.run_id]} for run in validation.runs], out, as_json, csv_text)
+    _print_summary(damper, validation, wanted or whole.name, peaks.values(), level)
+
+
+def _rig(dataset: Dataset, asked: str | None, of_model: str) -> Dataset:
+    """Return the runs of the rig asked for, of the model's rig, or of the only one."""
+    if asked is None and of_model not in dataset.rigs and len(dataset.rigs) == 1:
+        asked = dataset.rigs[0]
+        typer.echo(f"the model is of rig {of_model!r}; scoring the dataset's one rig {asked!r}", err=True)
+    return dataset.rig(of_model if asked is None else asked)
+
+
+def _print_summary(
+    damper: Damper, validation: Validation, rig: str, peaks: Iterable[dict[str, float]], level: float
+) -> None:
+    """Print the errors over all runs, and how many peak forces lie inside their band."""
+    from mrdamper.dampers.sessions import KNOWN
+
+    inside = [
+        p["peak_force_low_N"] <= p["peak_force_measured_N"] <= p["peak_force_high_N"]
+        for p in peaks
+        if "peak_force_low_N" in p
+    ]
+    if inside:
+        few = " (too few runs to tell a share)" if len(inside) < 20 else ""
         typer.echo(
-            f"{damper.title} on {len(validation.runs)} runs of {wanted or dataset.name}: median nrmse_pp "
-            f"{100 * validation.median():.2f} %, worst {100 * validation.worst().scores.nrmse_pp:.2f} % "
-            f"({validation.worst().run_id}), median energy error {100 * validation.median('energy_error'):.1f} %"
-            + (f", scatter of the rig {100 * sorted(floors)[len(floors) // 2]:.2f} %" if floors else "")
-            + (f"; {outside} runs extrapolate" if outside else "")
-            + f"; session known in {sum(run.session == KNOWN for run in validation.runs)}",
-            err=True,
+            f"peak force inside its {100 * level:g} % band in {sum(inside)} of {len(inside)} runs{few}", err=True
         )
+    floors = [run.floor for run in validation.runs if run.floor is not None]
+    outside = sum(bool(run.extrapolation) for run in validation.runs)
+    typer.echo(
+        f"{damper.title} on {len(validation.runs)} runs of {rig}: median nrmse_pp "
+        f"{100 * validation.median():.2f} %, worst {100 * validation.worst().scores.nrmse_pp:.2f} % "
+        f"({validation.worst().run_id}), median energy error {100 * validation.median('energy_error'):.1f} %"
+        + (f", scatter of the rig {100 * sorted(floors)[len(floors) // 2]:.2f} %" if floors else "")
+        + (f"; {outside} runs extrapolate" if outside else "")
+        + f"; session known in {sum(run.session == KNOWN for run in validation.runs)}",
+        err=True,
+    )
