@@ -7,7 +7,10 @@ import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import polars as pl
@@ -84,20 +87,15 @@ def _killed(source, out, rows):
 
 
 def _kept(out):
-    # A copy: the journal itself belongs to the process that writes it.
+    # A copy: the journal itself belongs to the process that writes it, and copies share no file with each other.
     try:
-        with _copied(out) as base:
-            return base.execute("SELECT count(*) FROM results").fetchone()[0]
+        with TemporaryDirectory() as folder:
+            for path in out.glob("journal.sqlite*"):
+                shutil.copyfile(path, Path(folder) / path.name)
+            with closing(sqlite3.connect(Path(folder) / "journal.sqlite")) as base:
+                return base.execute("SELECT count(*) FROM results").fetchone()[0]
     except (sqlite3.Error, OSError):
         return 0
-
-
-def _copied(out):
-    copy = out.parent / "copy.sqlite"
-    copy.with_name("copy.sqlite-wal").unlink(missing_ok=True)
-    for path in out.glob("journal.sqlite*"):
-        shutil.copyfile(path, copy.with_name(path.name.replace("journal", "copy")))
-    return sqlite3.connect(copy)
 
 
 def test_a_damper_that_cannot_be_used_is_named_and_the_others_go_on(identified, tmp_path):
