@@ -76,11 +76,14 @@ EXPLAINED = (
     ),
     Explained(
         "statistics.functions.fitting",
-        "np.linalg.qr(weighted",
+        "np.linalg.qr(weighted /",
         "Div → Mult",
         "the space columns span does not depend on their lengths",
     ),
     Explained("statistics.functions.fitting", "grid", "", _BUDGET),
+    Explained("statistics.functions.fitting", "explained = np.sum", "", _BUDGET),
+    Explained("statistics.functions.fitting", "or 1.0", "1.0 → 10.0", "zero, whatever divides it"),
+    Explained("statistics.functions.forms", "for rate, feature in", "items", _ORDER),
     Explained("identification.harmonic_balance", '"peaks":', "arguments", _ORDER),
     Explained(
         "identification.harmonic_balance", '"peaks":', "Sub → Add", "half a turn forth or back is the same angle"
@@ -109,6 +112,11 @@ EXPLAINED = (
     Explained("identification.covariance", "reshape(-1, block", "1 → 2", _ALIKE),
     Explained("identification.covariance", "powers[k - 1] if k", "", "a product of two"),
     Explained("identification.covariance", "np.finfo(float)", "", _GUARD),
+    Explained("identification.intervals", "math.pi / 2 - 1e-12", "", _GUARD),
+    Explained("identification.intervals", "- 15 * z", "Sub → Add", "a term below 1e-10 of the quantile"),
+    Explained("identification.intervals", "(nodes + 1)", "Add → Sub", "a cosine has no sign"),
+    Explained("identification.intervals", 'max(values["current"]) == 0', "max → min", _ALIKE),
+    Explained("identification.intervals", "(i, j): float(covariance", "items", _ALIKE),
     Explained("identification.loop_analysis", "t = motion.time", "", "a constant beside a column of ones"),
     Explained("identification.loop_analysis", "scale[scale == 0]", "", _SCALE),
     Explained("rig_files.quality.loop", "fit_harmonics(", "7 → 8", _BUDGET),

@@ -53,11 +53,12 @@ ROOMS = (
         "dampers/test_calibration.py dampers/test_random_effects.py",
     ),
     _room(
-        "dampers.covariance dampers.run_residuals identification.intervals",
+        "dampers.covariance dampers.run_residuals",
         "dampers/test_covariance_laws.py dampers/test_bands_by_hand.py dampers/test_parameter_uncertainty.py"
         " identification/test_covariance.py",
         "cover_what_they_say scatter_of_repeated",
     ),
+    _room("identification.intervals", "identification/test_intervals.py"),
     _room("study.plan", "study/test_plan.py"),
     _room(
         "systems.controllers.hooks systems.controllers.add systems.controllers.clipped_optimal systems.inverse"

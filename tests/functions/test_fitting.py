@@ -11,6 +11,7 @@ from mrdamper.errors import IdentificationError
 from mrdamper.statistics.functions import fitting
 from mrdamper.statistics.functions.fitting import FunctionFit, assess, choose_function, fit_function, require_determined
 from mrdamper.statistics.functions.forms import FORMS, ParameterFunction
+from mrdamper.statistics.functions.selection import fold_groups
 
 I, f, A, r, s = 1.3, 0.7, 0.06, 0.9, 2.1  # no two products of their powers are alike
 # Every form once more, term by term.
@@ -95,6 +96,50 @@ def test_searched_rates_are_charged_to_the_error_at_left_out_conditions():
     missed = (y - hat @ y) / (1 - np.diag(hat))
     N = y.size
     assert fit.left_out == pytest.approx(np.sqrt(np.mean(missed**2)) / np.std(y) * N / (N - 1), rel=1e-6)
+
+
+@pytest.mark.parametrize(("form", "rates"), [("linear-current", 0), ("decaying-current", 1)])
+def test_errors_of_left_out_groups_are_those_of_refits_and_charged_for_rates(form, rates):
+    """A fold of every kind is refitted without its values, at the rates of all; weights count in every error."""
+    errors = np.where(np.arange(CURRENT.size) % 3 == 0, 60.0, 20.0)
+    found = fitting._fitted(form, CONDITIONS, VALUES, False, errors)
+    w, y, N = 20.0 / errors, VALUES, VALUES.size
+    first = CURRENT if not rates else np.exp(-found.fit.function.rates[0] * CURRENT)
+    columns = np.column_stack([first, np.ones(N)])
+    folds = fold_groups(CONDITIONS)
+    assert set(found.errors) == set(folds) == {"condition", "current", "motion"}
+    for kind, groups in folds.items():
+        missed = []
+        for group in groups:
+            rest = np.setdiff1d(np.arange(N), group)
+            solved = np.linalg.lstsq(columns[rest] * w[rest, None], y[rest] * w[rest])[0]
+            missed += [w[i] * abs(y[i] - columns[i] @ solved) for i in group]
+        assert found.errors[kind] == pytest.approx(np.array(missed) * N / (N - rates), rel=1e-6)
+
+
+def test_a_form_that_breaks_a_law_of_physics_is_refused_with_its_reason():
+    falling = 900.0 - 700 * CURRENT + 120 * CURRENT**2  # least at 2.9 A: negative beyond the tests
+    free = choose_function(["constant", "linear-current", "quadratic-current"], CONDITIONS, falling)
+    assert (free.function.form, free.refused) == ("quadratic-current", {})
+    lawful = choose_function(["constant", "linear-current", "quadratic-current"], CONDITIONS, falling, dissipating="N")
+    assert lawful.function.form == "constant"
+    assert set(lawful.refused) == {"linear-current", "quadratic-current"}
+    assert all("negative" in reason or "falls" in reason for reason in lawful.refused.values())
+    # The smallest form stands where every form breaks a law.
+    alone = choose_function(["constant"], CONDITIONS, -falling.clip(1.0), dissipating="N")
+    assert (alone.function.form, alone.refused) == ("constant", {})
+
+
+def test_a_yield_force_rises_with_the_current_before_the_tests_are_many():
+    """Physics knows it: of three scattered values the line is taken where it rises, and the constant elsewhere."""
+    few, values = [Condition(i, 1.0, 0.02) for i in (0.0, 1.0, 2.0)], np.array([300.0, 290.0, 330.0])
+
+    def form(values, unit):
+        return choose_function(["constant", "linear-current"], few, values, dissipating=unit).function.form
+
+    assert (form(values, "N"), form(values, "N s/m"), form(values[::-1], "N")) == (
+        "linear-current", "constant", "constant",
+    )  # fmt: skip
 
 
 def test_weights_count_in_the_search_of_rates_too():
@@ -300,5 +345,7 @@ def test_a_form_that_needs_every_condition_is_not_chosen():
     """Without a condition it knows nothing of it; its error there was rounding over rounding."""
     few, values = [CONDITIONS[i] for i in (0, 4, 6, 8, 11)], np.array([300.0, 640.0, 1290.0, 1310.0, 2080.0])
     assert fit_function("plane", few, values).left_out == np.inf
+    dark = [Condition(i, 1.0, 0.02) for i in (0.0, 0.0, 0.0, 1.0)]  # the slope rests on the last
+    assert fit_function("linear-current", dark, [1.0, 2.0, 3.0, 9.0]).left_out == np.inf
     assert choose_function(["constant", "linear-current", "plane"], few, values).function.form == "linear-current"
     assert choose_function(["constant"], few[:1], [3.0]).function.coefficients == (3.0,)

@@ -14,7 +14,7 @@ from mrdamper import identification
 from mrdamper.data import Condition
 from mrdamper.identification import identify
 from mrdamper.identification.covariance import spread
-from mrdamper.identification.intervals import interval_about, weaknesses, written
+from mrdamper.identification.intervals import written
 from mrdamper.identification.problem import RunUncertainty
 from mrdamper.identification.uncertainty import uncertainty_of_run
 from mrdamper.models.bingham import Bingham
@@ -60,23 +60,6 @@ def test_a_motion_that_never_yields_says_so():
     assert "no yielding in this motion: beta not identifiable" in found.doubts
     assert found.interval("beta") is None
     assert identify(synthetic_run(CONDITION, 30.0, model=TRUTH)).doubts == ()
-
-
-def test_what_the_tests_have_one_of_is_the_reason():
-    one = [Condition(0.5, 1.0, a) for a in (0.01, 0.02)]
-    said = weaknesses(["k1", "m", "c"], np.diag([np.inf, np.inf, 1.0]), [(0, 1)], one)
-    assert said == [
-        "k1 and m are not both identifiable from one frequency and one current: they do the same to the force"
-    ]
-    still = [Condition(0.0, f, a) for f, a in ((1.0, 0.01), (2.0, 0.02))]
-    assert "fy1: not identifiable without current" in weaknesses(["fy1"], np.diag([np.inf]), (), still)[0]
-
-
-def test_correlations_are_stated_once_per_group_of_parameters():
-    chain = np.array([[1.0, 0.99, 0.5, 0.0], [0.99, 1.0, -0.985, 0.0], [0.5, -0.985, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
-    assert weaknesses("abcd", chain) == ["a, b and c are strongly correlated (|r| up to 0.990)"]
-    pair = np.array([[4.0, -1.99], [-1.99, 1.0]])
-    assert weaknesses("xy", pair) == ["x and y are strongly correlated (r = -0.995)"]
 
 
 def test_more_cycles_do_not_average_model_error_away():
@@ -143,31 +126,6 @@ def test_standard_errors_are_the_scatter_of_repeated_identifications():
         scatter = float(np.std([getattr(i.model, name) for i in found], ddof=1))
         said = float(np.median([i.standard_errors[name] for i in found]))
         assert said == pytest.approx(scatter, rel=0.25), name  # 60 repeats know their scatter to 9 %
-
-
-@pytest.mark.parametrize(
-    ("value", "ends", "unit", "text"),
-    [
-        (727.4, (617.0, 837.8), "N s/m", "730 ± 110 N s/m"),
-        (10812.3, (3012.0, 18612.6), "N", "10800 ± 7800 N"),
-        (0.28, (0.027, 2.8), "A", "0.28 (0.027 to 2.8) A"),
-        (0.0, (-0.5, 0.5), "N", "0 ± 0.5 N"),
-        (2e-4, (1.96e-4, 2.04e-4), "m", "0.2 ± 0.004 mm"),
-        (4.9e-3, (3.6e-3, 6.5e-3), "m/s", "4.9 (3.6 to 6.5) mm/s"),
-        (0.3, (0.2, 0.4), "-", "0.3 ± 0.1"),
-        (0.5, None, "m", "500 mm"),
-    ],
-)
-def test_a_number_is_written_as_an_engineer_reads_it(value, ends, unit, text):
-    assert written(value, ends, unit) == text
-
-
-def test_an_interval_over_three_decades_is_none():
-    assert interval_about(2200.0, 1.7, 30.0, 0.95, log=True) is None
-    assert interval_about(2200.0, np.inf, 30.0, 0.95, log=False) is None
-    low, high = interval_about(2200.0, 1.7, 1e9, 0.95, log=True)
-    assert high / low == pytest.approx(np.exp(3.4 * 1.96), rel=1e-3)
-    assert np.sqrt(low * high) == pytest.approx(2200.0)
 
 
 def test_what_is_known_is_computed_when_asked_and_travels_without_the_run(monkeypatch):

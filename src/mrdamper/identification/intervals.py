@@ -53,7 +53,7 @@ def _student(level: float, dof: float) -> float:
         reached = angle / 2 * float(weights @ np.cos(angle / 2 * (nodes + 1)) ** (dof - 1))
         step = (level * whole - reached) / max(math.cos(angle) ** (dof - 1), 1e-300)
         angle = min(angle + step, math.pi / 2 - 1e-12)
-        if abs(step) <= 1e-15 * angle:
+        if step <= 1e-15:
             break
     return math.sqrt(dof) * math.tan(angle)
 
@@ -74,7 +74,7 @@ def relative_width(value: float, half: float, log: bool) -> float:
     """Half an interval over the widest one of an identifiable parameter."""
     if log:
         return half / (math.log(_MAX_RATIO) / 2)
-    return half / (_MAX_RATIO * abs(value)) if value else math.inf * half if half else 0.0
+    return half / (_MAX_RATIO * abs(value)) if value else math.inf if half else 0.0
 
 
 _SHOWN = {"-": (1.0, ""), "m": (1e3, "mm"), "m/s": (1e3, "mm/s")}  # how a unit stands on screens
@@ -93,7 +93,7 @@ def written(value: float, ends: tuple[float, float] | None, unit: str = "") -> s
     half = (high - low) / 2
     if half == 0:
         return f"{_plain(value, 6)} ± 0 {unit}".strip()
-    digits = max(1, math.floor(math.log10(max(abs(value), half))) - math.floor(math.log10(half)) + 2)
+    digits = math.floor(math.log10(max(abs(value), half))) - math.floor(math.log10(half)) + 2
     if abs(high + low - 2 * value) > _LOPSIDED * half:
         return f"{_plain(value, digits)} ({_plain(low, digits)} to {_plain(high, digits)}) {unit}".strip()
     return f"{_plain(value, digits)} ± {_plain(half, 2)} {unit}".strip()

@@ -51,15 +51,14 @@ class _Fitted:
     columns: Floats
     target: Floats
     weight: Floats
-    size: float
     conditions: tuple[Condition, ...]
 
     @cached_property
     def errors(self) -> Mapping[str, Floats]:
-        """(N,) errors of values when they are left out, over the spread, by kind of fold."""
+        """(N,) errors of values when they are left out, by kind of fold."""
         rates = len(self.fit.function.rates)
         return {
-            kind: _fold_errors(self.columns, self.target, self.weight, groups, rates) / self.size
+            kind: _fold_errors(self.columns, self.target, self.weight, groups, rates)
             for kind, groups in _folds(self.conditions).items()
         }
 
@@ -116,7 +115,7 @@ def _fitted(
     function = ParameterFunction(chosen.name, tuple(coefficients.tolist()), tuple(float(r) for r in rates), log)
     size = np.sqrt(spread / target.size) or 1.0
     fit = FunctionFit(function, r2=1.0 - cost / spread if spread > 0 else 1.0, left_out=left_out / size)
-    return _Fitted(fit, columns, target, weight, size, tuple(conditions))
+    return _Fitted(fit, columns, target, weight, tuple(conditions))
 
 
 def choose_function(
@@ -227,8 +226,7 @@ def _best_rates(
 
     grid = np.array(list(product(*(np.linspace(low, high, 6) for low, high in zip(lower, upper, strict=True)))))
     tables = np.stack([form.columns(I, f, A, tuple(rates)) for rates in np.exp(grid)]) * weight[:, None]
-    size = np.linalg.norm(tables, axis=1, keepdims=True)
-    explained = np.sum((right @ np.linalg.qr(tables / np.where(size > 0, size, 1.0))[0]) ** 2, axis=-1)
+    explained = np.sum((right @ np.linalg.qr(tables)[0]) ** 2, axis=-1)
     starts = grid[np.argsort(-explained, kind="stable")[:3]]
     fit = [least_squares(residual, u, lower, upper, most_steps=15, slopes=slopes) for u in starts]
     best = min(fit, key=lambda minimum: minimum.cost)
@@ -253,7 +251,7 @@ def _solved(columns: Floats, target: Floats, weight: Floats, rates: int) -> tupl
     spare = 1.0 - np.sum(q**2, axis=1)  # share of a value that the others know
     left_out = float("inf")
     if spare.min() > _RANK_LIMIT:  # else some value alone says what a term is: without it the form knows nothing
-        penalty = target.size / max(target.size - rates, 1)
+        penalty = target.size / (target.size - rates)
         left_out = float(np.sqrt(np.sum(((right - q @ along) / spare) ** 2) / np.sum(weight**2)) * penalty)
     return np.linalg.solve(triangle, along) / scale, left_out
 
@@ -268,7 +266,7 @@ def _fold_errors(
 ) -> Floats:
     """Weighted magnitudes of errors at values left out in groups, exact for the linear part by the hat matrix."""
     weighted = columns * weight[:, None]
-    q = np.linalg.qr(weighted / np.linalg.norm(weighted, axis=0))[0]
+    q = np.linalg.qr(weighted)[0]
     right = target * weight
     residual = right - q @ (q.T @ right)
     errors = np.full(target.size, np.inf)
@@ -280,7 +278,7 @@ def _fold_errors(
         missed = np.linalg.solve(spare[determined], residual[rows[determined], None])
         errors[rows[determined]] = np.abs(missed[..., 0])
     order = [i for group in groups for i in group]
-    return errors[order] * (target.size / max(target.size - rates, 1))
+    return errors[order] * (target.size / (target.size - rates))
 
 
 def _weights(uncertainty: ArrayLike | None, target: Floats) -> Floats:
