@@ -9,15 +9,16 @@ from scipy.stats import norm
 from scipy.stats import t as students_t
 
 from mrdamper.dampers import bands
-from mrdamper.dampers.bands import band, no_band, portable_band, session_band
-from mrdamper.dampers.calibration import Growth
-from mrdamper.dampers.distance import Distance
+from mrdamper.dampers.bands import band, no_band, portable_band, scope, session_band
+from mrdamper.dampers.calibration import LEVELS, Calibration, Growth
+from mrdamper.dampers.distance import AT_TESTS, Distance
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.prediction import Prediction
 from mrdamper.dampers.sessions import RecordingTime, RunScatter, SessionCorrection, Sessions
-from mrdamper.dampers.uncertainty import Uncertainty, uncertainty_warnings
+from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty, _limit, table, uncertainty_warnings
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
+from mrdamper.identification.intervals import NOT_IDENTIFIABLE, written
 from mrdamper.models.bingham import Bingham
 from mrdamper.physics.motion import sine
 
@@ -90,10 +91,55 @@ def test_a_band_adds_numbers_sessions_and_form(level, shown):
     assert found.energy == pytest.approx((-loss, loss))
 
 
+def test_a_calibrated_band_is_its_factor_times_the_band_at_the_tests():
+    """Runs count by themselves in the calibration: the error between them has no degrees of freedom more."""
+    at_tests = replace(KNOWN, growth=Growth())
+    factors = {"force": 1.7, "peak": 0.6, "energy": 2.5}
+    calibrated = Calibration("run", 30, *((f,) * len(LEVELS) for f in factors.values()), (0.9, 0.9, 0.9))
+    plain = band(damper(replace(at_tests, run_dof=1e12)), PREDICTION, 0.8)
+    found = band(damper(replace(at_tests, calibration=calibrated)), PREDICTION, 0.8)
+    assert found.high - FORCE == pytest.approx(1.7 * (plain.high - FORCE))
+    assert np.diff(found.peak) == pytest.approx(0.6 * np.diff(plain.peak))
+    assert found.energy[1] == pytest.approx(2.5 * plain.energy[1])
+    # The growth away from the tests is outside the calibration: it stays as it is.
+    away = band(damper(replace(KNOWN, calibration=calibrated)), PREDICTION, 0.8)
+    grown = norm.ppf(0.9) ** 2 * GROWN["energy"]
+    assert away.energy[1] == pytest.approx(np.sqrt(found.energy[1] ** 2 + grown))
+
+
+def test_a_band_says_for_which_sessions_it_holds_and_how_far_it_is_calibrated():
+    few = Calibration("session", 4, (1.0,), (1.0,), (1.0,), (0.9, 0.9, 0.9))
+    future, like = "in a future test session", "for sessions like the tested ones (fewer than 3 known)"
+    beyond = ", calibrated to 80 % at most by 4 independent sessions and beyond by a normal distribution"
+    for dof, said in ((2.0, future), (0.0, like)):
+        known = replace(KNOWN, session_dof=dof)
+        assert scope(damper(known), 0.9) == said + ", not calibrated: no cross-validated runs"
+        assert scope(damper(replace(known, calibration=few)), 0.8) == said
+        assert scope(damper(replace(known, calibration=few)), 0.81) == said + beyond
+    assert scope(damper(None), 0.9) == ""
+
+
+def test_a_table_of_parameters_holds_their_intervals_and_states():
+    known = replace(KNOWN, effective={"c": 40.0, "fy": 7.0})
+    first, second = table(damper(known), 0.8)
+    assert (first["low"], first["high"]) == known.interval(damper(), "c", 0.8)
+    assert (first["name"], first["value"], first["unit"], first["state"]) == ("c", 2000.0, "N s/m", "determined")
+    assert (first["effective_samples"], second["effective_samples"]) == (40.0, 7.0)
+    assert first["written"] == written(2000.0, (first["low"], first["high"]), "N s/m")
+    first, second = table(damper(replace(known, unknown=("c",), one_sided=("fy",))))
+    assert (first["state"], first["written"]) == (NOT_IDENTIFIABLE, NOT_IDENTIFIABLE)
+    assert np.isnan([first["low"], first["high"], first["effective_samples"]]).all()
+    assert second["state"] == "one-sided: at a limit of what was searched"
+    assert [row["state"] for row in table(damper(None))] == ["no covariance"] * 2
+    # At a limit, that one is named.
+    for value, said in ((0.0, "its lower limit 0"), (5.0, "its upper limit 5"), (2.0, "a limit of what was searched")):
+        assert _limit(FittedParameter(value, (0.0, 5.0))) == said
+
+
 def test_where_nothing_is_known_there_is_no_band_and_its_reason():
     assert band(damper(None), PREDICTION) is None
     assert band(damper(replace(KNOWN, session_dof=0.0, run_dof=0.0)), PREDICTION) is None
-    assert band(damper(replace(KNOWN, session_dof=0.0)), PREDICTION) is not None
+    assert band(damper(replace(KNOWN, session_dof=0.0, run_dof=1.0)), PREDICTION) is not None
     assert band(damper(replace(KNOWN, run_dof=0.0)), PREDICTION) is not None
     assert "without its covariance" in no_band(damper(None))
     assert "too few" in no_band(damper())
@@ -111,20 +157,21 @@ def test_a_portable_band_is_that_of_loops_at_three_currents(monkeypatch):
 
     def predict(self, condition):
         asked.append(condition)
-        return Prediction(MOTION, (100 + 50 * condition.current_A) * np.array([1.5, -0.5]), condition, ())
+        return Prediction(MOTION, (100 + 50 * condition.current_A) * np.array([1.5, -0.5, 0.0]), condition, ())
 
     def found(damper, prediction, level):
-        ones, width = np.ones(2), widths[prediction.condition.current_A]
+        ones, width = np.array([0.2, 0.4, 2.4]), widths[prediction.condition.current_A] * np.array([0.1, 0.9, 2.0])
         assert level == 0.8
         return SimpleNamespace(parameter=3 * ones, session=4 * ones, model=12 * ones, high=prediction.force + width)
 
     monkeypatch.setattr(JointDamper, "predict", predict)
     monkeypatch.setattr(bands, "band", found)
     tested = SimpleNamespace(tested=True, middle=CONDITION, current_A=(0.0, 2.0), peak_velocity_m_s=(0.0, 0.9),
-        farthest=[CONDITION, replace(CONDITION, current_A=2.0)], distance=lambda condition, current: AWAY)  # fmt: skip
+        farthest=[CONDITION, replace(CONDITION, current_A=1.5)],
+        distance=lambda condition, current: AWAY if current == [condition.current_A] else AT_TESTS)  # fmt: skip
     portable = portable_band(replace(made, envelope=tested), 0.8)
     t = np.mean([30.0, 60.0, 130.0]) / 13
-    own = np.mean([9 / (100 + 50 * I) ** 2 for I in widths])
+    own = np.mean([9 * np.mean([0.04, 0.16, 5.76]) / (100 + 50 * I) ** 2 for I in widths])
     assert (portable.level, portable.gain, portable.offset_N) == (
         0.8, pytest.approx(np.hypot(0.03, 0.012) * t), pytest.approx(np.hypot(4, 2.5) * t),
     )  # fmt: skip
@@ -158,6 +205,14 @@ def test_what_is_known_badly_is_told_number_by_number():
 
     assert "sessions" not in said()
     assert "fewer than two degrees of freedom" in said(session_dof=1.9)
+    assert "degrees of freedom" not in said(session_dof=2.1)
+    assert "c, fy not identifiable from these runs." in said(unknown=("c", "fy"))
+    assert said(unknown=("c", "fy"), words=("c and fy not identifiable",)).count("identifiable") == 1
+    weak = said(covariance=np.diag([1001.0**2, 51.0**2]), dof=np.full(2, 1e9))
+    assert "Not significant: c (2000 ± 2000 N s/m), fy (100 ± 100 N)." in weak
+    turned = replace(damper(), model=replace(damper().model, f0=-25.0), free=("c", "f0"))
+    sure = replace(KNOWN, names=("c", "f0"), covariance=np.diag([90.0, 12.0**2]))
+    assert "f0" not in " ".join(uncertainty_warnings(replace(turned, uncertainty=sure)))
     assert "Fewer than three known sessions" in said(session_dof=0.0)
     errors = np.diag([1001.0**2, 49.0**2])
     assert "c is not significant (2000 ± 2200 N s/m)" in said(covariance=errors)

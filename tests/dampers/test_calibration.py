@@ -76,6 +76,28 @@ def test_the_model_error_is_what_gain_and_offset_leave():
     assert (found.gain, found.offset) == pytest.approx((1.4826 * 0.1, 1.4826 * 6), rel=0.01)
 
 
+def test_the_model_error_is_the_mean_square_over_samples_and_runs_of_uneven_errors():
+    rng = np.random.default_rng(6)
+    runs = [
+        replace(run(str(i), size * rng.exponential(1.0, TIME.size)), peak=1 + size / 50, energy=1 - size / 30)
+        for i, size in enumerate((1.0, 2.0, 30.0, 3.0))
+    ]
+    squares, gains = [], []
+    for each in runs:
+        gain, offset = np.polyfit(each.predicted, each.measured, 1)
+        squares.append(np.mean((each.measured - gain * each.predicted - offset) ** 2) / 100**2)
+        gains.append(gain)
+    found = model_error(runs)
+    assert found.force == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-3)
+    for name in ("peak", "energy"):
+        over = np.array([getattr(each, name) for each in runs]) / gains - 1
+        assert getattr(found, name) == pytest.approx(np.sqrt(np.mean(over**2)))
+    # An energy that cannot be compared, or a gain that is none, takes no part.
+    lost = [*runs, replace(runs[0], energy=np.inf), replace(runs[0], measured=-runs[0].predicted, peak=9.0)]
+    assert model_error(lost).energy == pytest.approx(model_error([*runs]).energy)
+    assert model_error([*runs, replace(runs[0], measured=-SWING, peak=9.0)]).peak == pytest.approx(found.peak)
+
+
 def test_peaks_are_calibrated_as_split_conformal_prediction():
     """The k-th smallest of n scores, k = ceil((n + 1) level)."""
     for count in (9, 14, 39):
@@ -152,13 +174,17 @@ def test_errors_are_over_their_standard_deviations():
     assert np.isinf(StandardizedErrors.of(replace(run("r"), energy=np.inf), np.ones(TIME.size), 1.0, 1.0).energy).all()
 
 
-def test_errors_grow_with_the_distance_from_the_tests_as_they_were_made():
-    at_tests = ModelError(force=0.02, peak=0.01, energy=0.03, gain=0.0, offset=0.0)
+@pytest.mark.parametrize(("gain", "offset"), [(0.0, 0.0), (0.05, 7.0)])
+def test_errors_grow_with_the_distance_from_the_tests_as_they_were_made(gain, offset):
+    at_tests = ModelError(force=0.02, peak=0.01, energy=0.03, gain=gain, offset=offset)
+    moved = gain**2 * np.mean(SWING**2) / 100**2 + (offset / 100) ** 2  # by a gain and an offset of the run
     ways = [Distance(b, e, m) for b, e, m in ((0.0, 0.0, 0.0), (0.06, 0.0, 0.0), (0.0, 0.4, 0.0), (0.0, 0.3, 0.8))]
     runs = []
     for way in ways:
-        peak, energy = (1 + np.sqrt(own**2 + g @ way.squares) for own, g in ((0.01, PEAK**2), (0.03, ENERGY**2)))
-        error = np.sqrt(0.02**2 + FORCE**2 @ way.squares) * np.ptp(SWING) / 2
+        peak, energy = (
+            1 + np.sqrt(gain**2 + own**2 + g @ way.squares) for own, g in ((0.01, PEAK**2), (0.03, ENERGY**2))
+        )
+        error = np.sqrt(moved + 0.02**2 + FORCE**2 @ way.squares) * np.ptp(SWING) / 2
         runs.append(replace(run("r", error, peak=peak, energy=energy), distance=way))
     found = Growth.of(runs, at_tests)
     assert found.force == pytest.approx(beside_typical(FORCE))
@@ -168,6 +194,9 @@ def test_errors_grow_with_the_distance_from_the_tests_as_they_were_made():
     unshown = Growth.of(runs[:1], at_tests)
     assert unshown.force == unshown.peak == unshown.energy == tuple(TYPICAL)
     assert Growth.of(runs[:2], at_tests).peak == pytest.approx((beside_typical(PEAK)[0], *TYPICAL[1:]))
+    # An energy that cannot be compared is wrong by all of it.
+    lost, twice = (Growth.of([replace(run("r", energy=e), distance=ways[1])], at_tests) for e in (np.inf, 2.0))
+    assert lost == twice
     none = Growth.of([replace(run("r"), distance=way) for way in ways], at_tests)  # better than at the tests
     assert none.force == none.energy == pytest.approx(beside_typical(0.0))
 

@@ -8,6 +8,7 @@ import pytest
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.calibration import Calibration, PredictedRun, StandardizedErrors, model_error
 from mrdamper.dampers.covariance import estimate_uncertainty
+from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.envelope import UNTESTED
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
@@ -92,6 +93,7 @@ def test_intervals_scale_with_the_force_and_forget_the_order_of_runs(sessions):
     assert (twice.force, twice.peak, twice.energy) == pytest.approx((plain.force, plain.peak, plain.energy), rel=1e-6)
     assert twice.dof == pytest.approx(plain.dof, rel=1e-6)
     assert sum(plain.information.values()) == pytest.approx(1.0)
+    assert twice.effective == pytest.approx(plain.effective, rel=1e-6)
     assert set(plain.effective) == set(plain.names) == {"c", "fy", "f0"}
     assert all(1 <= n <= sum(RunResiduals.of(damper, r).picked.size for r in runs) for n in plain.effective.values())
 
@@ -126,6 +128,80 @@ def test_without_gains_the_intervals_are_those_of_the_noise():
     assert np.sqrt(np.diag(known.covariance)) == pytest.approx(np.sqrt(np.diag(inverse @ square @ inverse)), rel=0.6)
     few = estimate_uncertainty(damper, runs[:3]).uncertainty
     assert np.all(np.diag(few.covariance) > np.diag(known.covariance))
+
+
+def linear_parts(damper, runs):
+    """Residuals of runs with the columns of Bingham's force and the inverse of their normal matrix."""
+    parts = [RunResiduals.of(damper, run) for run in runs]
+    motions = [part.prediction.motion for part in parts]
+    columns = [np.column_stack([m.velocity, np.sign(m.velocity), np.ones(len(m))])[p.picked]
+               for p, m in zip(parts, motions, strict=True)]  # fmt: skip
+    return parts, columns, np.linalg.inv(normal_matrix(columns, parts))
+
+
+def test_information_and_effective_samples_are_those_of_weighted_least_squares():
+    """A run's share is that of its residuals in the variance; n independent samples would give the same variance."""
+    runs = runs_of(sessions=3, session=0.05)
+    runs[2] = replace(runs[2], force=runs[2].force + 0.1 * np.ptp(runs[2].force) * np.sin(40 * runs[2].time))
+    damper = fitted(runs)
+    known = estimate_uncertainty(damper, runs).uncertainty
+    parts, columns, inverse = linear_parts(damper, runs)
+    squares = np.array(
+        [p.weight**2 * np.diag(inverse @ c.T @ c @ inverse) for c, p in zip(columns, parts, strict=True)]
+    )
+    shares = (squares / squares.sum(axis=0)).mean(axis=1)
+    assert list(known.information.values()) == pytest.approx(shares.tolist(), rel=1e-5)
+    left = sum(np.sum(p.residual**2) * p.weight**2 for p in parts)
+    samples = left * np.diag(inverse) / np.diag(known.covariance)
+    most = sum(p.picked.size for p in parts)
+    assert list(known.effective.values()) == pytest.approx(np.minimum(samples, most).tolist(), rel=1e-5)
+    assert min(samples) < most / 5
+
+
+def test_a_parameter_rests_on_one_run_of_three_or_more_only():
+    """Of one fast run beside slow ones most is known of the viscosity; of two runs it is no news."""
+    slow = [Condition(0.5, 0.1, a) for a in (0.001, 0.0011)]
+    runs = runs_of(conditions=[Condition(0.5, 2.0, 0.02), *slow], gain=0.0)
+    said = " ".join(estimate_uncertainty(fitted(runs), runs).uncertainty.words)
+    assert "c is determined mainly by run r0" in said
+    assert "determined mainly" not in " ".join(estimate_uncertainty(fitted(runs[:2]), runs[:2]).uncertainty.words)
+
+
+def test_degrees_of_freedom_are_those_of_the_parts_of_a_variance():
+    """Where sessions are all that scatters a variance has their degrees of freedom: of n sessions at most n - 1."""
+    for count in (3, 9):
+        runs = runs_of(gain=0.0, session=0.2, noise=1e-4, sessions=count, conditions=CONDITIONS)
+        known = estimate_uncertainty(fitted(runs), runs).uncertainty
+        assert known.session_dof <= count - 1
+        at = known.names.index("c")
+        assert known.dof[at] == pytest.approx(max(known.session_dof, 1.0), rel=0.25)
+
+
+def test_other_sessions_widen_the_scatter_of_sessions_and_far_runs_the_growth():
+    runs = runs_of(sessions=3, session=0.2)
+    damper = fitted(runs)
+    seen = [PredictedRun.of(r, damper.predict_run(r).force, damper.predict_run(r).motion.velocity) for r in runs]
+    far = [replace(p, predicted=1.5 * p.predicted, distance=Distance(0.0, 0.5, 0.0)) for p in seen]
+    plain = estimate_uncertainty(damper, runs, seen).uncertainty
+    for factor, wider in ((1.4, True), (1.0001, False)):
+        others = [replace(p, measured=p.predicted * factor) for p in seen]
+        known = estimate_uncertainty(damper, runs, seen, other_sessions=others).uncertainty
+        assert known.gain == pytest.approx(factor - 1 if wider else plain.gain)
+        assert known.offset == pytest.approx(plain.offset)
+        assert known.growth == plain.growth
+    known = estimate_uncertainty(damper, runs, seen, away=far).uncertainty
+    assert (known.gain, known.offset) == (plain.gain, plain.offset)
+    assert known.growth.force[1] > plain.growth.force[1]
+
+
+def test_the_first_sample_of_a_record_that_is_no_sine_enters():
+    time = np.linspace(0.0, 8.0, 801)
+    path = 0.01 * np.sin(2 * np.pi * (0.3 * time + 0.1 * time**2))
+    run = Run("sweep", time, path, 2000 * np.gradient(path, time), 0.5)
+    part = RunResiduals.of(TRUTH, run)
+    assert part.frequency is None
+    assert (part.picked[0], part.picked[-1]) == (0, 800)
+    assert part.measured == pytest.approx(run.force[part.picked])
 
 
 def test_the_model_error_of_cross_validation_takes_the_place_of_the_residuals():
@@ -182,11 +258,16 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
     for run in runs:
         shifted = run.force * (1 + 0.08 * rng.standard_normal()) + 40 * rng.standard_normal()
         seen.append(PredictedRun.of(run, shifted, damper.predict_run(run).motion.velocity))
+    seen[3] = replace(seen[3], distance=Distance(0.05, 0.2, 0.3))
+    seen[6] = replace(seen[6], run_id="recorded later")  # the parameters move it as they move the median run
     known = estimate_uncertainty(damper, runs, seen).uncertainty
     assert known.of_sessions
     assert min(known.run_gain, known.run_offset, known.force) > 0
-    scores = []
-    for run, prediction in zip(runs, seen, strict=True):
+    error = model_error(seen)
+    assert known.run_gain == pytest.approx(np.sqrt(error.gain**2 - known.gain**2))
+    assert known.run_offset == pytest.approx(np.sqrt(error.offset**2 - known.offset**2))
+    shares, scores = [], []
+    for run in runs:
         part = RunResiduals.of(damper, run)
         velocity = part.prediction.motion.velocity[part.picked]
         slopes = np.column_stack([velocity, np.sign(velocity), np.ones(velocity.size)])
@@ -194,8 +275,12 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
         power, *lost = (np.trapezoid(f * velocity, time) for f in (part.predicted, *slopes.T))
         swing = (slopes[part.predicted.argmax()] - slopes[part.predicted.argmin()]) / np.ptp(part.predicted)
         share = np.mean(np.sum(slopes @ known.covariance * slopes, axis=1)) / (np.ptp(part.predicted) / 2) ** 2
-        of_peak, of_energy = (d @ known.covariance @ d for d in (swing, np.array(lost) / power))
-        gain, offset, half = model_error(seen).gain ** 2, model_error(seen).offset ** 2, prediction.half
+        shares.append([share, *(d @ known.covariance @ d for d in (swing, np.array(lost) / power))])
+    shares[6] = np.median(shares, axis=0)
+    for own, prediction in zip(shares, seen, strict=True):
+        grown = [known.growth.variance(name, prediction.distance) for name in ("force", "peak", "energy")]
+        share, of_peak, of_energy = np.add(own, grown)
+        gain, offset, half = error.gain**2, error.offset**2, prediction.half
         force = np.sqrt(gain * prediction.predicted**2 + offset + (share + known.force**2) * half**2)
         peak, energy = np.sqrt(of_peak + gain + known.peak**2), np.sqrt(of_energy + gain + known.energy**2)
         scores.append(StandardizedErrors.of(prediction, force, peak, energy))

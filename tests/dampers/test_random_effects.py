@@ -138,6 +138,18 @@ def test_runs_far_off_pull_less_than_their_gain_would_say():
     assert 1.2 < variance / (0.05**2 / 40) < 1.8  # of a median: π / 2
 
 
+def test_a_run_counts_the_less_the_noisier_it_is():
+    """Weighted by one over its error, a run of four times the noise moves a common gain a quarter as much."""
+    noises = np.tile([60.0, 240.0], 10)
+    slope, runs = FORCE[:, None], []
+    for seed, noise in enumerate(noises):
+        runs += runs_of([0.0], [0.0], [None], noise=noise, seed=seed)
+    scatter = effects_of(runs, slope, slope.T / (slope.T @ slope) / 20)
+    variance = scatter.covariance(Effects(run_gain=0.02, run_dof=19.0))[0][0, 0]
+    share = (1 / noises) / np.sum(1 / noises)
+    assert variance == pytest.approx(0.02**2 * np.sum(share**2), rel=0.2)  # were they alike: a quarter less
+
+
 def test_a_run_counts_by_its_relative_error_whatever_its_force():
     runs = runs_of(np.zeros(20), np.zeros(20), [None] * 20, noise=60.0)
     slopes = []

@@ -39,6 +39,37 @@ def test_a_reading_is_least_squares_and_knows_every_other_error():
         assert found.error(gain, offset) == pytest.approx(direct)
 
 
+@pytest.mark.parametrize("unit", [1e-7, 1.0, 1e5])
+def test_a_reading_does_not_depend_on_the_unit_and_a_constant_shows_no_gain(unit):
+    predicted = unit * 100 * np.sin(np.linspace(0, 7, 90))
+    found = GainOffset.of(1.2 * predicted + 3 * unit, predicted)
+    assert (found.gain, found.offset) == pytest.approx((1.2, 3 * unit))
+    still = GainOffset.of(unit * np.linspace(1, 3, 90), np.full(90, 0.1 * unit))
+    assert (still.gain, still.offset) == (1.0, pytest.approx(1.9 * unit))
+
+
+def test_check_runs_join_the_own_tests_and_replace_those_of_their_name():
+    runs, readings = days(3)
+    sessions = Sessions.of(runs, readings, readings)
+    assert sessions.seen(DAMPER, [], own=True) == sessions
+    assert sessions.seen(DAMPER, [], own=False).run_ids == ()
+    again = replace(runs[4], force=1.3 * runs[4].force)
+    joined = sessions.seen(DAMPER, [again], own=True)
+    assert set(joined.run_ids) == set(sessions.run_ids)
+    gains = dict(zip(joined.run_ids, joined.gains, strict=True))
+    before = dict(zip(sessions.run_ids, sessions.gains, strict=True))
+    assert gains == {**before, again.id: pytest.approx(1.3, rel=1e-2)}
+    assert dict(zip(joined.run_ids, joined.when, strict=True)) == dict(
+        zip(sessions.run_ids, sessions.when, strict=True)
+    )
+    assert sessions.seen(DAMPER, [again], own=False).run_ids == (again.id,)
+
+
+def test_gains_that_do_not_scatter_have_no_spread():
+    when = [RecordingTime(f"day {i // 3}", 24.0 * (i // 3) + i) for i in range(12)]
+    assert RunScatter.likeliest(when, np.zeros(12)).total == 0.0
+
+
 def test_the_three_spreads_are_found_from_many_days():
     rng = np.random.default_rng(0)
     truth = RunScatter(0.03, 0.02, 0.01, 2.0)
@@ -116,3 +147,4 @@ def test_a_clock_that_cannot_be_is_refused(notes, said):
     with pytest.raises(InputError, match=said) as caught:
         known_errors(runs, [reading(1.0)] * len(runs))
     assert caught.value.code == "E_CLOCK"
+    assert f"run {len(runs) - 1}" in str(caught.value)  # the last: it comes back to a session that had ended

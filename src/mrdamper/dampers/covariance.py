@@ -200,7 +200,7 @@ def _shares(information: Floats) -> list[float]:
 
 def _rest_on_one_run(names: Sequence[str], parts: Sequence[RunResiduals], information: Floats) -> list[str]:
     """Parameters of which one run of several gives most of the information."""
-    if len(parts) < 3 or not names:
+    if len(parts) < 3:
         return []
     best = np.argmax(information, axis=0)
     return [

@@ -170,7 +170,7 @@ class GainsAndOffsets:
         shown = self._read_by(component, component)
         gram = shown.T @ shown
         trace, square = float(np.trace(gram)), float(np.sum(gram**2))
-        return min(trace**2 / square, count - 1.0) if square > 0 else 0.0
+        return min(trace**2 / square, count - 1.0)
 
     def _equations(self, components: Sequence[_Component]) -> Floats:
         """Return expectation of each statistic by each variance, every row over its own diagonal."""

@@ -156,7 +156,7 @@ class RunScatter:
             good = (sign > 0) & (scale > 0)
             return np.where(good, log + size * np.log(np.where(good, scale, 1.0)), np.inf), np.where(good, scale, 0.0)
 
-        best = (np.inf, cls(0.0, 0.0, float(np.sqrt(np.mean(values**2))), _CORRELATION_HOURS[0]))
+        best = (np.inf, cls(0.0, 0.0, 0.0, _CORRELATION_HOURS[0]))
         for hours in _CORRELATION_HOURS:
             near = cls(0.0, 1.0, 0.0, hours).covariance(when, when)
             np.fill_diagonal(near, 1.0)
