@@ -61,10 +61,10 @@ ROOMS = (
     _room("identification.intervals", "identification/test_intervals.py"),
     _room("study.plan", "study/test_plan.py"),
     _room(
-        "systems.controllers.hooks systems.controllers.add systems.controllers.clipped_optimal systems.inverse"
-        " systems.measures",
+        "systems.controllers.hooks systems.controllers.add systems.controllers.clipped_optimal systems.inverse",
         "systems/test_control.py systems/test_loop.py",
     ),
+    _room("systems.measures", "systems/test_measures.py"),
     _room("systems.monte_carlo", "systems/test_uncertainty.py"),
     _room("fleet.charts fleet.verdicts", "fleet/test_charts.py fleet/test_verdicts.py"),
     _room("paper.options paper.assumptions paper.recipes", "paper/test_functions.py paper/test_measured.py"),
