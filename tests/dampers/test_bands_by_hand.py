@@ -206,6 +206,7 @@ def test_what_is_known_badly_is_told_number_by_number():
     assert "sessions" not in said()
     assert "fewer than two degrees of freedom" in said(session_dof=1.9)
     assert "degrees of freedom" not in said(session_dof=2.1)
+    assert replace(KNOWN, session_dof=1.0).of_sessions
     assert "c, fy not identifiable from these runs." in said(unknown=("c", "fy"))
     assert said(unknown=("c", "fy"), words=("c and fy not identifiable",)).count("identifiable") == 1
     weak = said(covariance=np.diag([1001.0**2, 51.0**2]), dof=np.full(2, 1e9))

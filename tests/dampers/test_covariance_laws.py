@@ -7,10 +7,11 @@ import pytest
 
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.calibration import Calibration, PredictedRun, StandardizedErrors, model_error
-from mrdamper.dampers.covariance import estimate_uncertainty
+from mrdamper.dampers.covariance import _within, estimate_uncertainty
 from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.envelope import UNTESTED
 from mrdamper.dampers.joint import JointDamper
+from mrdamper.dampers.random_effects import GainsAndOffsets
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.data import Condition, Run
 from mrdamper.models.bingham import Bingham
@@ -175,6 +176,27 @@ def test_degrees_of_freedom_are_those_of_the_parts_of_a_variance():
         assert known.session_dof <= count - 1
         at = known.names.index("c")
         assert known.dof[at] == pytest.approx(max(known.session_dof, 1.0), rel=0.25)
+
+
+@pytest.mark.parametrize(("gain", "session", "noise"), [(0.03, 0.03, 0.02), (0.0, 0.0, 0.05)])
+def test_degrees_of_freedom_are_by_welch_and_satterthwaite(gain, session, noise):
+    runs = runs_of(gain=gain, session=session, noise=noise, sessions=3)
+    damper = fitted(runs)
+    known = estimate_uncertainty(damper, runs).uncertainty
+    parts, columns, inverse = linear_parts(damper, runs)
+    influence = [inverse @ (c * p.weight**2).T for c, p in zip(columns, parts, strict=True)]
+    scatter = GainsAndOffsets(parts, columns, influence)
+    effects = scatter.effects()
+    between, by_session, by_run = scatter.covariance(effects)
+    within, doubt = _within(parts, columns, inverse)
+    whole = np.diag(between + within)
+    kinds = [
+        (np.diag(between) * by_session, max(effects.session_dof, 1.0)),
+        (np.diag(between) * by_run, max(effects.run_dof, 1.0)),
+        (np.diag(within), 2 / doubt),
+    ]
+    expected = whole**2 / sum(variance**2 / dof for variance, dof in kinds)
+    assert known.dof == pytest.approx(np.maximum(expected, 1.0), rel=1e-4)
 
 
 def test_other_sessions_widen_the_scatter_of_sessions_and_far_runs_the_growth():

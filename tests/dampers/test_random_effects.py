@@ -113,6 +113,28 @@ def test_what_the_fit_has_absorbed_is_not_divided_by():
     assert found.session_dof == pytest.approx(5.0)
 
 
+def test_offsets_are_not_asked_of_runs_that_do_not_show_their_gain():
+    """Each run has a parameter that takes 98 % of its gain up: what is left is not scaled up by fifty."""
+    (gains, offsets), _ = drawn(20, 1, seed=6)
+    runs, rows = runs_of(0.02 * gains, offsets, [None] * 20), np.eye(20)
+    slopes = [np.outer(FORCE, row) for row in rows]
+    influence = [0.98 * np.outer(row, FORCE) / (FORCE @ FORCE) for row in rows]
+    assert GainsAndOffsets(runs, slopes, influence).effects() == Effects()
+
+
+def test_sessions_of_unequal_size_have_the_degrees_of_freedom_of_satterthwaite():
+    names = ["a", "b", *["c"] * 10]
+    (gains, offsets), _ = drawn(12, 1, seed=7)
+    assert effects_of(runs_of(gains, offsets, names)).effects().session_dof == pytest.approx(12**2 / (1 + 1 + 100))
+    # A parameter for each of four kinds of run takes a degree of freedom each.
+    slope = np.kron(np.eye(4), np.ones((3, 1)))
+    slopes = [np.outer(FORCE, row) for row in slope]
+    influence = [np.outer(row, FORCE) / (FORCE @ FORCE) / 3 for row in slope]
+    means = np.repeat(gains.reshape(4, 3).mean(axis=1), 3)
+    found = GainsAndOffsets(runs_of(gains - means, offsets, [None] * 12), slopes, influence).effects()
+    assert found.run_dof == pytest.approx(8.0)
+
+
 def test_one_parameter_scatters_as_the_mean_of_gains():
     """A common gain of R runs in S sessions: session² / S + run² / R, whatever draws say of it."""
     names = [f"day {i // 4}" for i in range(20)]

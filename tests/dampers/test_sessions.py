@@ -65,6 +65,12 @@ def test_check_runs_join_the_own_tests_and_replace_those_of_their_name():
     assert sessions.seen(DAMPER, [again], own=False).run_ids == (again.id,)
 
 
+def test_a_run_of_no_session_is_scored_as_it_is():
+    runs, readings = days(4)
+    alone, odd = replace(runs[0], id="alone", notes={}), reading(1.2, 30.0)
+    assert known_errors([*runs, alone], [*readings, odd])[-1] == odd.error(1.0, 0.0)
+
+
 def test_gains_that_do_not_scatter_have_no_spread():
     when = [RecordingTime(f"day {i // 3}", 24.0 * (i // 3) + i) for i in range(12)]
     assert RunScatter.likeliest(when, np.zeros(12)).total == 0.0

@@ -30,6 +30,24 @@ def test_ewma_of_the_nist_handbook():
     assert chart.signals == ()
 
 
+def test_limits_of_an_average_are_those_of_the_sum_of_its_weights():
+    """Of independent values: the average of i of them has the variance Σ λ² (1 - λ)^2k."""
+    chart = ewma(np.zeros(6), 50.0, 2.0, 0.3, 2.5)
+    for i in range(6):
+        deviation = 2.0 * np.sqrt(sum((0.3 * 0.7**k) ** 2 for k in range(i + 1)))
+        assert chart.upper[i] - 50 == pytest.approx(2.5 * deviation)
+        assert 50 - chart.lower[i] == pytest.approx(2.5 * deviation)
+    assert chart.signals == (0, 1, 2, 3, 4, 5)
+
+
+def test_too_few_or_equal_values_are_no_distribution():
+    assert is_normal(np.full(50, 3.0))
+    assert is_normal(np.array([1.0, 2.0]))
+    assert capability(np.array([1.0]), 0.0, 3.0) is None
+    assert capability(np.full(9, 2.0), 0.0, 3.0) is None
+    assert capability(np.array([1.0, 2.0]), 0.0, 3.0).ppk == pytest.approx(1.5 / (3 * np.sqrt(0.5)))
+
+
 def test_capability_of_a_sample_with_known_moments():
     """NIST 6.1.6: limits 8 and 20, mean 16, deviation 2 give 0.6667; its interval after Bissell."""
     base = np.random.default_rng(1).standard_normal(50)
@@ -82,6 +100,24 @@ def test_the_interval_holds_what_it_promises():
         found = capability(rng.standard_normal(60), -4.0, 4.0)
         held += np.isnan(found.ppk) or found.low <= truth <= found.high + 0.05
     assert held > 270
+
+
+def test_a_gauge_study_is_the_two_way_analysis_of_variance():
+    rng = np.random.default_rng(6)
+    table, line = rng.normal(0, 1, (3, 5)) + 4 * np.arange(5), rng.normal(0, 9, 40)
+    found = gauge_study(table, line)
+    left = table - table.mean(axis=1, keepdims=True) - table.mean(axis=0) + table.mean()
+    repeat, sessions = np.sum(left**2) / (2 * 4), 3 * np.var(table.mean(axis=0), ddof=1)
+    assert found.repeatability == pytest.approx(np.sqrt(repeat))
+    assert found.reproducibility == pytest.approx(np.sqrt((sessions - repeat) / 3))
+    assert found.gauge**2 + found.parts**2 == pytest.approx(np.var(line, ddof=1))
+    # Labels and what a damper's own level is change nothing.
+    turned = gauge_study(table[::-1, [3, 1, 0, 4, 2]] + [[7.0], [0.0], [-2.0]], line)
+    assert vars(turned) == pytest.approx(vars(found))
+    # One damper cannot tell repeats from sessions: all of it is counted as that of sessions.
+    alone = gauge_study(table[:1], line)
+    assert (alone.repeatability, alone.reproducibility) == (0.0, pytest.approx(np.std(table[0], ddof=1)))
+    assert gauge_study(table[:, :1], line) is None
 
 
 def test_gauge_study_finds_the_parts_of_the_variation():

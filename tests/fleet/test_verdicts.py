@@ -47,6 +47,20 @@ def test_without_golden_dampers_it_cannot_tell(planted):
     assert any("cannot tell" in d.text for d in told)
 
 
+def test_features_are_of_the_highest_speed_at_the_lowest_current_and_its_rise():
+    speeds, currents = (0.05, 0.3, 0.1), (0.5, 1.5, 0.0)
+    ladder = {}
+    for v in speeds:
+        for I in currents:
+            ladder[f"rebound_N_{v:g}m_s_{I:g}A"] = [1000 * v + 200 * I, 1.0]
+            ladder[f"compression_N_{v:g}m_s_{I:g}A"] = [-800 * v - 100 * I, -3.0]
+    found = with_features(pl.DataFrame(ladder))
+    assert found["force_off_N"].to_list() == pytest.approx([(300 + 240) / 2, 2.0])
+    assert found["force_rise_N"].to_list() == pytest.approx([(300 + 150) / 2, 0.0])
+    without = with_features(pl.DataFrame({"serial": ["a"]}))
+    assert without.select("force_off_N", "force_rise_N").row(0) == (None, None)
+
+
 def test_false_alarms_are_rare():
     alarms = 0
     for seed in range(20):

@@ -146,7 +146,7 @@ class RunScatter:
     def likeliest(cls, when: Sequence[RecordingTime], values: Floats) -> RunScatter:
         """Of greatest likelihood: the shares by halving steps from many starts, the scale in closed form."""
         size = len(values)
-        alike = cls(1.0, 0.0, 0.0, 1.0).covariance(when, when)
+        alike = cls(1.0, 0.0, 0.0, np.inf).covariance(when, when)
 
         def costs(points: Floats, near: Floats) -> tuple[Floats, Floats]:
             shares = np.exp(points)[:, :, None, None]

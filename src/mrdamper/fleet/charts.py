@@ -44,9 +44,9 @@ def individuals(values: Floats) -> tuple[ControlChart, ControlChart]:
     """Individuals and moving ranges of two [NIST 6.3.2.2]."""
     ranges = np.abs(np.diff(values))
     mean, spread = float(np.mean(values)), float(np.mean(ranges)) if ranges.size else 0.0
-    ones = np.ones(values.size)
-    first = ControlChart(values, (mean - 3 * spread / _D2) * ones, (mean + 3 * spread / _D2) * ones, mean)
-    return first, ControlChart(ranges, 0 * ranges, _D4 * spread * np.ones(ranges.size), spread)
+    lower, upper = (np.full(values.size, mean + side * spread / _D2) for side in (-3, 3))
+    first = ControlChart(values, lower, upper, mean)
+    return first, ControlChart(ranges, 0 * ranges, np.full(ranges.size, _D4 * spread), spread)
 
 
 def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, width: float = 3.0) -> ControlChart:
