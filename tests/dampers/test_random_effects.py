@@ -151,6 +151,21 @@ def test_one_parameter_scatters_as_the_mean_of_gains():
     assert scatter.covariance(Effects(offset=5.0, run_offset=5.0))[0][0, 0] == pytest.approx(0.0, abs=1e-20)
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+def test_shares_of_sessions_and_runs_are_those_of_their_gains_and_offsets(unit):
+    """One parameter that gains and offsets both move; the unit of the force drops out."""
+    force, slope = unit * FORCE, unit * (FORCE + 60.0)[:, None]
+    runs = runs_of(np.zeros(20), np.zeros(20), [f"day {i // 4}" for i in range(20)], noise=60.0)
+    for run in runs:
+        run.predicted, run.residual, run.scale = force, unit * run.residual, unit * run.scale
+    influence = slope.T / (slope.T @ slope) / 20
+    effects = Effects(gain=0.05, session_dof=4.0, run_offset=3.0 * unit, run_dof=19.0)
+    _, by_session, by_run = effects_of(runs, slope, influence).covariance(effects)
+    session = 5 * (0.05 * 4 * float(influence[0] @ force)) ** 2
+    run = 20 * (3.0 * unit * float(influence[0].sum())) ** 2
+    assert (by_session[0], by_run[0]) == pytest.approx((session / (session + run), run / (session + run)))
+
+
 def test_runs_far_off_pull_less_than_their_gain_would_say():
     """Beside small residuals runs are weighed by their distance: the common gain is nearly the median of theirs."""
     names = [f"day {i}" for i in range(40)]
@@ -177,6 +192,9 @@ def test_a_run_counts_by_its_relative_error_whatever_its_force():
     slopes = []
     for k, run in enumerate(runs):
         size = 10.0 ** (k % 3)
+        if k % 2:  # nor however long it is
+            run.predicted, run.residual = np.tile(run.predicted, 9), np.tile(run.residual, 9)
+            run.picked = np.arange(run.predicted.size)
         run.predicted, run.residual, run.scale = size * run.predicted, size * run.residual, size * run.scale
         slopes.append(run.predicted[:, None])
     scatter = GainsAndOffsets(runs, slopes, [s.T / (s.T @ s) / 20 for s in slopes])

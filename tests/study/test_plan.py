@@ -93,6 +93,69 @@ def test_what_no_run_could_tell_is_planned_for():
     assert made[-1].after < 0.2 * made[0].before
 
 
+FEW = [Condition(0.0, 1.0, 0.01), Condition(1.0, 0.5, 0.02)]
+
+
+def design(damper, about=None, **known):
+    return ExperimentDesign.of(replace(damper, uncertainty=replace(damper.uncertainty, **known)), LIMITS, FEW, about)
+
+
+def test_a_parameter_that_is_not_known_has_a_prior_and_one_that_is_its_covariance(damper):
+    known = estimate_uncertainty(joint_damper(), [run for run in session_runs(joint_damper()) if run.current_A == 0.5])
+    made = design(known)
+    size = len(known.uncertainty.names)
+    prior = np.linalg.inv(made.prior)
+    assert prior[:size, :size] == pytest.approx(known.uncertainty.covariance, rel=1e-6, abs=1e-12)
+    for i, name in enumerate(made.names[size:], size):
+        expected = 1.0 if known.fitted_parameters[name].log else 1 / made.goal[i, i]
+        assert prior[i, i] == pytest.approx(expected, rel=1e-6)
+    logs = {known.fitted_parameters[name].log for name in made.names[size:]}
+    assert logs == {True, False}
+    # The error of a parameter is relative: of its logarithm as it is, of one that is zero in its unit.
+    zero = replace(damper, model=replace(damper.model, f0=0.0))
+    for name, goal in (("vh", 1.0), ("f0", 1.0), ("c1", damper.model.c1**-2)):
+        made = design(zero, name)
+        i = made.names.index(name)
+        assert made.goal[i, i] == pytest.approx(goal)
+        assert np.count_nonzero(made.goal) == 1
+
+
+def test_errors_enter_a_design_by_their_squares(damper):
+    none = dict(gain=0.0, offset=0.0, run_gain=0.0, run_offset=0.0)
+    once, twice = (design(damper, force=force, **none) for force in (0.03, 0.06))
+    assert once.grams == pytest.approx(4 * twice.grams)
+    assert (once.beside, twice.beside) == pytest.approx((0.03**2, 0.06**2))
+    halves = [np.ptp(damper.predict(condition).force) / 2 for condition in FEW]
+    # A session is known to a ten thousandth and a thousandth of the force at best.
+    assert once.session == pytest.approx([1e8, (1e-3 / np.mean(np.divide(1, halves))) ** -2], rel=0.05)
+    gains, offsets = (design(damper, force=0.0, **none | {n: 0.2}) for n in ("gain", "offset"))
+    assert gains.session[0] == pytest.approx(0.2**-2)
+    assert offsets.beside == pytest.approx(0.2**2 * np.mean(np.divide(1, halves) ** 2), rel=0.05)
+    wide = design(damper, force=0.0, **none | {"gain": 0.4})
+    assert wide.beside == pytest.approx(4 * gains.beside)
+    assert 0.2**2 * 0.3 < gains.beside < 0.2**2 * 2  # of the mean square of the force over half its swing
+
+
+def test_a_plan_says_what_its_numbers_are(reckoning, damper):
+    played = [[3], [5, 7]]
+    made = reckoning.proposals(played)
+    today = np.sqrt(np.diag(np.linalg.inv(reckoning.prior)))
+    then = np.sqrt(np.diag(np.linalg.inv(reckoning.precision([[3], []])))) / today
+    best = reckoning.names[int(np.argmin(then))]
+    assert made[0].reason == f"{best} is then known to {100 * then.min():.0f} % of today's error"
+    assert then.min() < 1
+    before, after = reckoning.spread([]), reckoning.spread(played)
+    assert (made[0].before, made[-1].after) == (before, pytest.approx(after))
+    t = 164.4853627  # of a normal distribution, in per cent
+    whole = [t * np.sqrt(s**2 + reckoning.beside) for s in (before, after)]
+    text = reckoning.summary(made)
+    assert f"±{t * before:.1f} -> ±{t * after:.1f} % from the parameters" in text
+    assert f"±{whole[0]:.1f} -> ±{whole[1]:.1f} % with a future session and model error" in text
+    own = design(damper, "c1").proposals([[0], [1]])
+    shown = f"standard error of c1 {100 * own[0].before:.1f} -> {100 * own[-1].after:.1f} % of its value"
+    assert design(damper, "c1").summary(own) == shown
+
+
 def test_a_first_matrix_has_a_reason_for_every_row():
     made = first_matrix(LIMITS, 1.0)
     assert len({item.reason for item in made}) == len(made) > 8
