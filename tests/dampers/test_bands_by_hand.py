@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import norm
 from scipy.stats import t as students_t
 
 from mrdamper.dampers import bands
@@ -29,14 +28,15 @@ SLOPES = np.column_stack([MOTION.velocity, np.sign(MOTION.velocity + 1e-9)])
 COVARIANCE = np.array([[90.0, -4.0], [-4.0, 30.0]])
 AWAY = Distance(between=0.02, beyond=0.1, motion=0.5)
 GROWN = {  # by each way away from the tests
-    "force": 0.008**2 + 0.005**2 + 0.03**2,
-    "peak": 0.01**2 + 0.002**2 + 0.015**2,
-    "energy": 0.012**2 + 0.007**2 + 0.04**2,
+    "force": np.square([0.008, 0.005, 0.03]),
+    "peak": np.square([0.01, 0.002, 0.015]),
+    "energy": np.square([0.012, 0.007, 0.04]),
 }
+GROWN_DOF = (2.0, 1.0, 6.0)
 KNOWN = Uncertainty(
     ("c", "fy"), (False, False), COVARIANCE, np.array([12.0, 5.0]), gain=0.03, offset=4.0, session_dof=3.0,
     run_gain=0.012, run_offset=2.5, run_dof=8.0, force=0.02, peak=0.015, energy=0.05, left_out=9,
-    growth=Growth((0.4, 0.05, 0.06), (0.5, 0.02, 0.03), (0.6, 0.07, 0.08)),
+    growth=Growth((0.4, 0.05, 0.06), (0.5, 0.02, 0.03), (0.6, 0.07, 0.08), GROWN_DOF),
 )  # fmt: skip
 
 
@@ -71,8 +71,9 @@ def test_a_band_adds_numbers_sessions_and_form(level, shown):
     session, form = (0.03 * force) ** 2 + 16.0, (0.012 * force) ** 2 + 2.5**2 + 0.02**2 * half**2
     assert found.parameter == pytest.approx(np.sqrt(own))
     assert found.session == pytest.approx(np.sqrt(session))
-    assert found.model == pytest.approx(np.sqrt(form + GROWN["force"] * half**2))
-    away = {quantity: norm.ppf((1 + level) / 2) * np.sqrt(grown) for quantity, grown in GROWN.items()}
+    assert found.model == pytest.approx(np.sqrt(form + GROWN["force"].sum() * half**2))
+    quantiles = students_t.ppf((1 + level) / 2, GROWN_DOF)
+    away = {quantity: np.sqrt(quantiles**2 @ grown) for quantity, grown in GROWN.items()}
     whole = own + session + form
     t = reach(level, own.mean(), session.mean(), form.mean()) / np.sqrt(whole.mean())
     assert found.high - force == pytest.approx(np.hypot(t * np.sqrt(whole), away["force"] * half))
@@ -103,14 +104,14 @@ def test_a_calibrated_band_is_its_factor_times_the_band_at_the_tests():
     assert found.energy[1] == pytest.approx(2.5 * plain.energy[1])
     # The growth away from the tests is outside the calibration: it stays as it is.
     away = band(damper(replace(KNOWN, calibration=calibrated)), PREDICTION, 0.8)
-    grown = norm.ppf(0.9) ** 2 * GROWN["energy"]
+    grown = students_t.ppf(0.9, GROWN_DOF) ** 2 @ GROWN["energy"]
     assert away.energy[1] == pytest.approx(np.sqrt(found.energy[1] ** 2 + grown))
 
 
 def test_a_band_says_for_which_sessions_it_holds_and_how_far_it_is_calibrated():
     few = Calibration("session", 4, (1.0,), (1.0,), (1.0,), (0.9, 0.9, 0.9))
     future, like = "in a future test session", "for sessions like the tested ones (fewer than 3 known)"
-    beyond = ", calibrated to 80 % at most by 4 independent sessions and beyond by a normal distribution"
+    beyond = ", calibrated to 80 % at most by 4 independent sessions and beyond by Student's distribution"
     for dof, said in ((2.0, future), (0.0, like)):
         known = replace(KNOWN, session_dof=dof)
         assert scope(damper(known), 0.9) == said + ", not calibrated: no cross-validated runs"
@@ -151,6 +152,19 @@ def test_where_nothing_is_known_there_is_no_band_and_its_reason():
     assert band(damper(wild), PREDICTION).peak[0] == 0.0
 
 
+def test_beyond_the_reach_of_its_units_a_factor_has_their_degrees_of_freedom():
+    ones = (1.0,) * len(LEVELS)
+
+    def calibrated(units):
+        known = Calibration("run", units, ones, ones, ones, coverage=(0.9, 0.9, 0.9))
+        return band(damper(replace(KNOWN, calibration=known)), PREDICTION, 0.9)
+
+    plain = band(damper(), PREDICTION, 0.9)
+    assert calibrated(4).peak == plain.peak
+    assert calibrated(4).energy == plain.energy
+    assert calibrated(9).peak[1] < plain.peak[1]
+
+
 def test_a_portable_band_is_that_of_loops_at_three_currents(monkeypatch):
     asked, widths = [], {0.0: 30.0, 1.0: 60.0, 2.0: 130.0}
     made = damper()
@@ -176,7 +190,7 @@ def test_a_portable_band_is_that_of_loops_at_three_currents(monkeypatch):
         0.8, pytest.approx(np.hypot(0.03, 0.012) * t), pytest.approx(np.hypot(4, 2.5) * t),
     )  # fmt: skip
     assert portable.of_peak == pytest.approx(t * np.sqrt(0.02**2 + own))
-    away = norm.ppf(0.9) * np.sqrt(GROWN["force"])
+    away = np.sqrt(students_t.ppf(0.9, GROWN_DOF) ** 2 @ GROWN["force"])
     assert portable.of_peak_untested == pytest.approx(np.hypot(portable.of_peak, away))
     assert asked == [replace(CONDITION, current_A=I) for I in widths]
     slow = SimpleNamespace(**(vars(tested) | {"peak_velocity_m_s": (0.0, 0.05)}))  # slower than the middle of all

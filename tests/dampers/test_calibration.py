@@ -24,7 +24,7 @@ SWING = 100 * np.sin(2 * np.pi * TIME)
 
 
 def run(name, error=0.0, session=None, peak=1.0, energy=1.0):
-    return PredictedRun(name, session, SWING, SWING + error, peak, energy)
+    return PredictedRun(name, session, SWING, SWING + error, np.atleast_1d(peak), np.atleast_1d(energy))
 
 
 def scored(force, peak=1.0, energy=1.0):
@@ -56,21 +56,46 @@ def test_a_run_is_compared_inside_its_window_with_what_it_takes_out_of_the_motio
     assert found.predicted.size == np.sum(inside)  # some hundred samples are not thinned
     small = replace(found, predicted=1e-4 * found.predicted, measured=1e-4 * found.measured)
     assert small.gain_and_offset == pytest.approx((1.2, 3e-4))
-    parts = [found, replace(found, peak=1.4, energy=0.9), replace(found, peak=2.5, energy=2.0)]
+    parts = [found, *(replace(found, peak=np.array([p]), energy=np.array([e])) for p, e in ((1.4, 0.9), (2.5, 2.0)))]
     both = PredictedRun.joined("whole", parts)
-    assert (both.run_id, both.session, both.peak) == ("whole", "a", pytest.approx(5.1 / 3))
-    assert both.energy == pytest.approx((found.energy + 0.9 + 2.0) / 3)
+    assert (both.run_id, both.session) == ("whole", "a")
+    assert both.peak == pytest.approx([1.2, 1.4, 2.5])
+    assert both.energy == pytest.approx([*found.energy, 0.9, 2.0])
     assert both.predicted == pytest.approx(np.tile(found.predicted[::3], 3))
     assert both.measured == pytest.approx(np.tile(found.measured[::3], 3))
     still = replace(found, predicted=np.full(5, 7.0), measured=np.full(5, 9.0))
     assert still.gain_and_offset == pytest.approx((1.0, 2.0))  # a constant shows no gain
 
 
+def test_a_record_of_changing_current_is_compared_cycle_by_cycle():
+    """Errors of its currents cancel over the record; a prediction is asked for one of them."""
+    time = np.linspace(0.0, 40.0, 4001)
+    velocity = 2 * np.pi * np.cos(2 * np.pi * time)
+    current = np.where(time < 20, 0.0, 1.0)
+    force = 50 * velocity
+    measured = np.where(time < 20, 0.9, 1.1) * force
+    record = Run("r", time, np.sin(2 * np.pi * time), measured, current)
+    found = PredictedRun.of(record, force, velocity)
+    assert found.peak.size == found.energy.size == 40
+    for ratios in (found.peak, found.energy):
+        assert np.median(np.abs(ratios - 1)) == pytest.approx(0.1)
+        assert ratios.mean() == pytest.approx(1.0, abs=0.01)
+    alone = PredictedRun.of(replace(record, current=np.zeros(time.size)), force, velocity)
+    assert alone.energy == pytest.approx([1.0], abs=0.01)
+    error = model_error([found])
+    assert (error.peak, error.energy) == pytest.approx((0.1, 0.1), rel=0.05)
+    # At rest in one half: cycles that do not move have no loop.
+    still = np.where(time < 20, 0.0, np.sin(2 * np.pi * time))
+    half = PredictedRun.of(replace(record, displacement=still), force, velocity)
+    assert 18 <= half.peak.size <= 30
+    assert half.peak == pytest.approx(1.1, abs=0.1)
+
+
 def test_the_model_error_is_what_gain_and_offset_leave():
     beyond = 4 * np.cos(2 * np.pi * TIME)
     gains, offsets = (0.9, 1.1, 1.1), (-6.0, 6.0, 6.0)
     runs = [
-        replace(run(str(i)), measured=g * SWING + o + beyond, peak=1.05 * g, energy=0.9 * g)
+        replace(run(str(i)), measured=g * SWING + o + beyond, peak=np.array([1.05 * g]), energy=np.array([0.9 * g]))
         for i, (g, o) in enumerate(zip(gains, offsets, strict=True))
     ]
     found = model_error(runs)
@@ -83,7 +108,7 @@ def test_the_model_error_is_what_gain_and_offset_leave():
 def test_the_model_error_is_the_mean_square_over_samples_and_runs_of_uneven_errors():
     rng = np.random.default_rng(6)
     runs = [
-        replace(run(str(i), size * rng.exponential(1.0, TIME.size)), peak=1 + size / 50, energy=1 - size / 30)
+        run(str(i), size * rng.exponential(1.0, TIME.size), peak=1 + size / 50, energy=1 - size / 30)
         for i, size in enumerate((1.0, 2.0, 30.0, 3.0))
     ]
     squares, gains = [], []
@@ -94,12 +119,13 @@ def test_the_model_error_is_the_mean_square_over_samples_and_runs_of_uneven_erro
     found = model_error(runs)
     assert found.force == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-3)
     for name in ("peak", "energy"):
-        over = np.array([getattr(each, name) for each in runs]) / gains - 1
+        over = np.concatenate([getattr(each, name) for each in runs]) / gains - 1
         assert getattr(found, name) == pytest.approx(np.sqrt(np.mean(over**2)))
     # An energy that cannot be compared, or a gain that is none, takes no part.
-    lost = [*runs, replace(runs[0], energy=np.inf), replace(runs[0], measured=-runs[0].predicted, peak=9.0)]
+    infinite, nine = np.array([np.inf]), np.array([9.0])
+    lost = [*runs, replace(runs[0], energy=infinite), replace(runs[0], measured=-runs[0].predicted, peak=nine)]
     assert model_error(lost).energy == pytest.approx(model_error([*runs]).energy)
-    assert model_error([*runs, replace(runs[0], measured=-SWING, peak=9.0)]).peak == pytest.approx(found.peak)
+    assert model_error([*runs, replace(runs[0], measured=-SWING, peak=nine)]).peak == pytest.approx(found.peak)
 
 
 def test_peaks_are_calibrated_as_split_conformal_prediction():
@@ -132,6 +158,12 @@ def test_samples_of_a_true_error_model_need_its_own_factor(size):
     assert found.force == pytest.approx([size] * len(found.force), rel=0.05)
     assert found.coverage[0] == pytest.approx(0.9, abs=0.01)
     assert found.peak == (0.0,) * len(found.peak)
+
+
+def test_peaks_of_many_loops_are_pooled_as_samples_are():
+    rng = np.random.default_rng(5)
+    found = calibrated([scored(1.0, peak=np.abs(rng.standard_normal(400))) for _ in range(4)])
+    assert found.peak == pytest.approx([1.0] * len(found.peak), rel=0.1)
 
 
 def test_what_a_unit_is_called_and_how_long_a_run_is_changes_nothing():
@@ -187,13 +219,13 @@ def test_coverage_of_few_units_is_at_the_level_that_the_others_reach():
 
 
 def test_errors_are_over_their_standard_deviations():
-    at = replace(run("r", error=np.where(TIME < 0.5, 6.0, -3.0), peak=0.9, energy=1.3), session="a")
+    at = run("r", error=np.where(TIME < 0.5, 6.0, -3.0), session="a", peak=0.9, energy=1.3)
     found = StandardizedErrors.of(at, np.full(TIME.size, 2.0), 0.05, 0.1)
     assert found.force == pytest.approx(np.where(TIME < 0.5, 3.0, 1.5))
     assert (found.peak, found.energy) == (pytest.approx([2.0]), pytest.approx([3.0]))
     exact = StandardizedErrors.of(run("r"), np.zeros(TIME.size), 0.0, 0.0)
     assert not np.any([*exact.force, *exact.peak, *exact.energy])
-    assert np.isinf(StandardizedErrors.of(replace(run("r"), energy=np.inf), np.ones(TIME.size), 1.0, 1.0).energy).all()
+    assert np.isinf(StandardizedErrors.of(run("r", energy=np.inf), np.ones(TIME.size), 1.0, 1.0).energy).all()
 
 
 @pytest.mark.parametrize(("gain", "offset"), [(0.0, 0.0), (0.05, 7.0)])
@@ -215,7 +247,10 @@ def test_errors_grow_with_the_distance_from_the_tests_as_they_were_made(gain, of
     assert found.variance("peak", ways[2]) == pytest.approx((0.4 * beside_typical(PEAK)[1]) ** 2)
     unshown = Growth.of(runs[:1], at_tests)
     assert unshown.force == unshown.peak == unshown.energy == tuple(TYPICAL)
-    assert Growth.of(runs[:2], at_tests).peak == pytest.approx((beside_typical(PEAK)[0], *TYPICAL[1:]))
+    assert (found.dof, unshown.dof) == ((2.0, 2.0, 2.0), (1.0, 1.0, 1.0))
+    one = Growth.of(runs[:2], at_tests)
+    assert one.peak == pytest.approx((beside_typical(PEAK)[0], *TYPICAL[1:]))
+    assert one.dof == (2.0, 1.0, 1.0)
     far = Growth.of([replace(run("r", peak=1e4), distance=ways[2])], at_tests)  # beyond ten it is no longer told apart
     assert far.peak[1] == pytest.approx(np.sqrt((10.0**2 + TYPICAL[1] ** 2) / 2))
     # An energy that cannot be compared is wrong by all of it.
@@ -225,7 +260,18 @@ def test_errors_grow_with_the_distance_from_the_tests_as_they_were_made(gain, of
     assert none.force == none.energy == pytest.approx(beside_typical(0.0))
 
 
-TYPICAL = np.array([0.25, 0.12, 0.1])
+def test_the_scatter_at_the_tests_is_no_growth():
+    """Errors away from the tests as at them: their mean square in excess of these is nothing."""
+    at_tests = ModelError(force=0.02, peak=0.02, energy=0.02, gain=0.0, offset=0.0)
+    errors = 0.02 * np.sqrt(2) * np.array([1.0, 0.0, 1.0, 0.0])
+    way = Distance(0.0, 0.0, 0.5)
+    runs = [replace(run("r", e * np.ptp(SWING) / 2, peak=1 + e, energy=1 - e), distance=way) for e in errors]
+    found = Growth.of(runs, at_tests)
+    for quantity in ("force", "peak", "energy"):
+        assert getattr(found, quantity) == pytest.approx((*TYPICAL[:2], TYPICAL[2] / np.sqrt(2)))
+
+
+TYPICAL = np.array([0.065, 0.031, 0.026])
 
 
 def beside_typical(growth):
@@ -241,6 +287,6 @@ def test_the_scatter_between_sessions_is_that_of_their_means():
         replace(run("r", session=name), measured=g * SWING + 10 * (g - 1)) for name, each in gains.items() for g in each
     ]
     gain, offset = scatter_between_sessions(runs)
-    assert gain == pytest.approx(np.sqrt((0.04**2 + 0.06**2 + 0.0) / 3))
+    assert gain == pytest.approx(np.sqrt((0.04**2 + 0.06**2 + 0.0) / 3 * 2 / 3))
     assert offset == pytest.approx(10 * gain)
     assert scatter_between_sessions(runs[::-1]) == pytest.approx((gain, offset))

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.dampers.calibration import QUANTITIES, Growth, Quantity
+from mrdamper.dampers.calibration import Growth, Quantity
 from mrdamper.dampers.prediction import Prediction
 from mrdamper.dampers.protocols import DamperLike as Damper
 from mrdamper.dampers.sessions import SessionCorrection
@@ -92,9 +91,8 @@ def band(
     parameter = np.einsum("np,pq,nq->n", slopes, uncertainty.covariance, slopes)
     session = (uncertainty.gain * force) ** 2 + uncertainty.offset**2
     model = (uncertainty.run_gain * force) ** 2 + uncertainty.run_offset**2 + (uncertainty.force * half) ** 2
-    grown = {quantity: uncertainty.growth.variance(quantity, distance) for quantity in QUANTITIES}
     own = relative_variances(slopes, uncertainty.covariance, force, motion.velocity, motion.time)
-    dofs = _degrees_of_freedom(uncertainty)
+    dofs = _degrees_of_freedom(uncertainty, level)
     of_run, of_session = uncertainty.run_gain**2, uncertainty.gain**2
 
     def reach(quantity: Quantity, parts: Sequence[float]) -> float:
@@ -106,7 +104,8 @@ def band(
         return factor * student(level, dof) * float(np.sqrt(whole))
 
     def with_growth(at_tests: Any, quantity: Quantity) -> Any:
-        return np.sqrt(at_tests**2 + _normal(level) ** 2 * grown[quantity])  # calibration is at tests: not of growth
+        # Calibration is at the tests: not of growth.
+        return np.sqrt(at_tests**2 + uncertainty.growth.half_width(quantity, distance, level) ** 2)
 
     variance = parameter + session + model
     t = reach("force", [float(np.mean(v)) for v in (parameter, session, model)]) / (np.sqrt(np.mean(variance)) or 1.0)
@@ -116,22 +115,18 @@ def band(
         for between in (of_session, 0.0)
     )
     loss = float(with_growth(reach("energy", [own[2], of_session, of_run + uncertainty.energy**2]), "energy"))
-    model = model + grown["force"] * half**2
+    model = model + uncertainty.growth.variance("force", distance) * half**2
     return Band(
         force - width, force + width, np.sqrt(parameter), np.sqrt(session), np.sqrt(model),
         (max(half - future, 0.0), half + future), (-loss, loss), (max(half - known_session, 0.0), half + known_session),
     )  # fmt: skip
 
 
-def _normal(level: float) -> float:
-    """Quantile of a normal distribution of the error's growth with the distance from the tests."""
-    return NormalDist().inv_cdf((1 + level) / 2)
-
-
-def _degrees_of_freedom(uncertainty: Uncertainty) -> tuple[float, float, float]:
-    """Behind the variances of parameters, sessions and the rest; calibration counts the runs of the last by itself."""
+def _degrees_of_freedom(uncertainty: Uncertainty, level: float) -> tuple[float, float, float]:
+    """Behind the variances of parameters, sessions and the rest, which calibration counts itself within its reach."""
     worst = float(np.min(uncertainty.dof)) if uncertainty.names else 1.0
-    runs = np.inf if uncertainty.calibration else max(uncertainty.run_dof, 1.0)
+    calibration = uncertainty.calibration
+    runs = np.inf if calibration and level <= calibration.reachable else max(uncertainty.run_dof, 1.0)
     return worst, max(uncertainty.session_dof, 1.0), float(runs)
 
 
@@ -151,7 +146,7 @@ def scope(damper: Damper, level: float) -> str:
     if level > calibration.reachable:
         text += (
             f", calibrated to {100 * calibration.reachable:.0f} % at most by {calibration.units} independent "
-            f"{calibration.unit}s and beyond by a normal distribution"
+            f"{calibration.unit}s and beyond by Student's distribution"
         )
     return text
 
@@ -224,9 +219,10 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
         own.append(np.mean(interval.parameter**2) / peak_force(prediction.force) ** 2)
         quantile.append(np.mean(interval.high - prediction.force) / (np.mean(parts) or 1.0))
     t = float(np.mean(quantile))
-    grown = [uncertainty.growth.variance("force", tested.distance(c, np.array([c.current_A]))) for c in tested.farthest]
+    away = [tested.distance(c, np.array([c.current_A])) for c in tested.farthest]
+    grown = max((uncertainty.growth.half_width("force", distance, level) for distance in away), default=0.0)
     of_peak = t * float(np.sqrt(uncertainty.force**2 + np.mean(own)))
-    untested = float(np.hypot(of_peak, _normal(level) * np.sqrt(max(grown, default=0.0))))
+    untested = float(np.hypot(of_peak, grown))
     return PortableBand(
         level, t * uncertainty.total_gain, t * uncertainty.total_offset, of_peak, untested, scope(damper, level)
     )

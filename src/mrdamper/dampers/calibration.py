@@ -16,11 +16,14 @@ from statistics import NormalDist
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.dampers.distance import AT_TESTS, Distance
 from mrdamper.data.arrays import Floats
 from mrdamper.data.runs import Run
 from mrdamper.data.sessions import session_of
+from mrdamper.identification.intervals import student
+from mrdamper.physics.motion.sines import equivalent_sine
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 
 Quantity = Literal["force", "peak", "energy"]
@@ -31,9 +34,11 @@ _MAX_SAMPLES = 400  # of a run
 _ENOUGH_UNITS = 9  # independent units that reach a level of 90 %
 _MAX_FACTOR = 1e3  # standard deviations; an error beyond is no longer told apart
 _MAX_GROWTH = 10.0  # relative error per unit of distance; one beyond is no longer told apart
-# Growth by each distance that is typical of dampers of known truth (`benchmarks.synthetic_choice`): alone where
-# no fold is so far from its tests (one motion, two currents, random records alone), and beside the folds that are
-_TYPICAL_GROWTH = (0.25, 0.12, 0.1)
+# Growth by each distance that is typical of dampers of known truth (`benchmarks.synthetic_choice`), and the degrees of
+# freedom of its variance, so few because dampers differ: alone where no fold is so far from its tests (one motion, two
+# currents, random records alone), and beside the folds that are, which count as much
+_TYPICAL_GROWTH, _TYPICAL_DOF = (0.065, 0.031, 0.026), 1.0
+_NORMAL_DOF = 1e9  # of a normal distribution
 _SHOWN = (0.01, 0.05, 0.1)  # distances of a fold from its tests from which it shows growth
 _NORMAL_MEDIAN = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 
@@ -49,10 +54,8 @@ class PredictedRun:
         None where it is not known.
     predicted, measured : (N,) arrays
         At most some hundred samples [N].
-    peak : float
-        Measured over predicted peak-to-peak force.
-    energy : float
-        Measured over predicted dissipated energy.
+    peak, energy : (L,) arrays
+        Measured over predicted peak-to-peak force, and dissipated energy, of each loop (`_loops`).
     distance : Distance
         From the runs that the model was identified from.
     """
@@ -61,24 +64,30 @@ class PredictedRun:
     session: str | None
     predicted: Floats
     measured: Floats
-    peak: float
-    energy: float
+    peak: Floats
+    energy: Floats
     distance: Distance = AT_TESTS
 
     @classmethod
     def of(cls, run: Run, predicted: Floats, velocity: Floats, distance: Distance = AT_TESTS) -> PredictedRun:
         """From the prediction (N,) [N] along the whole run; raises E_CLOCK as `session_of`."""
         at = np.flatnonzero(run.in_window)
-        measured, force, time, v = run.force[at], predicted[at], run.time[at], velocity[at]
-        power = dissipated_power(force, v, time)
+        loops = _loops(run, at)
+        peaks, powers = (
+            np.array([[value(of[loop], loop) for loop in loops] for of in (run.force, predicted)])
+            for value in (
+                lambda force, _: peak_force(force),
+                lambda force, loop: dissipated_power(force, velocity[loop], run.time[loop]),
+            )
+        )
         step = max(1, at.size // _MAX_SAMPLES)
         return cls(
             run.id,
             session_of(run),
-            force[::step],
-            measured[::step],
-            peak_force(measured) / max(peak_force(force), 1e-300),
-            dissipated_power(measured, v, time) / power if power else np.inf,
+            predicted[at[::step]],
+            run.force[at[::step]],
+            peaks[0] / np.maximum(peaks[1], 1e-300),
+            np.divide(powers[0], powers[1], out=np.full(len(loops), np.inf), where=powers[1] != 0),
             distance,
         )
 
@@ -91,8 +100,8 @@ class PredictedRun:
             parts[0].session,
             np.concatenate([part.predicted[thin] for part in parts]),
             np.concatenate([part.measured[thin] for part in parts]),
-            float(np.mean([part.peak for part in parts])),
-            float(np.mean([part.energy for part in parts])),
+            np.concatenate([part.peak for part in parts]),
+            np.concatenate([part.energy for part in parts]),
             parts[0].distance,
         )
 
@@ -108,6 +117,22 @@ class PredictedRun:
         square = float(swing @ swing)
         gain = float(swing @ self.measured) / square if square > 0 else 1.0
         return gain, float(self.measured.mean()) - gain * float(self.predicted.mean())
+
+
+def _loops(run: Run, at: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Return the samples of each loop whose peak and energy are compared: the window `at` of a sine at one current.
+
+    A record of another motion, or of changing current, is cut into cycles of its mean frequency: over all of it the
+    errors at its motions and currents cancel, and a prediction is asked for one of them. Cycles of less than half its
+    mean amplitude have no loop.
+    """
+    sine = equivalent_sine(run)
+    count = int(np.ptp(run.time[at]) * sine.condition.frequency_Hz)
+    if count < 2 or (sine.is_sine and not run.current_changes):
+        return [at]
+    cycles = np.array_split(at, count)
+    moved = [np.ptp(run.displacement[cycle]) for cycle in cycles]
+    return [cycle for cycle, swing in zip(cycles, moved, strict=True) if swing >= sine.condition.amplitude_m] or [at]
 
 
 @dataclass(frozen=True)
@@ -148,9 +173,9 @@ def model_error(runs: Sequence[PredictedRun]) -> ModelError:
             peaks.append(run.peak / gain - 1)
             energies.append(run.energy / gain - 1)
 
-    def root(values: Sequence[float]) -> float:
-        finite = [v for v in values if np.isfinite(v)]
-        return float(np.sqrt(np.mean(np.square(finite)))) if finite else 0.0
+    def root(errors: Sequence[Floats]) -> float:
+        finite = [own for e in errors if (own := e[np.isfinite(e)]).size]
+        return float(np.sqrt(np.mean([np.mean(e**2) for e in finite]))) if finite else 0.0
 
     def spread(values: Sequence[float]) -> float:
         return _NORMAL_MEDIAN * float(np.median(np.abs(values)))
@@ -159,7 +184,9 @@ def model_error(runs: Sequence[PredictedRun]) -> ModelError:
 
 
 def scatter_between_sessions(runs: Sequence[PredictedRun]) -> tuple[float, float]:
-    """Root mean square of the mean gain, less one, and of the mean offset [N] of each session.
+    """Estimate the standard deviations of the gain and of the offset [N] between sessions.
+
+    The mean of a session, predicted by the mean of the S - 1 others, is off by S / (S - 1) of the variance.
 
     Parameters
     ----------
@@ -170,7 +197,7 @@ def scatter_between_sessions(runs: Sequence[PredictedRun]) -> tuple[float, float
     for run in runs:
         own.setdefault(run.session, []).append(run.gain_and_offset)
     means = np.array([np.mean(values, axis=0) for values in own.values()]) - [1.0, 0.0]
-    gain, offset = np.sqrt(np.mean(means**2, axis=0)).tolist()
+    gain, offset = np.sqrt((1 - 1 / len(means)) * np.mean(means**2, axis=0)).tolist()
     return gain, offset
 
 
@@ -183,6 +210,8 @@ class Growth:
     force, peak, energy : (float, float, float)
         Per unit of `Distance.between`, `beyond` and `motion`: of the force over half its peak-to-peak value, of the
         peak force and of the dissipated energy, relative.
+    dof : (float, float, float)
+        Degrees of freedom behind their squares, by distance.
     """
 
     __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}
@@ -190,6 +219,12 @@ class Growth:
     force: tuple[float, float, float] = (0.0, 0.0, 0.0)
     peak: tuple[float, float, float] = (0.0, 0.0, 0.0)
     energy: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    dof: tuple[float, float, float] = (_NORMAL_DOF, _NORMAL_DOF, _NORMAL_DOF)
+
+    def half_width(self, quantity: Quantity, distance: Distance, level: float) -> float:
+        """Half the relative interval that a distance alone gives."""
+        quantiles = [student(level, dof) for dof in self.dof]
+        return float(np.sqrt(np.square(np.multiply(getattr(self, quantity), quantiles)) @ distance.squares))
 
     def variance(self, quantity: Quantity, distance: Distance) -> float:
         """Relative variance that a distance adds."""
@@ -199,8 +234,9 @@ class Growth:
     def of(cls, runs: Sequence[PredictedRun], at_tests: ModelError) -> Growth:
         """Least squares of the squared errors in excess of those at the tests, by the squared distances.
 
-        The fastest motions, or the highest current, are one observation, and a lucky one would leave no growth: the
-        typical growth is a second one. A distance that no run has gets the typical growth alone.
+        The fastest motions, or the highest current, are one fold, and a lucky one would leave no growth. The variance
+        of the typical growth has as many degrees of freedom and is pooled with theirs [moderated variances: Smyth 2004,
+        Stat. Appl. Genet. Mol. Biol. 3, 3]; a distance that no run has gets the typical growth alone.
 
         Parameters
         ----------
@@ -212,23 +248,25 @@ class Growth:
 
         away = [run for run in runs if run.distance.squares.any()]
         if not away:
-            return cls(*(_TYPICAL_GROWTH for _ in QUANTITIES))
+            dof = (_TYPICAL_DOF, _TYPICAL_DOF, _TYPICAL_DOF)
+            return cls(_TYPICAL_GROWTH, _TYPICAL_GROWTH, _TYPICAL_GROWTH, dof)
         table = np.array([run.distance.squares for run in away])
         size = np.sqrt(np.mean(table**2, axis=0))
         size[size == 0] = 1.0
         shown = table.max(axis=0) > np.square(_SHOWN)
         excess = np.array([_squared_errors(run) - _expected(run, at_tests) for run in away])
-        slopes = np.array([nnls(table / size, np.maximum(column, 0.0))[0] / size for column in excess.T])
+        slopes = np.array([nnls(table / size, column)[0] / size for column in excess.T])
         typical = np.square(_TYPICAL_GROWTH)
         growth = np.sqrt(np.where(shown, (np.minimum(slopes, _MAX_GROWTH**2) + typical) / 2, typical))
-        return cls(*(tuple(values) for values in growth.tolist()))
+        dof = _TYPICAL_DOF * (1 + shown)
+        return cls(*(tuple(values) for values in [*growth.tolist(), dof.tolist()]))
 
 
 def _squared_errors(run: PredictedRun) -> Floats:
     """(3,) squared relative errors of the force, the peak and the energy; what is not finite counts as one."""
     force = float(np.mean((run.measured - run.predicted) ** 2)) / run.half**2
-    errors = np.square([np.sqrt(force), run.peak - 1, run.energy - 1])
-    return np.where(np.isfinite(errors), errors, 1.0)
+    of_loops = [np.mean(np.where(np.isfinite(ratio), (ratio - 1) ** 2, 1.0)) for ratio in (run.peak, run.energy)]
+    return np.array([force if np.isfinite(force) else 1.0, *of_loops])
 
 
 def _expected(run: PredictedRun, at_tests: ModelError) -> Floats:
@@ -341,12 +379,15 @@ def _factors(units: Sequence[Sequence[StandardizedErrors]], quantity: Quantity) 
 
 
 def _quantile(units: Sequence[Sequence[StandardizedErrors]], quantity: Quantity, level: float) -> float:
-    """Quantile of the scores with equal weight of units; for one value a run, with room for a unit to come."""
+    """Quantile of the scores with equal weight of units; where runs have one value each, with room for a unit to come.
+
+    Samples, and peaks and energies of the loops of long records, are pooled.
+    """
     scores = [getattr(scored, quantity) for unit in units for scored in unit]
     weights = [np.full(getattr(s, quantity).size, 1 / getattr(s, quantity).size / len(u)) for u in units for s in u]
     values, weight = np.concatenate(scores), np.concatenate(weights)
     order = np.argsort(values)
-    wanted = level * (len(units) + (quantity != "force"))
+    wanted = level * (len(units) + (quantity != "force" and any(s.size == 1 for s in scores)))
     at = int(np.searchsorted(np.cumsum(weight[order]), wanted * (1 - 1e-12)))
     return float(values[order[min(at, values.size - 1)]])
 

@@ -229,8 +229,8 @@ def _inside(part: RunResiduals) -> PredictedRun:
     """Return a run beside the force of the fit that saw it."""
     at, motion = part.picked, part.prediction.motion
     powers = [dissipated_power(f, motion.velocity[at], motion.time[at]) for f in (part.measured, part.predicted)]
-    peak = peak_force(part.measured) / max(peak_force(part.predicted), 1e-300)
-    energy = powers[0] / powers[1] if powers[1] else np.inf
+    peak = np.array([peak_force(part.measured) / max(peak_force(part.predicted), 1e-300)])
+    energy = np.array([powers[0] / powers[1] if powers[1] else np.inf])
     return PredictedRun(part.run.id, part.session, part.predicted, part.measured, peak, energy)
 
 
@@ -260,23 +260,25 @@ def _with_model_error(
         return uncertainty
     if other_sessions and uncertainty.of_sessions:
         gain, offset = scatter_between_sessions(other_sessions)
-        uncertainty = replace(uncertainty, gain=max(uncertainty.gain, gain), offset=max(uncertainty.offset, offset))
+        uncertainty = replace(uncertainty, gain=gain, offset=offset)
+    # A fold that saw other runs of a session has taken part of its gain up: the scatter about the mean is left.
+    left = 1 - 1 / max(len({part.session for part in parts}), 1)
+    of_sessions = {"gain": left * uncertainty.gain**2, "offset": left * uncertainty.offset**2}
     uncertainty = replace(
         uncertainty,
         left_out=len(cross_validated),
-        run_gain=float(np.sqrt(max(error.gain**2 - uncertainty.gain**2, 0.0))),
-        run_offset=float(np.sqrt(max(error.offset**2 - uncertainty.offset**2, 0.0))),
+        run_gain=float(np.sqrt(max(error.gain**2 - of_sessions["gain"], 0.0))),
+        run_offset=float(np.sqrt(max(error.offset**2 - of_sessions["offset"], 0.0))),
         run_dof=max(len(cross_validated) - 1.0, 1.0),
         growth=Growth.of([*cross_validated, *away], error),
     )
     usual = np.median(list(own.values()), axis=0)
+    gain, offset = (getattr(uncertainty, f"run_{name}") ** 2 + of_sessions[name] for name in ("gain", "offset"))
     scores = []
     for run in cross_validated:
         shares = zip(QUANTITIES, own.get(run.run_id, usual), strict=True)
-        # A fold that saw other runs of the session has taken part of its gain up: the scatter that is left counts.
-        gain = error.gain**2
         grown = {q: share + uncertainty.growth.variance(q, run.distance) for q, share in shares}
-        force = gain * run.predicted**2 + error.offset**2 + (grown["force"] + uncertainty.force**2) * run.half**2
+        force = gain * run.predicted**2 + offset + (grown["force"] + uncertainty.force**2) * run.half**2
         peak, energy = (np.sqrt(grown[q] + gain + getattr(uncertainty, q) ** 2) for q in ("peak", "energy"))
         scores.append(StandardizedErrors.of(run, np.sqrt(force), float(peak), float(energy)))
     return replace(uncertainty, calibration=Calibration.of(cross_validated, scores))
