@@ -140,6 +140,7 @@ EXPLAINED = (
     Explained("identification.intervals", "(i, j): float(covariance", "items", _ALIKE),
     Explained("identification.loop_analysis", "t = motion.time", "", "a constant beside a column of ones"),
     Explained("identification.loop_analysis", "scale[scale == 0]", "", _SCALE),
+    Explained("systems.controllers.clipped_optimal", "1e-15 * np.eye(n)", "Add → Sub", _GUARD),
     Explained("systems.measures", "-step / _WINDOW", "Div → Mult", "the window is of one second"),
     Explained("rig_files.quality.loop", "fit_harmonics(", "7 → 8", _BUDGET),
 )

@@ -62,7 +62,7 @@ ROOMS = (
     _room("study.plan", "study/test_plan.py"),
     _room(
         "systems.controllers.hooks systems.controllers.add systems.controllers.clipped_optimal systems.inverse",
-        "systems/test_control.py systems/test_loop.py",
+        "systems/test_laws_by_hand.py systems/test_control.py systems/test_loop.py",
     ),
     _room("systems.measures", "systems/test_measures.py"),
     _room("systems.monte_carlo", "systems/test_uncertainty.py"),
