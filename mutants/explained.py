@@ -25,6 +25,7 @@ _SCALE = "a factor that drops out"
 EXPLAINED = (
     Explained("paper.", "% 360", "", "an angle that is more by whole turns, or by half turns twice, is the same"),
     Explained("paper.", "< 5", "5 → 6", _BUDGET),
+    Explained("paper.output", '"nrmse_pp": None', "", _ORDER),
     Explained("paper.", "keys = [", "items", _ORDER),
     Explained("paper.", "sorted(set(keys))", "sorted backwards", _ORDER),
     Explained("paper.", "order.size // 60", "", _BUDGET),

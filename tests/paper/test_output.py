@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition
 from mrdamper.errors import ExcitationError
 from mrdamper.models.bingham import Bingham
@@ -13,7 +14,7 @@ from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper import output
 from mrdamper.paper.claims import Claim
 from mrdamper.paper.figures import Entry
-from mrdamper.paper.options import CONSISTENT, LITERAL, PaperOptions
+from mrdamper.paper.options import ALI, CONSISTENT, DIRECT, LITERAL, TRADITIONAL, PaperOptions
 from mrdamper.paper.output import all_tables, method_rows
 from mrdamper.paper.results import GeneticCheck, GeneticEnd
 from mrdamper.paper.sensitivity import OneAtATime, Sobol
@@ -93,6 +94,57 @@ def test_table_4_holds_every_run_of_every_method_under_its_own_name():
     assert absent["parameters"] == "there is no validation run"
     assert not set(absent) & set(made)
     assert made["methods"] == method_rows(study())
+
+
+def test_table_4_of_the_paper_holds_relative_errors_by_current_in_the_papers_order():
+    titles = (ALI, DIRECT, "joint", TRADITIONAL, LITERAL)
+    ways = [contender(title, "paper", 0.1 * k, 1.0) for k, title in enumerate(titles, 1)]
+    ways[1].validation = Validation(DIRECT, ())
+    rows = output._TABLES["table4"](study(contenders=ways))
+    assert [row["method"] for row in rows] == [LITERAL, TRADITIONAL, ALI]
+    for row, start in zip(rows, (0.5, 0.4, 0.1), strict=True):
+        errors = [start + more + 0.05 for more in (0.0, 0.2, 0.5)]
+        assert [row[f"{current}.00 A"] for current in range(3)] == pytest.approx(errors)
+        assert row["mean"] == pytest.approx(np.mean(errors))
+
+
+def test_tables_1_and_2_hold_what_was_identified_at_their_amplitude_by_frequency_and_current():
+    model = BoucWen(c=1e3, alpha=4e5, beta=6e6, gamma=6e6)
+    at = [(0.03, 2.0, 0.0), (0.03, 1.0, 1.0), (0.03, 1.0, 0.0), (0.06, 1.0, 0.0), (0.03, 3.0, 0.0)]
+    conditions = [Condition(I, f, a) for a, f, I in at]
+    train = tuple(SimpleNamespace(id=f"t{i}") for i in range(5))
+    one = contender(LITERAL, "paper", 0.1, 6.0)
+    one.identifications = tuple(  # the last was not identified
+        SimpleNamespace(run_id=f"t{i}", condition=c, model=model, evaluations=e, free=("c", "m"))
+        for i, (c, e) in enumerate(zip(conditions[:4], (10, 20, 90, 30), strict=True))
+    )
+    readings = tuple(SimpleNamespace(amplitude=100.0 + i, phase=0.1 * i) for i in range(5))
+    made = study(contenders=(one,), train=train, conditions=tuple(conditions), readings=readings)
+    made.amplitude_group = lambda place: [t for t, c in zip(train, conditions, strict=True)
+                                          if c.amplitude_m == sorted({0.03, 0.06})[place]]  # fmt: skip
+    found = {f"table{n}": output._TABLES[f"table{n}"](made) for n in (1, 2, 5)}
+    assert [row["run_id"] for row in found["table1"]] == ["t2", "t1", "t0"]
+    assert [row["run_id"] for row in found["table2"]] == ["t3"]
+    first = found["table1"][0]
+    assert (first["F0 [N]"], first["phi [rad]"], first["c [N s/m]"]) == (102.0, 0.2, 1e3)
+    assert (first["frequency_Hz"], first["amplitude_m"], first["current_A"]) == (1.0, 0.03, 0.0)
+    assert method_rows(made)[0]["forces_a_run"] == 25.0  # the median
+    assert found["table5"][0]["identified_per_run"] == 2
+    assert {row["what"]: row["seconds_a_run"] for row in output.time_rows(made)}[LITERAL] == 1.5
+
+
+def test_table_5_of_the_paper_counts_what_is_searched_among_what_is_identified():
+    first, *others = tables()[0]["table5"]
+    assert (first["searched_per_run"], first["identified_per_run"]) == (2, None)
+    based = [row for row in others if row["data_needed"].startswith("sines")]
+    assert 0 < len(based) < len(others)
+    for row in others:
+        if row in based:
+            assert 0 <= row["searched_per_run"] < row["identified_per_run"]
+        else:
+            assert row["searched_per_run"] is row["identified_per_run"] is None
+        assert " " in row["limits"]
+    assert {row["model"] for row in others} == {cls.heading for cls in all_published().values()}
 
 
 def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
@@ -210,6 +262,8 @@ def test_parameters_at_the_held_out_condition_are_listed_way_by_way(monkeypatch)
     held = (SimpleNamespace(id="h0"),)
     rows = output.parameter_rows(study(contenders=ways, held_out=held, options=PaperOptions(A=2.0), there=there))
     told = [(r["method"], r["values"], r["run_id"], r["current_A"], r["c [N s/m]"], r["alpha [N/m]"]) for r in rows]
+    table3 = output._TABLES["table3"](study(contenders=ways, held_out=held, options=PaperOptions(A=2.0), there=there))
+    assert table3 == [row for row in rows if row["method"] == LITERAL][:1]
     assert told == [
         (LITERAL, "by the functions", "h0", 1.5, 1000.0, 2e5),
         (CONSISTENT, "by the functions", "h0", 1.5, 1000.0, 2e5),
