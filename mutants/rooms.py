@@ -66,7 +66,8 @@ ROOMS = (
     ),
     _room("systems.measures", "systems/test_measures.py"),
     _room("systems.monte_carlo", "systems/test_uncertainty.py"),
-    _room("fleet.charts fleet.verdicts", "fleet/test_charts.py fleet/test_verdicts.py"),
+    _room("fleet.charts", "fleet/test_charts.py"),
+    _room("fleet.verdicts", "fleet/test_verdicts.py", "page charted no_column lower_limit another_rig"),
     _room("paper.options paper.assumptions paper.recipes", "paper/test_functions.py paper/test_measured.py"),
     _room("paper.virtual_rig", "paper/test_virtual_rig.py"),
     _room(

@@ -61,6 +61,56 @@ def test_features_are_of_the_highest_speed_at_the_lowest_current_and_its_rise():
     assert without.select("force_off_N", "force_rise_N").row(0) == (None, None)
 
 
+def test_what_lies_far_from_its_session_is_named_with_its_cause():
+    """Sessions of a rig differ by more than dampers do: each damper is beside those of its session."""
+    rng = np.random.default_rng(2)
+    sessions = np.repeat(["S1", "S2"], 20)
+    columns = {name: 100 + 3.0 * (sessions == "S2") + 0.1 * rng.standard_normal(40)
+               for name in ("force_off_N", "force_rise_N", "gas_force_N", "friction_N")}  # fmt: skip
+    columns["shape_deviation"] = 0.01 * np.exp(0.05 * rng.standard_normal(40))
+    columns["gas_force_N"][3] -= 2.0
+    columns["gas_force_N"][5] += 2.0
+    columns["force_rise_N"][25] -= 2.0
+    columns["friction_N"][30] -= 1.0
+    columns["friction_N"][31] -= 2.0
+    columns["gas_force_N"][31] += 1.0
+    columns["shape_deviation"][8] *= 2.0
+    columns["shape_deviation"][9] *= 0.5  # nearer to the law than others: no fault
+    table = pl.DataFrame({"serial": [f"D{i}" for i in range(40)], "session": sessions, **columns})
+    found = {s.serial: s for s in suspects(table)}
+    causes = {"D3": "low gas", "D5": "look at it", "D25": "wrong coil or weak fluid", "D30": "worn seal",
+              "D31": "worn seal", "D8": "odd loop: air in the oil, a valve"}  # fmt: skip
+    assert {serial: one.cause for serial, one in found.items()} == causes
+    assert found["D3"].session == "S1"
+    gas = np.concatenate([v - np.median(v) for v in columns["gas_force_N"].reshape(2, 20)])
+    away = gas / (1.4826 * np.median(np.abs(gas)))
+    assert found["D3"].findings == (f"gas force {away[3]:+.0f} σ",)
+    assert [text.rsplit(" ", 2)[0] for text in found["D31"].findings] == ["friction", "gas force"]  # the farthest first
+    turned = {s.serial: s for s in suspects(table[::-1])}
+    assert turned == found
+    assert suspects(table[:7]) == []
+
+
+@pytest.mark.parametrize(("rig", "line", "verdict"), [(0.03, 0.0, "rig"), (0.0, -0.02, "line"), (0.03, 0.01, "both")])
+def test_a_drift_is_told_by_its_size(rig, line, verdict):
+    sessions, values, serials, golden = [], [], [], []
+    for s in range(6):
+        for d in range(12):
+            own = 1 + 0.01 * d if d < 2 else 1 + 0.002 * (d - 6.5)
+            wobble = 1 + 1e-5 * (-1) ** s * (d < 2)
+            sessions.append(f"S{s}")
+            serials.append(f"G{d}" if d < 2 else f"D{s}-{d}")
+            golden.append(d < 2)
+            values.append(700 * own * wobble * np.exp(rig * s / 5) * (1 if d < 2 else np.exp(line * s / 5)))
+    found = drift(np.array(values), sessions, serials, golden)
+    assert found.verdict == verdict
+    assert (found.rig, found.line) == (pytest.approx(rig, abs=1e-4), pytest.approx(line, abs=1e-4))
+    assert f"rig changes by {100 * found.rig:+.1f} %" in found.text
+    few = [i for i, s in enumerate(sessions) if s < "S2"]
+    two = drift(np.array(values)[few], *([each[i] for i in few] for each in (sessions, serials, golden)))
+    assert (two.verdict, two.text) == ("cannot tell", "2 sessions: a drift needs three or more.")
+
+
 def test_false_alarms_are_rare():
     alarms = 0
     for seed in range(20):

@@ -5,11 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.linalg import expm, solve_discrete_lyapunov
 
 from mrdamper.systems.controllers import controller_type
 from mrdamper.systems.controllers.clipped_optimal import ClippedOptimal
 from mrdamper.systems.linear import aims, linear_system
-from mrdamper.systems.structure import quarter_car
+from mrdamper.systems.structure import Link, quarter_car, shear_building
 
 CAR = quarter_car("car", 300, 40, 20e3, 200e3)
 
@@ -74,10 +75,17 @@ def designed():
     return law.designed(CAR, CAR.links, 0.01).design
 
 
-def test_an_optimal_feedback_is_beaten_by_no_other(designed):
-    design = designed
-    linear = linear_system(CAR, [link for link in CAR.links if link.role == "damper"])
-    weights = np.array([3.0 if aim.kind == "span" else 1.0 for aim in aims(CAR)])
+PAIR = shear_building(
+    "pair", [100.0, 80.0], [4e5, 3e5], [50.0, 40.0], [Link("a", "floor1", "ground"), Link("b", "floor2", "floor1")]
+)
+
+
+@pytest.mark.parametrize("system", [CAR, PAIR], ids=["car", "two dampers"])
+def test_an_optimal_feedback_is_beaten_by_no_other(system):
+    dampers = [link for link in system.links if link.role == "damper"]
+    design = ClippedOptimal(effort=0.05, span_weight=3.0).designed(system, system.links, 0.01).design
+    linear = linear_system(system, dampers)
+    weights = np.array([3.0 if aim.kind == "span" else 1.0 for aim in aims(system)])
     assert len(set(weights)) == 2
     of_state, of_force = (part * weights[:, None] for part in linear.aim)
 
@@ -95,6 +103,40 @@ def test_an_optimal_feedback_is_beaten_by_no_other(designed):
         more, less = spent(design.G + way), spent(design.G - way)
         assert min(more, less) > least
         assert abs(more - less) < 0.05 * (more + less - 2 * least)  # a parabola with its vertex here
+
+
+def test_an_optimal_force_is_asked_for_where_the_damper_can_come_nearer_to_it():
+    law = ClippedOptimal()
+    for size in (1e-4, 1.0, 1e4):
+        for wanted, force in product((-2.0, -0.5, 0.5, 2.0), (-1.0, 1.0)):
+            seen = Seen()
+            seen.link, seen.force, seen.shared = (
+                SimpleNamespace(name="d"),
+                size * force,
+                {"wanted": {"d": size * wanted}},
+            )
+            assert law.law(seen) == (wanted * force > 1)  # of the same sign, and larger
+
+
+def test_an_observer_has_the_least_error_of_all(designed):
+    """Beside white noise of the input and of the sensors, as densities; no other gain has a smaller covariance."""
+    linear = linear_system(CAR, [link for link in CAR.links if link.role == "damper"])
+    n, inputs = linear.E.shape
+    step = np.zeros((n + inputs, n + inputs))
+    step[:n] = 0.01 * np.hstack([linear.A, linear.E])
+    E = expm(step)[:n, n:]
+    W, V = E @ E.T * ClippedOptimal().noise_ratio, np.eye(3)
+
+    def error(L):
+        left = designed.A - L @ designed.C
+        return np.trace(solve_discrete_lyapunov(left, W + L @ V @ L.T))
+
+    rng, least = np.random.default_rng(2), error(designed.L)
+    for _ in range(6):
+        way = 1e-5 * designed.L * rng.standard_normal(designed.L.shape)
+        more, less = error(designed.L + way), error(designed.L - way)
+        assert min(more, less) > least
+        assert abs(more - less) < 0.3 * (more + less - 2 * least)
 
 
 def test_an_observer_steps_as_its_equation_says(designed):
