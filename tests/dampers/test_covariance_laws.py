@@ -14,6 +14,7 @@ from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.random_effects import GainsAndOffsets
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.data import Condition, Run
+from mrdamper.identification.covariance import score_covariance
 from mrdamper.models.bingham import Bingham
 from mrdamper.physics.motion import sine
 
@@ -159,6 +160,40 @@ def test_information_and_effective_samples_are_those_of_weighted_least_squares()
     assert min(samples) < most / 5
 
 
+def test_noise_counts_by_its_square_however_large_beside_the_force():
+    """The same noise ten times smaller: what a run's own gain takes up of it does not grow with it."""
+    spreads, doubts = [], []
+    for noise in (0.1, 1.0):
+        runs = runs_of(gain=0.0, noise=noise)
+        spread, doubt = _within(*linear_parts(fitted(runs), runs))
+        spreads.append(np.diag(spread)), doubts.append(doubt)
+    assert spreads[1] == pytest.approx(100 * spreads[0], rel=0.25)
+    alone = runs_of(conditions=CONDITIONS[:1])
+    parts, (columns,), inverse = linear_parts(fitted(alone), alone)
+    (part,) = parts
+    table = np.column_stack([part.predicted, np.ones(part.predicted.size)])
+    rest = part.residual - table @ np.linalg.lstsq(table, part.residual)[0]
+    time = part.prediction.motion.time[part.picked]
+    dof = score_covariance(columns, rest, time, part.frequency, inverse * part.weight**2)[1]
+    assert _within(parts, [columns], inverse)[1] == pytest.approx(2 / dof)  # of a variance with its degrees of freedom
+
+
+def test_without_cross_validation_the_residuals_of_the_fit_stand_in():
+    runs = [replace(r, force=r.force * (1 + 0.1 * np.sin(9 * r.time))) for r in runs_of(noise=0.05)]
+    damper = fitted(runs)
+    known = estimate_uncertainty(damper, runs).uncertainty
+    inside = []
+    for part in linear_parts(damper, runs)[0]:
+        motion = part.prediction.motion
+        time, v = motion.time[part.picked], motion.velocity[part.picked]
+        energy = np.trapezoid(part.measured * v, time) / np.trapezoid(part.predicted * v, time)
+        peak = np.ptp(part.measured) / np.ptp(part.predicted)
+        inside.append(PredictedRun(part.run.id, None, part.predicted, part.measured, peak, energy))
+    error = model_error(inside)
+    assert (known.force, known.peak, known.energy) == pytest.approx((error.force, error.peak, error.energy), rel=1e-6)
+    assert error.peak != pytest.approx(error.energy, rel=0.1)
+
+
 def test_a_parameter_rests_on_one_run_of_three_or_more_only():
     """Of one fast run beside slow ones most is known of the viscosity; of two runs it is no news."""
     slow = [Condition(0.5, 0.1, a) for a in (0.001, 0.0011)]
@@ -211,6 +246,9 @@ def test_other_sessions_show_the_scatter_of_sessions_and_far_runs_the_growth():
         assert known.gain == pytest.approx(np.sqrt(2 / 3) * (factor - 1))
         assert known.offset == pytest.approx(0.0, abs=1e-9)
         assert known.growth == plain.growth
+    shifted = [replace(p, measured=p.predicted + 500.0) for p in seen]
+    known = estimate_uncertainty(damper, runs, seen, other_sessions=shifted).uncertainty
+    assert (known.gain, known.offset) == pytest.approx((0.0, np.sqrt(2 / 3) * 500.0), abs=1e-9)
     known = estimate_uncertainty(damper, runs, seen, away=far).uncertainty
     assert (known.gain, known.offset) == (plain.gain, plain.offset)
     assert known.growth.force[1] > plain.growth.force[1]
@@ -273,18 +311,19 @@ def test_a_parameter_at_its_bound_is_held_and_one_the_runs_do_not_show_is_named(
 
 def test_cross_validated_errors_are_over_the_whole_error_model():
     """Parameters, gains and offsets as the folds left them, and the form: their squares add up."""
-    runs = runs_of(sessions=3, session=0.05)
+    runs = [replace(r, force=r.force + 12 * (i % 3)) for i, r in enumerate(runs_of(sessions=3, session=0.05))]
     damper = fitted(runs)
     rng = np.random.default_rng(5)
     seen = []
     for run in runs:
         shifted = run.force * (1 + 0.08 * rng.standard_normal()) + 40 * rng.standard_normal()
         seen.append(PredictedRun.of(run, shifted, damper.predict_run(run).motion.velocity))
+    seen[1] = replace(seen[1], peak=1.3 * seen[1].peak, energy=0.7 * seen[1].energy)
     seen[3] = replace(seen[3], distance=Distance(0.05, 0.2, 0.3))
     seen[6] = replace(seen[6], run_id="recorded later")  # the parameters move it as they move the median run
     known = estimate_uncertainty(damper, runs, seen).uncertainty
     assert known.of_sessions
-    assert min(known.run_gain, known.run_offset, known.force) > 0
+    assert min(known.run_gain, known.run_offset, known.offset, known.force, known.peak, known.energy) > 0
     error = model_error(seen)
     # A fold that saw two of the three parts of a session's scatter leaves as much in its errors.
     assert known.run_gain == pytest.approx(np.sqrt(error.gain**2 - 2 / 3 * known.gain**2))
