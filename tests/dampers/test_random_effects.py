@@ -193,7 +193,7 @@ def test_a_run_counts_by_its_relative_error_whatever_its_force():
     for k, run in enumerate(runs):
         size = 10.0 ** (k % 3)
         if k % 2:  # nor however long it is
-            run.predicted, run.residual = np.tile(run.predicted, 9), np.tile(run.residual, 9)
+            run.predicted, run.residual = np.tile(run.predicted, 36), np.tile(run.residual, 36)
             run.picked = np.arange(run.predicted.size)
         run.predicted, run.residual, run.scale = size * run.predicted, size * run.residual, size * run.scale
         slopes.append(run.predicted[:, None])

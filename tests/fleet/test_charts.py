@@ -30,6 +30,12 @@ def test_ewma_of_the_nist_handbook():
     assert chart.signals == ()
 
 
+def test_values_beyond_each_limit_are_counted():
+    values = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])
+    counts = [capability(values, *limits).outside for limits in ((2.5, 6.5), (2.5, None), (None, 6.5), (1.0, 7.0))]
+    assert counts == [3, 2, 1, 0]
+
+
 def test_limits_of_an_average_are_those_of_the_sum_of_its_weights():
     """Of independent values: the average of i of them has the variance Σ λ² (1 - λ)^2k."""
     chart = ewma(np.zeros(6), 50.0, 2.0, 0.3, 2.5)

@@ -64,10 +64,11 @@ def test_features_are_of_the_highest_speed_at_the_lowest_current_and_its_rise():
 def test_what_lies_far_from_its_session_is_named_with_its_cause():
     """Sessions of a rig differ by more than dampers do: each damper is beside those of its session."""
     rng = np.random.default_rng(2)
-    sessions = np.repeat(["S1", "S2"], 20)
-    columns = {name: 100 + 3.0 * (sessions == "S2") + 0.1 * rng.standard_normal(40)
+    sessions = np.repeat(["S1", "S2", "S3"], 20)
+    level = 100 + 3.0 * (sessions == "S2") - 5.0 * (sessions == "S3")
+    columns = {name: level + 0.1 * rng.standard_normal(60)
                for name in ("force_off_N", "force_rise_N", "gas_force_N", "friction_N")}  # fmt: skip
-    columns["shape_deviation"] = 0.01 * np.exp(0.05 * rng.standard_normal(40))
+    columns["shape_deviation"] = 0.01 * np.exp(0.05 * rng.standard_normal(60))
     columns["gas_force_N"][3] -= 2.0
     columns["gas_force_N"][5] += 2.0
     columns["force_rise_N"][25] -= 2.0
@@ -76,13 +77,13 @@ def test_what_lies_far_from_its_session_is_named_with_its_cause():
     columns["gas_force_N"][31] += 1.0
     columns["shape_deviation"][8] *= 2.0
     columns["shape_deviation"][9] *= 0.5  # nearer to the law than others: no fault
-    table = pl.DataFrame({"serial": [f"D{i}" for i in range(40)], "session": sessions, **columns})
+    table = pl.DataFrame({"serial": [f"D{i}" for i in range(60)], "session": sessions, **columns})
     found = {s.serial: s for s in suspects(table)}
     causes = {"D3": "low gas", "D5": "look at it", "D25": "wrong coil or weak fluid", "D30": "worn seal",
               "D31": "worn seal", "D8": "odd loop: air in the oil, a valve"}  # fmt: skip
     assert {serial: one.cause for serial, one in found.items()} == causes
     assert found["D3"].session == "S1"
-    gas = np.concatenate([v - np.median(v) for v in columns["gas_force_N"].reshape(2, 20)])
+    gas = np.concatenate([v - np.median(v) for v in columns["gas_force_N"].reshape(3, 20)])
     away = gas / (1.4826 * np.median(np.abs(gas)))
     assert found["D3"].findings == (f"gas force {away[3]:+.0f} σ",)
     assert [text.rsplit(" ", 2)[0] for text in found["D31"].findings] == ["friction", "gas force"]  # the farthest first
@@ -106,6 +107,13 @@ def test_a_drift_is_told_by_its_size(rig, line, verdict):
     assert found.verdict == verdict
     assert (found.rig, found.line) == (pytest.approx(rig, abs=1e-4), pytest.approx(line, abs=1e-4))
     assert f"rig changes by {100 * found.rig:+.1f} %" in found.text
+    # A golden damper that misses the last session takes its own level with it: the drift stays.
+    most = [i for i, (s, d) in enumerate(zip(sessions, serials, strict=True)) if (s, d) != ("S5", "G1")]
+    missed = drift(np.array(values)[most], *([each[i] for i in most] for each in (sessions, serials, golden)))
+    assert missed.rig == pytest.approx(rig, abs=5e-3)
+    alone = [i for i, g in enumerate(golden) if not g]
+    untold = drift(np.array(values)[alone], *([each[i] for i in alone] for each in (sessions, serials, golden)))
+    assert (untold.verdict, f"Forces change by {100 * (rig + line):+.1f} %" in untold.text) == ("cannot tell", True)
     few = [i for i, s in enumerate(sessions) if s < "S2"]
     two = drift(np.array(values)[few], *([each[i] for i in few] for each in (sessions, serials, golden)))
     assert (two.verdict, two.text) == ("cannot tell", "2 sessions: a drift needs three or more.")
@@ -187,6 +195,8 @@ def test_a_clock_that_jumps_is_said():
     jump = "the clock jumps back from 2024-02-01 in session S1 to 2024-01-01 in session S2"
     assert clock_findings(frame)[0] == jump
     assert "soon" in clock_findings(frame)[1]
+    timed = ["2024-02-01T10:00:00", "2024-02-02", None]
+    assert clock_findings(frame.with_columns(date=pl.Series(timed, dtype=pl.String))) == []
 
 
 def test_golden_dampers_are_named_in_the_profile():

@@ -106,6 +106,7 @@ def test_table_4_of_the_paper_holds_relative_errors_by_current_in_the_papers_ord
         errors = [start + more + 0.05 for more in (0.0, 0.2, 0.5)]
         assert [row[f"{current}.00 A"] for current in range(3)] == pytest.approx(errors)
         assert row["mean"] == pytest.approx(np.mean(errors))
+        assert list(row) == ["method", "0.00 A", "1.00 A", "2.00 A", "mean"]
 
 
 def test_tables_1_and_2_hold_what_was_identified_at_their_amplitude_by_frequency_and_current():
@@ -185,6 +186,7 @@ def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
     assert (page["study"], page["best"], page["synthetic"]) == (made, "one", False)
     assert page["about"].startswith("from rig 1. Reference")
     times = (tmp_path / "out" / "tables" / "seconds.csv").read_text(encoding="utf-8").splitlines()
+    assert page["numbered"] == [(name, output.NUMBERED[name]) for name in ("table4", "table5") if name in tables]
     assert times[1:] == ["one,0,3.0,3.0", "two,0,5.0,5.0", "in all,0,12.4,"]
     facts = json.loads((tmp_path / "out" / "made.json").read_text(encoding="utf-8"))
     assert facts["seconds"] == {"in all": 12.4, "one": 3.0, "two": 5.0}
@@ -209,6 +211,9 @@ def test_tests_and_searches_stand_in_their_columns():
         {"current_A": 1.0, "frequency_Hz": 1.5, "amplitude_m": 0.05, "reached_rmse_N": 21.0, "least_rmse_N": 20.0,
          "evaluations": 123, "alpha": 4e5, "beta": 7e6}
     ]  # fmt: skip
+    searches = [row for row in output.time_rows(study(genetic=(check, check))) if "genetic" in row["what"]]
+    assert [row["what"].partition(",")[0] for row in searches] == ["genetic search 1", "genetic search 2"]
+    assert [(row["runs"], row["seconds"], row["seconds_a_run"]) for row in searches] == [(1, 8.0, 8.0)] * 2
     assert made["genetic_runs"] == [
         {"run_id": "a", "seed": 3, "alpha_over_optimum": 1.5, "beta_over_optimum": 0.2, "error_over_least": 1.01,
          "forces": 420, "forces_to_settle": 90}

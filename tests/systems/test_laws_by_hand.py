@@ -121,6 +121,8 @@ def test_an_optimal_force_is_asked_for_where_the_damper_can_come_nearer_to_it():
 def test_an_observer_has_the_least_error_of_all(designed):
     """Beside white noise of the input and of the sensors, as densities; no other gain has a smaller covariance."""
     linear = linear_system(CAR, [link for link in CAR.links if link.role == "damper"])
+    np.testing.assert_allclose(designed.C, linear.seen[0] * designed.size[:, None])
+    np.testing.assert_allclose(designed.D, linear.seen[1] * designed.size[:, None])
     n, inputs = linear.E.shape
     step = np.zeros((n + inputs, n + inputs))
     step[:n] = 0.01 * np.hstack([linear.A, linear.E])
