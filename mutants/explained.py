@@ -127,6 +127,8 @@ EXPLAINED = (
         "the force of a state of zero, whatever weighs it",
     ),
     Explained("identification.covariance", "points = 1 <<", "", "a longer transform of the same samples"),
+    Explained("identification.covariance", "bent = -2", "USub", "what is bent enters by its square"),
+    Explained("systems.monte_carlo", "machine = len(draws)", "", _BUDGET),
     Explained("identification.covariance", "odd = orders", "", _ALIKE),
     Explained("identification.covariance", "-logs", "", "the space columns span does not depend on their signs"),
     Explained("identification.covariance", "max(", "1 → 2", _GUARD),

@@ -96,6 +96,7 @@ def test_an_exact_fit_has_no_spread():
     phase = np.linspace(0, 20, 300)
     found = spread(np.column_stack([np.cos(phase), np.sin(phase)]), np.zeros(300), phase, 1 / (2 * np.pi))
     assert np.array_equal(found.errors, [0.0, 0.0])
+    assert found.memory == pytest.approx(300)  # every sample is independent of what is none
 
 
 def test_white_noise_gives_the_textbook_errors():

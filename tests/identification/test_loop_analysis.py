@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mrdamper.data import Condition, Run
-from mrdamper.identification.loop_analysis import analyse_loop, at_levels, dynamic_ranges, whole_cycles
+from mrdamper.identification.loop_analysis import analyse_loop, at_levels, damping_share, dynamic_ranges, whole_cycles
 from mrdamper.physics.motion import sine
 
 
@@ -29,6 +29,20 @@ def test_a_dashpot_with_spring_and_offset(condition):
     assert loop.mean_force == pytest.approx(f0, abs=0.1)
     assert (loop.run_id, loop.split) == ("one", "train")
     assert loop.condition.current_A == condition.current_A
+
+
+def test_the_damping_share_is_that_of_the_dashpot_beside_spring_offset_and_drift():
+    motion = sine(Condition(0.5, 2.0, 0.01), 4, 1000)
+
+    def share(c, unit=1.0):
+        force = c * motion.velocity + 2e4 * motion.displacement + 70.0 + 9.0 * motion.time
+        return damping_share(motion, unit * force), c * np.std(motion.velocity) / np.std(force)
+
+    for c in (1500.0, -400.0, 20.0):
+        found, expected = share(c)
+        assert found == pytest.approx(expected, rel=1e-6)
+        assert share(c, 1e-3)[0] == pytest.approx(found)
+    assert damping_share(motion, -80.0 * motion.velocity) == pytest.approx(-1.0)
 
 
 def test_dry_friction_dissipates_four_amplitudes_of_it():

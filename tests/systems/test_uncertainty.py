@@ -47,6 +47,31 @@ def test_parameters_of_other_sizes_are_drawn_alike():
     assert np.std(offsets) == pytest.approx(2.0, rel=0.06)
 
 
+@pytest.mark.parametrize("dof", [5.0, 40.0])
+def test_draws_have_the_variance_of_student(dof):
+    """Of d degrees of freedom: d / (d - 2) times the square of the spread, for numbers as for sessions."""
+    damper = certain(joint_damper(), ("f0", "k"), [2.0, 30.0], gain=0.04, offset=6.0)
+    few = replace(damper.uncertainty, dof=np.full(2, dof), session_dof=dof)
+    drawn = [row["d"] for row in draw({"d": replace(damper, uncertainty=few)}, 20_000, seed=3)]
+    wider = np.sqrt(dof / (dof - 2))
+    for values, spread in (
+        ([one.numbers["f0"] - damper.model.f0 for one in drawn], 2.0),
+        ([one.numbers["k"] - damper.model.k for one in drawn], 30.0),
+        ([one.gain for one in drawn], 0.04),
+        ([one.offset for one in drawn], 6.0),
+    ):
+        assert np.mean(values) == pytest.approx(0.0, abs=0.05 * spread)
+        assert np.std(values) == pytest.approx(wider * spread, rel=0.06)
+
+
+def test_two_draws_are_the_fewest():
+    damper = certain(joint_damper(), ("f0",), [2.0])
+    assert len(draw({"d": damper}, 2)) == 2
+    for count in (1, 0, 10**9):
+        with pytest.raises(InputError, match="E_DRAWS"):
+            draw({"d": damper}, count)
+
+
 @pytest.mark.parametrize("kind", DAMPERS)
 def test_other_numbers_in_one_loop_are_other_dampers(kind):
     damper, names = DAMPERS[kind]
