@@ -5,18 +5,21 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from support.dampers import joint_damper, modified_damper
+from support.dampers import ENVELOPE, joint_damper, modified_damper
 
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.modified import ModifiedModel
+from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.dampers.streaming import stepper
 from mrdamper.errors import InputError, ParameterError
+from mrdamper.models import model_type
 from mrdamper.statistics.functions.forms import ParameterFunction
 from mrdamper.systems.controllers import controller_type, controller_types
 from mrdamper.systems.controllers.base import Controller
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.controllers.preview import NonCausalOptimum
 from mrdamper.systems.inputs import load_input
-from mrdamper.systems.inverse import invert
+from mrdamper.systems.inverse import check_monotone, invert
 from mrdamper.systems.measures import cost
 from mrdamper.systems.simulate import SystemLoop
 from mrdamper.systems.structure import quarter_car
@@ -117,6 +120,57 @@ def test_the_inverse_gives_the_force_that_is_wanted(case):
     assert current.max() <= highest
     if damper.coil is None:  # no spike at a reversal: the current moves as the one that was there
         assert np.abs(np.diff(current[200:])).max() < 0.12 * highest
+
+
+def linear_in_current(*fy, coil=None):
+    """A damper of 800 N s/m, an offset of 30 N, and friction by its current."""
+    form = "linear-current" if len(fy) == 2 else "quadratic-current"
+    functions = {"c": ParameterFunction("constant", (800.0,)), "fy": ParameterFunction(form, fy),
+                 "f0": ParameterFunction("constant", (30.0,))}  # fmt: skip
+    return ModifiedModel("bench", ParameterMap(model_type("bingham"), functions), ENVELOPE, coil=coil)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_the_inverse_of_a_force_linear_in_the_current_is_that_line(size):
+    """Found at once, and taken but for a share of a ten thousandth: the current is kept where none is told."""
+    made = linear_in_current(600.0, 100.0)
+    assert (check_monotone(made), check_monotone(made, 0.5)) == pytest.approx((600.0, 300.0))
+    inverse, last = invert(made), 0.0
+    for way, wanted in ((1, 0.4), (1, 0.4), (-1, 0.7), (-1, 0.1), (1, 0.9)):
+        v = way * 0.1 * size
+        asked = 30 + way * (800 * abs(v) + 100 + 600 * wanted)
+        found = inverse.step(0.001, v, 0.0, asked, 1e-3)
+        last += (wanted - last) / (1 + 0.01**2)
+        assert found.current == pytest.approx(last, rel=1e-9)
+        assert found.force == pytest.approx(30 + way * (800 * abs(v) + 100 + 600 * last))
+        ends = sorted(30 + way * (800 * abs(v) + 100 + more) for more in (0.0, 600.0))
+        assert (found.lowest, found.highest) == pytest.approx(tuple(ends))
+    assert inverse.step(0.0, 0.0, 0.0, 500.0, 1e-3).current == pytest.approx(last)  # at rest every current does
+
+
+def test_the_inverse_drives_a_slow_coil_ahead_of_its_field():
+    """From 0.4 to 0.2 A a field that falls by 20 ms is there after 20 ln 2 = 14 ms without current, and stays."""
+    inverse = invert(linear_in_current(600.0, 100.0, coil=Coil(0.0, 20e-3)))
+    steps = [inverse.step(0.001, 0.1, 0.0, 30 + 80 + 100 + 600 * (0.4 if k < 20 else 0.2), 1e-3) for k in range(45)]
+    force, current = (np.array([getattr(step, name) for step in steps]) for name in ("force", "current"))
+    assert force[1:20] == pytest.approx(450.0, rel=1e-3)
+    assert current[20:30] == pytest.approx(0.0)
+    assert force[30] > 340
+    assert force[38:] == pytest.approx(330.0, rel=5e-3)
+    turned = invert(linear_in_current(600.0, 100.0, coil=Coil(20e-3, 0.0)))
+    rising = [turned.step(0.001, 0.1, 0.0, 30 + 80 + 100 + 600 * (0.1 if k < 60 else 0.4), 1e-3) for k in range(85)]
+    assert max(step.current for step in rising[60:66]) > 0.8  # ahead: 20 ln(9/6) = 8 ms instead of 60
+    assert [step.force for step in rising[78:]] == pytest.approx([450.0] * 7, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("fy", "said"), [((-1000.0, 1600.0, 400.0), "above 0.8 A"), ((-1500.0, 1500.0, 400.0), "falls back")]
+)
+def test_a_force_that_falls_back_is_refused_with_its_current(fy, said):
+    """The second comes back whole: at the highest current it is that of none."""
+    with pytest.raises(ParameterError, match=said) as refused:
+        check_monotone(linear_in_current(*fy))
+    assert refused.value.code == "E_NOT_MONOTONE"
 
 
 def test_out_of_reach_is_clipped_and_said():

@@ -46,7 +46,7 @@ def individuals(values: Floats) -> tuple[ControlChart, ControlChart]:
     mean, spread = float(np.mean(values)), float(np.mean(ranges)) if ranges.size else 0.0
     lower, upper = (np.full(values.size, mean + side * spread / _D2) for side in (-3, 3))
     first = ControlChart(values, lower, upper, mean)
-    return first, ControlChart(ranges, 0 * ranges, np.full(ranges.size, _D4 * spread), spread)
+    return first, ControlChart(ranges, np.zeros(ranges.size), np.full(ranges.size, _D4 * spread), spread)
 
 
 def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, width: float = 3.0) -> ControlChart:

@@ -64,7 +64,10 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
             remedy="identify it from tests at several currents", code="E_NOT_MONOTONE",
         )  # fmt: skip
     wide = width > 0.2 * width.max()
-    back = np.diff(table[wide], axis=1) * -np.sign(table[wide, -1] - table[wide, 0])[:, None] / width[wide][:, None]
+    rises = np.where(
+        table[wide, -1] < table[wide, 0], -1.0, 1.0
+    )  # a force that comes back whole has no sign of its own
+    back = np.diff(table[wide], axis=1) * -rises[:, None] / width[wide][:, None]
     if back.max() > _TURNS_BACK:
         at = grid[back.max(axis=0).argmax()]
         raise ParameterError(
