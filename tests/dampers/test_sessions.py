@@ -71,6 +71,17 @@ def test_a_run_of_no_session_is_scored_as_it_is():
     assert known_errors([*runs, alone], [*readings, odd])[-1] == odd.error(1.0, 0.0)
 
 
+def test_sessions_share_what_they_share_without_a_clock():
+    rng = np.random.default_rng(5)
+    when = [RecordingTime(f"day {i // 3}") for i in range(60)]
+    values = np.repeat(0.05 * rng.standard_normal(20), 3) + 0.01 * rng.standard_normal(60)
+    found = RunScatter.likeliest(when, values)
+    assert np.hypot(found.session, found.hour) == pytest.approx(0.05, rel=0.35)
+    mean, left = found.given(RecordingTime("day 0"), when[:3], values[:3])
+    assert mean == pytest.approx(np.mean(values[:3]), rel=0.15)
+    assert left < 0.03
+
+
 def test_gains_that_do_not_scatter_have_no_spread():
     when = [RecordingTime(f"day {i // 3}", 24.0 * (i // 3) + i) for i in range(12)]
     assert RunScatter.likeliest(when, np.zeros(12)).total == 0.0
