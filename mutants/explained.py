@@ -150,6 +150,8 @@ EXPLAINED = (
     Explained("paper.output", "literal.identifications[0].free", "0 → 1", "all identifications are of one model"),
     Explained("systems.controllers.clipped_optimal", "design.A.shape[0]", "0 → 1", "a square matrix"),
     Explained("systems.controllers.clipped_optimal", "1e-15 * np.eye(n)", "Add → Sub", _GUARD),
+    Explained("systems.inverse", "_MOTION // 2 :", "2 → 3", _BUDGET),
+    Explained("systems.inverse", "range(_ROUNDS + 1)", "1 → 2", "it breaks off before"),
     Explained("systems.measures", "-step / _WINDOW", "Div → Mult", "the window is of one second"),
     Explained("rig_files.quality.loop", "fit_harmonics(", "7 → 8", _BUDGET),
 )

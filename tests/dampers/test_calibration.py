@@ -128,6 +128,29 @@ def test_the_model_error_is_the_mean_square_over_samples_and_runs_of_uneven_erro
     assert model_error([*runs, replace(runs[0], measured=-SWING, peak=nine)]).peak == pytest.approx(found.peak)
 
 
+def test_every_run_counts_alike_in_the_model_error_however_many_loops_it_has():
+    loops = [np.array([1.1]), np.array([1.0, 1.02, 1.3, 0.98]), np.array([0.97, 1.01, np.inf])]
+    runs = [replace(run(str(i)), peak=each, energy=each[::-1]) for i, each in enumerate(loops)]
+    finite = [each[np.isfinite(each)] for each in loops]
+    expected = np.sqrt(np.mean([np.mean((each - 1) ** 2) for each in finite]))
+    assert model_error(runs).peak == model_error(runs).energy == pytest.approx(expected)
+
+
+def test_a_record_of_changing_frequency_is_compared_loop_by_loop():
+    time = np.linspace(0.0, 12.0, 2401)
+    turns = np.where(time < 4, time, 2 * time - 4)  # four cycles, sixteen twice as fast
+    size = np.where(time < 10, 0.02, 0.002)  # the last ones have no loop worth the name
+    path, velocity = size * np.sin(2 * np.pi * turns), np.cos(2 * np.pi * turns)
+    factor = np.where(time < 6, 1.2, 0.9)
+    found = PredictedRun.of(Run("r", time, path, factor * 50 * velocity, 0.0), 50 * velocity, velocity)
+    count = found.peak.size
+    assert 10 < count < 19
+    assert np.mean(np.isclose(found.peak, 1.2) | np.isclose(found.peak, 0.9)) > 0.85
+    assert np.isclose(found.energy, 1.2).any() & np.isclose(found.energy, 0.9).any()
+    steady = PredictedRun.of(Run("r", TIME, np.sin(2 * np.pi * TIME), SWING, 0.0), SWING, np.cos(2 * np.pi * TIME))
+    assert steady.peak.size == 1
+
+
 def test_peaks_are_calibrated_as_split_conformal_prediction():
     """The k-th smallest of n scores, k = ceil((n + 1) level)."""
     for count in (9, 14, 39):
