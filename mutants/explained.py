@@ -66,6 +66,7 @@ EXPLAINED = (
     Explained("dampers.calibration", "size = np.sqrt(np.mean(table", "", _SCALE),
     Explained("dampers.random_effects", "weight = 1 / np.maximum(", "1 → 2", _SCALE),
     Explained("dampers.calibration", "parts[0].distance", "0 → 1", "the stretches of a run have one distance"),
+    Explained("dampers.calibration", "parts[0].session", "0 → 1", "the stretches of a run have one session"),
     Explained("dampers.random_effects", "kinds.append(", "items 0 and 1", _ALIKE),
     Explained("dampers.random_effects", "self.slopes[0].shape[1]", "0 → 1", "all runs have one number of columns"),
     Explained("dampers.bands", "student(level, 1.0)", "1.0 → 10.0", "the level alone is checked"),

@@ -65,6 +65,7 @@ def test_a_run_is_compared_inside_its_window_with_what_it_takes_out_of_the_motio
     assert both.measured == pytest.approx(np.tile(found.measured[::3], 3))
     still = replace(found, predicted=np.full(5, 7.0), measured=np.full(5, 9.0))
     assert still.gain_and_offset == pytest.approx((1.0, 2.0))  # a constant shows no gain
+    assert still.half == 1.0  # nor a swing: errors are then in N
 
 
 def test_a_record_of_changing_current_is_compared_cycle_by_cycle():
@@ -118,6 +119,7 @@ def test_the_model_error_is_the_mean_square_over_samples_and_runs_of_uneven_erro
         gains.append(gain)
     found = model_error(runs)
     assert found.force == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-3)
+    assert found.gain == pytest.approx(1.4826 * np.median(np.abs(np.array(gains) - 1)))
     for name in ("peak", "energy"):
         over = np.concatenate([getattr(each, name) for each in runs]) / gains - 1
         assert getattr(found, name) == pytest.approx(np.sqrt(np.mean(over**2)))
