@@ -111,6 +111,15 @@ def test_the_second_set_is_found(kind, name):
     assert {one.cause for one in found} <= set(folder.causes)
 
 
+@pytest.mark.parametrize("name", ["stroke for amplitude in three runs", "a worn damper in a random record"])
+def test_runs_that_are_not_the_first_suspects_are_found(name):
+    """Two of three alike raise the error assumed of the third; a record of many currents is improbable in any case."""
+    folder = next(f for f in second_folders(SECOND[0]) if f.name == name)
+    found = find_contradictions(folder.runs)
+    assert {one.run_id for one in found} == folder.wrong
+    assert {one.cause for one in found} <= set(folder.causes)
+
+
 def test_a_gain_of_a_run_multiplies_the_expected_force(sound):
     """Runs without contradiction determine the same coefficients whatever model error is assumed."""
     tracks = tracks_of(sound)

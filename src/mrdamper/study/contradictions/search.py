@@ -32,7 +32,7 @@ _ALONE_ODDS = 10.0  # more of them for a run that nothing explains
 _MISFITS = (4.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35)  # factors of the usual model error that are tried
 _DRIFTS = ((0.06, 0.04), (0.04, 0.04), (0.06, 0.01), (0.04, 0.01))  # gains and offsets that are tried
 _SHARED_EXPLANATIONS = 3  # explanations of a run that others may have in common with it
-_RUNS_PER_ROUND = 12  # runs whose explanations are tried in a round, at least
+_RUNS_PER_ROUND = 16  # runs whose explanations are tried in a round, at least
 _KEEP_ODDS = 3.0  # logarithm of the odds from which an accepted explanation stays
 _SHIFT_ODDS = 12.0  # logarithm of the prior odds against shifted rows
 _EXCHANGE_ODDS = 6.0  # the same against two exchanged rows
@@ -180,9 +180,12 @@ class Search:
         order = sorted(left, key=lambda k: -odds[k])
         self._own = self.evidence.log_evidence([self._members[k] for k in self._agreeing()])
         self._options: dict[int, list[Explanation]] = {}
-        singles = [self._of_one(i) for i in order[: max(_RUNS_PER_ROUND, len(order) // 4)]]
+        most = max(_RUNS_PER_ROUND, len(order) // 4)
+        # A record of many currents is improbable before any run, too: what the others leave of it counts as well.
+        by_others = sorted(left, key=lambda k: posterior.log_probability_by_others(self._members[k]))
+        singles = [self._of_one(i) for i in dict.fromkeys([*order[:most], *by_others[: most // 3]])]
         yield from map(self._refined, sorted(singles, key=lambda proposal: -proposal.gain)[:_REFINED_EXPLANATIONS])
-        groups = dict.fromkeys([*self._groups(order, posterior), *self._alike(order)])
+        groups = dict.fromkeys([*self._groups(order, posterior), *self._alike()])
         ranked = sorted(map(self._of_group, groups), key=lambda proposal: -proposal.gain)
         yield from (self._smaller(proposal) for proposal in ranked[:_REFINED_EXPLANATIONS])
         if not self.found:
@@ -268,11 +271,13 @@ class Search:
             sets.append(self._grown(seeds, posterior))
         return list(dict.fromkeys(tuple(sorted(s)) for s in sets if 2 <= len(s) <= len(self.tracks) // 2))
 
-    def _alike(self, order: Sequence[int]) -> list[tuple[int, ...]]:
-        """Return sets of runs that one explanation makes more probable each."""
+    def _alike(self) -> list[tuple[int, ...]]:
+        """Return sets of runs that one explanation makes more probable each, from the runs that are explained best."""
         sets = []
-        for i in order[:_GROUP_SEEDS]:
-            for explanation in self._options.get(i, [])[:_SHARED_EXPLANATIONS]:
+        for i in sorted(self._options, key=lambda k: -max((e.gain for e in self._options[k]), default=-np.inf)):
+            if len(sets) >= _GROUP_SEEDS * _SHARED_EXPLANATIONS:
+                break
+            for explanation in self._options[i][:_SHARED_EXPLANATIONS]:
                 trial = explanation.trial
                 sets.append(
                     [k for k, of in self._options.items() if any(e.gain > 0 and e.trial.is_like(trial) for e in of)]
