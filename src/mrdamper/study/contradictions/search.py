@@ -45,6 +45,7 @@ _MAJORITY_ODDS = 6.0  # the same against another current of most runs at a curre
 _MIN_SHIFTED_RUNS = 2  # runs whose current a shift has to change
 _SAME_CURRENT = 0.01  # difference of two currents that are one [A]
 _TIE_ODDS = 6.0  # odds up to which a run nothing explains better takes the best explanation
+_SHARED_CAUSES = ("force", "offset", "displacement", "time", "sign")  # causes that several runs have with one value
 _COMPARED_EXPLANATIONS = 6  # explanations of a run that are compared with those of other runs
 _GROUP_SEEDS = 5  # runs from which a second group of runs is grown
 _GROUP_ERROR_RATIO = 2.5  # factor by which the model error of a group of its own is smaller than that of all runs
@@ -91,6 +92,8 @@ class Search:
         while len(self.found) <= most:
             best = max(self._proposals(), key=lambda proposal: proposal.gain, default=_NO_PROPOSAL)
             if not best.explanations or best.gain < self._threshold(best.explanations.values()):
+                best = self._further()
+            if not best.explanations:
                 break
             self._accept(best.explanations)
         self._review()
@@ -192,6 +195,20 @@ class Search:
             best = max(self._of_rows(order[:_RUNS_PER_ROUND]), key=lambda proposal: proposal.gain, default=_NO_PROPOSAL)
             if best.explanations:
                 yield self._refined_rows(best, posterior)
+
+    def _further(self) -> JointExplanation:
+        """Return the run that best has the cause found in others, as a further one of their group."""
+        shared = [e.trial for e in self.found.values() if e.cause in _SHARED_CAUSES]
+        options = [
+            (e.gain + e.trial.odds - _MEMBER_ODDS, i, e)
+            for i, of in self._options.items()
+            for e in of
+            if any(e.trial.is_like(trial) for trial in shared)
+        ]
+        gain, i, best = max(options, key=lambda option: option[0], default=(-np.inf, 0, None))
+        if best is None or gain < _TIE_ODDS:
+            return _NO_PROPOSAL
+        return JointExplanation({i: replace(best, gain=gain)}, gain)
 
     def _of_one(self, i: int) -> JointExplanation:
         """Return the best explanation of a run."""
