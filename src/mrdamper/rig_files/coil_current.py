@@ -132,11 +132,11 @@ def _folders(table: RawTable, path: Path) -> list[Statement]:
 
 def held_current_of(table: RawTable) -> float | None:
     """Coil current [A] that a file holds as one number beside its columns, `current_A = 0.5`; None if it does not."""
-    held = set()
-    for name, value in table.constants.items():
-        header = split_name(name)
-        if header.known and header.dimension == header.role == "current" and np.isfinite(value):
-            held.add(header.known.factor * value)
+    named = [(split_name(name), value) for name, value in table.constants.items() if np.isfinite(value)]
+    named = [(header, value) for header, value in named if names_condition(header.name, "current")]
+    measured = [(header, value) for header, value in named if header.role == "current"]
+    stated = measured or named  # a set point, I_set_A = 0.5, where nothing else names a current
+    held = {h.known.factor * value for h, value in stated if h.known and h.dimension == "current"}
     return held.pop() if len(held) == 1 else None
 
 

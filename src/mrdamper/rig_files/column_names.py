@@ -54,7 +54,8 @@ _SYMBOLS = MappingProxyType(
 # Ends of compounds: Spulenstrom, Dämpferkraft, Kolbenweg.
 _COMPOUNDS = MappingProxyType(
     {
-        "strom": "current", "kraft": "force", "weg": "displacement", "hub": "displacement", "zeit": "time",
+        "strom": "current", "ström": "current", "strøm": "current", "stroom": "current", "kraft": "force",
+        "weg": "displacement", "hub": "displacement", "zeit": "time",
         "geschwindigkeit": "velocity", "beschleunigung": "acceleration", "spannung": "voltage",
         "temperatur": "temperature", "druck": "pressure",
     }
@@ -93,6 +94,7 @@ _COIL = frozenset(
     ("coil", "spule", "spulenstrom", "bobine", "bobina", "solenoid", "magnet", "线圈电流", "damper", "icoil", "ispule")
 )
 _FACTOR = re.compile(r"[\s_][x×*·]\s?10+(?![0-9])|\bp-p\b")  # Force x10, Force p-p
+_CONDITION = re.compile(r"=\s*[+-]?[0-9]")  # stroke = 40
 _COMPRESSION = ("compress", "jounce", "bump", "druckkraft", "druckweg", "einfeder", "compresi", "druckstufe")
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,40})[\])}>]\s*$", re.DOTALL)
 _INNER = re.compile(r"^(?P<name>[^\[({<]+?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,20})[\])}>]\s*[-–:,;@|/].*$", re.DOTALL)
@@ -178,7 +180,7 @@ def role_of(name: str) -> str | None:
     lower = [w.casefold().rstrip("0123456789") or w for w in words]
     if any(word in _NOT_MEASURED or word in _MADE or word in _ELSEWHERE for word in lower) or _FACTOR.search(name):
         return None
-    if _COMMANDED.search(name):
+    if _COMMANDED.search(name) or _CONDITION.search(name):
         return None
     if len(words) == 1 and words[0] in _SYMBOLS:
         return _SYMBOLS[words[0]]

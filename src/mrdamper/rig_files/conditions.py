@@ -20,7 +20,8 @@ from mrdamper.rig_files.units import Unit, parse_unit
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
 _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it
 _IN_NAME = re.compile(
-    r"(?<![0-9A-Za-z.,])(?:[iI](?:_?(?:[cC]oil|[sS]pule))?|(?:[sS]pulen|[cC]oil)?(?:[sS]trom|[cC]urr(?:ent)?|[cC]ur))?"
+    r"(?<![0-9A-Za-z.,])"
+    r"(?:(?:[iI](?:_?(?:[cC]oil|[sS]pule))?|(?:[sS]pulen|[cC]oil)?(?:[sS]trom|[cC]urr(?:ent)?|[cC]ur))(?: ?= ?)?)?"
     r"([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(m?)(?:A(?:mp(?:ere)?s?)?|amp(?:ere)?s?|(?<=m)a)"
     r"(?![A-Za-z0-9]|\s?/\s?(?:m?V|%|div|s)\b)"
 )
@@ -28,7 +29,7 @@ _NEXT_NUMBER = re.compile(r"_A_[0-9.]+(?:_|\.[a-z]{2,4}$|$)")  # 2_A_20: the nam
 _NEGATIVE = re.compile(r"[=:]\s*[-−]$")  # a dash elsewhere may stand between two parts of a name
 _NUMERIC_CELL = re.compile(r"[,;]\s*\"?[+-]?[0-9.]+\"?\s*$")
 _LINE = re.compile(
-    r"^[\s#%/\"]*(?P<key>[^:=;\t]{1,60}?)[\s\"]*[:=;,\t][\s:=;,\t\"]*(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)"
+    r"^[\s#%/\"]*(?P<key>[^:=;\t]{1,60}?)[\s\"]*(?:[:=;\t]|(?<![0-9]),|,(?![0-9]+(?![0-9.])))[\s:=;,\t\"]*(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)"
     r"[\s;,\t\"]*[\[(]?(?P<unit>(?:1/)?[A-Za-zµ/]{0,9}(?:-1)?)[\])]?[\s;,\t\"]*$"
 )
 _LONGEST_LINE, _MOST_PARTS = 300, 20
@@ -43,10 +44,10 @@ _LABELLED_RATING = re.compile(
     r"fuse|suppl|amplif|rated|range|probe|clamp|(?<![a-z])(?:max|limit)(?![a-z])", re.IGNORECASE
 )
 _RATE = re.compile(
-    r"sampl|abtast|messrate|^rate$|scan|acquisition|échantillon|muestreo|campion|^fs$|^f_s$", re.IGNORECASE
+    r"sampl|abtast|messrate|^(?:data )?rate$|scan|acquisition|échantillon|muestreo|campion|^fs$|^f_s$", re.IGNORECASE
 )
 _STEP = re.compile(
-    r"^dt$|^d_t$|^delta[ _]?[tx]|^[dΔ] ?t$|sampl|abtast|time ?step|step ?time|zeitschritt|increment|échantillon"
+    r"^dt$|^d_t$|^delta[ _]?[tx]|^[dΔ] ?[tx]$|sampl|abtast|time ?step|step ?time|zeitschritt|increment|échantillon"
     r"|muestreo|^[hx][ _]?(?:resolution|interval|increment|step)$",
     re.IGNORECASE,
 )
@@ -95,7 +96,7 @@ def currents_in_cells(line: str) -> list[float]:
 
 def without_currents(text: str) -> str:
     """Return a title without the currents it states."""
-    return re.sub(r"\s{2,}", " ", _IN_NAME.sub(" ", text[:255])).strip() if currents_in(text) else text
+    return re.sub(r"\(\s*\)|\[\s*\]|\s{2,}", " ", _IN_NAME.sub(" ", text[:255])).strip() if currents_in(text) else text
 
 
 def amperes(number: str, unit: str) -> float:

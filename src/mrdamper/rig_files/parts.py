@@ -21,6 +21,7 @@ from mrdamper.rig_files.units import DIMENSION
 
 MOST_RUNS = 2000
 _FEWEST_ROWS = 5  # of a test, on average
+_MOST_LEVELS = 200  # currents of a column of texts that are looked at
 _SMALL = 32 * 2**20  # bytes of a file whose columns are kept together
 _RUN_WORDS = frozenset(
     ("run", "test", "specimen", "experiment", "trial", "versuch", "prüfung", "prüflauf", "lauf", "messung", "essai",
@@ -46,7 +47,11 @@ def _run_column(table: RawTable, form: FileForm) -> int | None:
     if wanted is None:
         words = [[word.casefold().rstrip("0123456789") for word in words_of(name[:60])] for name in table.names]
         named = [i for i, of in enumerate(words) if _RUN_WORDS & {*of} and {*of} <= _RUN_WORDS | _NUMBER_WORDS]
-        return named[0] if named and table.words is not None else None
+        stated = [] if named or table.words is None else [i for i, cell in enumerate(table.odd) if currents_in(cell)]
+        stated = [
+            i for i in stated if all(len(currents_in(label)) == 1 for label in table.words(i).labels[:_MOST_LEVELS])
+        ]  # type: ignore[misc]
+        return (*named, *stated, None)[0] if table.words is not None else None
     if isinstance(wanted, int):
         columns = [wanted - 1] if wanted <= len(table.names) else []
     else:

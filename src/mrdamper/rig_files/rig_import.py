@@ -30,6 +30,7 @@ from mrdamper.rig_files.mapping.companions import (
     with_legend_of,
     with_results_of,
 )
+from mrdamper.rig_files.mapping.description import is_description
 from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.packed_folder import unpacked
 from mrdamper.rig_files.profile import Profile, profile_of
@@ -257,7 +258,7 @@ class _Intake:
             refused = contradictions_with(self.tests(), results, path) if results else None
             if refused is not None:
                 self._refuse(refused)
-            elif path not in self._given and is_list(path):
+            elif path not in self._given and (is_list(path) or is_description(path)):
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
             else:
                 continue

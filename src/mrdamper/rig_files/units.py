@@ -34,7 +34,7 @@ class Unit:
 
 
 _EXACT = {
-    "time": {"s": 1, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60, "h": 3600},
+    "time": {"s": 1, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60, "h": 3600, "days": 86400},
     "length": {"m": 1, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": INCH, "ft": 0.3048,
         "mil": 1e-3 * INCH, "thou": 1e-3 * INCH, "pouce": INCH,
     },
@@ -73,7 +73,7 @@ _WORDS = {
     "кгс": "kgf", "а": "A", "ма": "mA", "в": "V", "°с": "°C",
     "秒": "s", "毫秒": "ms", "米": "m", "毫米": "mm", "厘米": "cm", "微米": "um", "牛": "N", "牛顿": "N", "千牛": "kN",
     "安": "A", "安培": "A", "毫安": "mA", "伏": "V", "초": "s", "ミリ秒": "ms", "アンペア": "A",
-    "pct": "%", "percent": "%",
+    "ole": "days", "ole date": "days", "day": "days", "tage": "days", "pct": "%", "percent": "%",
     "segment": "segments", "cycle": "cycles", "count": "counts", "degree": "deg", "degrees": "deg",
 }  # fmt: skip
 _OTHER = {

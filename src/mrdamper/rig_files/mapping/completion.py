@@ -56,7 +56,9 @@ _CHANNEL_IS = re.compile(
     r"(?i)(?<!\w)(?:ch(?:annel)?|kanal|canal|voie|canale)[ ._]?(?P<number>[0-9]{1,3})\s*[:=]\s*(?P<what>[^;|\t]{2,60})"
 )
 _FLOAT = re.compile(r"[+-]?[0-9]+(?:[.][0-9]*)?(?:[eE][+-]?[0-9]+)?")
-_AXIS_UNIT = re.compile(r"(?i)^[\s\"]*x[ _-]?axis[ _-]?unit\"?\s*[;,:=\t]\s*\"?([a-zµ]{1,12})\"?[\s;,\"]*$")
+_AXIS_UNIT = re.compile(
+    r"(?i)^[\s\"]*(?P<axis>[xyz])[ _-]?axis[ _-]?unit\"?\s*[;,:=\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s;,\"]*$"
+)
 _SENSE_NAMES = frozenset(("sense", "direction", "dir", "sign", "richtung", "vorzeichen", "sens", "sentido", "verso"))
 _SENSES = {
     1: ("tensi", "exten", "pull", "zug", "traction", "tracc", "rebound"),
@@ -223,14 +225,21 @@ def _with_indexed_names(table: RawTable) -> RawTable:
 
 
 def _with_keyed_axis(table: RawTable) -> RawTable:
-    """Take the x axis as time where rows of headings begin with their meaning and one gives the axis a unit of time."""
-    if not table.names or table.names[0].casefold() != "name" or table.units[0].casefold() != "unit":
+    """Take the x axis as time where a line gives it a unit of time: of keyed rows, or X and Y."""
+    axes = [m for line in table.remarks if (m := _AXIS_UNIT.match(line[:_LONGEST_LINE])) and is_unit(m["unit"])]
+    clocks = {m["unit"] for m in axes if m["axis"] in "xX" and split_name("", m["unit"]).dimension == "time"}
+    if len(clocks) != 1 or not table.names:
         return table
-    stated = {m[1] for line in table.remarks if (m := _AXIS_UNIT.match(line[:_LONGEST_LINE])) and is_unit(m[1])}
-    units = [unit for unit in stated if (parsed := parse_unit(unit)) and parsed.dimension == "time"]
-    if len(units) != 1:
+    names, units = list(table.names), list(table.units)
+    if names[0].casefold() == "name" and units[0].casefold() == "unit":
+        names[0], units[0] = "time", clocks.pop()
+        return replace(table, names=tuple(names), units=tuple(units))
+    others = {m["unit"] for m in axes if m["axis"] not in "xX"}
+    named = split_name(table.source.name.partition(".")[0])  # a channel a file: Run1_Force.txt
+    if len(others) != 1 or names[-2:-1] not in (["X"], ["x"]) or any(units) or named.role is None:
         return table
-    return replace(table, names=("time", *table.names[1:]), units=(units[0], *table.units[1:]))
+    names[-2:], units[-2:] = ["time", named.role], [clocks.pop(), others.pop()]
+    return replace(table, names=tuple(names), units=tuple(units))
 
 
 def _with_titles(table: RawTable) -> RawTable:
@@ -252,7 +261,7 @@ def _with_titles(table: RawTable) -> RawTable:
                 units[i] = units[i] or header.unit or bare.unit
                 over[i] = f"{title} {name}".strip()
         stated = currents_in(names[i])
-        rest = without_currents(names[i]).strip(" ,;:@-_/()[]") if len(stated) == 1 else ""
+        rest = without_currents(names[i]).strip(" ,;:@-_/") if len(stated) == 1 else ""
         if rest and split_name(rest, units[i]).role in ("force", "displacement", "time", "velocity"):
             over[i] = over[i] if currents_in(over[i]) else f"{over[i]} {names[i]}".strip()
             names[i] = without_currents(names[i]).strip(" ,;:@-_/")
@@ -267,6 +276,15 @@ def _with_listed_units(table: RawTable) -> RawTable:
     if not bare or not table.remarks:
         return table
     wanted = {table.names[i].strip().casefold(): i for i in bare}
+    written: dict[int, set[str]] = {}
+    for line in table.remarks:  # Weg in mm, Kraft in N
+        for cell in re.split(r"[,;|\t]\s*", line[:_LONGEST_LINE].lstrip("#%/ ")):
+            header, i = split_name(cell), wanted.get(split_name(cell).name.strip().casefold())
+            if i is not None and header.dimension and header.dimension == DIMENSION.get(header.role or ""):
+                written.setdefault(i, set()).add(header.unit)
+    if written and all(len(units) == 1 for units in written.values()):
+        own = [next(iter(written.get(i, ())), unit) for i, unit in enumerate(table.units)]
+        return replace(table, units=tuple(own))
     for separator in _SEPARATORS:
         units_of: dict[int, list[str]] = {}
         for line in table.remarks:

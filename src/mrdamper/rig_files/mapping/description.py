@@ -1,4 +1,4 @@
-"""Files beside a record that describe it: an XML file its columns, rate and current, a README its scales."""
+"""Files beside a record that describe it: its columns, rate and current in XML or a short text, scales in a README."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
 
+from mrdamper.rig_files.conditions import stated_by_lines
 from mrdamper.rig_files.mapping.completion import scaled_columns, states_scale
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.units import is_unit
@@ -16,6 +17,8 @@ from mrdamper.rig_files.units import is_unit
 _LARGEST = 2**16  # bytes
 _PLACES = ("column", "number", "index", "no", "position", "channel")
 _MOST = 200  # elements
+_FEWEST_ROWS = 50  # of a record
+_TEXTS = (".csv", ".txt", ".tsv", ".ini", ".cfg", ".par", ".set")
 _README = re.compile(
     r"(?i)(?:read[_ ]?me|lies_?mich|lisez[-_ ]?moi|l[eé]eme|leggimi|leia[-_ ]?me|notes?|info|说明|説明|설명)\b.*"
 )
@@ -35,7 +38,10 @@ def with_notes(table: RawTable, path: Path) -> RawTable:
 
 def with_description(table: RawTable, path: Path) -> RawTable:
     """Return the table with what the XML file of its name, or the only other file of its folder, states."""
-    elements = _elements(path)
+    other = _only_other(path)
+    if other is not None and is_description(other):
+        return replace(table, remarks=(*table.remarks, *_decoded(other).splitlines()))
+    elements = _elements(path, other)
     if not elements:
         return table
     says = [(e, {key.casefold(): value.strip() for key, value in e.attrib.items()}) for e in elements]
@@ -58,17 +64,35 @@ def _unit(attributes: dict[str, str]) -> str:
     return attributes.get("unit", attributes.get("units", ""))
 
 
-def _elements(path: Path) -> list[ElementTree.Element]:
+def is_description(path: Path) -> bool:
+    """Tell if a file is a short text that states quantities, and no record: Coil_Current, 0.5, A."""
+    if path.suffix.lower() not in _TEXTS or not path.is_file() or path.stat().st_size > _LARGEST:
+        return False
+    lines = [line for line in _decoded(path).splitlines() if line.strip()]
+    return len(lines) < _FEWEST_ROWS and bool(stated_by_lines(lines, "."))
+
+
+def _decoded(path: Path) -> str:
+    content = path.read_bytes()
+    return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig", "replace")
+
+
+def _only_other(path: Path) -> Path | None:
+    """Return the only other file of a file's folder; None if there is none, or several."""
+    try:
+        with os.scandir(path.parent) as folder:  # not read to its end: it may hold thousands of files
+            visible = (file.name for file in folder if not file.name.startswith(".") and file.name != path.name)
+            others = [path.with_name(name) for name in islice(visible, 2)]
+    except OSError:
+        return None
+    return others[0] if len(others) == 1 else None
+
+
+def _elements(path: Path, other: Path | None) -> list[ElementTree.Element]:
     """Return the elements of the description of a file; empty if it has none, or one that could be hostile."""
     beside = path.with_suffix(".xml")
     if not beside.is_file():
-        try:
-            with os.scandir(path.parent) as folder:  # not read to its end: it may hold thousands of files
-                visible = (file.name for file in folder if not file.name.startswith(".") and file.name != path.name)
-                others = [path.with_name(name) for name in islice(visible, 2)]
-        except OSError:
-            return []
-        beside = others[0] if len(others) == 1 and others[0].suffix.lower() == ".xml" and others[0].is_file() else path
+        beside = other if other and other.suffix.lower() == ".xml" and other.is_file() else path
     if beside == path or beside.stat().st_size > _LARGEST:
         return []
     content = beside.read_bytes()

@@ -152,7 +152,7 @@ def unpacked(says: Mapping[str, Any], values: np.ndarray) -> np.ndarray:
     """Numbers as netCDF and others pack them: scale_factor, add_offset, and a code for missing ones."""
     if values.dtype.kind not in "iuf":
         return values
-    formula = _formula_of(says) if values.dtype.kind in "iu" else None
+    formula = _formula_of(says) or counts_of(says) if values.dtype.kind in "iu" else None
     if formula is not None:
         return formula[0] * values.astype(np.float64) + formula[1]
     if not any(name in says for name in _PACKING):
@@ -163,6 +163,17 @@ def unpacked(says: Mapping[str, Any], values: np.ndarray) -> np.ndarray:
             numbers[np.isin(values, np.asarray(says[name]))] = np.nan
     factor, offset = (float(np.reshape(says.get(n, d), -1)[0]) for n, d in (("scale_factor", 1), ("add_offset", 0)))
     return factor * numbers + offset
+
+
+def counts_of(says: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Scale and offset of counts of a converter, where both and the unit that they lead to are stated together."""
+    lower = {name.casefold(): np.reshape(value, -1) for name, value in says.items()}
+    if not {"scale", "offset"} <= set(lower) or not {"unit", "units"} & set(lower):
+        return None
+    both = [lower[name] for name in ("scale", "offset")]
+    if any(value.dtype.kind not in "iuf" or value.size != 1 for value in both) or both[0][0] in (0, 1):
+        return None
+    return float(both[0][0]), float(both[1][0])
 
 
 def _formula_of(says: Mapping[str, Any]) -> tuple[float, float] | None:

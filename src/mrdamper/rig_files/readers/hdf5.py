@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from typing import Any, ClassVar
 
@@ -17,6 +17,7 @@ from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import (
     array_table,
     check_unpacked,
+    counts_of,
     expand,
     load,
     pick,
@@ -25,6 +26,7 @@ from mrdamper.rig_files.readers.arrays import (
     unpacked,
 )
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
+from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.units import is_unit
 
 # pyright: reportMissingImports=false, reportAttributeAccessIssue=false
@@ -62,7 +64,9 @@ def hdf5_tables(source: Source, title: str) -> list[RawTable]:
         content = _Found(source)
         _walk(file, "", content)
     groups = {
-        group: _with_clocks(_frame(columns) or _titled(columns, content.lists.get(group, [])))
+        group: _with_clocks(
+            _frame(columns) or _titled(_with_units(columns, group, content), content.lists.get(group, []))
+        )
         for group, columns in content.groups.items()
     }
     objects = content.objects
@@ -102,10 +106,13 @@ def _table(
         turned = "MATLAB_class" in dataset.attrs and array.ndim == 2  # MATLAB stores its matrices so
         return unpacked(dataset.attrs, pick(array.T if turned else array, part))
 
-    return array_table(
+    table = array_table(
         source, [c[0] for c in columns], [c[1] for c in columns], column_of, label=label.strip("/"),
         title=title, fallback=fallback, constants=constants, remarks=remarks,
     )  # fmt: skip
+    counts = [name for name, _, d, _ in columns if d is not None and "dtype" in dir(d) and counts_of(d.attrs)]
+    text = f"{', '.join(map(repr, counts))}: scale * counts + offset, by the attributes"
+    return replace(table, findings=(Finding("W_SCALE", text),)) if counts else table
 
 
 @dataclass
@@ -118,6 +125,7 @@ class _Found:
     objects: list[str] = field(default_factory=list)
     remarks: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
     lists: dict[str, list[list[str]]] = field(default_factory=lambda: defaultdict(list))
+    units: dict[str, dict[str, str]] = field(default_factory=dict)  # of a group and those below it, by column
     seen: int = 0
     numbers: int = 0
 
@@ -140,7 +148,9 @@ def _walk(group: Any, path: str, content: _Found) -> None:
             content.groups[path].append((str(name), "", None, None))
             continue
         item = group.get(name)
-        if isinstance(item, h5py.Group) and name != "#refs#" and name != "#subsystem#":
+        if isinstance(item, h5py.Group) and name in _UNIT_NAMES and all(map(_is_text, item.values())):
+            content.units[path] = {key: _text(value[()]) for key, value in item.items()}
+        elif isinstance(item, h5py.Group) and name != "#refs#" and name != "#subsystem#":
             _walk(item, f"{path}/{name}", content)
         elif isinstance(item, h5py.Dataset) and h5py.check_ref_dtype(item.dtype) is h5py.Reference:
             _follow(item, str(name), path, content)
@@ -289,12 +299,26 @@ def _columns(dataset: Any, name: str, path: str, content: _Found) -> list[tuple]
     if kind.names:
         return [(field, "", dataset, field) for field in kind.names]
     stated = [dataset.attrs[name] for name in _UNIT_NAMES if name in dataset.attrs]
-    if kind.kind in "iu":
+    if kind.kind in "iu" and counts_of(dataset.attrs) is None:
         content.constants[path] |= {f"{name}_{key}": number for key, number in _numbers(dataset.attrs).items()}
     unit = next((_text(value) for value in stated if np.asarray(value).dtype.kind in "SUO"), "")
     unit = unit.partition(" since ")[0]  # netCDF counts time from a date
     shape = dataset.shape[::-1] if "MATLAB_class" in dataset.attrs else dataset.shape
     return [(column, unit, dataset, part) for column, part in expand(name, shape)]
+
+
+def _with_units(columns: list[tuple], group: str, content: _Found) -> list[tuple]:
+    """Return the columns with the units that a group of texts beside or above them gives them by name: units/F = N."""
+    above = [units for path, units in content.units.items() if f"{group}/".startswith(f"{path}/")]
+    stated = {key: unit for units in above for key, unit in units.items() if is_unit(unit)}
+    return [(name, unit or stated.get(name, ""), *rest) for name, unit, *rest in columns]
+
+
+def _is_text(item: Any) -> bool:
+    """Tell if a dataset is a single text."""
+    import h5py
+
+    return isinstance(item, h5py.Dataset) and item.size == 1 and h5py.check_string_dtype(item.dtype) is not None
 
 
 def _is_words(item: Any) -> bool:

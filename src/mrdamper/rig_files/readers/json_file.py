@@ -11,7 +11,7 @@ import numpy as np
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import damaged, twice
 from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, Source
-from mrdamper.rig_files.readers.nested import MOST_ITEMS, nested_tables
+from mrdamper.rig_files.readers.nested import nested_tables
 from mrdamper.rig_files.text.tokens import stamp
 
 _LARGEST = 200 * 10**6  # bytes: a text of numbers, read as a whole
@@ -112,7 +112,7 @@ def _tree(value: Any) -> Any:
     items = [item for item in value if item is not None]
     if items and all(isinstance(item, dict) for item in items) and _are_records(items):
         return items
-    return [_tree(item) for item in items[:MOST_ITEMS]]
+    return [_tree(item) for item in items]
 
 
 def _are_records(items: list[dict[str, Any]]) -> bool:

@@ -19,7 +19,7 @@ import numpy as np
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_clock
 from mrdamper.rig_files.readers.arrays import array_table, expand, pick, tests_across, titles_of
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Source
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
 from mrdamper.rig_files.units import is_unit
 
 DEEPEST = 8  # levels
@@ -75,7 +75,7 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
             elif value:
                 node.lists.append(value)
         elif isinstance(value, list):
-            inner += _items(key, value[:MOST_ITEMS], node)
+            inner += _items(key, value, node)
         elif isinstance(value, np.ndarray):
             node.columns += _across(key, "", value)
         elif isinstance(value, Mapping):
@@ -207,13 +207,16 @@ def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, A
 def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[str, Any]]]:
     """Nodes of their own among the items of a list; items that are channels become columns, records a table."""
     mappings = [item for item in items if isinstance(item, Mapping)]
+    records = _records(mappings) if len(mappings) == len(items) else {}
+    if records:
+        return [(key, records)]
+    if len(items) > MOST_ITEMS and any(isinstance(item, (Mapping, np.ndarray)) for item in items):
+        problem = f"a list of {len(items)} objects or arrays that are no records of one form"
+        raise RigFileError("E_BLOCKS", problem, remedy=f"export at most {MOST_ITEMS} tests a file")
     channels = [_channel("", item) for item in mappings]
     if mappings and all(channels):
         node.columns += [column for channel in channels for column in channel]
         return []
-    records = _records(mappings) if len(mappings) == len(items) else {}
-    if records:
-        return [(key, records)]
     number = len(items) > 1
     nodes = [(f"{key}_{i}" if number else key, item) for i, item in enumerate(items, 1) if isinstance(item, Mapping)]
     nodes = [(name, item) for name, item in nodes if not _is_plain(item)]

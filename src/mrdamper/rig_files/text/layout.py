@@ -32,6 +32,8 @@ _MARKS, _DIGITS = frozenset("#%/"), frozenset("0123456789+-.")
 _FEWEST_LINES = 20  # of a text: fewer, with words among the numbers, are notes
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
+_UNIT_KEYS = frozenset(("unit", "units", "einheit", "einheiten", "unité", "unidad", "unità", "jednostka", "enhet"))
+_LABELS = frozenset(("label", "name", "channel", "channel name", "signal", "trace", "titel", "bezeichnung", "nom"))
 _MOST_LEVELS = 4  # lines of headings
 _TELLING = 2  # columns whose names tell what they are
 _WORD = re.compile(r"(?:[^\W\d_]-)?[^\W\d_]{3,}")  # also x-axis
@@ -184,7 +186,8 @@ def _stated_for_all(above: Sequence[str], separator: str, width: int) -> list[st
         if key and len(cells) == width - 1 and len(set(cells)) == 1 and cells[0]:
             keyed[key.strip('"')] = cells[0].strip('"')
     units = {key[:-4]: unit for key, unit in keyed.items() if key.casefold().endswith("unit") and is_unit(unit)}
-    return [
+    own = [f"{key}: {number}" for key, number in keyed.items() if split_name(key).unit and looks_numeric(number)]
+    return own + [
         f"{key}: {number} {unit}"
         for start, unit in units.items()
         for key, number in keyed.items()
@@ -250,7 +253,9 @@ def _roles(cells: Sequence[str]) -> set[str | None]:
 
 def _notes_beside(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
     """Names with a number behind them that stand beside the first rows, as lines."""
-    pairs = [(a, b) for row in rows[:_SAMPLE] for a, b in pairwise(row) if a and b]
+    filled = Counter(i for row in rows for i, cell in enumerate(row) if cell)
+    columns = {i for i, count in filled.items() if 2 * count > len(rows) > _SAMPLE}  # channels and labels, no notes
+    pairs = [(a, b) for row in rows[:_SAMPLE] for i, (a, b) in enumerate(pairwise(row)) if a and b and i not in columns]
     return tuple(f"{a}: {b}" for a, b in pairs if not looks_numeric(a) and looks_numeric(b))[:_SAMPLE]
 
 
@@ -268,6 +273,10 @@ def _titles(above: Sequence[str], separator: str, width: int) -> tuple[str, ...]
     """Titles of groups of columns, one a column: each stands over its group's first column."""
     if not above or separator == SPACES or is_comment(above[-1]):
         return ()
+    for line in above[-_MOST_LEVELS:]:  # Label, Displacement 10 mm/V, Force 1 kN/V
+        labels = [cell.strip('"') for cell in cells_of(line, separator)]
+        if len(labels) == width > _TELLING and labels[0].casefold().rstrip("s") in _LABELS and len(_roles(labels)) > 1:
+            return ("", *labels[1:])
     cells = cells_of(above[-1], separator)[:width]
     if sum(map(bool, cells)) < 2 or not cells[0] or len(cells) < width // 2:
         return ()
@@ -388,7 +397,7 @@ def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) ->
         cells = cells_of(line, separator)
         if not _is_row(cells):
             keyed, worded = None, worded or (i, cells)
-        elif len(cells) == width and not _WORD.match(cells[0].strip('"')):
+        elif len(cells) == width and not _is_key(cells[0].strip('"')):
             return keyed or (i, cells)
         elif width > 2 and len(set(filter(None, cells[1:]))) == 1:  # a key with one value for all columns
             keyed = None
@@ -397,6 +406,12 @@ def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) ->
             worded = worded or keyed
     assert worded is not None
     return worded
+
+
+def _is_key(cell: str) -> bool:
+    """Tell if the first cell of a line of numbers is a word, or a name with its unit: dx [s]."""
+    header = split_name(cell)
+    return _WORD.match(cell) is not None or (header.unit != "" and header.name[:1].isalpha())
 
 
 def _rows(lines: Sequence[str], separator: str, width: int, trailing: bool) -> list[list[str]]:
@@ -442,9 +457,9 @@ def _header_lines(
                 raise source.refuse("E_PROFILE", f"there is no line {index + 1}", "correct [file] of the profile")
         return header, units
     plain = [] if _lists_columns(lines[:first], width) else _plain(lines[:first])
-    keyed = {_cells(lines[i], separator, width)[0].casefold(): i for i in plain} if width > 1 else {}
-    if {"name", "unit"} <= set(keyed) and len(_fields(lines[keyed["name"]], separator, width)) == width:
-        return keyed["name"], keyed["unit"]  # rows that begin with what they hold
+    keyed = _keyed_lines(lines, plain, separator, width)
+    if keyed:
+        return keyed
     marked = [i for i, line in enumerate(lines[:first]) if is_comment(line)]
     for candidates in (plain, marked):
         fitting = [i for i in candidates if len(_fields(lines[i], separator, width)) == width]
@@ -469,11 +484,21 @@ def _header_lines(
         telling = [i for i in fitting if len(_roles(_cells(lines[i], separator, width))) >= _TELLING]
         if telling and not _roles(_cells(lines[last], separator, width)):  # names of sensors or types below the names
             last = telling[-1]
-        return last, (form.units_line - 1 if form.units_line else None)
+        below = [i for i in marked if i > last and _is_units(_cells(lines[i], separator, width))]  # #, deg, mm, N
+        below = [i for i in below if candidates is plain and len(_fields(lines[i], separator, width)) == width]
+        return last, (form.units_line - 1 if form.units_line else (*below, None)[0])
     naming = [i for i in plain if _names_columns(lines[i], separator)]
     if naming and not form.names:
         raise _mismatch(source, separator, len(_fields(lines[naming[-1]], separator, width)), width, first, lines)
     return None, (form.units_line - 1 if form.units_line else None)
+
+
+def _keyed_lines(lines: Sequence[str], plain: list[int], separator: str, width: int) -> tuple[int, int] | None:
+    """Return the lines of names and of units, where lines begin with what they hold: descriptor, path, unit."""
+    cells = {i: _cells(lines[i], separator, width) for i in plain if len(_fields(lines[i], separator, width)) == width}
+    units = [i for i, row in cells.items() if width > 1 and row[0].casefold() in _UNIT_KEYS and _is_units(row[1:])]
+    named = {i: (row[0].casefold() == "name", len(_roles(row)), i) for i, row in cells.items() if i not in units}
+    return (max(named, key=lambda i: named[i]), units[-1]) if units and named else None
 
 
 def _plain(lines: Sequence[str]) -> list[int]:

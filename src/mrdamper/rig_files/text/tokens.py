@@ -68,7 +68,7 @@ def number(token: str, mark: str) -> float | None:
 
 def looks_numeric(token: str) -> bool:
     """Tell if a cell is meant as a value, in any notation: separates rows of data from headers."""
-    token = token.strip(" \t")
+    token = _SIGN_APART.sub(r"\1", token.strip(" \t"), count=1)
     return _looks_numeric(token) if len(token) <= _LONGEST else _looks_numeric.__wrapped__(token)
 
 

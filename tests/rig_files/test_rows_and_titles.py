@@ -1,0 +1,138 @@
+"""Numbers, units and currents in the lines and columns beside a record, as loggers and scripts write them."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+from mrdamper.rig_files.column_names import role_of
+from mrdamper.rig_files.conditions import currents_in, stated_by_lines, stated_rate, without_currents
+from mrdamper.rig_files.rig_import import import_files
+
+T = np.arange(0.0, 3.0, 0.002)
+X = 10 * np.sin(2 * np.pi * T + 0.3)  # [mm]
+
+
+def force(current):
+    speed = np.cos(2 * np.pi * T + 0.3)
+    return (200 + 400 * current) * speed + (80 + 300 * current) * np.tanh(speed / 0.02)
+
+
+def currents_of(path):
+    found = import_files([path])
+    assert not found.refusals, str(found.refusals[0].error)
+    return sorted(round(float(np.median(record.current)), 3) for record in found.records)
+
+
+def rows(*columns, mark="."):
+    return "\n".join(";".join(f"{v:.6g}".replace(".", mark) for v in row) for row in zip(*columns, strict=True)) + "\n"
+
+
+def test_no_record_of_json_lines_is_cut(tmp_path):
+    lines = [{"t_s": t, "pos_mm": x, "load_N": f, "I_A": 0.5} for t, x, f in zip(T, X, force(0.5), strict=True)]
+    time = np.arange(3 * T.size) * 0.002
+    lines = [{**lines[i % T.size], "t_s": round(float(t), 6)} for i, t in enumerate(time)]
+    (tmp_path / "a.jsonl").write_text("\n".join(map(json.dumps, lines)))
+    (record,) = import_files([tmp_path / "a.jsonl"]).records
+    assert record.time.size == len(lines) > 2000
+
+
+@pytest.mark.parametrize(
+    "title",
+    ["corrente 0,5 A", "Courant 0,5 A", "Versuch 3, Strom 0,5 A", "Versuch 3, Strom 0,5 A, Frequenz 1 Hz",
+     "Essai n°3, courant de 0,5 A", "Ensaio 3 - corrente 0,5 A, frequência 1 Hz", "Corrente: 0,5 A",
+     "Strom 0,5 A; 1 Hz", "Prova 2 - I = 0,5 A, f = 1 Hz"],
+)  # fmt: skip
+def test_a_decimal_comma_separates_no_name_from_its_number(tmp_path, title):
+    assert {s.amperes for s in stated_by_lines([title])} <= {0.5}
+    text = title + "\nZeit (s);Weg (mm);Kraft (N)\n" + rows(T, X, force(0.5), mark=",")
+    (tmp_path / "test.csv").write_text(text)
+    assert currents_of(tmp_path) == [0.5]
+
+
+def test_lines_of_cells_keep_their_separating_commas():
+    assert [s.amperes for s in stated_by_lines(["Coil current,0.5,A", "Coil current, 0,5 A"])] == [0.5, 0.5]
+    assert stated_rate(["Abtastrate 500 Hz, Spulenstrom 0,00 A"], {}) == 500
+
+
+def test_a_column_of_texts_that_state_a_current_tells_tests_apart(tmp_path):
+    levels = (0.0, 0.5, 1.0)
+    lines = [f'"I={q:.1f} A";{line}'.replace(".", ",") for q in levels for line in rows(T, X, force(q)).splitlines()]
+    (tmp_path / "all.csv").write_text('"stufe";"zeit_s";"weg_mm";"kraft_N"\n' + "\n".join(lines) + "\n")
+    assert currents_of(tmp_path) == [0.0, 0.5, 1.0]
+
+
+def test_a_name_without_its_condition_is_a_channel_and_a_condition_is_none():
+    assert currents_in("F(I=0.5A)[N]") == (0.5,)
+    assert role_of(without_currents("F(I=0.5A)").strip()) == "force"
+    assert role_of("corsa") == "displacement"
+    assert role_of("corsa = 40") is None
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "# Abtastrate 500 Hz, Strom 0.5 A\n# Weg in mm, Kraft in N\n# Nr;Weg;Kraft\n",
+        "Strom: 0.5 A\nData rate;500 Hz\nNr;Weg;Kraft\n#;mm;N\n",
+        "Strom: 0.5 A\ndx [s];0.002;0.002\nNr;Weg [mm];Kraft [N]\n",
+    ],
+)
+def test_units_and_rates_that_lines_state_are_taken(tmp_path, head):
+    (tmp_path / "a.csv").write_text(head + rows(np.arange(T.size), X, force(0.5)))
+    assert currents_of(tmp_path) == [0.5]
+
+
+def test_signs_apart_and_days_are_numbers(tmp_path):
+    signed = [f"{t / 86400 + 45363:.11f};{x:+9.4f};{f:+9.2f}" for t, x, f in zip(T, X, force(0.5), strict=True)]
+    signed = [line.replace("+", "+ ").replace("-", "- ") for line in signed]
+    (tmp_path / "a_0.5A.csv").write_text("Timestamp;Weg;Kraft\nOLE;mm;N\n" + "\n".join(signed) + "\n")
+    (record,) = import_files([tmp_path]).records
+    np.testing.assert_allclose(record.time - record.time[0], T, atol=2e-6)
+
+
+def test_rows_that_begin_with_their_meaning_give_the_names_above_the_paths(tmp_path):
+    head = (
+        "descriptor;time;s_Kolben;F_Kraft\npath;;Root/s_Kolben;Root/F_Kraft\nunit;s;mm;N\ntype;double;double;double\n"
+    )
+    body = "\n".join(";" + line for line in rows(T, X, force(0.5)).splitlines())
+    (tmp_path / "a_0.5A.csv").write_text(head + body + "\n")
+    assert currents_of(tmp_path) == [0.5]
+
+
+def test_scales_in_a_line_of_labels_are_those_of_the_columns(tmp_path):
+    head = "Vertical Units;V;V\nLabel;Displacement 10 mm/V;Force 1 kN/V\n\nTIME;CH1;CH2\n"
+    (tmp_path / "a_0.5A.csv").write_text("Horizontal Units;s\n" + head + rows(T, X / 10, force(0.5) / 1000))
+    (record,) = import_files([tmp_path]).records
+    assert np.ptp(record.displacement) == pytest.approx(0.02, rel=1e-3)
+    assert np.ptp(record.force) == pytest.approx(np.ptp(force(0.5)), rel=1e-3)
+
+
+def test_a_short_text_beside_a_record_states_its_current(tmp_path):
+    for i, current in enumerate((0.0, 1.5)):
+        folder = tmp_path / f"Run {i}"
+        folder.mkdir()
+        (folder / "Daq.csv").write_text("Time;Position;Force\n(s);(mm);(N)\n" + rows(T, X, force(current)))
+        (folder / "Variables.csv").write_text(f"Name,Value,Unit\nCoil_Current,{current:.3f},A\nFrequency,1.000,Hz\n")
+    assert currents_of(tmp_path) == [0.0, 1.5]
+
+
+def test_a_channel_a_file_with_its_axes_in_lines_is_joined_by_its_number(tmp_path):
+    for run, current in ((1, 0.0), (2, 1.0)):
+        channels = {"Displacement": (X, "mm"), "Force": (force(current), "N"), "Current": (0 * T + current, "A")}
+        for name, (values, unit) in channels.items():
+            head = f"X-Axis unit:\ts\nZ-Axis unit:\t{unit}\nIndex;X;Real\n"
+            (tmp_path / f"Run{run}_{name}.txt").write_text(head + rows(np.arange(T.size), T, values))
+    assert currents_of(tmp_path) == [0.0, 1.0]
+
+
+def test_counts_with_scale_offset_and_unit_are_converted_and_their_units_may_stand_in_a_group(tmp_path):
+    with h5py.File(tmp_path / "a_0.5A.h5", "w") as file:
+        for name, values in (("t", T), ("x", X)):
+            file.create_dataset(f"runs/1/{name}", data=values)
+            file[f"units/{name}"] = {"t": "s", "x": "mm"}[name]
+        counts = file.create_dataset("runs/1/F", data=np.round((force(0.5) - 20) / 0.5).astype("<i2"))
+        counts.attrs.update({"scale": 0.5, "offset": 20.0, "unit": "N"})
+    (record,) = import_files([tmp_path]).records
+    np.testing.assert_allclose(record.force, force(0.5), atol=0.26)
+    assert np.ptp(record.displacement) == pytest.approx(0.02, rel=1e-3)
