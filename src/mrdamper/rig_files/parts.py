@@ -47,11 +47,10 @@ def _run_column(table: RawTable, form: FileForm) -> int | None:
     if wanted is None:
         words = [[word.casefold().rstrip("0123456789") for word in words_of(name[:60])] for name in table.names]
         named = [i for i, of in enumerate(words) if _RUN_WORDS & {*of} and {*of} <= _RUN_WORDS | _NUMBER_WORDS]
-        stated = [] if named or table.words is None else [i for i, cell in enumerate(table.odd) if currents_in(cell)]
-        stated = [
-            i for i in stated if all(len(currents_in(label)) == 1 for label in table.words(i).labels[:_MOST_LEVELS])
-        ]  # type: ignore[misc]
-        return (*named, *stated, None)[0] if table.words is not None else None
+        if named or table.words is None:
+            return named[0] if named and table.words is not None else None
+        stated = [(i, table.words(i).labels[:_MOST_LEVELS]) for i, cell in enumerate(table.odd) if currents_in(cell)]
+        return next((i for i, labels in stated if all(len(currents_in(label)) == 1 for label in labels)), None)
     if isinstance(wanted, int):
         columns = [wanted - 1] if wanted <= len(table.names) else []
     else:

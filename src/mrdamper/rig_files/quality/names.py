@@ -25,16 +25,18 @@ def agrees_with_its_name(view: View) -> Iterator[Finding]:
     name = f"{notes.get('file', '')} {view.record.id} {notes.get('motion_stated', '')}"
     measured = motion.condition
     frequency, amplitude = _stated(_FREQUENCY, name), _stated(_AMPLITUDE, name)
-    found = []
+    contradictions = []
     if frequency is not None and abs(measured.frequency_Hz / frequency - 1) > _SAME_FREQUENCY:
-        found.append((f"{frequency:g} Hz", f"{measured.frequency_Hz:.3g} Hz", "time"))
+        contradictions.append((f"{frequency:g} Hz", f"{measured.frequency_Hz:.3g} Hz", "time"))
     if amplitude is not None and not _AMPLITUDES[0] < 1e3 * measured.amplitude_m / amplitude < _AMPLITUDES[1]:
-        found.append((f"{amplitude:g} mm", f"an amplitude of {1e3 * measured.amplitude_m:.3g} mm", "displacement"))
-    if len(found) > 1:
-        stated, has, channels = (" and ".join(words) for words in zip(*found, strict=True))
+        contradictions.append(
+            (f"{amplitude:g} mm", f"an amplitude of {1e3 * measured.amplitude_m:.3g} mm", "displacement")
+        )
+    if len(contradictions) > 1:
+        stated, has, channels = (" and ".join(words) for words in zip(*contradictions, strict=True))
         problem = f"the name or heading states {stated}, and the record has {has}: the record of another test?"
         raise view.refused("E_MOTION_CONTRADICTS", problem, f"correct the name or heading, or the units of {channels}")
-    for stated, has, channel in found:
+    for stated, has, channel in contradictions:
         text = f"the name or heading states {stated} and the record has {has}: check the unit of {channel}, or the name"
         yield Finding("W_NAME", text)
 
