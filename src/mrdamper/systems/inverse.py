@@ -64,9 +64,7 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
             remedy="identify it from tests at several currents", code="E_NOT_MONOTONE",
         )  # fmt: skip
     wide = width > 0.2 * width.max()
-    rises = np.where(
-        table[wide, -1] < table[wide, 0], -1.0, 1.0
-    )  # a force that comes back whole has no sign of its own
+    rises = np.where(table[wide, -1] < table[wide, 0], -1.0, 1.0)  # also of a force that comes back whole
     back = np.diff(table[wide], axis=1) * -rises[:, None] / width[wide][:, None]
     if back.max() > _TURNS_BACK:
         at = grid[back.max(axis=0).argmax()]
@@ -130,7 +128,8 @@ def invert_on(
         return Demand(steady, copy.settle(steady)["force"], lowest, most)
     field = tape.remember(f"{prefix}field")
     lag = tape.select(steady > field, coil.rise_s, coil.fall_s)
-    ahead = steady + (steady - field) * lag / np.maximum(_FIELD_TIME_RATIO * lag, 2 * motion["dt"])
+    from_there = tape.select(tape.first, steady, field)  # a coil starts settled at its first command
+    ahead = steady + (steady - from_there) * lag / np.maximum(_FIELD_TIME_RATIO * lag, 2 * motion["dt"])
     command = np.minimum(np.maximum(ahead, 0.0), highest)
     field_current = field_step(tape, motion["dt"], command, coil.rise_s, coil.fall_s)
     tape.update(field, field_current)
