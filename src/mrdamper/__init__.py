@@ -9,36 +9,43 @@ True
 
 from __future__ import annotations
 
-# ruff: noqa: F401  type checkers take the names from the imports, everybody else from _HOME
 import importlib
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from mrdamper.dampers.base import Damper
-    from mrdamper.dampers.model_file import load_model, save_model
-    from mrdamper.dampers.prediction import Prediction
-    from mrdamper.dampers.streaming import stepper
-    from mrdamper.data import Condition, Dataset, Run
-    from mrdamper.discovery import register
-    from mrdamper.errors import InputError
-    from mrdamper.export import export_model
-    from mrdamper.fleet.run import run_fleet
-    from mrdamper.paper.study import reproduce
-    from mrdamper.physics.gas_spring import GasSpring
-    from mrdamper.physics.motion import Excitation, sine, sweep
-    from mrdamper.physics.simulation import simulate
-    from mrdamper.report.plots.loops import plot_force, plot_loop
-    from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
-    from mrdamper.rig_files.rig_import import import_files
-    from mrdamper.study.check import check, identify
-    from mrdamper.study.comparison import compare
-    from mrdamper.study.plan import plan_tests
-    from mrdamper.study.validation import validate
-    from mrdamper.study.workflow import run_study
-    from mrdamper.systems.inputs import load_input
-    from mrdamper.systems.inverse import invert
-    from mrdamper.systems.simulate import simulate_system
-    from mrdamper.systems.system_file import load_system
+if TYPE_CHECKING:  # here type checkers find the names, which "as" exports; everybody else in _HOME
+    from mrdamper.dampers.base import Damper as Damper
+    from mrdamper.dampers.model_file import load_model as load_model
+    from mrdamper.dampers.model_file import save_model as save_model
+    from mrdamper.dampers.prediction import Prediction as Prediction
+    from mrdamper.dampers.streaming import stepper as stepper
+    from mrdamper.data import Condition as Condition
+    from mrdamper.data import Dataset as Dataset
+    from mrdamper.data import Run as Run
+    from mrdamper.discovery import register as register
+    from mrdamper.errors import InputError as InputError
+    from mrdamper.export import export_model as export_model
+    from mrdamper.fleet.run import run_fleet as run_fleet
+    from mrdamper.paper.study import reproduce as reproduce
+    from mrdamper.physics.gas_spring import GasSpring as GasSpring
+    from mrdamper.physics.motion import Excitation as Excitation
+    from mrdamper.physics.motion import sine as sine
+    from mrdamper.physics.motion import sweep as sweep
+    from mrdamper.physics.simulation import simulate as simulate
+    from mrdamper.report.plots.loops import plot_force as plot_force
+    from mrdamper.report.plots.loops import plot_loop as plot_loop
+    from mrdamper.rig_files.dataset_folder import load_dataset as load_dataset
+    from mrdamper.rig_files.dataset_folder import save_dataset as save_dataset
+    from mrdamper.rig_files.rig_import import import_files as import_files
+    from mrdamper.study.check import check as check
+    from mrdamper.study.check import identify as identify
+    from mrdamper.study.comparison import compare as compare
+    from mrdamper.study.plan import plan_tests as plan_tests
+    from mrdamper.study.validation import validate as validate
+    from mrdamper.study.workflow import run_study as run_study
+    from mrdamper.systems.inputs import load_input as load_input
+    from mrdamper.systems.inverse import invert as invert
+    from mrdamper.systems.simulate import simulate_system as simulate_system
+    from mrdamper.systems.system_file import load_system as load_system
 
 _HOME = {
     "Condition": "data",
