@@ -208,7 +208,7 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
     if not 0 < at.peak_velocity <= tested.peak_velocity_m_s[1]:
         at = replace(at, amplitude_m=tested.peak_velocity_m_s[1] / (2 * np.pi * at.frequency_Hz))
     currents = sorted({*tested.current_A, at.current_A})
-    at_tests: Damper = replace(damper, uncertainty=replace(uncertainty, growth=Growth()))  # type: ignore[type-var]
+    at_tests: Damper = replace(damper, uncertainty=replace(uncertainty, growth=Growth()))
     own, quantile = [], []
     for current in currents:
         prediction = damper.predict(replace(at, current_A=current))
@@ -239,7 +239,7 @@ def session_band(
         return None
     spreads = {"gain": expected.gain_spread, "offset": expected.offset_spread, "run_gain": 0.0, "run_offset": 0.0}
     left = replace(damper.uncertainty, **spreads)
-    uncorrected = band(replace(damper, uncertainty=left), prediction, level, shown)  # type: ignore[type-var]
+    uncorrected = band(replace(damper, uncertainty=left), prediction, level, shown)
     if uncorrected is None:
         return None
     peaks = {n: tuple(expected.gain * v for v in getattr(uncorrected, n)) for n in ("peak", "known_session")}

@@ -81,6 +81,7 @@ class Damper(Displayable):
     True
     """
 
+    __dataclass_fields__: ClassVar[dict[str, Any]]  # what `dataclasses.replace` takes
     kind: ClassVar[str]
     saved: ClassVar[type[Saved]]
     conditional: ClassVar[bool] = False

@@ -101,7 +101,7 @@ def estimate_uncertainty(
         effective=dict(zip(spread.names, spread.effective.tolist(), strict=True)),
     )  # fmt: skip
     uncertainty = _with_model_error(uncertainty, parts, spread.slopes, cross_validated, away, other_sessions)
-    return replace(damper, uncertainty=uncertainty)  # type: ignore[type-var]
+    return replace(damper, uncertainty=uncertainty)
 
 
 @dataclass(frozen=True, eq=False)

@@ -355,7 +355,7 @@ def _with_uncertainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
         model.force, model.peak, model.energy, model.left_out, saved.words, saved.taught,
         saved.effective, saved.sessions, saved.calibration, saved.growth,
     )  # fmt: skip
-    return replace(damper, uncertainty=uncertainty)  # type: ignore[type-var]
+    return replace(damper, uncertainty=uncertainty)
 
 
 def _describe_coil(coil: Coil | None) -> _Coil | None:

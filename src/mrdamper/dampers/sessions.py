@@ -23,9 +23,10 @@ from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
     from mrdamper.dampers.protocols import DamperLike as Damper
+    from mrdamper.dampers.protocols import PredictionLike
 
 STRICT = {"extra": "forbid", "allow_inf_nan": False}  # of what is read from a saved model
-P = TypeVar("P")  # a prediction
+P = TypeVar("P", bound="PredictionLike")
 UNKNOWN, KNOWN = "unknown", "known"  # session of a score: predicted as it is, or corrected by other runs of the day
 _CORRELATION_HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # over which what an hour shares is forgotten
 _MIN_RUN_SHARE = (
@@ -195,8 +196,8 @@ class SessionCorrection:
 
     def corrected(self, prediction: P) -> P:
         """Correct a `Prediction` by this gain and offset."""
-        force = self.gain * prediction.force + self.offset  # type: ignore[attr-defined]
-        return replace(prediction, force=force)  # type: ignore[type-var]
+        force = self.gain * prediction.force + self.offset
+        return replace(prediction, force=force)
 
 
 @dataclass(frozen=True)
@@ -334,7 +335,7 @@ def known_errors(runs: Sequence[Run], left_out: Sequence[GainOffset]) -> Floats:
         As `Sessions.of`.
     """
     sessions = Sessions.of(runs, left_out, left_out)
-    errors = []
+    errors: list[float] = []
     for run, reading in zip(runs, left_out, strict=True):
         correction = sessions.expected(RecordingTime.of(run), without=run.id)
         errors.append(reading.error(correction.gain, correction.offset) if correction else reading.error(1.0, 0.0))

@@ -399,7 +399,7 @@ def _with_sessions(chosen: RecipeResult, dataset: Dataset) -> tuple[RecipeResult
     if damper.uncertainty is None:
         return chosen, error
     uncertainty = replace(damper.uncertainty, sessions=sessions)
-    return replace(chosen, damper=replace(damper, uncertainty=uncertainty)), error  # type: ignore[type-var]
+    return replace(chosen, damper=replace(damper, uncertainty=uncertainty)), error
 
 
 def with_unused_runs(candidate: RecipeResult, everything: Sequence[Run]) -> RecipeResult:

@@ -79,7 +79,7 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
 
 def _forces(damper: Damper, grid: Floats) -> Floats:
     """Calculate (samples, currents) forces [N] along the second half of a tested sine."""
-    stepping = stream(replace(damper, coil=None))  # type: ignore[type-var]
+    stepping = stream(replace(damper, coil=None))
     prepare, step = python_functions(stepping.step)
     given = tuple(float(e.value) for e in stepping.step.tape.parameters.values())
     derived, memory = prepare(given)[1], tuple(stepping.step.tape.starts.values())
@@ -112,7 +112,7 @@ def invert_on(
     highest : float
         Largest current [A].
     """
-    bare = stream(replace(damper, coil=None)).step  # type: ignore[type-var]
+    bare = stream(replace(damper, coil=None)).step
     copy = ProgramCopy(bare, tape, prefix, "current", **motion)
     last = tape.remember(f"{prefix}wanted_current")
     coil = damper.coil or Coil(0.0, 0.0)

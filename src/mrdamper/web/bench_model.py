@@ -29,7 +29,7 @@ def held_model(damper: Damper, condition: Condition, held: Mapping[str, float]) 
     for name in held:
         if name not in values:
             raise ParameterError(f"this damper has no parameter {name!r}", remedy="load the page again")
-    return replace(model, **held)  # type: ignore[type-var]
+    return replace(model, **held)
 
 
 def loop_held(damper: Damper, condition: Condition, held: Mapping[str, float]) -> Response:
@@ -52,7 +52,7 @@ def as_damper(damper: Damper, held: Mapping[str, float]) -> Damper:
     if not held:
         return damper
     about = {**damper.provenance, "held by hand": ", ".join(f"{n} = {v!r}" for n, v in sorted(held.items()))}
-    return replace(damper.holding(held), provenance=about)  # type: ignore[type-var]
+    return replace(damper.holding(held), provenance=about)
 
 
 def sliders(damper: Damper) -> list[dict[str, Any]]:

@@ -97,7 +97,7 @@ def _load(model: Path, coil_lag: float | None) -> Damper:
     if coil_lag is None:
         return damper
     driver = damper.coil.driver if damper.coil else None
-    return replace(damper, coil=Coil(1e-3 * coil_lag, 1e-3 * coil_lag, driver))  # type: ignore[type-var]
+    return replace(damper, coil=Coil(1e-3 * coil_lag, 1e-3 * coil_lag, driver))
 
 
 def _predict(
