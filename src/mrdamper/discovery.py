@@ -19,7 +19,7 @@ from importlib.metadata import Distribution, EntryPoint, entry_points, version
 from types import MappingProxyType, ModuleType
 from typing import Any, Generic, TypeVar
 
-from mrdamper.errors import InputError, UnknownNameError, shown
+from mrdamper.errors import InputError, UnknownNameError, is_a, shown
 
 T = TypeVar("T")
 OWN = "mrdamper"  # the distribution whose broken parts are errors, not skipped
@@ -81,7 +81,7 @@ def provided_modules(group: str) -> tuple[tuple[EntryPoint, tuple[ModuleType, ..
     PluginWarning
         For a package other than mrdamper that cannot be loaded; it is skipped.
     """
-    loaded = []
+    loaded: list[tuple[EntryPoint, tuple[ModuleType, ...] | type]] = []
     for point in sorted(entry_points(group=group), key=_order):
         try:
             _require_this_version(point.dist)
@@ -167,7 +167,7 @@ class Registry(Generic[T]):
         Raises `UnknownNameError` with the near matches.
         """
         types = self.all()
-        if not isinstance(name, str) or name not in types:
+        if not is_a(name, str) or name not in types:
             raise UnknownNameError.of(self.kind, str(name)[:100], types)
         return types[name]
 
@@ -252,7 +252,7 @@ def register(cls: type[T]) -> type[T]:
     >>> model_type("renamed").__name__
     'Renamed'
     """
-    registry = next((r for r in _registries.values() if isinstance(cls, type) and issubclass(cls, r.base)), None)
+    registry = next((r for r in _registries.values() if is_a(cls, type) and issubclass(cls, r.base)), None)
     if registry is None or not isinstance(getattr(cls, "name", None), str) or inspect.isabstract(cls):
         raise InputError(
             f"{shown(cls)} cannot be registered",
@@ -265,7 +265,7 @@ def register(cls: type[T]) -> type[T]:
 
 def modules_with(group: str, function: str) -> tuple[tuple[ExtensionPart, ModuleType], ...]:
     """List the modules of a group that define a function of that name, as commands and checks do."""
-    modules = []
+    modules: list[tuple[ExtensionPart, ModuleType]] = []
     for point, target in provided_modules(group):
         for module in target if isinstance(target, tuple) else ():
             if callable(getattr(module, function, None)):

@@ -70,6 +70,11 @@ class InputError(ValueError):
         return printable(f"{text} [{self.code}]")
 
 
+def is_a(value: object, kind: type | tuple[type, ...]) -> bool:
+    """Tell if a value is of a kind; unlike `isinstance` it says nothing to a type checker, who trusts annotations."""
+    return isinstance(value, kind)
+
+
 def require(value: object, kind: type | tuple[type, ...], wanted: str, remedy: str = "") -> None:
     """Refuse an argument of another kind in a public function.
 
@@ -153,11 +158,11 @@ def _fits(value: Any, kind: Any) -> bool:
     if not issubclass(origin, Iterable):  # a callable, or one of our own
         return isinstance(value, origin)
     if issubclass(origin, Mapping):
-        return isinstance(value, Mapping) and all(_fits(k, inner[0]) and _fits(v, inner[1]) for k, v in value.items())
+        return is_a(value, Mapping) and all(_fits(k, inner[0]) and _fits(v, inner[1]) for k, v in value.items())
     wanted = Iterable if origin is Iterable else Collection
-    if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, wanted):
+    if is_a(value, (str, bytes, Mapping)) or not is_a(value, wanted):
         return False
-    if not isinstance(value, Collection):
+    if not is_a(value, Collection):
         return True  # looked at while it is used up
     each = inner[:1] * len(value) if origin is not tuple or inner[-1] is ... else inner
     return len(each) == len(value) and all(map(_fits, value, each))

@@ -1,6 +1,6 @@
 """Test data: a `Condition` of the test matrix, a recorded `Run`, a `Dataset` of runs; and how notebooks show them."""
 
-from mrdamper.data.arrays import Floats
+from mrdamper.data.arrays import Floats, index_at
 from mrdamper.data.conditions import Condition, current_levels, same_condition, same_motion
 from mrdamper.data.datasets import Dataset
 from mrdamper.data.displayable import Displayable
@@ -18,6 +18,7 @@ __all__ = [
     "current_levels",
     "held_current",
     "hour_of",
+    "index_at",
     "once_per_run",
     "require_name",
     "same_condition",

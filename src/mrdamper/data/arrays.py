@@ -4,34 +4,41 @@ from __future__ import annotations
 
 import mmap
 from collections.abc import Iterator
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+T = TypeVar("T", bound=np.generic)
 CHUNK = 2**20  # samples
 
 
-def chunks(values: NDArray, overlap: int = 0) -> Iterator[tuple[int, NDArray]]:
+def chunks(values: NDArray[T], overlap: int = 0) -> Iterator[tuple[int, NDArray[T]]]:
     """Start and samples of every chunk of an array, in order; each but the last holds `overlap` samples of the next."""
     for at in range(0, max(values.size, 1), CHUNK):
         yield at, values[at : at + CHUNK + overlap]
         drop_pages(values)
 
 
-def take(values: NDArray, index: NDArray) -> NDArray:
+def take(values: NDArray[T], index: NDArray[np.intp]) -> NDArray[T]:
     """Return the samples of an increasing index, without holding all of a memory-mapped array at once."""
     if values.size <= CHUNK:
         return values[index]
     bounds = np.searchsorted(index, np.arange(CHUNK, values.size, CHUNK))
-    parts = []
+    parts: list[NDArray[T]] = []
     for part in np.split(index, bounds):
         parts.append(values[part])
         drop_pages(values)
     return np.concatenate(parts)
 
 
-def drop_pages(values: NDArray) -> None:
+def index_at(values: NDArray[np.generic], value: float, side: Literal["left", "right"] = "left") -> int:
+    """Index of the first of increasing values that is not below a value, or that is above it (`right`)."""
+    return int(np.searchsorted(values, value, side))
+
+
+def drop_pages(values: NDArray[np.generic]) -> None:
     """Let go of the memory of a memory-mapped array, or of a view of one; its numbers stay in its file."""
     held: object = values
     while held is not None:

@@ -15,13 +15,13 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from mrdamper.data.temporary import temporary_folder
-from mrdamper.errors import OutputError, resource_error, shown
+from mrdamper.errors import OutputError, is_a, resource_error, shown
 
 MADE = "made.json"  # which files of a folder are a result's, and what differs from run to run: times
 _MAX_NAME_BYTES = 255  # bytes, of a file or folder
@@ -44,13 +44,13 @@ class ResultRecord:
     """
 
     files: tuple[str, ...] = ()
-    seconds: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict)
+    seconds: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict[str, float])
     processes: int | None = None
 
 
-def path_of(path: object) -> Path:
+def path_of(path: str | os.PathLike[str]) -> Path:
     """Return the path a user gave; raises `OutputError` (E_PATH) if it is none."""
-    if isinstance(path, str | os.PathLike):
+    if is_a(path, (str, os.PathLike)):
         with contextlib.suppress(UnicodeEncodeError):
             parts = os.fsencode(path).split(os.sep.encode())
             if b"\0" not in os.fsencode(path) and max(map(len, parts)) <= _MAX_NAME_BYTES:
@@ -59,7 +59,7 @@ def path_of(path: object) -> Path:
 
 
 @contextmanager
-def write_folder(folder: str | Path, *, replace: bool = False) -> Iterator[Path]:
+def write_folder(folder: str | Path, *, replace: bool = False) -> Generator[Path]:
     """Give a temporary folder that takes the final name when the block ends without an error.
 
     An existing folder is replaced only if it is empty, or if that is asked for: its other files then move into the
@@ -80,7 +80,7 @@ def write_folder(folder: str | Path, *, replace: bool = False) -> Iterator[Path]
 
 
 @contextmanager
-def write_into(folder: str | Path) -> Iterator[Path]:
+def write_into(folder: str | Path) -> Generator[Path]:
     """Give a temporary folder whose files come to `folder` in one step when the block ends.
 
     Files of the same name are replaced; others stay. Raises `OutputError` if the folder cannot be made or written to.
@@ -93,7 +93,7 @@ def write_into(folder: str | Path) -> Iterator[Path]:
 
 
 @contextmanager
-def write_result(folder: str | Path, record: ResultRecord | None = None) -> Iterator[Path]:
+def write_result(folder: str | Path, record: ResultRecord | None = None) -> Generator[Path]:
     """Give a temporary folder whose files take the place of an earlier result in one step when the block ends.
 
     Files of the earlier result that this one does not have are gone afterwards; files of others stay. `made.json`
@@ -125,7 +125,7 @@ def publish(
 
 
 @contextmanager
-def write_file(path: str | Path) -> Iterator[Path]:
+def write_file(path: str | Path) -> Generator[Path]:
     """Give a temporary path that takes the final name when the block ends without an error.
 
     Raises `OutputError` if the file cannot be written.
@@ -160,7 +160,7 @@ def require_writable(path: str | Path | None) -> None:
 
 
 @contextmanager
-def _beside(final: Path) -> Iterator[Path]:
+def _beside(final: Path) -> Generator[Path]:
     """Give a scratch folder on the same file system, so that a rename suffices."""
     parent = final.absolute().parent
     with _coded(final):
@@ -176,7 +176,7 @@ def _beside(final: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _coded(final: Path) -> Iterator[None]:
+def _coded(final: Path) -> Generator[None]:
     """Say with a code what the system refuses; errors of reading elsewhere pass."""
     try:
         yield
@@ -233,7 +233,7 @@ def _carried(old: Path, new: Path, stale: frozenset[str]) -> bool:
     """Link the files of others into the new folder; False where there are too many, or more than files."""
     if old == Path.cwd() or old in Path.cwd().parents or os.path.ismount(old):
         return False
-    foreign = []
+    foreign: list[Path] = []
     for folder, folders, files in os.walk(old):
         here = Path(folder).relative_to(old)
         names = [here / name for name in files]

@@ -61,8 +61,8 @@ class Child:
             env={**os.environ, **threads, "POLARS_MAX_THREADS": str(polars_threads)},
         )  # fmt: skip
         assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._requests, self._answers = self._process.stdin, self._process.stdout
+        self._requests = self._process.stdin
+        self._answers: Any = self._process.stdout  # typeshed does not know that it is buffered
         self.pid = self._process.pid
 
     @property
@@ -108,7 +108,7 @@ class Child:
         view = values.data.cast("B")
         at = 0
         while at < len(view):
-            count = self._answers.readinto(view[at:])  # type: ignore[attr-defined]
+            count = self._answers.readinto(view[at:])
             if not count:
                 raise EOFError
             at += count
@@ -135,7 +135,7 @@ class Child:
 
 def descendants(pid: int) -> list[int]:
     """List the processes that a process started, and those that they started; empty where the system has no list."""
-    processes = []
+    processes: list[int] = []
     with contextlib.suppress(OSError):
         for task in Path(f"/proc/{pid}/task").iterdir():
             for child in map(int, (task / "children").read_text().split()):

@@ -94,7 +94,7 @@ def _levels(currents: tuple[float, ...]) -> tuple[float, ...]:
     middle = [(values[(a + b - 1) // 2] + values[(a + b) // 2]) / 2 for a, b in pairwise(ends)]  # medians
     names = [float(f"{value:.3g}") for value in middle]
     levels = np.empty(values.size)
-    levels[order] = [0.0 if abs(names[i]) < 5e-3 else names[i] for i in level]
+    levels[order] = np.array([0.0 if abs(name) < 5e-3 else name for name in names])[level]
     return tuple(levels.tolist())
 
 

@@ -95,10 +95,9 @@ def with_values(kind: type[T], values: Mapping[str, float]) -> T:
 
 def _info(f: Field[Any]) -> ParameterInfo:
     default = None if f.default is MISSING else float(f.default)
-    facts = f.metadata[_KEY]
-    return ParameterInfo(
-        **{**facts, "name": f.name, "default": default, "symbol": facts["symbol"] or latex_symbol(f.name)}
-    )
+    facts: dict[str, Any] = {**f.metadata[_KEY], "name": f.name, "default": default}
+    facts["symbol"] = facts["symbol"] or latex_symbol(f.name)
+    return ParameterInfo(**facts)
 
 
 _GREEK = (

@@ -17,7 +17,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mrdamper.data.arrays import Floats, chunks, take
+from mrdamper.data.arrays import Floats, chunks, index_at, take
 from mrdamper.data.conditions import Condition
 from mrdamper.data.displayable import Displayable
 from mrdamper.errors import (
@@ -25,6 +25,7 @@ from mrdamper.errors import (
     RunError,
     TimeOrderError,
     check_fields,
+    is_a,
     printable,
     require,
     shown,
@@ -99,8 +100,8 @@ class Run(Displayable):
     window: tuple[float, float] | None = None
     repeatability: float | None = None
     segments: tuple[tuple[int, int], ...] = ()
-    further: Mapping[str, Floats] = field(default_factory=dict)
-    notes: Mapping[str, str] = field(default_factory=dict)
+    further: Mapping[str, Floats] = field(default_factory=dict[str, Floats])
+    notes: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def __post_init__(self) -> None:
         check_fields(self, "excitation", "nominal", "window", "repeatability", "segments", "notes")
@@ -134,7 +135,7 @@ class Run(Displayable):
                     remedy="trim or resample the run",
                 )  # fmt: skip
         object.__setattr__(self, "further", {name: np.asarray(v, dtype=float) for name, v in self.further.items()})
-        if not isinstance(self.split, str) or self.split not in ("train", "validate"):
+        if not is_a(self.split, str) or self.split not in ("train", "validate"):
             raise RunError(f"split is {shown(self.split)}", where=self._where, remedy="use train or validate")
         object.__setattr__(self, "segments", tuple(self.segments) or ((0, size),))
         object.__setattr__(self, "notes", dict(self.notes))
@@ -322,7 +323,7 @@ _VON_NEUMANN_RATIO = 1.0  # von Neumann's ratio: two for white noise, near zero 
 @once_per_run
 def _held_current(run: Run) -> tuple[float, str]:
     first, last = run.window or (-math.inf, math.inf)
-    start, stop = int(np.searchsorted(run.time, first)), int(np.searchsorted(run.time, last, "right"))
+    start, stop = index_at(run.time, first), index_at(run.time, last, "right")
     start, stop = (start, stop) if stop - start >= 3 else (0, run.time.size)
     return held_current(take(run.current, np.arange(start, stop, 1 + (stop - start) // _MAX_CURRENT_SAMPLES)))
 

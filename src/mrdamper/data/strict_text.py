@@ -14,11 +14,12 @@ import re
 import stat
 import tomllib
 from pathlib import Path
-from typing import Any, BinaryIO, NoReturn
+from typing import Any, BinaryIO, NoReturn, TypeGuard
 
 _MAX_DEPTH = 64  # objects and arrays inside each other
 _MAX_DIGITS = 40  # characters of a whole number
 _LONGEST = 200_000  # characters; the profiles of the documentation have under 3,000
+_NESTED: tuple[type[Any], ...] = (dict, list)
 _DOTTED = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){17}""")  # ours have two parts
 
 
@@ -83,9 +84,14 @@ def _depth(value: Any) -> int:
     depth, level = 0, [value]
     while level:
         depth += 1
-        inner = [v for v in level if isinstance(v, dict | list)]
-        level = [part for v in inner for part in (v.values() if isinstance(v, dict) else v)]
+        inner = [v for v in level if isinstance(v, _NESTED)]
+        level = [part for v in inner for part in (v.values() if is_table(v) else v)]
     return depth
+
+
+def is_table(value: object) -> TypeGuard[dict[str, Any]]:
+    """Tell if a value that was read is an object of JSON, or a table of TOML."""
+    return isinstance(value, dict)
 
 
 def read_toml_file(path: Path) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -13,7 +13,7 @@ _PREFIX, _SUFFIX = "mrdamper-", ".scratch"
 
 
 @contextmanager
-def temporary_folder(parent: Path | None = None, prefix: str = _PREFIX, suffix: str = _SUFFIX) -> Iterator[Path]:
+def temporary_folder(parent: Path | None = None, prefix: str = _PREFIX, suffix: str = _SUFFIX) -> Generator[Path]:
     """Give a new folder that goes with the block; those of its kind whose process was killed go first.
 
     Parameters

@@ -69,14 +69,15 @@ class CWriter(Writer):
         return "".join(f"    {line}\n" for line in lines)
 
     def _guards(self, stage: int) -> str:
-        lines = []
+        lines: list[str] = []
         for question, answer in self.program.guards(stage):
             text = self.text(question)
             lines.append(f"    if ({'!' if answer else ''}{text}) {{\n        return 0;\n    }}\n")
         return "".join(lines)
 
     def _lines(self, statements: list[Statement], indent: int) -> list[str]:
-        pad, lines = "    " * indent, []
+        pad = "    " * indent
+        lines: list[str] = []
         for statement in statements:
             if isinstance(statement, Let):
                 lines.append(f"{pad}{self._declared(statement.expression)} = {self.formula(statement.expression)};")

@@ -51,7 +51,7 @@ class Traced:
 class Operation:
     """An operation on numbers: its plain value, and whether it answers yes or no."""
 
-    value: Callable[..., Any]
+    value: Callable[[Any], Any] | Callable[[Any, Any], Any]
     logical: bool = False
 
 
@@ -91,6 +91,7 @@ OPERATIONS: dict[str, Operation] = {
     "logical_not": Operation(lambda a: not a, logical=True),
     "isfinite": Operation(math.isfinite, logical=True),
 }
+_NUMPY: tuple[type[Any], ...] = (np.ndarray, np.generic)
 _ALIASES = {"true_divide": "divide", "bitwise_and": "logical_and", "bitwise_or": "logical_or", "invert": "logical_not"}
 
 
@@ -144,7 +145,9 @@ class Expression(NDArrayOperatorsMixin, Traced):
             raise TraceError(f"numpy.{ufunc.__name__} has no scalar form here; add it to OPERATIONS")
         return self.tape.apply(name, *(plain(value) for value in inputs))
 
-    def __array_function__(self, func: Callable, types: Iterable[type], args: tuple, options: dict) -> Any:
+    def __array_function__(
+        self, func: Callable[..., Any], types: Iterable[type], args: tuple[Any, ...], options: dict[str, Any]
+    ) -> Any:
         if func is np.where and len(args) == 3:
             return self.tape.select(*args)
         if func is np.clip:
@@ -156,7 +159,7 @@ class Expression(NDArrayOperatorsMixin, Traced):
 
 def plain(value: Any) -> Any:
     """Return the number in a NumPy scalar or in an array of one element."""
-    return value.item() if isinstance(value, np.ndarray | np.generic) and np.ndim(value) == 0 else value
+    return value.item() if isinstance(value, _NUMPY) and np.ndim(value) == 0 else value
 
 
 def choose(condition: Any, then: Callable[[], Any], otherwise: Callable[[], Any]) -> Any:

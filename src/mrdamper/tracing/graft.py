@@ -108,7 +108,7 @@ class ProgramCopy:
         if node.op == "memory":
             return self.memory[node.name]
         if node.op == "lookup":
-            return self.tape.lookup(self.source.tape.tables[node.args[0]], of(node.args[1]))
+            return self.tape.lookup(self.source.tape.tables[int(node.args[0])], of(node.args[1]))
         if node.op == "select":
             return self.tape.select(*map(of, node.args))
         return self.tape.apply(node.op, *map(of, node.args))

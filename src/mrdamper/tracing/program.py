@@ -53,11 +53,11 @@ class Program:
 
     tape: Tape
     outputs: Mapping[str, Any]
-    setup: list[Statement] = field(default_factory=list)
-    step: list[Statement] = field(default_factory=list)
-    derived: list[Expression] = field(default_factory=list)  # what `setup` hands to `step`
+    setup: list[Statement] = field(default_factory=list[Statement])
+    step: list[Statement] = field(default_factory=list[Statement])
+    derived: list[Expression] = field(default_factory=list[Expression])  # what `setup` hands to `step`
     # name of an expression, by its id; expressions without one are written where they are used
-    names: dict[int, str] = field(default_factory=dict)
+    names: dict[int, str] = field(default_factory=dict[int, str])
 
     def guards(self, stage: int) -> list[tuple[Expression, bool]]:
         """Settled questions that can be asked again at a stage."""
@@ -189,10 +189,11 @@ def _fill(result: Program, order: list[Any], scopes: dict[int, Scope]) -> None:
     result.setup, result.step = blocks[(), True], blocks[(), False]
 
 
-FUNCTIONS = {name: name for name in ("sqrt", "exp", "expm1", "log", "log1p", "tan", "tanh")}
-FUNCTIONS |= {"arctan": "atan", "arctanh": "atanh"}  # as C, JavaScript and Python call them
-_MARKS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
-_MARKS |= {"less": "<", "less_equal": "<=", "greater": ">", "greater_equal": ">=", "equal": "==", "not_equal": "!="}
+_SAME_NAME = ("sqrt", "exp", "expm1", "log", "log1p", "tan", "tanh")
+FUNCTIONS = dict(zip(_SAME_NAME, _SAME_NAME, strict=True)) | {"arctan": "atan", "arctanh": "atanh"}  # in C, JS, Python
+_MARKS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"} | {
+    "less": "<", "less_equal": "<=", "greater": ">", "greater_equal": ">=", "equal": "==", "not_equal": "!="
+}  # fmt: skip
 
 
 class Writer(ABC):

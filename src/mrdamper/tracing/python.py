@@ -28,7 +28,8 @@ class PythonWriter(Writer):
 
     def statements(self, block: list[Statement], indent: int) -> list[str]:
         """Lines of a block."""
-        pad, lines = "    " * indent, []
+        pad = "    " * indent
+        lines: list[str] = []
         for statement in block:
             if isinstance(statement, Let):
                 lines.append(f"{pad}{self.name(statement.expression)} = {self.formula(statement.expression)}")
@@ -91,7 +92,7 @@ def python_functions(program: Program) -> tuple[Callable[..., Any], Callable[...
 
 
 def _guards(writer: Writer, program: Program, stage: int, rest: str) -> list[str]:
-    lines = []
+    lines: list[str] = []
     for question, answer in program.guards(stage):
         text = writer.text(question)
         lines += [f"    if {'not ' if answer else ''}{text}:", f"        return {OUTSIDE}, {rest}"]

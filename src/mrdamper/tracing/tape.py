@@ -20,7 +20,10 @@ from mrdamper.tracing.expression import CONSTANT, OPERATIONS, PARAMETER, SAMPLE,
 
 Floats = NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])
-_WITH_INFINITY = {op: OPERATIONS[op].value for op in ("less", "less_equal", "greater", "greater_equal")}
+_GROUP: type[Any] = tuple
+_WITH_INFINITY: dict[str, Callable[..., Any]] = {
+    op: OPERATIONS[op].value for op in ("less", "less_equal", "greater", "greater_equal")
+}
 _UNROLLED = 6  # highest integer power written as products
 
 
@@ -198,7 +201,7 @@ def streamed(step: Callable[..., Any]) -> Callable[[F], F]:
         @wraps(of_arrays)
         def either(*args: Any, **options: Any) -> Any:
             for arg in args:
-                one = arg[0] if isinstance(arg, tuple) and arg else arg
+                one = arg[0] if isinstance(arg, _GROUP) and arg else arg
                 if isinstance(one, Traced):
                     return step(one.tape, *args, **options)
             return of_arrays(*args, **options)

@@ -86,7 +86,7 @@ def clear_cache() -> int:
 
 def cache_size() -> tuple[int, int]:
     """Return the number of compiled libraries, and their size [bytes]."""
-    sizes = []
+    sizes: list[int] = []
     for path in _libraries(cache_folder()):
         with suppress(OSError):
             sizes.append(path.stat().st_size)
@@ -241,7 +241,7 @@ def _bound(folder: Path) -> None:
             if time.time() - path.stat().st_mtime > _DAY:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
     kept = 0
-    sizes = []
+    sizes: list[tuple[float, int, Path]] = []
     for path in _libraries(folder):
         with suppress(OSError):
             sizes.append((path.stat().st_mtime, path.stat().st_size, path))
