@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from mrdamper.data import Run
-from mrdamper.errors import IdentificationError, validate_arguments
+from mrdamper.errors import IdentificationError, is_a, validate_arguments
 from mrdamper.identification.methods import all_methods, method_named
 from mrdamper.identification.problem import Identification, Method, Problem, Solution
 from mrdamper.identification.uncertainty import uncertainty_of_run
@@ -83,7 +83,7 @@ def identify(
     >>> round(found.model.c, -3)  # post-yield damping [N s/m]
     7000.0
     """
-    if not isinstance(run, Run):
+    if not is_a(run, Run):
         remedy = 'identify one run, identify(dataset["ID"]); run_study(dataset) identifies them all'
         raise IdentificationError(f"a {type(run).__name__} in place of a run", remedy=remedy)
     refuse_clipped(run, clipped)
@@ -152,7 +152,7 @@ def conclude(problem: Problem, method: Method, solution: Solution) -> Identifica
 
 
 def _notes(problem: Problem) -> tuple[str, ...]:
-    notes = []
+    notes: list[str] = []
     names = {info.name for info in problem.model_type.parameters()}
     if "m" in names and "m" not in problem.free and not problem.fixed.get("m"):
         notes.append("mass left out: on one frequency it is part of k1 (a = −ω² x); k1 holds k1 − m ω²")

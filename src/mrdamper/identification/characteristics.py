@@ -93,7 +93,8 @@ def characterise(runs: Sequence[Run]) -> Characteristics:
 
     `runs`: of one rig.
     """
-    usable, passed_over = [], {}
+    usable: list[Run] = []
+    passed_over: dict[str, str] = {}
     for run in runs:
         try:
             run.current_A  # noqa: B018

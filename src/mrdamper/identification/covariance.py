@@ -68,7 +68,7 @@ def spread(
         kept = whole // block * block
         jacobian, residual = (a[:kept].reshape(-1, block, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))
         time = None if time is None else time[:kept].reshape(-1, block).mean(axis=1)
-    scale = np.sqrt(np.sum(jacobian**2, axis=0))
+    scale: Floats = np.sqrt(np.sum(jacobian**2, axis=0))
     active = scale > 0
     size, count = residual.size, scale.size
     covariance = np.diag(np.full(count, np.inf))
@@ -106,14 +106,15 @@ def alike_groups(vectors: Floats) -> list[tuple[list[int], int]]:
 
     `vectors` (P, K): combinations of parameters that change nothing.
     """
-    basis, own = vectors.T.copy(), []
+    basis = vectors.T.copy()
+    own: list[int] = []
     for k in range(len(basis)):
-        row, column = np.unravel_index(int(np.argmax(np.abs(basis[k:]))), basis[k:].shape)
+        row, column = map(int, np.unravel_index(int(np.argmax(np.abs(basis[k:]))), basis[k:].shape))
         basis[[k, k + row]] = basis[[k + row, k]]
         basis[k] /= basis[k, column]
         others = np.arange(len(basis)) != k
         basis[others] -= np.multiply.outer(basis[others, column], basis[k])
-        own.append(int(column))
+        own.append(column)
     return [(np.flatnonzero(np.abs(row) > _TAKES_PART).tolist(), one) for row, one in zip(basis, own, strict=True)]
 
 
@@ -157,7 +158,8 @@ def _repeated(
     turned = _powers(np.exp(2j * np.pi * frequency * (time - time[0])), most)
     waves = np.stack([turned.real, turned.imag], axis=1).reshape(2 * most, size)
     gram = waves @ waves.T
-    amplitudes = np.linalg.solve(gram, waves @ (residual - residual.mean()))
+    along: Floats = waves @ (residual - residual.mean())
+    amplitudes = np.linalg.solve(gram, along)
     rest = residual - amplitudes @ waves
     responses = (waves @ jacobian).T  # (P, 2K)
     # Share of every wave that the parameters can take up, and so have taken out of the residual.

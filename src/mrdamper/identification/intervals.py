@@ -153,7 +153,7 @@ def _correlated(covariance: Floats) -> list[tuple[list[int], float]]:
     for pair in links:
         joined = [group for group in groups if group & set(pair)]
         groups = [group for group in groups if group not in joined] + [set(pair).union(*joined)]
-    sentences = []
+    sentences: list[tuple[list[int], float]] = []
     for group in groups:
         largest = max((r for (i, _), r in links.items() if i in group), key=abs)
         sentences.append((sorted(group), largest if len(group) == 2 else abs(largest)))

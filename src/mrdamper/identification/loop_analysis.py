@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats, Run, current_levels, same_motion
+from mrdamper.data import Condition, Floats, Run, current_levels, index_at, same_motion
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.measured import measured_motion
 from mrdamper.physics.motion.sines import MotionAnalysis, analyse_motion
@@ -82,7 +82,7 @@ def at_levels(loops: Sequence[LoopAnalysis]) -> tuple[LoopAnalysis, ...]:
 def whole_cycles(time: Floats, frequency: float) -> slice:
     """Return the samples of the largest whole number of cycles from the start."""
     cycles = max(1, int(np.ptp(time) * frequency + 0.02))
-    return slice(0, int(np.searchsorted(time, time[0] + cycles / frequency + 1e-9, side="right")))
+    return slice(0, index_at(time, time[0] + cycles / frequency + 1e-9, "right"))
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class DynamicRange:
 
 def dynamic_ranges(loops: Sequence[LoopAnalysis]) -> tuple[DynamicRange, ...]:
     """Dynamic range of every motion that was tested at two currents or more."""
-    ranges = []
+    ranges: list[DynamicRange] = []
     for group in same_motion([loop.condition for loop in loops]):
         members = sorted((loops[i] for i in group), key=lambda loop: loop.condition.current_A)
         currents = tuple(m.condition.current_A for m in members)

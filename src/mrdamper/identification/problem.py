@@ -148,10 +148,10 @@ class RunUncertainty:
     """Standard errors of a run's parameters and search coordinates, and what to know of them."""
 
     # errors, dof: standard errors, and the degrees of freedom behind them
-    errors: Mapping[str, float] = field(default_factory=dict)
-    dof: Mapping[str, float] = field(default_factory=dict)
+    errors: Mapping[str, float] = field(default_factory=dict[str, float])
+    dof: Mapping[str, float] = field(default_factory=dict[str, float])
     # independent samples that would give each error, were the residual white
-    effective: Mapping[str, float] = field(default_factory=dict)
+    effective: Mapping[str, float] = field(default_factory=dict[str, float])
     doubts: tuple[str, ...] = ()  # what the samples cannot tell
 
 
@@ -247,7 +247,7 @@ class Identification(Displayable):
     def details(self) -> Sequence[str]:
         """Free parameters with their 95 % intervals and units, and the independent samples these rest on."""
         infos = {info.name: info for info in self.model.parameters()}
-        lines = []
+        lines: list[str] = []
         for name in self.free:
             state, ends = self._state(name), self.interval(name)
             count = (

@@ -96,7 +96,7 @@ def _sensitivities(
         zip([info.name for info in infos], linear_table(bare, infos, scored, state)[1].T, strict=True)
     )
     base = residual + problem.force
-    columns = []
+    columns: list[Floats] = []
     for name in names:
         if name in linear_columns:
             columns.append(linear_columns[name])
@@ -124,7 +124,8 @@ def _of_parameters(
         step = _DIFFERENCE_STEP * abs(point[names[i]]) or _DIFFERENCE_STEP
         moved = problem.model_type.build({**point, names[i]: point[names[i]] + step})
         slopes[:, k] = [(getattr(moved, name) - getattr(at, name)) / step for name in missing]
-    block, errors = covariance[np.ix_(searched, searched)], {}
+    block = covariance[np.ix_(searched, searched)]
+    errors: dict[str, tuple[float, list[str]]] = {}
     for name, row in zip(missing, slopes, strict=True):
         if (used := row != 0).any():
             variance = float(row[used] @ block[np.ix_(used, used)] @ row[used])

@@ -89,7 +89,7 @@ class BoucWen(Model):
         """Yield displacement (log), asymmetry (gamma − beta)/(gamma + beta) and n: nearly orthogonal."""
         amplitude = scale.amplitude
         ladder = tuple(amplitude * np.geomspace(1e-4, 2.0, 14))
-        axes = []
+        axes: list[SearchAxis] = []
         if "beta" in free or "gamma" in free:
             axes.append(SearchAxis("yield_displacement", amplitude * 1e-5, amplitude * 10, ladder, log=True))
         if "beta" in free and "gamma" in free:

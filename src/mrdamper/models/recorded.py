@@ -29,7 +29,7 @@ def recorded(state: S) -> S:
     """
 
     @wraps(state)
-    def along(self: Any, motion: Excitation) -> Floats:
+    def along(self: Any, motion: Excitation | TracedMotion) -> Floats:
         if not isinstance(motion, Excitation):
             return state(self, motion)
         outputs = _along(self, motion, None, lambda free, traced, tape: {"state": state(free, traced)})
@@ -62,17 +62,18 @@ def _along(
     outputs: Callable[[Any, Any, Tape], Mapping[str, Any]],
 ) -> Floats | None:
     """(K, N) outputs of a program of the model along a motion; programs are kept by the names of their tangents."""
+    kind: type = model.__class__
     values = model.values()
     if len(motion) < _MIN_COMPILED_SAMPLES or not all(isinstance(value, float | int) for value in values.values()):
         return None
     given = tuple(map(float, values.values()))
-    programs = _PROGRAMS.setdefault((type(model), names), [])
+    programs = _PROGRAMS.setdefault((kind, names), [])
     for record in programs:
         if (derived := record.prepare(given)) is not None:
             break
     else:
         try:
-            record = RecordProgram(_traced(type(model), values, outputs))
+            record = RecordProgram(_traced(kind, values, outputs))
         except TraceError:
             if names is None:
                 raise

@@ -7,10 +7,11 @@ in another order, which changes the last bits of a result: everything runs on on
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property, wraps
+from importlib import import_module
 from typing import Any, ParamSpec, Self, TypeVar
 
 import numpy as np
@@ -159,8 +160,18 @@ class FixedColumns:
         return np.linalg.inv(self.triangle) / self.scale[:, None]
 
 
+def nonnegative_least_squares(table: Floats, right: Floats) -> tuple[Floats, float]:
+    """Coefficients of least squares that are not negative, and the norm of the rest; SciPy is slow to import."""
+    return import_module("scipy.optimize").nnls(table, right)
+
+
+def solve_lower_triangle(triangle: NDArray[np.floating[Any]], right: Floats) -> Floats:
+    """Solve with a matrix of which the lower triangle alone is looked at."""
+    return import_module("scipy.linalg").solve_triangular(triangle, right, lower=True)
+
+
 @contextmanager
-def one_blas_thread() -> Iterator[None]:
+def one_blas_thread() -> Generator[None]:
     """Hold the linear algebra to one thread inside the block.
 
     It takes threadpoolctl. Without it, set OMP_NUM_THREADS=1 and OPENBLAS_NUM_THREADS=1 (or
@@ -189,8 +200,8 @@ def on_one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
 @cache
 def _controller() -> Any:
     try:
-        from threadpoolctl import ThreadpoolController
+        threadpoolctl: Any = import_module("threadpoolctl")
     except ModuleNotFoundError:
         return None
     np.linalg.inv(np.eye(2))  # the library to be held has to be loaded first
-    return ThreadpoolController()
+    return threadpoolctl.ThreadpoolController()

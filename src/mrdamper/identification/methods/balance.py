@@ -72,7 +72,7 @@ class Balance(Method):
         costs = [float(np.sum(residual(u) ** 2)) for u in grid]
         lower = np.array([axis.coordinate(axis.lower) for axis in axes])
         upper = np.array([axis.coordinate(axis.upper) for axis in axes])
-        starts = [grid[i] for i in np.argsort(costs)[: min(len(axes), 2)]]
+        starts: list[Floats] = [grid[i] for i in np.argsort(costs)[: min(len(axes), 2)]]
         minima = [(start, least_squares(residual, start, lower, upper)) for start in starts]
         start, best = min(minima, key=lambda pair: pair[1].cost)
         model, _, held = balanced.at(point(best.point))

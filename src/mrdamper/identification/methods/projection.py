@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.data import Floats
+from mrdamper.data import Floats, index_at
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.elimination import Elimination
@@ -178,7 +178,7 @@ def _few_cycles(problem: Problem) -> tuple[Path, NDArray[np.intp]]:
     cycle = (size - 1) / float(np.ptp(problem.motion.time)) / problem.analysis.condition.frequency_Hz
     thin = max(1, int(cycle / _GRID_SAMPLES_A_CYCLE))
     scored = min(problem.force.size, math.ceil(_GRID_CYCLES * cycle))
-    led = np.searchsorted(whole.stroke, whole.stroke[max(0, size - scored - math.ceil(cycle / 2))])
+    led = index_at(whole.stroke, whole.stroke[max(0, size - scored - math.ceil(cycle / 2))])
     picked = np.arange(size - 1, led - 1, -thin)[::-1]
     path = Path(
         whole.stroke[picked] - whole.stroke[picked[0]],

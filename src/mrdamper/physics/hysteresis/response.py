@@ -79,7 +79,7 @@ def step(shape: Shape, zeta: Any, dx: Any) -> Any:
     curve, back = master_curve(shape.n), dx < 0
     xp = math if isinstance(back, bool) else functions
     w = choose(back, lambda: -zeta, lambda: zeta)
-    reached = _advance(curve, shape.rho, w, shape.kappa * abs(dx), xp)
+    reached = advance(curve, shape.rho, w, shape.kappa * abs(dx), xp)
     return choose(back, lambda: -reached, lambda: reached)
 
 
@@ -108,14 +108,14 @@ def stroke(shape: Shape, zeta0: ArrayLike, distance: ArrayLike) -> Floats:
     if np.any(travelled < 0):
         raise ExcitationError("a stroke has negative length", remedy="give the distance and state zeta0 · sgn v")
     phi = float(shape.kappa) * travelled.ravel()
-    states = _states(master_curve(shape.n), float(shape.rho), start.ravel(), slice(None), phi)
+    states = states_after(master_curve(shape.n), float(shape.rho), start.ravel(), slice(None), phi)
     return states.reshape(start.shape)[()]
 
 
 def _follow_one(curve: MasterCurve, kappa: float, rho: float, path: Path, zeta0: float) -> Floats:
     """One state follows from the other at the reversals only: plain floats there, arrays for the samples."""
     starts = starts_of_strokes(curve, kappa, rho, path, path.first_direction * zeta0)
-    return path.direction * _states(curve, rho, np.array(starts), path.stroke, kappa * path.distance)
+    return path.direction * states_after(curve, rho, np.array(starts), path.stroke, kappa * path.distance)
 
 
 def starts_of_strokes(curve: MasterCurve, kappa: float, rho: float, path: Path, w: float) -> list[float]:
@@ -124,7 +124,7 @@ def starts_of_strokes(curve: MasterCurve, kappa: float, rho: float, path: Path, 
     full = (curve.release_distance(1.0, rho, math) + curve.full) / kappa
     for length in path.lengths:
         if w != -1.0 or length < full:  # else the stroke leads from saturation to saturation
-            w = -_advance(curve, rho, w, kappa * length)
+            w = -advance(curve, rho, w, kappa * length)
         starts.append(w)
     return starts
 
@@ -139,7 +139,7 @@ def on_curve(curve: MasterCurve, rho: float, phi: Floats) -> Floats:
     return w
 
 
-def _states(curve: MasterCurve, rho: float, starts: Floats, stroke: np.ndarray | slice, phi: Floats) -> Floats:
+def states_after(curve: MasterCurve, rho: float, starts: Floats, stroke: np.ndarray | slice, phi: Floats) -> Floats:
     """State in the direction of motion after phi, for samples whose stroke began at `starts[stroke]`.
 
     All but the states that already point along the motion are on one curve through zero.
@@ -155,7 +155,7 @@ def _states(curve: MasterCurve, rho: float, starts: Floats, stroke: np.ndarray |
     return w
 
 
-def _advance(curve: MasterCurve, rho: Any, w: Any, phi: Any, xp: ModuleType = math) -> Any:
+def advance(curve: MasterCurve, rho: Any, w: Any, phi: Any, xp: ModuleType = math) -> Any:
     """One stroke of one number."""
 
     def released() -> Any:

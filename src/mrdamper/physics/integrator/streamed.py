@@ -18,11 +18,11 @@ MOST_STEPS = 400  # between two samples; a sound model takes a handful
 _STATE_DIFFERENCE, _TIME_DIFFERENCE = 1e-7, 1e-5  # for derivatives by differences
 
 
-class _Columns(list):
+class _Columns(list[Any]):
     """States by column, as `state[:, j]` asks for them."""
 
     def __getitem__(self, index: Any) -> Any:
-        return super().__getitem__(index[1] if isinstance(index, tuple) else index)
+        return super().__getitem__(index[1] if hasattr(index, "__len__") else index)
 
 
 def integrate_step(
@@ -98,7 +98,7 @@ def _rodas3(
     order = range(len(y))
     sizes = [np.maximum(abs(y[j]), scale[j]) for j in order]
     f = slopes(t, y)
-    columns = []
+    columns: list[list[Any]] = []
     for j in order:
         nudge = _STATE_DIFFERENCE * sizes[j]
         moved = slopes(t, [y[i] + nudge if i == j else y[i] for i in order])

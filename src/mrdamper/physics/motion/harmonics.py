@@ -169,7 +169,7 @@ def _spectral_line(time: Floats, signal: Floats) -> float:
         every = max(1, time.size // max(_SAMPLES_PER_BLOCK, _SAMPLES_PER_HALF_PERIOD * often))
         time, signal = time[::every], signal[::every]
     size = time.size
-    wave = np.interp(np.linspace(time[0], time[-1], size), time, signal)
+    wave = np.interp(np.linspace(float(time[0]), float(time[-1]), size), time, signal)
     place = np.arange(size) - (size - 1) / 2
     wave = wave - wave.mean() - place * (place @ wave / (place @ place))
     window = np.hanning(size + 2)[1:-1] if _crossings(wave) > 4 else np.ones(size)

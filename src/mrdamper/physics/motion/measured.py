@@ -89,7 +89,7 @@ def whole_clock(time: Floats) -> Floats:
     """
     steps = np.diff(time)
     rounding = float(np.ptp(steps))
-    even = np.linspace(time[0], time[-1], time.size)
+    even = np.linspace(float(time[0]), float(time[-1]), time.size)
     spacing = float(even[1] - even[0])
     rounded = _UNIFORM * spacing < rounding < 0.5 * spacing and np.max(np.abs(time - even)) <= 1.01 * rounding
     return even if rounded else time

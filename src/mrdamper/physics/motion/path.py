@@ -97,6 +97,9 @@ class Path:
         return turn, back, move
 
 
+_REMEMBERED: tuple[type[Any], ...] = (np.ndarray, Path)
+
+
 def memoize_per_path(function: Callable[..., Floats]) -> Callable[..., Floats]:
     """Remember what a function of a path or of samples, and of some numbers, gave the last two times.
 
@@ -107,7 +110,7 @@ def memoize_per_path(function: Callable[..., Floats]) -> Callable[..., Floats]:
 
     @wraps(function)
     def remembered(first: Any, *given: Any) -> Floats:
-        if not isinstance(first, np.ndarray | Path) or len(first) > LONG:
+        if not isinstance(first, _REMEMBERED) or len(first) > LONG:
             return function(first, *given)
         if id(first) not in memory:
             memory[id(first)] = ref(first, lambda _, key=id(first): memory.pop(key, None)), []

@@ -40,7 +40,7 @@ class FunctionFit:
     function: ParameterFunction
     r2: float
     left_out: float
-    refused: Mapping[str, str] = field(default_factory=dict, compare=False)
+    refused: Mapping[str, str] = field(default_factory=dict[str, str], compare=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +208,8 @@ def _best_rates(
     """Search the rates in their logarithm: a grid, then refinement from its three best points."""
     if not form.rate_bounds:
         return ()
-    lower, upper = np.log(np.array(form.rate_bounds)).T
+    bounds = np.log(np.array(form.rate_bounds))
+    lower, upper = bounds[:, 0], bounds[:, 1]
     right = target * weight
 
     def fitted(u: Floats) -> tuple[Floats, Floats]:
@@ -224,7 +225,7 @@ def _best_rates(
         by_rate = (form.slopes(columns, I, f, tuple(np.exp(u))) @ fit).T
         return project_out_columns(columns, by_rate)  # the coefficients move along [Kaufman 1975]
 
-    grid = np.array(list(product(*(np.linspace(low, high, 6) for low, high in zip(lower, upper, strict=True)))))
+    grid: Floats = np.array(list(product(*np.linspace(lower, upper, 6).T)))
     tables = np.stack([form.columns(I, f, A, tuple(rates)) for rates in np.exp(grid)]) * weight[:, None]
     explained = np.sum((right @ np.linalg.qr(tables)[0]) ** 2, axis=-1)
     starts = grid[np.argsort(-explained, kind="stable")[:3]]

@@ -9,7 +9,7 @@ velocity, too, and the projection on a convex set is continuous.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -19,6 +19,7 @@ import numpy as np
 from mrdamper.data.arrays import Floats
 from mrdamper.data.conditions import Condition, same_motion
 
+_where: Callable[..., Any] = np.where  # of arrays and of traced numbers
 _SLEEK = 0.05  # width of a hull in the logarithm below which it is a segment: tests repeat a motion to some per cent
 _ZERO_IN_LOGARITHM = 1e-12  # frequency [Hz] and amplitude [m] that stand for zero in the logarithm
 
@@ -67,7 +68,7 @@ class MotionHull:
         f, A = np.exp(nearest[1]), np.exp(nearest[2])
         if count == 2:
             return f, A
-        return np.where(inside, frequency, f), np.where(inside, amplitude, A)
+        return _where(inside, frequency, f), _where(inside, amplitude, A)
 
 
 @lru_cache(maxsize=256)

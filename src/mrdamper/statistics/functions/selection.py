@@ -120,7 +120,7 @@ def broken_law(function: ParameterFunction, conditions: Sequence[Condition], uni
         Empty where it breaks none.
     """
     tested = np.unique(current_levels([abs(c.current_A) for c in conditions]))
-    currents = np.unique(np.concatenate([np.linspace(0.0, BEYOND * tested[-1], 61), tested]))
+    currents = np.unique(np.concatenate([np.linspace(0.0, BEYOND * float(tested[-1]), 61), tested]))
     motions = MotionHull.of(conditions).corners
     values = np.array([np.broadcast_to(function(currents, *motion), currents.shape) for motion in motions])
     if values.min() < 0:
