@@ -107,8 +107,9 @@ def band(
         # Calibration is at the tests: not of growth.
         return np.sqrt(at_tests**2 + uncertainty.growth.half_width(quantity, distance, level) ** 2)
 
-    variance = parameter + session + model
-    t = reach("force", [float(np.mean(v)) for v in (parameter, session, model)]) / (np.sqrt(np.mean(variance)) or 1.0)
+    variance: Floats = parameter + session + model
+    t = reach("force", [float(np.mean(v)) for v in (parameter, session, model)])
+    t /= float(np.sqrt(np.mean(variance))) or 1.0
     width = half * with_growth(t * np.sqrt(variance) / (half or 1.0), "force")
     future, known_session = (
         half * with_growth(reach("peak", [own[1], between, of_run + uncertainty.peak**2]), "peak")
@@ -208,16 +209,17 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
     if not 0 < at.peak_velocity <= tested.peak_velocity_m_s[1]:
         at = replace(at, amplitude_m=tested.peak_velocity_m_s[1] / (2 * np.pi * at.frequency_Hz))
     currents = sorted({*tested.current_A, at.current_A})
-    at_tests: Damper = replace(damper, uncertainty=replace(uncertainty, growth=Growth()))
-    own, quantile = [], []
+    at_tests = replace(damper, uncertainty=replace(uncertainty, growth=Growth()))
+    own: list[float] = []
+    quantile: list[float] = []
     for current in currents:
-        prediction = damper.predict(replace(at, current_A=current))
+        prediction: Prediction = damper.predict(replace(at, current_A=current))
         interval = band(at_tests, prediction, level)
         if interval is None:
             return None
         parts = np.sqrt(interval.parameter**2 + interval.session**2 + interval.model**2)
-        own.append(np.mean(interval.parameter**2) / peak_force(prediction.force) ** 2)
-        quantile.append(np.mean(interval.high - prediction.force) / (np.mean(parts) or 1.0))
+        own.append(float(np.mean(interval.parameter**2)) / peak_force(prediction.force) ** 2)
+        quantile.append(float(np.mean(interval.high - prediction.force)) / (float(np.mean(parts)) or 1.0))
     t = float(np.mean(quantile))
     away = [tested.distance(c, np.array([c.current_A])) for c in tested.farthest]
     grown = max((uncertainty.growth.half_width("force", distance, level) for distance in away), default=0.0)

@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.distance import AT_TESTS, Distance
-from mrdamper.data.arrays import Floats
+from mrdamper.data.arrays import Floats, index_at
 from mrdamper.data.runs import Run
 from mrdamper.data.sessions import session_of
 from mrdamper.identification.intervals import student
 from mrdamper.physics.motion.sines import equivalent_sine
+from mrdamper.statistics.linear import nonnegative_least_squares
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 
 Quantity = Literal["force", "peak", "energy"]
@@ -163,15 +164,11 @@ def model_error(runs: Sequence[PredictedRun]) -> ModelError:
     ----------
     runs : sequence of PredictedRun, length R > 0
     """
-    rests, peaks, energies, gains, offsets = [], [], [], [], []
-    for run in runs:
-        gain, offset = run.gain_and_offset
-        rests.append(np.mean((run.measured - gain * run.predicted - offset) ** 2) / run.half**2)
-        gains.append(gain - 1)
-        offsets.append(offset)
-        if gain > 0:
-            peaks.append(run.peak / gain - 1)
-            energies.append(run.energy / gain - 1)
+    corrected = [(run, *run.gain_and_offset) for run in runs]
+    rests = [float(np.mean((run.measured - g * run.predicted - o) ** 2)) / run.half**2 for run, g, o in corrected]
+    gains, offsets = [g - 1 for _, g, _ in corrected], [o for _, _, o in corrected]
+    peaks = [run.peak / g - 1 for run, g, _ in corrected if g > 0]
+    energies = [run.energy / g - 1 for run, g, _ in corrected if g > 0]
 
     def root(errors: Sequence[Floats]) -> float:
         finite = [own for e in errors if (own := e[np.isfinite(e)]).size]
@@ -244,8 +241,6 @@ class Growth:
             Predicted by models identified without a condition, a current, or the fastest motions.
         at_tests : ModelError
         """
-        from scipy.optimize import nnls
-
         away = [run for run in runs if run.distance.squares.any()]
         if not away:
             dof = (_TYPICAL_DOF, _TYPICAL_DOF, _TYPICAL_DOF)
@@ -255,7 +250,8 @@ class Growth:
         size[size == 0] = 1.0
         shown = table.max(axis=0) > np.square(_SHOWN)
         excess = np.array([_squared_errors(run) - _expected(run, at_tests) for run in away])
-        slopes = np.array([nnls(table / size, column)[0] / size for column in excess.T])
+        fits = [nonnegative_least_squares(table / size, column)[0] for column in excess.T]
+        slopes = np.array(fits) / size
         typical = np.square(_TYPICAL_GROWTH)
         growth = np.sqrt(np.where(shown, (np.minimum(slopes, _MAX_GROWTH**2) + typical) / 2, typical))
         dof = _TYPICAL_DOF * (1 + shown)
@@ -325,7 +321,7 @@ class Calibration:
 
     def factor(self, quantity: Quantity, level: float) -> float:
         """Factor on a normal interval; beyond the reachable level that of the highest one."""
-        values = getattr(self, quantity)
+        values: tuple[float, ...] = getattr(self, quantity)
         return float(np.interp(level, LEVELS[: len(values)], values)) if values else 1.0
 
     @classmethod
@@ -356,6 +352,10 @@ class StandardizedErrors:
     peak: Floats
     energy: Floats
 
+    def samples(self, quantity: Quantity) -> Floats:
+        """Return the errors of one quantity."""
+        return getattr(self, quantity)
+
     @classmethod
     def of(cls, run: PredictedRun, force: Floats, peak: float, energy: float) -> StandardizedErrors:
         """By standard deviations of the force (N,) [N], and of peak and energy, relative."""
@@ -383,12 +383,12 @@ def _quantile(units: Sequence[Sequence[StandardizedErrors]], quantity: Quantity,
 
     Samples, and peaks and energies of the loops of long records, are pooled.
     """
-    scores = [getattr(scored, quantity) for unit in units for scored in unit]
-    weights = [np.full(getattr(s, quantity).size, 1 / getattr(s, quantity).size / len(u)) for u in units for s in u]
+    scores = [scored.samples(quantity) for unit in units for scored in unit]
+    weights = [np.full(s.samples(quantity).size, 1 / s.samples(quantity).size / len(u)) for u in units for s in u]
     values, weight = np.concatenate(scores), np.concatenate(weights)
     order = np.argsort(values)
     wanted = level * (len(units) + (quantity != "force" and any(s.size == 1 for s in scores)))
-    at = int(np.searchsorted(np.cumsum(weight[order]), wanted * (1 - 1e-12)))
+    at = index_at(np.cumsum(weight[order]), wanted * (1 - 1e-12))
     return float(values[order[min(at, values.size - 1)]])
 
 
@@ -399,9 +399,9 @@ def _covered(
     level: float,
 ) -> float:
     """Share of scores that factors from the other units cover, each unit counting alike."""
-    shares = []
+    shares: list[float] = []
     for unit, rest in zip(units, others, strict=True):
         reached = min(level, len(rest) / (len(rest) + 1)) if rest else 0.0
         most = _quantile(rest, quantity, reached) if rest else np.inf
-        shares.append(np.mean([np.mean(getattr(scored, quantity) <= most) for scored in unit]))
+        shares.append(float(np.mean([np.mean(scored.samples(quantity) <= most) for scored in unit])))
     return float(np.mean(shares))

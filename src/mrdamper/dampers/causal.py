@@ -50,7 +50,8 @@ def trace(damper: Damper, free: bool = False) -> Program:
             "no form for one sample", where=damper.title, remedy="stream a damper with a model behind it"
         )
     tape = Tape()
-    middle = float(np.mean(damper.envelope.current_A)) if damper.envelope.tested else 0.0
+    currents: tuple[float, ...] = damper.envelope.current_A
+    middle = float(np.mean(currents)) if damper.envelope.tested else 0.0
     x, v, a = (tape.input(name) for name in ("displacement", "velocity", "acceleration"))
     asked, dt = tape.input("current", middle), tape.input("dt")
     moved = x - tape.previous(x, "displacement")

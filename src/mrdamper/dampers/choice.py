@@ -326,10 +326,10 @@ class CrossValidation:
         on = np.array([n in active or n.startswith("coil.") for n in self.names])
         shift = np.where(on, 0.0, self.neutral - self.values)
         base = self.residual + self.jacobian @ shift
-        errors_by_fold = {}
+        errors_by_fold: dict[str, Floats] = {}
         normal, right = self.jacobian[:, on].T @ self.jacobian[:, on], self.jacobian[:, on].T @ base
         for what, groups in self.groups.items():
-            errors = []
+            errors: list[float] = []
             for group in groups:
                 J = self.jacobian[np.ix_(group, on)]
                 step = _damped(normal - J.T @ J, -(right - J.T @ base[group]))
@@ -346,7 +346,8 @@ class CrossValidation:
     def choose(self, removable: Sequence[ModelTerm]) -> tuple[frozenset[str], tuple[TermTrial, ...]]:
         """Select the terms without which the cross-validated error increases, one after the other."""
         active = frozenset(n for n in self.names if not n.startswith("coil."))
-        now, tried = self.scores(active), []
+        now = self.scores(active)
+        tried: list[TermTrial] = []
         for term in removable:
             if set(term.names) <= active:
                 without = self.scores(active - set(term.names))
@@ -389,7 +390,7 @@ def _means(errors: Errors) -> dict[str, float]:
 
 def _by_condition(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndarray]]:
     """Rows left out together: of a condition, or a stretch of another record."""
-    rows_by_key = {}
+    rows_by_key: dict[str, list[np.ndarray]] = {}
     sines = [i for i, part in enumerate(problem.parts) if part.is_sine and not part.changes]
     conditions = [problem.parts[i].condition for i in sines]
     groups = [np.flatnonzero(np.isin(owner, [sines[k] for k in group])) for group in same_condition(conditions)]

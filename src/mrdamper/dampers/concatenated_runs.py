@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.coil import Coil
-from mrdamper.data import Condition, Floats, Run
+from mrdamper.data import Condition, Floats, Run, index_at
 from mrdamper.errors import RunError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.models.base import Model
@@ -79,14 +79,14 @@ class RunRows:
         followed = _carrying(motion, sine.condition)
         steady = first
         if sine.is_sine:
-            steady = max(first, int(np.searchsorted(time, time[last] - _CYCLES * period)))
+            steady = max(first, index_at(time, time[last] - _CYCLES * period))
             followed &= (time <= time[first] + period) | (time >= time[steady] - _WARM_UP * period)
         else:
             information = max(1.0, np.sqrt((time[last] - time[first]) / period))
         at = np.flatnonzero(followed)
         x = motion.displacement
         moved = np.maximum.accumulate(x) - np.minimum.accumulate(x)  # not the travel: that grows at rest, by noise
-        unknown = min(int(np.searchsorted(moved, sine.condition.amplitude_m)), max(first, len(motion) // 4))
+        unknown = min(index_at(moved, sine.condition.amplitude_m), max(first, len(motion) // 4))
         rows = at[(at >= unknown) & (at < len(motion) - 1)]  # the last sample turns towards the next run
         before, inside, after = rows[rows < first], rows[(rows >= steady) & (rows <= last)], rows[rows > last]
         inside = inside[:: max(1, int(inside.size / (_ROWS * information)))]
@@ -110,7 +110,7 @@ class RunRows:
             sine.is_sine,
             float(np.min(run.displacement)),
             float(np.max(run.displacement)),
-            (int(np.searchsorted(at, inside[0])), int(np.searchsorted(at, inside[-1]))),
+            (index_at(at, inside[0]), index_at(at, inside[-1])),
         )
 
     def steady_end(self) -> RunRows:
@@ -397,7 +397,8 @@ def project_out(slopes: Floats, columns: Floats) -> Floats:
 def concatenate(motions: Iterable[Excitation]) -> Excitation:
     """Concatenate motions, a second apart."""
     parts = list(motions)
-    time, clock = [], 0.0
+    time: list[Floats] = []
+    clock = 0.0
     for part in parts:
         time.append(part.time - part.time[0] + clock)
         clock = float(time[-1][-1]) + 1.0

@@ -180,8 +180,9 @@ def _determined(
 ) -> tuple[list[int], list[int], list[list[int]], Floats]:
     """Columns to keep, those no run shows, groups that do the same, and the inverse of the kept ones' normal matrix."""
     normal = normal_matrix(slopes, parts)
-    keep = [i for i in range(count) if normal[i, i] > 0]
-    unseen, alike = [i for i in range(count) if i not in keep], []
+    keep: list[int] = [i for i in range(count) if normal[i, i] > 0]
+    unseen = [i for i in range(count) if i not in keep]
+    alike: list[list[int]] = []
     while keep:
         scale = np.sqrt(np.diag(normal)[keep])
         values, vectors = np.linalg.eigh(normal[np.ix_(keep, keep)] / np.outer(scale, scale))
@@ -205,7 +206,7 @@ def _rest_on_one_run(names: Sequence[str], parts: Sequence[RunResiduals], inform
     best = np.argmax(information, axis=0)
     return [
         f"{name} is determined mainly by run {parts[r].run.id} ({100 * information[r, i]:.0f} % of its information)"
-        for i, (name, r) in enumerate(zip(names, best, strict=True))
+        for i, (name, r) in enumerate(zip(names, map(int, best), strict=True))
         if information[r, i] > _MAX_RUN_SHARE
     ]
 
@@ -274,7 +275,7 @@ def _with_model_error(
     )
     usual = np.median(list(own.values()), axis=0)
     gain, offset = (getattr(uncertainty, f"run_{name}") ** 2 + of_sessions[name] for name in ("gain", "offset"))
-    scores = []
+    scores: list[StandardizedErrors] = []
     for run in cross_validated:
         shares = zip(QUANTITIES, own.get(run.run_id, usual), strict=True)
         grown = {q: share + uncertainty.growth.variance(q, run.distance) for q, share in shares}

@@ -13,6 +13,7 @@ from mrdamper.dampers.distance import Distance, distance_from
 from mrdamper.data.conditions import Condition, same_condition
 from mrdamper.data.runs import Floats
 from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.statistics.linear import nonnegative_least_squares
 
 SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
 COMBINATION = "combination"  # every quantity was tested, these together were not
@@ -150,11 +151,9 @@ class Envelope:
 
 @lru_cache(maxsize=4096)
 def _in_hull(tested: tuple[tuple[float, float, float], ...], scale: float, asked: tuple[float, float, float]) -> bool:
-    from scipy.optimize import nnls  # slow to import, and needed only here
-
     corners = np.array([_features(point, scale) for point in tested]) - _features(asked, scale)
     centred = np.column_stack([corners, np.full(len(corners), _SUM_WEIGHT)])
-    return bool(nnls(centred.T, np.array([0.0, 0.0, 0.0, _SUM_WEIGHT]))[1] < SLACK)
+    return bool(nonnegative_least_squares(centred.T, np.array([0.0, 0.0, 0.0, _SUM_WEIGHT]))[1] < SLACK)
 
 
 def _point(condition: Condition) -> tuple[float, float, float]:

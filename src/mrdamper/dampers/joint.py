@@ -81,7 +81,7 @@ class JointDamper(Damper):
     model: Model
     free: tuple[str, ...]
     envelope: Envelope
-    provenance: Mapping[str, str] = field(default_factory=dict)
+    provenance: Mapping[str, str] = field(default_factory=dict[str, str])
     coil: Coil | None = None
     uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 
@@ -474,7 +474,7 @@ class JointProblem:
     def _at_bounds(self, point: Floats) -> list[str]:
         """Parameters whose search axis ended at a limit, under their own names."""
         own = {info.name for info in self.model_type.parameters()}
-        names = []
+        names: list[str] = []
         middle = np.mean(self.box(), axis=0)
         for i, axis in enumerate(self.axes):
             if not axis.at_bound(float(point[i])):

@@ -101,7 +101,7 @@ class KernelDamper(Damper):
     rig: str
     law: KernelLaw
     envelope: Envelope
-    provenance: Mapping[str, str] = field(default_factory=dict)
+    provenance: Mapping[str, str] = field(default_factory=dict[str, str])
     coil: Coil | None = None
     uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 
@@ -136,8 +136,9 @@ class KernelDamper(Damper):
         centres = inputs[np.sort(pick)]
         table = _kernel(inputs, centres) * trust[:, None]
         normal = table.T @ table / len(inputs) + _RIDGE * _kernel(centres, centres) / len(centres)
-        normal += 1e-10 * np.trace(normal) / len(centres) * np.eye(len(centres))
-        weights = np.linalg.solve(normal, table.T @ ((force - mean) / size * trust) / len(inputs))
+        stiff: Floats = normal + 1e-10 * np.trace(normal) / len(centres) * np.eye(len(centres))
+        right: Floats = table.T @ ((force - mean) / size * trust) / len(inputs)
+        weights = np.asarray(np.linalg.solve(stiff, right), dtype=float)
         conditions = [piece.condition for piece in pieces]
         law = KernelLaw(centres, weights, spread, mean, size)
         return cls(runs[0].rig, law, Envelope.of(conditions), dict(provenance or {}))

@@ -212,7 +212,7 @@ def profile(likelihood: Likelihood, name: str) -> LikelihoodProfile:
             if fall > 3 * CHI_SQUARED_95:
                 break
     order = np.argsort([p[i] for p in points])
-    us, fall = np.array([points[k][i] for k in order]), np.array([falls[k] for k in order])
+    us, fall = np.array(points)[order, i], np.array(falls)[order]
     fall = fall - fall.min()
     best = int(np.argmin(fall))
     low, high = _crossing(us[: best + 1][::-1], fall[: best + 1][::-1]), _crossing(us[best:], fall[best:])

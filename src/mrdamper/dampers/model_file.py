@@ -24,7 +24,7 @@ from mrdamper.dampers.sessions import Sessions
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import require_name
 from mrdamper.data.atomic import path_of, write_file
-from mrdamper.data.strict_text import open_regular, parse_json
+from mrdamper.data.strict_text import is_table, open_regular, parse_json
 from mrdamper.errors import InputError, ModelFileError, require
 from mrdamper.models import model_parts
 
@@ -136,7 +136,7 @@ class _Document(_SavedPart):
 def model_schema() -> dict[str, Any]:
     """Return the JSON Schema of a saved model, every kind of damper included."""
     schema = _Document.model_json_schema()
-    kinds = []
+    kinds: list[dict[str, Any]] = []
     for name, kind in all_kinds().items():
         own = TypeAdapter(kind.saved).json_schema(ref_template="#/$defs/{model}")
         schema.setdefault("$defs", {}).update(own.pop("$defs", {}))
@@ -234,7 +234,7 @@ def parse_model(text: str, where: str = "model") -> Damper:
         raw = parse_json(text)
     except ValueError as error:
         raise ModelFileError(str(error), where=where, remedy="copy the file again") from error
-    if not isinstance(raw, dict) or raw.get("format") != FORMAT:
+    if not is_table(raw) or raw.get("format") != FORMAT:
         raise ModelFileError("not a saved model", where=where, remedy="give a model.json written by mrdamper")
     version = re.fullmatch(r"(\d{1,4})\.\d{1,4}", str(raw.get("version")))
     if version and int(version[1]) > MAJOR:
@@ -292,9 +292,9 @@ def _kind(described: dict[str, Any], where: str) -> tuple[type[Damper], dict[str
 def _upgraded(raw: dict[str, Any]) -> dict[str, Any]:
     """Convert older minor versions. Before 1.2 a kernel regression was a condition-dependent damper."""
     described = raw.get("damper")
-    if isinstance(described, dict) and described.get("kind") == "conditioned" and described.get("model") == "kernel":
+    if is_table(described) and described.get("kind") == "conditioned" and described.get("model") == "kernel":
         numbers, tables = described.get("coefficients"), described.get("tables")
-        if isinstance(numbers, dict) and isinstance(tables, dict):
+        if is_table(numbers) and is_table(tables):
             spread = [numbers.get(f"spread_{n}") for n in ("displacement", "velocity", "acceleration", "current")]
             whole = {"mean": numbers.get("mean"), "size": numbers.get("size"), "spread": spread}
             return {**raw, "damper": {"kind": "kernel", **tables, **whole}}
@@ -361,8 +361,8 @@ def _with_uncertainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
 def _describe_coil(coil: Coil | None) -> _Coil | None:
     if coil is None:
         return None
-    driver = coil.driver and _Driver(
-        **{**asdict(coil.driver), "limit_A": None if coil.driver.limit_A == math.inf else coil.driver.limit_A}
+    driver = coil.driver and _Driver.model_validate(
+        {**asdict(coil.driver), "limit_A": None if coil.driver.limit_A == math.inf else coil.driver.limit_A}
     )
     return _Coil(rise_s=coil.rise_s, fall_s=coil.fall_s, driver=driver)
 

@@ -77,7 +77,7 @@ class ModifiedModel(Damper):
     rig: str
     parameters: ParameterMap
     envelope: Envelope
-    provenance: Mapping[str, str] = field(default_factory=dict)
+    provenance: Mapping[str, str] = field(default_factory=dict[str, str])
     coil: Coil | None = None
     uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 
@@ -188,7 +188,7 @@ class ModifiedFit:
     values: Mapping[str, Floats]
     conditions: tuple[Condition, ...]
     at_bounds: tuple[str, ...] = ()
-    refused: Mapping[str, str] = field(default_factory=dict)
+    refused: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
     def few_motions(self) -> bool:
@@ -339,7 +339,7 @@ def _dissipating(model_type: type[Model]) -> dict[str, str]:
 def functions_at_bounds(parameters: ParameterMap, conditions: Sequence[Condition]) -> tuple[str, ...]:
     """Parameters whose function leaves their bounds at a test, or has a rate at a bound of the search."""
     bounds = {info.name: info.bounds for info in parameters.model_type.parameters()}
-    names = []
+    names: list[str] = []
     for name, function in parameters.functions.items():
         low, high = bounds.get(name, (0.0 if name == "yield_force" else -np.inf, np.inf))
         values = function(*features(conditions))

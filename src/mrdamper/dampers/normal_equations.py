@@ -11,6 +11,7 @@ a run from a drifting session then pulls less (iteratively reweighted least squa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -106,7 +107,7 @@ class Condensed:
             ]
         ).transpose(2, 0, 1)  # (R, 2, 4)
         weights[:, 1] /= logs[1] - logs[0]
-        rows, pair = np.arange(u.size)[:, None], first[:, None] + np.arange(2)
+        rows, pair = np.arange(len(shape_values))[:, None], first[:, None] + np.arange(2)
         nodes = np.concatenate([self.gram[rows, pair], self.bend[rows, pair]], axis=1)  # (R, 4, L+1, L+1)
         both = (weights @ nodes.reshape(u.size, 4, -1)).reshape(u.size, 2, *nodes.shape[2:])
         return both[:, 0], both[:, 1]
@@ -168,9 +169,10 @@ def _spline_curvature(gram: Floats) -> Floats:
 def _length_grid(amplitudes: Sequence[float]) -> Floats:
     """Rungs [m] from far inside the smallest amplitude to the largest."""
     low, high = (
-        np.log(v / _GRID_ORIGIN_M) / np.log(_GRID_RATIO) for v in (_MIN_LENGTH_RATIO * min(amplitudes), max(amplitudes))
+        float(np.log(v / _GRID_ORIGIN_M) / np.log(_GRID_RATIO))
+        for v in (_MIN_LENGTH_RATIO * min(amplitudes), max(amplitudes))
     )
-    return _GRID_ORIGIN_M * _GRID_RATIO ** np.arange(np.floor(low), np.ceil(high) + 1)
+    return _GRID_ORIGIN_M * _GRID_RATIO ** np.arange(math.floor(low), math.ceil(high) + 1.0)
 
 
 def _gram(problem: Problem, linear: tuple[str, ...], shape: str, ladder: Floats) -> Floats:
@@ -451,7 +453,7 @@ def _factor(gram: Floats) -> Floats:
 
 def _reweighted(design: _Design, gram: Floats, reweightings: int) -> _Solution:
     table, _ = design.table(gram)
-    solution = _solve(table, np.ones(gram.shape[0]))
+    solution = _solve(table, np.ones(len(gram)))
     for _ in range(reweightings):
         solution = _solve(table, robust_weights(solution.nrmse_pp, _MIN_ERROR_PP))
     return solution
@@ -558,7 +560,7 @@ def _tried(
     if data.shape:
         start = fit_function(law_of(forms[data.shape])[0], data.conditions, shape_values, log=True).function
     fit = fit_jointly(data, forms, start, reweightings=2, most_steps=5, polish=False)
-    errors = {}
+    errors: dict[str, Floats] = {}
     for kind, groups in folds.items():
         members = [i for group in groups for i in group]
         errors[kind] = leave_out_errors(data, fit, groups, forms)[members]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats, Run
+from mrdamper.data import Condition, Floats, Run, index_at
 from mrdamper.models import Model
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.sines import centred_motion, equivalent_sine
@@ -23,7 +23,9 @@ class Piece:
     scored: slice
     force: Floats
     scale: float
-    states: dict[tuple[float, ...], Floats] = field(default_factory=dict)  # by what of a model shapes them
+    states: dict[tuple[float, ...], Floats] = field(
+        default_factory=dict[tuple[float, ...], Floats]
+    )  # by what of a model shapes them
 
     @classmethod
     def of(cls, run: Run) -> Piece:
@@ -31,8 +33,8 @@ class Piece:
         sine = equivalent_sine(run)
         last = int(np.flatnonzero(run.in_window)[-1])
         period = 1 / sine.condition.frequency_Hz
-        begin = int(np.searchsorted(run.time, run.time[last] - period))
-        lead = int(np.searchsorted(run.time, run.time[last] - 1.75 * period))
+        begin = index_at(run.time, run.time[last] - period)
+        lead = index_at(run.time, run.time[last] - 1.75 * period)
         step = max(1, (last - begin) // _SAMPLES)
         motion = centred_motion(run).part(slice(lead, last + 1, step))
         force = run.force[lead : last + 1 : step]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +64,7 @@ def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed:
     """
     if importlib.util.find_spec("emcee") is None:
         raise MissingExtraError("samples need emcee", remedy="pip install 'mrdamper[uq]'")
-    import emcee
+    emcee: Any = importlib.import_module("emcee")
 
     size = len(likelihood.names)
     count = walkers or 2 * size + 2
@@ -79,16 +80,19 @@ def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed:
             * np.log1p(np.sum(((points - likelihood.start) @ inverse.T) ** 2, axis=1) / _PROPOSAL_DOF)
         )
 
-    def propose(points: Floats, random) -> tuple[Floats, Floats]:
+    def propose(points: Floats, random: np.random.RandomState) -> tuple[Floats, Floats]:
         shape = points.shape
-        scale = np.sqrt(_PROPOSAL_DOF / random.chisquare(_PROPOSAL_DOF, shape[0]))
+        scale = np.sqrt(_PROPOSAL_DOF / random.chisquare(_PROPOSAL_DOF, len(points)))
         new = likelihood.start + (random.standard_normal(shape) * scale[:, None]) @ root.T
         return new, wide(points) - wide(new)
+
+    def logarithm(point: Floats) -> float:
+        return -0.5 * likelihood(point)
 
     begin = likelihood.start + 0.5 * rng.standard_normal((count, size)) @ root.T
     begin = np.clip(begin, likelihood.bounds[:, 0], likelihood.bounds[:, 1])
     moves = [(emcee.moves.MHMove(propose), 0.7), (emcee.moves.StretchMove(), 0.3)]
-    sampler = emcee.EnsembleSampler(count, size, lambda u: -0.5 * likelihood(u), moves=moves)
+    sampler = emcee.EnsembleSampler(count, size, logarithm, moves=moves)
     sampler.random_state = np.random.RandomState(seed).get_state()
     sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
     kept: Floats = np.asarray(

@@ -16,6 +16,7 @@ import numpy as np
 
 from mrdamper.dampers.run_residuals import RunResiduals
 from mrdamper.data import SESSIONS_NEEDED, Floats
+from mrdamper.statistics.linear import nonnegative_least_squares
 
 _MIN_RETAINED = 0.05  # share of a variance that the fit must have left in the residuals for it to be estimated
 _MAX_CONDITION = 100.0  # condition number of the moment equations; beyond, runs and sessions are not separated
@@ -125,7 +126,7 @@ class GainsAndOffsets:
         for k, members in enumerate(self.sessions):
             drawn[:, members] += shared[:, k : k + 1]
         whole = self._refitted(drawn)
-        kinds = []
+        kinds: list[Floats] = []
         for members, (gain, offset) in (
             (self.sessions, (effects.gain, effects.offset)),
             ([[k] for k in range(count)], (effects.run_gain, effects.run_offset)),
@@ -181,14 +182,13 @@ class GainsAndOffsets:
         return float(np.linalg.cond(self._equations(components)))
 
     def _solved(self, between: Sequence[_Component], within: Sequence[_Component]) -> Effects:
-        from scipy.optimize import nnls
-
         used = [c for c in (*between, *within) if self._retained(c) >= _MIN_RETAINED]
         if not used:
             return Effects()
         own = np.array([self._moment(c, c) for c in used])
         read = np.array([self._excess(c) for c in used])
-        variances = dict(zip(map(id, used), nnls(self._equations(used), read / own)[0].tolist(), strict=True))
+        fitted, _ = nonnegative_least_squares(self._equations(used), read / own)
+        variances: dict[int, float] = dict(zip(map(id, used), fitted.tolist(), strict=True))
         gain, offset = (float(np.sqrt(variances.get(id(c), 0.0))) for c in between) if between else (0.0, 0.0)
         run_gain, run_offset = (float(np.sqrt(variances.get(id(c), 0.0))) for c in within) if within else (0.0, 0.0)
         return Effects(
@@ -210,9 +210,9 @@ class GainsAndOffsets:
         moved, weight = np.zeros((len(shift), size)), np.ones((len(shift), count))
         for _ in range(_ROUNDS):
             pull = weight / scale**2
-            normal = np.einsum("dr,rpq->dpq", pull, grams[:, :size, :size])
-            unit = np.sqrt(np.einsum("dpp->dp", normal))
-            right = np.einsum("dr,drp->dp", pull, pulls) / unit
+            normal: Floats = np.einsum("dr,rpq->dpq", pull, grams[:, :size, :size])
+            unit: Floats = np.sqrt(np.einsum("dpp->dp", normal))
+            right: Floats = np.einsum("dr,drp->dp", pull, pulls) / unit
             moved = np.linalg.solve(normal / unit[:, :, None] / unit[:, None, :], right[:, :, None])[:, :, 0] / unit
             left = np.concatenate([np.broadcast_to(moved[:, None, :], (len(shift), count, size)), -shift], axis=2)
             squares = np.einsum("drp,rpq,drq->dr", left, grams, left, optimize=True) + rest

@@ -9,7 +9,7 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.prediction import Prediction
-from mrdamper.data import Floats, Run, session_of
+from mrdamper.data import Floats, Run, index_at, session_of
 
 _MAX_SAMPLES = 400  # samples of a run that enter
 _CYCLES = 4  # of a sine that enter, as in the joint fit
@@ -56,8 +56,8 @@ class RunResiduals:
         begin = 0
         if prediction.is_sine:
             period = 1 / prediction.condition.frequency_Hz
-            first = max(first, int(np.searchsorted(run.time, run.time[last] - _CYCLES * period)))
-            begin = int(np.searchsorted(run.time, run.time[first] - _WARM_UP * period))
+            first = max(first, index_at(run.time, run.time[last] - _CYCLES * period))
+            begin = index_at(run.time, run.time[first] - _WARM_UP * period)
             short = replace(prediction, motion=prediction.motion.part(slice(begin, last + 1)))
             prediction = replace(short, force=damper.force_for(short))
         measured = run.force[first : last + 1 : max(1, (last + 1 - first) // _MAX_SAMPLES)]

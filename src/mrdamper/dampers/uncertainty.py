@@ -100,8 +100,8 @@ class Uncertainty:
     energy: float = 0.0
     left_out: int = 0
     words: tuple[str, ...] = ()
-    information: Mapping[str, float] = field(default_factory=dict)
-    effective: Mapping[str, float] = field(default_factory=dict)
+    information: Mapping[str, float] = field(default_factory=dict[str, float])
+    effective: Mapping[str, float] = field(default_factory=dict[str, float])
     sessions: Sessions | None = None
     calibration: Calibration | None = None
     growth: Growth = field(default_factory=Growth)
@@ -163,7 +163,9 @@ def uncertainty_warnings(damper: Damper) -> list[str]:
         )
     elif uncertainty.session_dof < 2:
         sentences.append("The scatter between sessions rests on fewer than two degrees of freedom.")
-    apart, wide, weak = [], [], []
+    apart: list[int] = []
+    wide: list[tuple[str, str]] = []
+    weak: list[tuple[str, str]] = []
     for i, name in enumerate(uncertainty.names):
         ends = uncertainty.ends(damper, name)
         if ends is None:
@@ -204,7 +206,7 @@ def table(damper: Damper, level: float = 0.95) -> list[dict[str, Any]]:
     known), state, written (as on a screen).
     """
     uncertainty: Uncertainty | None = damper.uncertainty
-    rows = []
+    rows: list[dict[str, Any]] = []
     for name, own in damper.fitted_parameters.items():
         ends = uncertainty.ends(damper, name, level) if uncertainty else None
         if uncertainty is None:

@@ -9,7 +9,7 @@ from typing import Any, Concatenate, Literal, ParamSpec
 
 from mrdamper import identification
 from mrdamper.data import Dataset, Displayable, Run
-from mrdamper.errors import InputError, validate_arguments
+from mrdamper.errors import InputError, is_a, validate_arguments
 from mrdamper.rig_files.quality.table import check_run, with_findings
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
 from mrdamper.study.workflow import accepted_runs
@@ -145,7 +145,7 @@ def _of_accepted_runs(
 
     @wraps(identify_run)
     def identify_accepted(run: Run, *args: P.args, **kwargs: P.kwargs) -> identification.Identification:
-        if not isinstance(run, Run):
+        if not is_a(run, Run):
             return identify_run(run, *args, **kwargs)  # says what to give instead
         refusal, noted = check_run(run)
         if refusal is not None:

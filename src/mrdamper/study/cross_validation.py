@@ -14,7 +14,16 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import PredictedRun
-from mrdamper.data import SESSIONS_NEEDED, Condition, Run, current_levels, same_condition, same_motion, session_of
+from mrdamper.data import (
+    SESSIONS_NEEDED,
+    Condition,
+    Run,
+    current_levels,
+    index_at,
+    same_condition,
+    same_motion,
+    session_of,
+)
 from mrdamper.errors import InputError
 from mrdamper.physics.motion import equivalent_sine
 from mrdamper.study.validation import RunScore, Validation, leave_out, score_run
@@ -121,7 +130,7 @@ def cross_validate_by_kind(
 
     Runs of a fold without which no damper can be made are among the refused.
     """
-    scores = {}
+    scores: dict[str, Validation] = {}
     for kind, groups in folds_by_kind(pieces).items():
         scored: list[RunScore] = []
         refused: dict[str, str] = {}
@@ -143,10 +152,10 @@ def stretches(run: Run) -> list[Run]:
     count = min(_MAX_STRETCHES, int((end - begin) / period / _MIN_STRETCH_CYCLES))
     if (motion.is_sine and not run.current_changes) or count < 2:
         return [run]
-    cuts = np.searchsorted(run.time, np.linspace(begin, end, count + 1))
-    parts = []
-    for number, (first, last) in enumerate(pairwise(cuts.tolist()), 1):
-        lead = max(0, int(np.searchsorted(run.time, run.time[first] - 1.5 * period)))
+    cuts: list[int] = np.searchsorted(run.time, np.linspace(begin, end, count + 1)).tolist()
+    parts: list[Run] = []
+    for number, (first, last) in enumerate(pairwise(cuts), 1):
+        lead = max(0, index_at(run.time, run.time[first] - 1.5 * period))
         window = (float(run.time[first]), float(run.time[min(last, run.time.size) - 1]))
         notes = {**run.notes, _STRETCH_NOTE: run.id}
         parts.append(replace(run.part(lead, last), id=f"{run.id} {number}/{count}", window=window, notes=notes))

@@ -14,6 +14,7 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.data.strict_text import read_toml_file
+from mrdamper.errors import is_a
 from mrdamper.rig_files.limits_file import RIG_LIMITS, LimitsError, require_known_keys
 
 _MAX_SAMPLES = 500_000  # of a planned record
@@ -112,15 +113,15 @@ class Limits:
         require_known_keys(given, LimitsError, str(path))
         given = {name: value for name, value in given.items() if name in RIG_LIMITS}
         for name, value in given.items():
-            numbers = value if isinstance(value, list) else [value]
+            numbers: list[Any] = value if is_a(value, list) else [value]
             plain = all(isinstance(n, int | float) and not isinstance(n, bool) and math.isfinite(n) for n in numbers)
-            if not plain or isinstance(value, list) != (name in _RANGES) or len(numbers) != 1 + (name in _RANGES):
+            if not plain or is_a(value, list) != (name in _RANGES) or len(numbers) != 1 + (name in _RANGES):
                 raise bad_limits(
                     f"{name} = {value!r}", "give [lowest, highest]" if name in _RANGES else "give one number"
                 )
         if missing := [name for name in _RANGES if name not in given]:
             raise bad_limits(f"no {', '.join(missing)}", "give [lowest, highest] of each (mrdamper init limits)")
-        values: dict[str, Any] = {n: tuple(map(float, v)) if isinstance(v, list) else v for n, v in given.items()}
+        values: dict[str, Any] = {n: tuple(map(float, v)) if is_a(v, list) else v for n, v in given.items()}
         return cls(**values)
 
     @classmethod

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, Future, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mrdamper.data import Run
+from mrdamper.data import Run, index_at
 from mrdamper.errors import InputError
 from mrdamper.identification import Identification, Method, Problem, conclude
 from mrdamper.identification.basis import Basis
@@ -73,7 +73,7 @@ IN_PROCESS = Processes()
 
 
 @contextmanager
-def several(count: int) -> Iterator[Processes]:
+def several(count: int) -> Generator[Processes]:
     """Start `count` processes, this one included, for the length of a block."""
     if count < 2:
         yield IN_PROCESS
@@ -91,7 +91,7 @@ def _quietly(function: Callable[[T, Progress], R], item: T) -> R:
 
 
 @contextmanager
-def worker_pool(runs: Iterable[Run], workers: int) -> Iterator[WorkerPool]:
+def worker_pool(runs: Iterable[Run], workers: int) -> Generator[WorkerPool]:
     """Yield processes that hold these runs, of one thread each, so that their number changes no bit."""
     held = {run.id: run for run in runs}.values()
     before = {name: os.environ.get(name) for name in _THREADS}
@@ -200,7 +200,7 @@ def shortened(run: Run) -> Run:
     """Return the last cycles of a run's steady window, thinned: what costly identifications see."""
     steady = run.steady()
     frequency = analyse_motion(run).condition.frequency_Hz
-    begin = int(np.searchsorted(steady.time, steady.time[-1] - (_CYCLES + 1) / frequency))
+    begin = index_at(steady.time, steady.time[-1] - (_CYCLES + 1) / frequency)
     if len(run.segments) > 1:
         return run
     cut = steady.part(begin, steady.time.size)

@@ -135,7 +135,7 @@ class ExperimentDesign:
         # What no run could tell is planned for too: anything within a factor, or what moves the force by all of it.
         unknown = [n for n in damper.fitted_parameters if n not in uncertainty.names and n not in uncertainty.one_sided]
         names = (*uncertainty.names, *unknown)
-        slopes_of_draws = []
+        slopes_of_draws: list[Floats] = []
         for number, condition in enumerate(conditions):
             progress(f"what test {number + 1} of {len(conditions)} would tell", 0.9 * number / len(conditions))
             slopes_of_draws.append(_slopes(damper, uncertainty, names, condition))
@@ -233,7 +233,8 @@ class ExperimentDesign:
     def proposals(self, played: Sessions) -> list[Proposal]:
         """Return the records with the standard deviation before and after each, session by session."""
         proposals: list[Proposal] = []
-        before, so_far = self.spread([]), [[] for _ in played]
+        before = self.spread([])
+        so_far: Sessions = [[] for _ in played]
         today = np.sqrt(np.diag(np.linalg.inv(self.prior)))
         for session, rows in enumerate(played):
             for i in rows:
@@ -269,7 +270,7 @@ def _slopes(damper: Damper, uncertainty: Uncertainty, names: Sequence[str], cond
     rng = np.random.default_rng(_SEED)
     root = np.linalg.cholesky(uncertainty.covariance + 1e-12 * np.diag(np.diag(uncertainty.covariance)))
     motion, last = sine(condition, 2, 4 * _SAMPLES), slice(-4 * _SAMPLES, None, 4)
-    slopes = []
+    slopes: list[Floats] = []
     for draw in range(_DRAWS + 1):
         shift = 0.5 * root @ rng.standard_normal(len(uncertainty.names)) * (draw > 0)
         own = [damper.fitted_parameters[name] for name in uncertainty.names]

@@ -125,8 +125,8 @@ class RecipeResult:
     cross_validated: Validation
     validation: Validation
     seconds: float
-    by_kind: Mapping[str, Validation] = field(default_factory=dict)
-    spread: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    by_kind: Mapping[str, Validation] = field(default_factory=dict[str, Validation])
+    spread: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
 
     @property
     def title(self) -> str:
@@ -242,7 +242,8 @@ def fit_and_score_all(
         Recipes whose damper cannot be determined from these runs.
     """
     cache = {} if cache is None else cache
-    scored, refused = [], {}
+    scored: list[RecipeResult] = []
+    refused: dict[str, str] = {}
     for number, (recipe, runs) in enumerate(steps):
 
         def tell(what: str, share: float, number: int = number, recipe: Recipe = recipe) -> None:
@@ -274,7 +275,8 @@ def identified(
     """
     if basis is None:
         return [], 0.0
-    identifications, spent = [], 0.0
+    identifications: list[Identification] = []
+    spent = 0.0
     for number, run in enumerate(runs):
         if (basis, run.id) not in cache:
             progress(f"run {run.id}", number / len(runs))

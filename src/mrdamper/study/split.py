@@ -67,7 +67,7 @@ def hold_out(
         )
     condition_of = {run.id: _condition(run) for run in dataset}
     held: set[str] = set()
-    reasons = []
+    reasons: list[str] = []
     for name in runs:
         if name not in condition_of:
             raise UnknownNameError.of("run", name, condition_of)
@@ -136,8 +136,9 @@ def _stratified(condition_of: dict[str, Condition | None], where: str) -> tuple[
     left_motion = Counter(motion_of[group[0]] for group in groups)
     order = sorted(left_current, key=lambda level: min(conditions[i].current_A for i in range(len(conditions))
                                                       if current_of[i] == level))  # fmt: skip
-    ends = {order[0], order[-1]} if order else set()
-    target, chosen = max(1, round(SHARE * len(groups))), []
+    ends = {*order[:1], *order[-1:]}
+    target = max(1, round(SHARE * len(groups)))
+    chosen: list[list[int]] = []
     taken_current: Counter[int] = Counter()
     taken_motion: Counter[int] = Counter()
     while len(chosen) < target:

@@ -13,7 +13,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import PredictedRun
 from mrdamper.dampers.prediction import Prediction
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, GainOffset, RecordingTime, SessionCorrection, Sessions
-from mrdamper.data import Condition, Displayable, Run
+from mrdamper.data import Condition, Displayable, Floats, Run
 from mrdamper.errors import InputError, RunError, UnknownNameError, require, validate_arguments
 from mrdamper.statistics.metrics import Scores, dissipated_power, peak_force, score
 
@@ -73,7 +73,7 @@ class Validation(Displayable):
 
     title: str
     runs: tuple[RunScore, ...]
-    refused: Mapping[str, str] = field(default_factory=dict)
+    refused: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
     def headline(self) -> str:
@@ -157,7 +157,8 @@ def validate(
     """
     if not hasattr(damper, "predict_run"):
         require(damper, Damper, "a damper", "load_model(file) gives one")
-    scored, refused = [], {}
+    scored: list[RunScore] = []
+    refused: dict[str, str] = {}
     for run in runs:
         require(run, Run, "a run")
         try:
@@ -280,14 +281,17 @@ class SessionDrift:
 
 def session_drift(damper: Damper, runs: Iterable[Run]) -> SessionDrift:
     """Regress every run's measured force on its prediction."""
-    gains, offsets, errors = [], [], []
+    gains: list[float] = []
+    offsets: list[float] = []
+    errors: list[float] = []
     for run in runs:
         inside = run.in_window
         measured, predicted = run.force[inside], damper.predict_run(run).force[inside]
         gain, offset = np.polynomial.polynomial.polyfit(predicted, measured, 1)[::-1]
         gains.append(gain)
         offsets.append(offset)
-        errors.append(np.sqrt(np.mean((offset + gain * predicted - measured) ** 2)) / np.ptp(measured))
+        rest: Floats = offset + gain * predicted - measured
+        errors.append(float(np.sqrt(np.mean(rest**2)) / np.ptp(measured)))
     return SessionDrift(float(np.std(gains)), float(np.std(offsets)), float(np.median(errors)))
 
 

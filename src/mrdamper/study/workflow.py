@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import time
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -53,7 +53,7 @@ _MIN_SAMPLES_PER_CYCLE = 8  # below, neither the velocity nor a loop can be told
 _MAX_DISTORTION = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
 _DUPLICATE_TOLERANCE = 1e-4  # of the range: two tests never agree so well, a file written twice does
 _MIN_RUNS = 4  # runs that say what is usual
-_SIZES = (
+_SIZES: tuple[tuple[str, str, int, Callable[[Run], float]], ...] = (
     ("peak-to-peak force", "N", 100, lambda run: float(np.ptp(run.force))),
     ("stroke", "m", 300, lambda run: float(np.ptp(run.displacement))),
     ("current", "A", 12, lambda run: float(np.median(np.abs(run.current)))),
@@ -422,14 +422,14 @@ def errors_by_kind(candidates: Sequence[RecipeResult]) -> list[dict[str, Floats]
     """
     by_candidate: list[dict[str, Floats]] = [{} for _ in candidates]
     for kind in dict.fromkeys(name for c in candidates for name in (CONDITION, *c.by_kind)):
-        errors = []
+        errors: list[dict[str, float]] = []
         for candidate in candidates:
             own = {run.run_id: abs(run.scores.nrmse_pp) for run in candidate.cross_validated.runs}
             left_out = {run.run_id: abs(run.scores.nrmse_pp) for run in _runs(candidate, kind)}
-            refused = candidate.by_kind[kind].refused if kind in candidate.by_kind else {}
+            refused: Mapping[str, str] = candidate.by_kind[kind].refused if kind in candidate.by_kind else {}
             errors.append({**own, **left_out, **dict.fromkeys(refused, np.inf)})
-        left_out = set().union(*({run.run_id for run in _runs(c, kind)} for c in candidates))
-        common = sorted(left_out.intersection(*errors))
+        of_any = {run.run_id for c in candidates for run in _runs(c, kind)}
+        common = sorted(of_any.intersection(*errors))
         for errors_of, row in zip(by_candidate, errors, strict=True):
             if common:
                 errors_of[kind] = np.array([row[name] for name in common])
@@ -445,7 +445,8 @@ def _runs(candidate: RecipeResult, kind: str) -> Sequence[RunScore]:
 
 def runs_for_global_fit(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
     """Return the runs that a global model accepts, any motion and current, and the reasons for excluding the others."""
-    runs_used, refused = [], {}
+    runs_used: list[Run] = []
+    refused: dict[str, str] = {}
     for run in runs:
         try:
             refuse_clipped(with_findings(run), clipped)
@@ -524,7 +525,7 @@ def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
 
 def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
     """Return the runs whose motion is a sine at one current, and why the others are not used."""
-    sines = []
+    sines: list[Run] = []
     kept, refused = accepted_runs(dataset)
     for run in kept:
         try:

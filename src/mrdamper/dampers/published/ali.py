@@ -64,7 +64,7 @@ class AliType(ConditionedDamper):
 
     def model_at(self, condition: Condition) -> Spencer:
         given = self.coefficients
-        values = {}
+        values: dict[str, float] = {}
         for name in _VARYING:
             power = (condition.amplitude_m / self.reference.amplitude_m) ** given[f"{name}_p"]
             power *= (condition.frequency_Hz / self.reference.frequency_Hz) ** given[f"{name}_q"]

@@ -33,7 +33,9 @@ class SavedConditioned(Saved):
     model: str
     coefficients: dict[str, float]
     reference: tuple[float, float, float]  # current [A], frequency [Hz], amplitude [m]
-    tables: dict[str, list[float] | list[list[float]]] = field(default_factory=dict)
+    tables: dict[str, list[float] | list[list[float]]] = field(
+        default_factory=dict[str, list[float] | list[list[float]]]
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,7 +71,7 @@ class ConditionedDamper(Damper):
     coefficients: Mapping[str, float]
     reference: Condition
     envelope: Envelope
-    provenance: Mapping[str, str] = field(default_factory=dict)
+    provenance: Mapping[str, str] = field(default_factory=dict[str, str])
     coil: Coil | None = field(default=None, kw_only=True)
     uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 

@@ -73,7 +73,7 @@ class BoadaType(ConditionedDamper):
         weights = self._part("weight", _weight_count(len(_OUTPUTS)))
         outputs = _network(weights, [(value - centre) / spread for value, centre, spread in scaled], len(_OUTPUTS))
         bounds = {info.name: info.bounds for info in Guo.parameters()}
-        values = {}
+        values: dict[str, float] = {}
         for i, (name, output) in enumerate(zip(_OUTPUTS, outputs, strict=True)):
             middle, width = self.coefficients[f"middle{i}"], self.coefficients[f"width{i}"]
             values[name] = np.clip(_backward(name, middle + width * np.clip(output, -4, 4)), *bounds[name])

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from mrdamper.data import Floats, current_levels
+from mrdamper.statistics.linear import solve_lower_triangle
 from mrdamper.study.contradictions.tracks import Track
 
 _YIELDS = (0.015, 0.06, 0.2, 0.6)  # yield displacements of the stop operators, relative to the median amplitude
@@ -140,7 +140,7 @@ class Posterior:
     mean: Floats
     root: Floats
     evidence: Evidence
-    known: dict[bytes, tuple[Floats, Floats]] = field(default_factory=dict)
+    known: dict[bytes, tuple[Floats, Floats]] = field(default_factory=dict[bytes, tuple[Floats, Floats]])
 
     def at(self, over: Floats | None) -> tuple[Floats, Floats]:
         """Mean and covariance of the coefficients at a constant current, or of all of them."""
@@ -211,14 +211,14 @@ class Evidence:
         """Coefficients determined by runs."""
         gram, moment = self.total(members)
         factor = np.linalg.cholesky(self._root.T @ gram @ self._root + np.eye(len(moment)))
-        root = solve_triangular(factor, self._root.T, lower=True).T
+        root = solve_lower_triangle(factor, self._root.T).T
         return Posterior(root @ (root.T @ moment), root, self)
 
     def log_evidence(self, members: Sequence[Moments]) -> float:
         """Logarithm of the evidence that runs follow one model."""
         gram, moment = self.total(members)
         factor = np.linalg.cholesky(self._root.T @ gram @ self._root + np.eye(len(moment)))
-        half = solve_triangular(factor, self._root.T @ moment, lower=True)
+        half = solve_lower_triangle(factor, self._root.T @ moment)
         power = sum(member.power for member in members)
         return float(0.5 * (half @ half) - np.sum(np.log(np.diag(factor))) - 0.5 * power)
 
@@ -316,7 +316,7 @@ def stop_operators(displacements: Sequence[Floats], yields: Floats) -> list[Floa
 def _nodes(tracks: Sequence[Track]) -> Floats:
     """Currents at which coefficients are estimated [A]: the tested levels, or some of many."""
     constant = [float(t.current[0]) for t in tracks if not t.current_changes]
-    levels = set(current_levels(constant)) if constant else set()
+    levels: set[float] = set(current_levels(constant)) if constant else set()
     for track in tracks:
         if track.current_changes:
             levels |= set(np.percentile(track.current, (0, 50, 100)).tolist())

@@ -122,7 +122,7 @@ class ExplanationCandidate:
             Look only at explanations like one of these, if there are any.
         """
         least = others.log_probability(others.weigh(self.own))
-        candidates = []
+        candidates: list[Explanation] = []
         for trial, products in self._trials(others, like):
             if self._is_large(trial, products, others):
                 odds = trial.odds + (_EDGE_ODDS if trial.cause in ("force", "current") and self._is_edge else 0.0)
@@ -185,10 +185,11 @@ class ExplanationCandidate:
         """Another constant current."""
         if self.track.current_changes:
             return
-        levels = self.evidence.nodes.tolist()
+        levels: list[float] = self.evidence.nodes.tolist()
         yield from (Trial("current", level, "", _LEVEL_ODDS) for level in levels)
         yield from (
-            Trial("current", i, "", _FREE_ODDS) for i in np.linspace(0, levels[-1], _TRIED_CURRENTS)[1:-1].tolist()
+            Trial("current", level, "", _FREE_ODDS)
+            for level in np.linspace(0, levels[-1], _TRIED_CURRENTS)[1:-1].tolist()
         )
 
     def _of_the_motion(self) -> Iterator[Trial]:

@@ -157,7 +157,7 @@ class Search:
         It fails there in every run alike: the others at a motion say how much, and not the run itself.
         """
         agreeing, posterior = self._agreeing(), self.posterior()
-        ratios = {}
+        ratios: dict[int, float] = {}
         for k in agreeing:
             products = self._products[k] = replace(self._products[k], misfit=1.0)
             error = products.unexplained(posterior.without(self._members[k])[0], MAX_SESSION_GAIN)
@@ -251,9 +251,9 @@ class Search:
     def _falling(self, members: Sequence[Moments]) -> float:
         """Logarithm of the prior odds against a force that falls with the current, by the share it falls by."""
         occupied = np.sum([m.over for m in members if m.over is not None and m.over.max() > _AT_NODE], axis=0)
-        nodes = np.eye(self.evidence.nodes.size)[np.asarray(occupied) > 0] if np.ndim(occupied) else []
-        if len(nodes) < 2:
+        if np.ndim(occupied) == 0 or np.count_nonzero(np.asarray(occupied) > 0) < 2:
             return 0.0
+        nodes = np.eye(self.evidence.nodes.size)[np.asarray(occupied) > 0]
         posterior = self.evidence.posterior(members)
         sizes = np.array(
             [np.sqrt(mean @ self._usual_gram @ mean) for mean in (posterior.at(node)[0] for node in nodes)]
@@ -290,7 +290,7 @@ class Search:
 
     def _alike(self) -> list[tuple[int, ...]]:
         """Return sets of runs that one explanation makes more probable each, from the runs that are explained best."""
-        sets = []
+        sets: list[list[int]] = []
         for i in sorted(self._options, key=lambda k: -max((e.gain for e in self._options[k]), default=-np.inf)):
             if len(sets) >= _GROUP_SEEDS * _SHARED_EXPLANATIONS:
                 break
@@ -320,7 +320,7 @@ class Search:
                 break
             own = self.evidence.posterior([members[k] for k in group])
             rest = self.evidence.posterior([members[k] for k in members if k not in group])
-            moved = set()
+            moved: set[int] = set()
             for k in every:
                 run, inside = members[k], k in group
                 by_own = own.log_probability_by_others(run) if inside else own.log_probability(run)

@@ -12,7 +12,7 @@ from typing import Self
 
 import numpy as np
 
-from mrdamper.data import Floats, Run
+from mrdamper.data import Floats, Run, index_at
 from mrdamper.errors import InputError
 from mrdamper.physics.motion.measured import measured_motion
 from mrdamper.physics.motion.sines import equivalent_sine
@@ -81,7 +81,7 @@ class Track:
 
 def tracks_of(runs: Sequence[Run]) -> list[Track]:
     """Make the short versions of the runs that move; others are left out."""
-    tracks = []
+    tracks: list[Track] = []
     for run in runs:
         try:
             tracks.append(_track(run))
@@ -102,7 +102,7 @@ def _track(run: Run) -> Track:
     if sine.is_sine:
         cycles = min(_CYCLES, duration * sine.condition.frequency_Hz)
         wanted = int(_SAMPLES_PER_CYCLE * max(cycles, 0.5))
-        start = int(np.searchsorted(run.time, run.time[stop - 1] - cycles / sine.condition.frequency_Hz))
+        start = index_at(run.time, run.time[stop - 1] - cycles / sine.condition.frequency_Hz)
     index = np.unique(np.linspace(start, stop - 1, min(wanted, stop - start)).astype(int))
     x = motion.displacement[index]
     rows = np.unique(np.linspace(0, index.size - 1, min(_ROWS, index.size)).astype(int))
