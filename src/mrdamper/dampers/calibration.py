@@ -73,13 +73,10 @@ class PredictedRun:
     def of(cls, run: Run, predicted: Floats, velocity: Floats, distance: Distance = AT_TESTS) -> PredictedRun:
         """From the prediction (N,) [N] along the whole run; raises E_CLOCK as `session_of`."""
         at = np.flatnonzero(run.in_window)
-        loops = _loops(run, at)
-        peaks, powers = (
-            np.array([[value(of[loop], loop) for loop in loops] for of in (run.force, predicted)])
-            for value in (
-                lambda force, _: peak_force(force),
-                lambda force, loop: dissipated_power(force, velocity[loop], run.time[loop]),
-            )
+        loops, forces = _loops(run, at), (run.force, predicted)
+        peaks = np.array([[peak_force(force[loop]) for loop in loops] for force in forces])
+        powers = np.array(
+            [[dissipated_power(force[loop], velocity[loop], run.time[loop]) for loop in loops] for force in forces]
         )
         step = max(1, at.size // _MAX_SAMPLES)
         return cls(
