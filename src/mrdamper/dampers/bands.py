@@ -210,8 +210,7 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
         at = replace(at, amplitude_m=tested.peak_velocity_m_s[1] / (2 * np.pi * at.frequency_Hz))
     currents = sorted({*tested.current_A, at.current_A})
     at_tests = replace(damper, uncertainty=replace(uncertainty, growth=Growth()))
-    own: list[float] = []
-    quantile: list[float] = []
+    own, quantile = list[float](), list[float]()
     for current in currents:
         prediction: Prediction = damper.predict(replace(at, current_A=current))
         interval = band(at_tests, prediction, level)

@@ -346,8 +346,7 @@ class CrossValidation:
     def choose(self, removable: Sequence[ModelTerm]) -> tuple[frozenset[str], tuple[TermTrial, ...]]:
         """Select the terms without which the cross-validated error increases, one after the other."""
         active = frozenset(n for n in self.names if not n.startswith("coil."))
-        now = self.scores(active)
-        tried: list[TermTrial] = []
+        now, tried = self.scores(active), list[TermTrial]()
         for term in removable:
             if set(term.names) <= active:
                 without = self.scores(active - set(term.names))

@@ -397,8 +397,7 @@ def project_out(slopes: Floats, columns: Floats) -> Floats:
 def concatenate(motions: Iterable[Excitation]) -> Excitation:
     """Concatenate motions, a second apart."""
     parts = list(motions)
-    time: list[Floats] = []
-    clock = 0.0
+    time, clock = list[Floats](), 0.0
     for part in parts:
         time.append(part.time - part.time[0] + clock)
         clock = float(time[-1][-1]) + 1.0

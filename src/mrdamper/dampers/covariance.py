@@ -181,8 +181,7 @@ def _determined(
     """Columns to keep, those no run shows, groups that do the same, and the inverse of the kept ones' normal matrix."""
     normal = normal_matrix(slopes, parts)
     keep: list[int] = [i for i in range(count) if normal[i, i] > 0]
-    unseen = [i for i in range(count) if i not in keep]
-    alike: list[list[int]] = []
+    unseen, alike = [i for i in range(count) if i not in keep], list[list[int]]()
     while keep:
         scale = np.sqrt(np.diag(normal)[keep])
         values, vectors = np.linalg.eigh(normal[np.ix_(keep, keep)] / np.outer(scale, scale))

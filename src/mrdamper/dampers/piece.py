@@ -23,9 +23,8 @@ class Piece:
     scored: slice
     force: Floats
     scale: float
-    states: dict[tuple[float, ...], Floats] = field(
-        default_factory=dict[tuple[float, ...], Floats]
-    )  # by what of a model shapes them
+    # by what of a model shapes them
+    states: dict[tuple[float, ...], Floats] = field(default_factory=dict[tuple[float, ...], Floats])
 
     @classmethod
     def of(cls, run: Run) -> Piece:

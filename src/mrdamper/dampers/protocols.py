@@ -11,17 +11,6 @@ from mrdamper.data.parameters import ParameterInfo
 from mrdamper.data.runs import Run
 
 
-class PredictionLike(Protocol):
-    """The force of a `Prediction`, which the gain and offset of a session correct."""
-
-    __dataclass_fields__: ClassVar[dict[str, Any]]  # what `dataclasses.replace` takes
-
-    @property
-    def force(self) -> Floats:
-        """(N,) [N]."""
-        ...
-
-
 class DamperLike(Protocol):
     """Properties and methods of a `Damper` that its parts use."""
 

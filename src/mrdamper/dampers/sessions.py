@@ -12,10 +12,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, ClassVar, TypeVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from mrdamper.dampers.prediction import Prediction
 from mrdamper.data.arrays import Floats
 from mrdamper.data.runs import Run
 from mrdamper.data.sessions import SESSIONS_NEEDED, hour_of, session_of
@@ -23,10 +24,8 @@ from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
     from mrdamper.dampers.protocols import DamperLike as Damper
-    from mrdamper.dampers.protocols import PredictionLike
 
 STRICT = {"extra": "forbid", "allow_inf_nan": False}  # of what is read from a saved model
-P = TypeVar("P", bound="PredictionLike")
 UNKNOWN, KNOWN = "unknown", "known"  # session of a score: predicted as it is, or corrected by other runs of the day
 _CORRELATION_HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # over which what an hour shares is forgotten
 _MIN_RUN_SHARE = (
@@ -194,8 +193,8 @@ class SessionCorrection:
     offset: float
     offset_spread: float
 
-    def corrected(self, prediction: P) -> P:
-        """Correct a `Prediction` by this gain and offset."""
+    def corrected(self, prediction: Prediction) -> Prediction:
+        """Correct a prediction by this gain and offset."""
         force = self.gain * prediction.force + self.offset
         return replace(prediction, force=force)
 

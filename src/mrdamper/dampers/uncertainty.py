@@ -163,9 +163,7 @@ def uncertainty_warnings(damper: Damper) -> list[str]:
         )
     elif uncertainty.session_dof < 2:
         sentences.append("The scatter between sessions rests on fewer than two degrees of freedom.")
-    apart: list[int] = []
-    wide: list[tuple[str, str]] = []
-    weak: list[tuple[str, str]] = []
+    apart, wide, weak = list[int](), list[tuple[str, str]](), list[tuple[str, str]]()
     for i, name in enumerate(uncertainty.names):
         ends = uncertainty.ends(damper, name)
         if ends is None:

@@ -93,8 +93,7 @@ def characterise(runs: Sequence[Run]) -> Characteristics:
 
     `runs`: of one rig.
     """
-    usable: list[Run] = []
-    passed_over: dict[str, str] = {}
+    usable, passed_over = list[Run](), dict[str, str]()
     for run in runs:
         try:
             run.current_A  # noqa: B018

@@ -106,8 +106,7 @@ def alike_groups(vectors: Floats) -> list[tuple[list[int], int]]:
 
     `vectors` (P, K): combinations of parameters that change nothing.
     """
-    basis = vectors.T.copy()
-    own: list[int] = []
+    basis, own = vectors.T.copy(), list[int]()
     for k in range(len(basis)):
         row, column = map(int, np.unravel_index(int(np.argmax(np.abs(basis[k:]))), basis[k:].shape))
         basis[[k, k + row]] = basis[[k + row, k]]

@@ -124,8 +124,7 @@ def _of_parameters(
         step = _DIFFERENCE_STEP * abs(point[names[i]]) or _DIFFERENCE_STEP
         moved = problem.model_type.build({**point, names[i]: point[names[i]] + step})
         slopes[:, k] = [(getattr(moved, name) - getattr(at, name)) / step for name in missing]
-    block = covariance[np.ix_(searched, searched)]
-    errors: dict[str, tuple[float, list[str]]] = {}
+    block, errors = covariance[np.ix_(searched, searched)], dict[str, tuple[float, list[str]]]()
     for name, row in zip(missing, slopes, strict=True):
         if (used := row != 0).any():
             variance = float(row[used] @ block[np.ix_(used, used)] @ row[used])

@@ -107,8 +107,7 @@ def compare(
     workers = jobs or os.cpu_count() or 1
     rigs = [_seen(dataset.rig(name)) for name in dataset.rigs]
     completed = [_completed(chosen, rig) for rig in rigs]
-    tasks: list[tuple[Basis, Run]] = []
-    steps: list[tuple[Recipe, Sequence[Run]]] = []
+    tasks, steps = list[tuple[Basis, Run]](), list[tuple[Recipe, Sequence[Run]]]()
     for rig, (recipes_of_rig, _) in zip(rigs, completed, strict=True):
         bases = dict.fromkeys(recipe.basis for recipe in recipes_of_rig if recipe.basis)
         tasks += [(basis, run) for basis in bases for run in rig.sines]
@@ -159,8 +158,7 @@ def _seen(rig: Dataset) -> _Seen:
 def _completed(chosen: Sequence[Recipe], rig: _Seen) -> tuple[list[Recipe], dict[str, str]]:
     """Complete the recipes for a rig; and why some cannot be followed on its runs."""
     pure = [run for run in rig.train if analyse_motion(run).is_sine]
-    recipes_of_rig: list[Recipe] = []
-    refused: dict[str, str] = {}
+    recipes_of_rig, refused = list[Recipe](), dict[str, str]()
     for recipe in chosen:
         try:
             recipes_of_rig.append(recipe.for_runs(pure))

@@ -14,16 +14,8 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import PredictedRun
-from mrdamper.data import (
-    SESSIONS_NEEDED,
-    Condition,
-    Run,
-    current_levels,
-    index_at,
-    same_condition,
-    same_motion,
-    session_of,
-)
+from mrdamper.data import SESSIONS_NEEDED, Condition, Run, current_levels, same_condition, same_motion, session_of
+from mrdamper.data.arrays import index_at
 from mrdamper.errors import InputError
 from mrdamper.physics.motion import equivalent_sine
 from mrdamper.study.validation import RunScore, Validation, leave_out, score_run

@@ -45,8 +45,7 @@ def first_matrix(limits: Limits, hours: float) -> list[Proposal]:
         condition = Condition(current, min(frequency, top), amplitude * 1e-3)
         return Proposal(session, condition, limits.minutes(condition), reason)
 
-    tests: list[Proposal] = []
-    left = hours * 60 - limits.opening
+    tests, left = list[Proposal](), hours * 60 - limits.opening
     again = proposed(repeat, _SESSIONS) if limits.sessions >= _SESSIONS else None
     reserved = limits.opening + again.minutes if again else 0.0
     first = proposed(wanted[1], 1)

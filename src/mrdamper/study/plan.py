@@ -233,8 +233,7 @@ class ExperimentDesign:
     def proposals(self, played: Sessions) -> list[Proposal]:
         """Return the records with the standard deviation before and after each, session by session."""
         proposals: list[Proposal] = []
-        before = self.spread([])
-        so_far: Sessions = [[] for _ in played]
+        before, so_far = self.spread([]), [list[int]() for _ in played]
         today = np.sqrt(np.diag(np.linalg.inv(self.prior)))
         for session, rows in enumerate(played):
             for i in rows:

@@ -242,8 +242,7 @@ def fit_and_score_all(
         Recipes whose damper cannot be determined from these runs.
     """
     cache = {} if cache is None else cache
-    scored: list[RecipeResult] = []
-    refused: dict[str, str] = {}
+    scored, refused = list[RecipeResult](), dict[str, str]()
     for number, (recipe, runs) in enumerate(steps):
 
         def tell(what: str, share: float, number: int = number, recipe: Recipe = recipe) -> None:

@@ -137,8 +137,7 @@ def _stratified(condition_of: dict[str, Condition | None], where: str) -> tuple[
     order = sorted(left_current, key=lambda level: min(conditions[i].current_A for i in range(len(conditions))
                                                       if current_of[i] == level))  # fmt: skip
     ends = {*order[:1], *order[-1:]}
-    target = max(1, round(SHARE * len(groups)))
-    chosen: list[list[int]] = []
+    target, chosen = max(1, round(SHARE * len(groups))), list[list[int]]()
     taken_current: Counter[int] = Counter()
     taken_motion: Counter[int] = Counter()
     while len(chosen) < target:

@@ -157,8 +157,7 @@ def validate(
     """
     if not hasattr(damper, "predict_run"):
         require(damper, Damper, "a damper", "load_model(file) gives one")
-    scored: list[RunScore] = []
-    refused: dict[str, str] = {}
+    scored, refused = list[RunScore](), dict[str, str]()
     for run in runs:
         require(run, Run, "a run")
         try:
@@ -281,9 +280,7 @@ class SessionDrift:
 
 def session_drift(damper: Damper, runs: Iterable[Run]) -> SessionDrift:
     """Regress every run's measured force on its prediction."""
-    gains: list[float] = []
-    offsets: list[float] = []
-    errors: list[float] = []
+    gains, offsets, errors = list[float](), list[float](), list[float]()
     for run in runs:
         inside = run.in_window
         measured, predicted = run.force[inside], damper.predict_run(run).force[inside]

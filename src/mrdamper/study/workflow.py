@@ -445,8 +445,7 @@ def _runs(candidate: RecipeResult, kind: str) -> Sequence[RunScore]:
 
 def runs_for_global_fit(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
     """Return the runs that a global model accepts, any motion and current, and the reasons for excluding the others."""
-    runs_used: list[Run] = []
-    refused: dict[str, str] = {}
+    runs_used, refused = list[Run](), dict[str, str]()
     for run in runs:
         try:
             refuse_clipped(with_findings(run), clipped)

@@ -76,8 +76,7 @@ class CWriter(Writer):
         return "".join(lines)
 
     def _lines(self, statements: list[Statement], indent: int) -> list[str]:
-        pad = "    " * indent
-        lines: list[str] = []
+        pad, lines = "    " * indent, list[str]()
         for statement in statements:
             if isinstance(statement, Let):
                 lines.append(f"{pad}{self._declared(statement.expression)} = {self.formula(statement.expression)};")

@@ -28,8 +28,7 @@ class PythonWriter(Writer):
 
     def statements(self, block: list[Statement], indent: int) -> list[str]:
         """Lines of a block."""
-        pad = "    " * indent
-        lines: list[str] = []
+        pad, lines = "    " * indent, list[str]()
         for statement in block:
             if isinstance(statement, Let):
                 lines.append(f"{pad}{self.name(statement.expression)} = {self.formula(statement.expression)}")

@@ -21,9 +21,7 @@ from mrdamper.tracing.expression import CONSTANT, OPERATIONS, PARAMETER, SAMPLE,
 Floats = NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])
 _GROUP: type[Any] = tuple
-_WITH_INFINITY: dict[str, Callable[..., Any]] = {
-    op: OPERATIONS[op].value for op in ("less", "less_equal", "greater", "greater_equal")
-}
+_WITH_INFINITY = ("less", "less_equal", "greater", "greater_equal")
 _UNROLLED = 6  # highest integer power written as products
 
 
@@ -214,7 +212,7 @@ def streamed(step: Callable[..., Any]) -> Callable[[F], F]:
 def _simplified(op: str, args: tuple[Any, ...]) -> Any:
     """Neutral elements x + 0, x · 1, x / 1; comparisons with infinity, which finite numbers all pass."""
     if op in _WITH_INFINITY and isinstance(args[1], float) and math.isinf(args[1]):
-        return _WITH_INFINITY[op](0.0, args[1])
+        return _value(op, (0.0, args[1]))
     if op == "logical_and" and not isinstance(args[0], Expression):
         return args[1] if args[0] else False
     if op == "add" and isinstance(args[0], float | int) and args[0] == 0:

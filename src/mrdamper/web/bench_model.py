@@ -29,7 +29,7 @@ def held_model(damper: Damper, condition: Condition, held: Mapping[str, float]) 
     for name in held:
         if name not in values:
             raise ParameterError(f"this damper has no parameter {name!r}", remedy="load the page again")
-    return replace(model, **held)
+    return replace(model, **held)  # type: ignore[type-var]
 
 
 def loop_held(damper: Damper, condition: Condition, held: Mapping[str, float]) -> Response:

@@ -24,6 +24,7 @@ from mrdamper.statistics.levenberg_marquardt import least_squares
 _MAX_STEPS = 8
 AT_BOUNDS = "at a bound of the search"  # entry of the provenance: coefficients whose values are no estimates
 _COEFFICIENT_RANGE = 0.8  # a coefficient may move by this share of its start, or of one
+Tables = dict[str, list[float] | list[list[float]]]
 
 
 @dataclass(frozen=True)
@@ -33,9 +34,7 @@ class SavedConditioned(Saved):
     model: str
     coefficients: dict[str, float]
     reference: tuple[float, float, float]  # current [A], frequency [Hz], amplitude [m]
-    tables: dict[str, list[float] | list[list[float]]] = field(
-        default_factory=dict[str, list[float] | list[list[float]]]
-    )
+    tables: Tables = field(default_factory=Tables)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -15,7 +15,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.physics.hysteresis.master_curve import master_curve
-from mrdamper.physics.hysteresis.response import advance, on_curve, starts_of_strokes, states_after
+from mrdamper.physics.hysteresis.response import advance, on_curve, starts_of_strokes, state_at
 from mrdamper.physics.hysteresis.shape import Shape
 from mrdamper.physics.motion.path import Path
 from mrdamper.statistics.linear import FixedColumns
@@ -75,9 +75,7 @@ def follow_quickly(kappa: float, rho: float, n: float, path: Path, part: slice =
     """States of one shape at a part of the samples, from zero, nothing checked: for inner loops."""
     curve = master_curve(n)
     starts = starts_of_strokes(curve, kappa, rho, path, 0.0)
-    return path.direction[part] * states_after(
-        curve, rho, np.array(starts), path.stroke[part], kappa * path.distance[part]
-    )
+    return path.direction[part] * state_at(curve, rho, np.array(starts), path.stroke[part], kappa * path.distance[part])
 
 
 def follow_with_slope(kappa: float, rho: float, n: float, path: Path, part: slice) -> tuple[Floats, Floats]:
@@ -100,7 +98,7 @@ def follow_with_slope(kappa: float, rho: float, n: float, path: Path, part: slic
         starts.append(w)
         shifts.append(slope / _rate(w, rho, n) if slope else 0.0)
     stroke, phi = path.stroke[part], kappa * path.distance[part]
-    states = states_after(curve, rho, np.array(starts), stroke, phi)
+    states = state_at(curve, rho, np.array(starts), stroke, phi)
     size = np.abs(states)
     rate = 1.0 - (size if n == 1 else size * size if n == 2 else size**n)
     if rho != 1.0:

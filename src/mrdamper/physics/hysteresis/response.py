@@ -108,14 +108,14 @@ def stroke(shape: Shape, zeta0: ArrayLike, distance: ArrayLike) -> Floats:
     if np.any(travelled < 0):
         raise ExcitationError("a stroke has negative length", remedy="give the distance and state zeta0 · sgn v")
     phi = float(shape.kappa) * travelled.ravel()
-    states = states_after(master_curve(shape.n), float(shape.rho), start.ravel(), slice(None), phi)
+    states = state_at(master_curve(shape.n), float(shape.rho), start.ravel(), slice(None), phi)
     return states.reshape(start.shape)[()]
 
 
 def _follow_one(curve: MasterCurve, kappa: float, rho: float, path: Path, zeta0: float) -> Floats:
     """One state follows from the other at the reversals only: plain floats there, arrays for the samples."""
     starts = starts_of_strokes(curve, kappa, rho, path, path.first_direction * zeta0)
-    return path.direction * states_after(curve, rho, np.array(starts), path.stroke, kappa * path.distance)
+    return path.direction * state_at(curve, rho, np.array(starts), path.stroke, kappa * path.distance)
 
 
 def starts_of_strokes(curve: MasterCurve, kappa: float, rho: float, path: Path, w: float) -> list[float]:
@@ -139,7 +139,7 @@ def on_curve(curve: MasterCurve, rho: float, phi: Floats) -> Floats:
     return w
 
 
-def states_after(curve: MasterCurve, rho: float, starts: Floats, stroke: np.ndarray | slice, phi: Floats) -> Floats:
+def state_at(curve: MasterCurve, rho: float, starts: Floats, stroke: np.ndarray | slice, phi: Floats) -> Floats:
     """State in the direction of motion after phi, for samples whose stroke began at `starts[stroke]`.
 
     All but the states that already point along the motion are on one curve through zero.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.data.arrays import Floats
-from mrdamper.errors import ExcitationError
+from mrdamper.errors import ExcitationError, is_a
 
 LONG = 200_000  # samples from which what could be remembered is not worth its memory
 
@@ -97,9 +97,6 @@ class Path:
         return turn, back, move
 
 
-_REMEMBERED: tuple[type[Any], ...] = (np.ndarray, Path)
-
-
 def memoize_per_path(function: Callable[..., Floats]) -> Callable[..., Floats]:
     """Remember what a function of a path or of samples, and of some numbers, gave the last two times.
 
@@ -110,7 +107,7 @@ def memoize_per_path(function: Callable[..., Floats]) -> Callable[..., Floats]:
 
     @wraps(function)
     def remembered(first: Any, *given: Any) -> Floats:
-        if not isinstance(first, _REMEMBERED) or len(first) > LONG:
+        if not is_a(first, (np.ndarray, Path)) or len(first) > LONG:
             return function(first, *given)
         if id(first) not in memory:
             memory[id(first)] = ref(first, lambda _, key=id(first): memory.pop(key, None)), []

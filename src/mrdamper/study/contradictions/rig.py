@@ -98,8 +98,7 @@ def _in_amperes(tracks: Sequence[Track], keep: Collection[str]) -> tuple[list[Tr
     """Return the runs, those in amperes whose current is a thousand times the others', which are in milliamperes."""
     sizes = [float(np.median(track.current)) for track in tracks]
     usual = float(np.median([size for size in sizes if size > 0] or [0.0]))
-    kept: list[Track] = []
-    contradictions: dict[str, Contradiction] = {}
+    kept, contradictions = list[Track](), dict[str, Contradiction]()
     for track, size in zip(tracks, sizes, strict=True):
         run = track.run
         if usual <= 0 or size < _MILLIAMPERE_RATIO * usual or run.id in keep:

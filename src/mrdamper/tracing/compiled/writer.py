@@ -209,8 +209,7 @@ def functions(program: Program, index: int = 0, keep: bool = False) -> str:
     setup, body = writer.setup(), writer.refresh + writer.sample() + writer.results()
     kept = f", real m[{max(1, writer.kept)}]" if keep else ""
     names = [re.sub(r"\W", "_", f"table_{index}_{i}") for i in range(len(program.tape.tables))]
-    tables: list[str] = []
-    defined: list[str] = []
+    tables, defined = list[str](), list[str]()
     for i, (name, table) in enumerate(zip(names, program.tape.tables, strict=True)):
         nodes = ", ".join(map(writer.number, table.nodes.tolist()))
         rows = ",\n    ".join("{" + ", ".join(map(writer.number, row)) + "}" for row in table.cells.tolist())
