@@ -295,7 +295,7 @@ def test_gains_are_expected_of_other_runs_of_the_session_and_bands_follow():
     with pytest.raises(InputError, match="lists differ in length"):
         replace(sessions, gains=(1.0,))
     known = SessionCorrection(1.2, 0.01, 5.0, 2.0)
-    assert known.corrected(PREDICTION).force == pytest.approx(1.2 * FORCE + 5)
+    assert PREDICTION.corrected(known.gain, known.offset).force == pytest.approx(1.2 * FORCE + 5)
     plain = band(damper(replace(KNOWN, gain=0.01, offset=2.0, run_gain=0.0, run_offset=0.0)), PREDICTION, 0.8)
     moved = session_band(known, damper(), PREDICTION, 0.8)
     assert moved.low == pytest.approx(1.2 * plain.low + 5)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,6 +49,10 @@ class Prediction(Displayable):
     condition: Condition
     extrapolation: tuple[str, ...]
     steady: bool = False
+
+    def corrected(self, gain: float, offset: float) -> Prediction:
+        """Return the prediction with another gain and offset [N] of the force."""
+        return replace(self, force=gain * self.force + offset)
 
     def distance(self, tested: Envelope) -> Distance:
         """Distance from tests."""

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from mrdamper.dampers.prediction import Prediction
 from mrdamper.data.arrays import Floats
 from mrdamper.data.runs import Run
 from mrdamper.data.sessions import SESSIONS_NEEDED, hour_of, session_of
@@ -192,11 +191,6 @@ class SessionCorrection:
     gain_spread: float
     offset: float
     offset_spread: float
-
-    def corrected(self, prediction: Prediction) -> Prediction:
-        """Correct a prediction by this gain and offset."""
-        force = self.gain * prediction.force + self.offset
-        return replace(prediction, force=force)
 
 
 @dataclass(frozen=True)

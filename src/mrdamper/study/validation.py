@@ -186,7 +186,7 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> Run
     beside = PredictedRun.of(run, prediction.force, prediction.motion.velocity, away)
     expected = sessions.expected(RecordingTime.of(run), without=run.id) if sessions else None
     if expected is not None:
-        prediction = expected.corrected(prediction)
+        prediction = prediction.corrected(expected.gain, expected.offset)
     return RunScore(
         run.id,
         run.rig,
@@ -220,7 +220,7 @@ def peak_band(
         interval = band(damper, prediction, level, inside)
     else:
         interval = session_band(expected, damper, prediction, level, inside)
-    prediction = expected.corrected(prediction) if expected else prediction
+    prediction = prediction.corrected(expected.gain, expected.offset) if expected else prediction
     velocity, time = prediction.motion.velocity[inside], run.time[inside]
     cycles = max(prediction.condition.frequency_Hz, 1e-9)
     energy = dissipated_power(run.force[inside], velocity, time) / cycles

@@ -134,7 +134,7 @@ def _session_known(
         f"offset {expected.offset:.3g} ± {expected.offset_spread:.2g} N",
         err=True,
     )
-    return expected.corrected(prediction), session_band(expected, damper, prediction, level)
+    return prediction.corrected(expected.gain, expected.offset), session_band(expected, damper, prediction, level)
 
 
 def _write_figure(path: Path, prediction: Prediction, interval: Band | None, level: float) -> None:
