@@ -11,8 +11,9 @@ from benchmarks.coverage import jointly
 from benchmarks.synthetic_coverage import FAMILIES, covered
 
 LEVEL, REPEATS = 0.95, 50
-# On the motions of labcontrol d and T move along a curved valley with e, vh and fy1 where sessions differ: the standard
-# deviation of T is 1.7 times that of linearised fits (60 refits), and 500 repeats cover 90.8 and 90.0 %.
+# On the motions of labcontrol d, e, T, vh and fy1 are correlated where sessions differ, along a curve of nearly equal
+# force: the standard deviation of T is 1.7 times that of linearised fits (60 refits), and 500 repeats cover 90.8 (d)
+# and 90.0 % (T).
 CURVED = {"labcontrol": {"d": 0.90, "T": 0.90}, "utfsm": {}}
 
 
