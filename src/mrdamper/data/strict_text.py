@@ -19,6 +19,7 @@ from typing import Any, BinaryIO, NoReturn, TypeGuard
 _MAX_DEPTH = 64  # objects and arrays inside each other
 _MAX_DIGITS = 40  # characters of a whole number
 _LONGEST = 200_000  # characters; the profiles of the documentation have under 3,000
+_TABLE: type[Any] = dict
 _NESTED: tuple[type[Any], ...] = (dict, list)
 _DOTTED = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){17}""")  # ours have two parts
 
@@ -85,7 +86,7 @@ def _depth(value: Any) -> int:
     while level:
         depth += 1
         inner = [v for v in level if isinstance(v, _NESTED)]
-        level = [part for v in inner for part in (v.values() if is_table(v) else v)]
+        level = [part for v in inner for part in (v.values() if isinstance(v, _TABLE) else v)]
     return depth
 
 
