@@ -17,7 +17,7 @@ from mrdamper.rig_files.mapping.proposals import damping_share
 from mrdamper.rig_files.mapping.questions import question_of
 from mrdamper.rig_files.mapping.results import results_in
 from mrdamper.rig_files.mapping.session import stretches_of_session
-from mrdamper.rig_files.profile import Profile, parse_profile
+from mrdamper.rig_files.profile import CurrentSource, Profile, ProfileError, parse_profile
 from mrdamper.rig_files.readers import raw_tables
 from mrdamper.rig_files.rig_import import import_files, to_dataset
 
@@ -73,6 +73,84 @@ def test_a_current_of_the_profile_against_the_files_name_is_refused(tests, tmp_p
     put(tmp_path / "run_0.6A.csv", ["time_s,displacement_mm,force_N", *rows(test.t, 1e3 * test.x, test.f)])
     found = import_files([tmp_path], parse_profile("[current]\nvalue = 1.2"))
     assert [refusal.error.code for refusal in found.refusals] == ["E_CURRENT_CONTRADICTS"]
+
+
+def put_tests(tests, folder, names):
+    for test, name in zip(tests, names, strict=False):
+        put(folder / name, ["time_s,displacement_mm,force_N", *rows(test.t, 1e3 * test.x, test.f)])
+
+
+def test_currents_by_names_are_those_of_the_tests(tests, tmp_path):
+    chosen = [test for test in tests if test.current > 0][:2]
+    put_tests(chosen, tmp_path, ["MRD_C05_A12.csv", "Second.csv"])
+    values = f'[current]\nvalues = {{"mrd_c05*" = {chosen[0].current}, "second" = {chosen[1].current}}}'
+    found = import_files([tmp_path], parse_profile(values))
+    assert found.refusals == ()
+    assert [float(record.current[0]) for record in found.records] == [test.current for test in chosen]
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "code"),
+    [
+        ("a.csv", {"b*": 0.6}, "E_PROFILE"),
+        ("a.csv", {"a*": 0.6, "*.csv": 1.2}, "E_AMBIGUOUS"),
+        ("a_0.6A.csv", {"a*": 1.2}, "E_CURRENT_CONTRADICTS"),
+        ("a_0.6A.csv", {"a*": 0.6}, None),
+        ("a.csv", {"a*": 0.6, "*.csv": 0.6}, None),
+    ],
+)
+def test_a_current_by_name_that_does_not_hold_is_refused(tests, tmp_path, name, values, code):
+    put_tests(tests, tmp_path, [name])
+    profile = Profile(current=CurrentSource(values=values))
+    try:
+        found = import_files([tmp_path], profile)
+        codes = [refusal.error.code for refusal in found.refusals]
+    except ProfileError as error:
+        codes = [error.code]
+    assert codes == ([] if code is None else [code])
+
+
+def test_a_current_by_name_against_the_channel_is_refused(tests, tmp_path):
+    test = tests[0]
+    channel = rows(test.t, 1e3 * test.x, test.f, 0 * test.t + 0.6)
+    put(tmp_path / "a.csv", ["time_s,displacement_mm,force_N,current_A", *channel])
+    for value, codes in ((1.2, ["E_CURRENT_CONTRADICTS"]), (0.6, [])):
+        found = import_files([tmp_path], Profile(current=CurrentSource(values={"a": value})))
+        assert [refusal.error.code for refusal in found.refusals] == codes
+
+
+def test_the_written_profile_lists_tests_without_a_current(tests, tmp_path):
+    """Filled in as it stands, the profile imports every test."""
+    folder, profile = tmp_path / "lab", tmp_path / "rig.toml"
+    folder.mkdir()
+    chosen = [test for test in tests if test.current > 0][:2]
+    put_tests(chosen, folder, ["first [1].csv", "second.csv"])
+    done = CliRunner().invoke(application(), ["import", str(folder), "--write-profile", str(profile)])
+    assert done.exit_code == 0, done.output
+    lines = profile.read_text(encoding="utf-8").splitlines()
+    start = lines.index("#[current.values]")
+    assert len(lines) == start + 3
+    filled = [f"{line[1:]} {test.current}" for line, test in zip(lines[start + 1 :], chosen, strict=True)]
+    profile.write_text("\n".join([*lines[:start], "[current.values]", *filled]), encoding="utf-8")
+    found = import_files([folder], profile)
+    assert [float(record.current[0]) for record in found.records] == [test.current for test in chosen]
+
+
+def test_a_monitors_voltage_is_asked_for_its_scale(tests, tmp_path):
+    folder, profile = tmp_path / "lab", tmp_path / "rig.toml"
+    folder.mkdir()
+    test = tests[0]
+    channel = rows(test.t, 1e3 * test.x, test.f, 0 * test.t + 2.5)
+    put(folder / "a.csv", ["time (s),stroke (mm),force (N),current monitor (V)", *channel])
+    (refusal,) = import_files([folder]).refusals
+    assert "[channels.current] unit" in refusal.error.remedy
+    CliRunner().invoke(application(), ["import", str(folder), "--write-profile", str(profile)])
+    lines = profile.read_text(encoding="utf-8").splitlines()
+    start = lines.index("#[channels.current]")
+    wanted = [line[1:] for line in lines[start : start + 4]]
+    profile.write_text("\n".join([*lines[:start], *wanted[:-1], wanted[-1] + " 0.4"]), encoding="utf-8")
+    (record,) = import_files([folder], profile).records
+    np.testing.assert_allclose(record.current, 1.0)
 
 
 def test_without_out_the_files_and_the_mapping_are_shown(tests, tmp_path):

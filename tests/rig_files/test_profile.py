@@ -49,7 +49,9 @@ PROFILES = st.builds(
             delay_ms=st.floats(-1e3, 1e3),
         ),
     ),
-    current=st.none() | st.builds(CurrentSource, value=st.floats(-10, 10)),
+    current=st.none()
+    | st.builds(CurrentSource, value=st.floats(-10, 10))
+    | st.builds(CurrentSource, values=st.dictionaries(NAME, st.floats(-10, 10), min_size=1, max_size=3)),
 )
 
 WRONG = {
@@ -62,8 +64,8 @@ WRONG = {
     "scale of zero": ('[channels.force]\nunit = "N"\nscale = 0', "scale of zero"),
     "scale without unit": ("[channels.force]\nscale = 2.0", "scale needs the unit"),
     "offset without scale": ('[channels.force]\nunit = "N"\noffset = 2.0', "offset belongs to a calibration"),
-    "current twice": ('[current]\nvalue = 1.0\npattern = "*{current}A"', "either value or pattern"),
-    "no current": ("[current]", "either value or pattern"),
+    "current twice": ('[current]\nvalue = 1.0\npattern = "*{current}A"', "either value or pattern or values"),
+    "no current": ("[current]", "either value or pattern or values"),
     "pattern without place": ('[current]\npattern = "*A"', "{current} once"),
     "infinite": ("[current]\nvalue = inf", "current.value"),
     "comma twice": ('[file]\nseparator = ","\ndecimal = ","', "both a comma"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -21,9 +22,10 @@ from mrdamper.rig_files.conditions import (
 )
 from mrdamper.rig_files.profile import Profile, current_in_name
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.record import Finding, Record
 
 _FEWEST_SLOW = 5  # samples of a current that is recorded more rarely than the force
+NO_CHANNEL = "the current channel is left out"  # beginning of the finding on a column of no current
 _FOLDERS = 3  # above a file, whose names may state its current
 
 
@@ -43,7 +45,7 @@ def current_of(
     if profile.current is not None and profile.current.value is not None:
         _refuse_contradiction(profile.current.value, channel, _statements(table, path), printable(table.source.name))
         return profile.current.value, {"current_from": "profile"}
-    if profile.current is not None:
+    if profile.current is not None and profile.current.pattern is not None:
         places = (path.name, table.label, f"{path.name}/{table.label}", f"{path.as_posix()}/{table.label}".rstrip("/"))
         current = next((v for place in places if place and (v := current_in_name(place, profile)) is not None), None)
         if current is None and channel is None:
@@ -75,6 +77,35 @@ def current_of(
     if channel is not None or stated is None:
         return None, {}
     return stated.amperes, {"current_from": as_data(stated.whence)}
+
+
+def with_value_of_name(record: Record, path: Path, profile: Profile) -> Record:
+    """Return the record with the current that the profile's table of values gives a file or test of its name.
+
+    Raises
+    ------
+    ColumnError
+        E_AMBIGUOUS if two patterns give it different currents, E_CURRENT_CONTRADICTS if the file states another.
+    """
+    values = profile.current.values if profile.current is not None else {}
+    patterns = profile.current.fitting(path, record.id) if profile.current is not None else []
+    if not patterns:
+        return record
+    value, where = values[patterns[0]], printable(path.name)
+    other = next((pattern for pattern in patterns if values[pattern] != value), None)
+    if other is not None:
+        raise ColumnError(
+            printable(f"{patterns[0]!r} and {other!r} give {record.id} {value:g} and {values[other]:g} A"), where=where,
+            remedy="correct [current.values] of the profile", code="E_AMBIGUOUS",
+        )  # fmt: skip
+    if record.current is None:
+        findings = tuple(finding for finding in record.findings if not finding.text.startswith(NO_CHANNEL))
+        provenance = {**record.provenance, "current_from": "profile"}
+        return replace(record, current=constant(value, record.time), findings=findings, provenance=provenance)
+    whence = record.provenance.get("current_from", "")
+    stated = [Statement(float(record.current[0]), whence)] if whence else []
+    _refuse_contradiction(value, None if whence else record.current, stated, where)
+    return record
 
 
 def _refuse_contradiction(value: float, channel: Floats | None, statements: list[Statement], where: str) -> None:

@@ -84,7 +84,7 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
         if (
             role in columns
             or (role == "time" and profile.file.sample_rate_Hz)
-            or (role == "current" and profile.current)
+            or (role == "current" and profile.current and not profile.current.values)
         ):
             continue
         try:
@@ -158,7 +158,7 @@ def left_out(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]
     taken = {entry.column for entry in assigned.values()}
     reasons = {}
     for role in OPTIONAL:
-        if role in assigned or (role == "current" and profile.current):
+        if role in assigned or (role == "current" and profile.current and not profile.current.values):
             continue
         stated = profile.channel(role).column
         try:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from mrdamper.errors import ColumnError, CombinedError, InputError, printable
-from mrdamper.rig_files.coil_current import as_data
+from mrdamper.rig_files.coil_current import as_data, with_value_of_name
 from mrdamper.rig_files.column_names import names_computed
 from mrdamper.rig_files.columns import assign, partly_assigned
 from mrdamper.rig_files.folder import is_left_out
@@ -64,7 +64,15 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
         records[0] = records[0].noticed(finding)
     if len({record.id for record in records}) < len(records):
         records = [replace(record, id=f"{record.id}_{i}") for i, record in enumerate(records, 1)]
-    return records, problems
+    named = []
+    for record in records:
+        try:
+            named.append(with_value_of_name(record, path, profile))
+        except InputError as error:
+            problems.append(error)
+    if not named:
+        CombinedError.raise_from(problems)
+    return named, problems
 
 
 def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:

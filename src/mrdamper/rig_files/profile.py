@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -95,24 +96,35 @@ class CurrentSource(Table):
         Name of the file, of the table within it, or of both with their folders, with {current} where
         the number stands and * for anything: `*_{current}A_*`, `*/I_{current}A/*`. {run}, {frequency}
         and {amplitude} stand for what tells the tests apart otherwise.
+    values : mapping of str to float
+        [A], by patterns with * of file or test names, with their folders where the pattern has a slash.
     unit : "A" or "mA"
         Of the number in the file name.
     """
 
     value: float | None = Field(default=None, allow_inf_nan=False, ge=-1000, le=1000)
     pattern: NAME | None = None
+    values: dict[NAME, Annotated[float, Field(allow_inf_nan=False, ge=-1000, le=1000)]] = Field(
+        default_factory=dict, max_length=1000
+    )
     unit: Literal["A", "mA"] = "A"
 
     @model_validator(mode="after")
     def _says_one_thing(self) -> CurrentSource:
-        if (self.value is None) == (self.pattern is None):
-            raise ValueError("give either value or pattern")
+        if (self.value is not None) + (self.pattern is not None) + bool(self.values) != 1:
+            raise ValueError("give either value or pattern or values")
         unknown = set(re.findall(r"\{(.*?)\}", self.pattern or "")) - {"current", "run", "frequency", "amplitude"}
         if unknown:
             raise ValueError(f"no placeholder is called {{{unknown.pop()}}}; known: current, run, frequency, amplitude")
         if self.pattern is not None and (self.pattern.count("{current}") != 1 or self.pattern.count("*") > 3):
             raise ValueError("the pattern needs {current} once, and at most three *")
         return self
+
+    def fitting(self, path: Path, test: str) -> list[str]:
+        """Return the patterns of `values` that match a file, or a test of it, whatever the case."""
+        names = [name.casefold() for name in (path.name, path.stem, test) if name]
+        whole = [path.as_posix().casefold()]
+        return [p for p in self.values if any(fnmatchcase(n, p.casefold()) for n in (whole if "/" in p else names))]
 
 
 class Correction(Table):
@@ -216,9 +228,13 @@ def profile_text(profile: Profile) -> str:
     for name in ("current", "correction"):
         table = getattr(profile, name)
         sections[name] = {} if table is None else table.model_dump(exclude_none=True)
+    if profile.current is not None:
+        sections["current.values"] = sections["current"].pop("values")
+        if sections["current.values"] and "unit" not in profile.current.model_fields_set:
+            del sections["current"]["unit"]
     for name, section in sections.items():
         if section or name.startswith("channels."):
-            lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in section.items())]
+            lines += ["", f"[{name}]", *(f"{_key(key)} = {_toml(value)}" for key, value in section.items())]
     return "\n".join(lines) + "\n"
 
 
@@ -287,6 +303,10 @@ def _as_expression(pattern: str) -> str:
     meant = {"{current}": number, "*": ".*?", "{run}": "(?P<run>.+?)", "{frequency}": other, "{amplitude}": other}
     inner = "".join(meant.get(part, re.escape(part)) for part in parts)
     return inner if re.search(r"\.[A-Za-z0-9]{1,5}$|\*$", pattern) else inner + r"(?:\..*)?"
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_]+", key) else _toml(key)
 
 
 def _toml(value: Any) -> str:

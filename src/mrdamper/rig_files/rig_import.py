@@ -13,7 +13,7 @@ import numpy as np
 
 from mrdamper.data import Dataset
 from mrdamper.errors import ColumnError, CombinedError, InputError
-from mrdamper.rig_files.coil_current import as_data
+from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, with_value_of_name
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.folder import files_in, is_left_out
 from mrdamper.rig_files.long_records import check_long_record
@@ -33,7 +33,7 @@ from mrdamper.rig_files.mapping.companions import (
 from mrdamper.rig_files.mapping.description import is_description
 from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.packed_folder import unpacked
-from mrdamper.rig_files.profile import Profile, profile_of
+from mrdamper.rig_files.profile import Profile, ProfileError, profile_of
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
 from mrdamper.rig_files.record import Record, Refusal
 from mrdamper.rig_files.tests_table import NAME as TESTS
@@ -161,6 +161,7 @@ def import_files(
         intake.join()
         if table is not None:
             table.require_found(intake.met)
+        _require_matches(profile, [*intake.met, *((path, "") for path in files)])
         refusals = intake.refusals
         if intake.tests() or refusals:
             left_out += [Path(note.file) for note in intake.notes]
@@ -218,6 +219,10 @@ class _Intake:
         """Check a test with what the table of tests says of it, or keep it until another file states its current."""
         self.met.append((path, record.id))
         problems: list[InputError] = []
+        try:
+            record = with_value_of_name(record, path, self._profile)
+        except InputError as error:
+            problems.append(error)
         if self._table is not None:
             try:
                 record = applied(record, self._table.of(path, record.id), self._table)
@@ -350,6 +355,18 @@ def found_tests(
     return tuple(_with_folders(records)), tuple(refusals)
 
 
+def _require_matches(profile: Profile, tests: Sequence[tuple[Path, str]]) -> None:
+    """Refuse patterns of the profile's table of currents that match no file and no test."""
+    if profile.current is None or not profile.current.values:
+        return
+    absent = set(profile.current.values).difference(*(profile.current.fitting(path, test) for path, test in tests))
+    if absent:
+        raise ProfileError(
+            f"no file or test is called {', '.join(repr(pattern) for pattern in sorted(absent))}",
+            where="[current.values]", remedy="write names of files or tests, with * for anything",
+        )  # fmt: skip
+
+
 def _with_folders(tests: Sequence[tuple[Path, Record]]) -> list[Record]:
     """Return records whose file is told with its folders, where files of several folders have one name."""
     paths = {path for path, _ in tests}
@@ -379,12 +396,14 @@ def _with_current(record: Record) -> Record:
     """Return the record, if it has a current."""
     if record.current is not None:
         return record
-    why = [f.text for f in record.findings if f.text.startswith("the current channel")]
+    why = [f.text for f in record.findings if f.text.startswith(NO_CHANNEL)]
+    calibrated = 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile; else '
     raise ColumnError(
         why[0] if why else "no coil current in a column or in the file name",
         where=Path(record.provenance.get("file", record.id)).name,
-        remedy='write the currents into tests.csv (--write-tests), or set [current] pattern = "*_{current}A_*", '
-        '[channels.current] column = "..." or, if all tests have one, [current] value = 0.5 in a profile',
+        remedy=(calibrated if why else "") + "write the currents into tests.csv (--write-tests), or set [current] "
+        'pattern = "*_{current}A_*", values = {"test1*" = 0.5}, [channels.current] column = "..." or, '
+        "if all tests have one, [current] value = 0.5 in a profile",
         code="E_CURRENT_MISSING",
     )
 

@@ -12,7 +12,7 @@ from mrdamper.data import Floats
 from mrdamper.data.arrays import chunks
 from mrdamper.errors import ColumnError, InputError
 from mrdamper.physics.motion.measured import smooth
-from mrdamper.rig_files.coil_current import as_data, constant, current_of, without_gaps
+from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, constant, current_of, without_gaps
 from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
 from mrdamper.rig_files.conditions import currents_in, stated_motion
@@ -32,7 +32,6 @@ _HZ = re.compile(r"(?<![\w.,])([0-9]{1,4}(?:[.,][0-9]{1,4})?) ?Hz(?![A-Za-z])")
 _SAMPLE = 10_000  # samples looked at
 _LEAST_CURRENT = 0.02  # [A] largest of a record: less is no current of a coil
 _MOST_FURTHER = 12  # channels
-_LEFT_OUT = "the current channel is left out"
 _LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged cell there costs the channel, not the run
 
 
@@ -87,7 +86,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
             noticed = [*findings, *slow]
         if current is not None:
             part["current"] = constant(current, part["time"])
-            noticed = [f for f in findings if not f.text.startswith(_LEFT_OUT)]
+            noticed = [f for f in findings if not f.text.startswith(NO_CHANNEL)]
         records.append(
             Record(
                 id=_run_id(table, path) + (f"_{number}" if len(stretches) > 1 else ""),

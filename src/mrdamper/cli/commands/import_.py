@@ -132,7 +132,8 @@ def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
 
     with first_file(files) as first:
         guess = guess_profile(first, settings)
-        text = profile_text(guess) + _alternatives(columns_of(first, settings))
+        columns = columns_of(first, settings)
+        text = profile_text(guess) + _alternatives(columns) + _missing_currents(files, guess, columns)
         try:
             read_runs(first, guess)
         except InputError as error:
@@ -142,6 +143,31 @@ def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
         return
     with write_file(target) as path:
         path.write_text(text, encoding="utf-8")
+
+
+def _missing_currents(files: list[Path], guess: Profile, columns: tuple[str, ...]) -> str:
+    """List what a person fills in for tests without a current, as comments: their currents, or a column's scale."""
+    import json
+    from collections import Counter
+    from glob import escape
+
+    from mrdamper.rig_files.rig_import import import_files
+
+    refusals = import_files(files, guess).refusals if guess.current is None else ()
+    missing = [refusal for refusal in refusals if refusal.error.code == "E_CURRENT_MISSING"]
+    if not missing:
+        return ""
+    lines = []
+    column = next((name for name in columns if name and f"column {name!r}" in missing[0].error.found), None)
+    if column is not None:
+        shown = json.dumps(column, ensure_ascii=False)
+        lines = ["# Calibration of the current: A for 1 of the column:", "#[channels.current]", f"#column = {shown}"]
+        lines += ['#unit = "A"', "#scale =", ""]
+    counts = Counter(refusal.run for refusal in missing)
+    names = [r.run if counts[r.run] == 1 else "*/" + "/".join(Path(r.file).parts[-2:]) for r in missing]
+    lines += ["# Tests without a current: remove the #, and write each current [A] behind its =:", "#[current.values]"]
+    lines += [f"#{json.dumps(escape(name) if name[:2] != '*/' else name, ensure_ascii=False)} =" for name in names]
+    return "\n".join(["", *lines, ""])
 
 
 def _alternatives(columns: tuple[str, ...]) -> str:
