@@ -68,12 +68,13 @@ def number(token: str, mark: str) -> float | None:
 
 def looks_numeric(token: str) -> bool:
     """Tell if a cell is meant as a value, in any notation: separates rows of data from headers."""
-    token = _SIGN_APART.sub(r"\1", token.strip(" \t"), count=1)
+    token = token.strip(" \t")
     return _looks_numeric(token) if len(token) <= _LONGEST else _looks_numeric.__wrapped__(token)
 
 
 @lru_cache(maxsize=4096)  # a cell of a file's head is asked about several times
 def _looks_numeric(token: str) -> bool:
+    token = _SIGN_APART.sub(r"\1", token, count=1)
     if (
         NUMBER["."].fullmatch(token)
         or token.lower() in MISSING
