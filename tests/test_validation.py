@@ -37,6 +37,9 @@ class Said:
     def distance(self, tested):
         return AT_TESTS
 
+    def corrected(self, gain, offset):
+        return replace(self, force=gain * self.force + offset)
+
 
 class Memory:
     """Knows the force of every run it was made of, and of every run at their conditions; says zero of all others."""
@@ -231,8 +234,7 @@ def test_the_band_of_the_peak_is_told_beside_the_measured_peak_of_the_window(mon
     assert np.array_equal(asked["shown"], run.in_window)
     assert peak_band(Exact(), run, 0.3) == pytest.approx(measured)
     monkeypatch.setattr(validation, "session_band", lambda expected, *given: said(*given))
-    shifted = SimpleNamespace(corrected=lambda p: replace(p, force=2 * p.force))
-    known = peak_band(Exact(), run, expected=shifted)
+    known = peak_band(Exact(), run, expected=SimpleNamespace(gain=2.0, offset=0.0))
     assert known == pytest.approx({**measured, **band, "energy_low_J": 1.8 * expected, "energy_high_J": 2.4 * expected})
 
 
