@@ -204,7 +204,7 @@ def test_a_parameter_rests_on_one_run_of_three_or_more_only():
 
 
 def test_degrees_of_freedom_are_those_of_the_parts_of_a_variance():
-    """Where sessions are all that scatters a variance has their degrees of freedom: of n sessions at most n - 1."""
+    """Of n sessions a variance between sessions has at most n - 1 degrees of freedom."""
     for count in (3, 9):
         runs = runs_of(gain=0.0, session=0.2, noise=1e-4, sessions=count, conditions=CONDITIONS)
         known = estimate_uncertainty(fitted(runs), runs).uncertainty

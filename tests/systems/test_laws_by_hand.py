@@ -16,7 +16,7 @@ CAR = quarter_car("car", 300, 40, 20e3, 200e3)
 
 
 class Seen:
-    """What a law sees: motions above and below the damper as given; an answer is what the law asks for."""
+    """Inputs of a control law: motions above and below the damper as given; outputs are demanded force or current."""
 
     def __init__(self, rate=0.0, **motions):
         self.motions, self.stroke_rate, self.tape = motions, rate, SimpleNamespace(select=lambda c, a, b: a if c else b)

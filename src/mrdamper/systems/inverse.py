@@ -128,8 +128,8 @@ def invert_on(
         return Demand(steady, copy.settle(steady)["force"], lowest, most)
     field = tape.remember(f"{prefix}field")
     lag = tape.select(steady > field, coil.rise_s, coil.fall_s)
-    from_there = tape.select(tape.first, steady, field)  # a coil starts settled at its first command
-    ahead = steady + (steady - from_there) * lag / np.maximum(_FIELD_TIME_RATIO * lag, 2 * motion["dt"])
+    before = tape.select(tape.first, steady, field)  # a coil starts settled at its first command
+    ahead = steady + (steady - before) * lag / np.maximum(_FIELD_TIME_RATIO * lag, 2 * motion["dt"])
     command = np.minimum(np.maximum(ahead, 0.0), highest)
     field_current = field_step(tape, motion["dt"], command, coil.rise_s, coil.fall_s)
     tape.update(field, field_current)

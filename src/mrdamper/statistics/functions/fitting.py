@@ -55,7 +55,7 @@ class _Fitted:
 
     @cached_property
     def errors(self) -> Mapping[str, Floats]:
-        """(N,) errors of values when they are left out, by kind of fold."""
+        """(N,) cross-validation errors of the values, by kind of fold."""
         rates = len(self.fit.function.rates)
         return {
             kind: _fold_errors(self.columns, self.target, self.weight, groups, rates)
