@@ -32,30 +32,18 @@ _FUNCTIONS = (
 
 @dataclass(frozen=True)
 class PaperAssumptions:
-    """Parameters held in every identification by the paper's method: the gas spring, or what replaces it.
-
-    Attributes
-    ----------
-    gas : GasSpring or None
-    fixed : tuple of (str, float)
-    free : tuple of str
-    notes : tuple of str
-        Origin of the stiffness, where the gas spring is not known.
-    """
+    """Parameters held in every identification by the paper's method: the gas spring, or what replaces it."""
 
     gas: GasSpring | None
     fixed: tuple[tuple[str, float], ...] = ()
     free: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # origin of the stiffness, where the gas spring is not known
 
     @classmethod
     def of(cls, train: Sequence[Run], gas: GasSpring | None) -> PaperAssumptions:
         """Take the gas spring, or separate stiffness and mass by the frequencies of the identification runs.
 
-        Raises
-        ------
-        ParameterError
-            If the motion leaves no gas volume.
+        Raises `ParameterError` if the motion leaves no gas volume.
         """
         if gas is not None:
             longest = max(float(np.ptp(run.displacement)) / 2 for run in train)
@@ -106,10 +94,7 @@ def missing_functions(conditions: Sequence[Condition]) -> tuple[str, ...]:
 def require_paper_functions(train: Sequence[Run]) -> None:
     """Refuse tests that do not determine every function of the paper.
 
-    Raises
-    ------
-    IdentificationError
-        E_PAPER_TESTS with the functions by name.
+    Raises `IdentificationError` E_PAPER_TESTS with the functions by name.
     """
     conditions = [analyse_motion(run).condition for run in train]
     if missing := missing_functions(conditions):

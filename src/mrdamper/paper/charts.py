@@ -23,31 +23,15 @@ class Series:
 
 @dataclass(frozen=True)
 class Panel:
-    """Axes with lines over them.
+    """Axes with lines over them."""
 
-    Attributes
-    ----------
-    axes : (str, str)
-        Texts of the two axes: quantity and unit.
-    lines : sequence of Series
-    title : str
-    log : str
-        Axes with a logarithmic scale: "x", "y".
-    rows : sequence of str
-        Names on the vertical axis, from the top; row k lies at −k.
-    columns : sequence of str
-        Names on the horizontal axis; column k lies at k.
-    low : float or None
-        Lower end of the axis of values.
-    """
-
-    axes: tuple[str, str]
+    axes: tuple[str, str]  # texts of the two axes: quantity and unit
     lines: Sequence[Series] = ()
     title: str = ""
-    log: str = ""
-    rows: Sequence[str] = ()
-    columns: Sequence[str] = ()
-    low: float | None = None
+    log: str = ""  # axes with a logarithmic scale: "x", "y"
+    rows: Sequence[str] = ()  # names on the vertical axis, from the top; row k lies at −k
+    columns: Sequence[str] = ()  # names on the horizontal axis; column k lies at k
+    low: float | None = None  # lower end of the axis of values
 
 
 @dataclass(frozen=True)

@@ -27,26 +27,13 @@ _RECOVERED = {"agrees": "recovered", "agrees in part": "recovered in part", "dif
 
 @dataclass(frozen=True)
 class ClaimLimit:
-    """ClaimLimit of one value.
+    """Limit of one value."""
 
-    Attributes
-    ----------
-    value : str
-        Description of the value.
-    sense : {"below", "above"}
-    holds : float
-        The value must be on this side of it, the limit itself included.
-    near : float
-        Wider limit, within which the claim agrees in part; the same where there is none.
-    alone : bool
-        Whether the value speaks for the claim even where no other one does.
-    """
-
-    value: str
+    value: str  # description of the value
     sense: Literal["below", "above"]
-    holds: float
-    near: float
-    alone: bool = True
+    holds: float  # the value must be on this side of it, the limit itself included
+    near: float  # wider limit, within which the claim agrees in part; the same where there is none
+    alone: bool = True  # the value supports the claim even where no other one does
 
     def grade(self, value: float) -> int:
         """Return 2 within the limit, 1 within the wider one, 0 beyond both."""
@@ -168,35 +155,19 @@ ROWS: Mapping[str, _Row] = MappingProxyType({
 
 @dataclass(frozen=True)
 class Claim:
-    """Result on one claim of the paper.
+    """Result on one claim of the paper."""
 
-    Attributes
-    ----------
-    key : str
-        Of `ROWS`.
-    text, source : str
-        The claim; equation or section of Qian et al. 2024.
-    verdict : str
-        By `verdict_on`.
-    said : str
-        The verdict for a reader, with the damper it rests on.
-    evidence, threshold : str
-        Values and limits.
-    figure : str
-        Name of the figure that shows it.
-    seeds : str
-        Number of noise seeds with the same verdict, and the other verdicts; empty where it was checked once.
-    """
-
-    key: str
+    key: str  # of `ROWS`
+    # text and source: the claim; equation or section of Qian et al. 2024
     text: str
     source: str
-    verdict: Verdict
-    said: str
+    verdict: Verdict  # by `verdict_on`
+    said: str  # the verdict for a reader, with the damper it rests on
+    # evidence and threshold: values and limits
     evidence: str
     threshold: str
-    figure: str
-    seeds: str
+    figure: str  # name of the figure that shows it
+    seeds: str  # number of noise seeds with the same verdict, and the other verdicts; empty where it was checked once
 
 
 def check_claims(study: Reproduction) -> tuple[Claim, ...]:

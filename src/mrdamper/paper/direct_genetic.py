@@ -30,19 +30,13 @@ _LINEAR = ("c", "f0", "k1", "k2", "k3", "m")
 
 @dataclass(frozen=True)
 class DirectGenetic(Method):
-    """RMSE of the force on the measured sine over all free parameters of the Bouc–Wen model.
-
-    Attributes
-    ----------
-    genetic : GeneticSettings
-    bounds : mapping of str to (float, float)
-        Replace the box of a coordinate: c, f0, k1, k3, m, yield_force, yield_displacement, n, asymmetry [SI].
-    """
+    """RMSE of the force on the measured sine over all free parameters of the Bouc–Wen model."""
 
     name: ClassVar[str] = "direct-genetic"
     summary: ClassVar[str] = "all parameters of the Bouc–Wen model by the genetic algorithm"
 
     genetic: GeneticSettings = field(default_factory=lambda: GeneticSettings(narrowings=3))
+    # replace the box of a coordinate: c, f0, k1, k3, m, yield_force, yield_displacement, n, asymmetry [SI]
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
 
     def for_many_runs(self) -> Method:
@@ -52,12 +46,7 @@ class DirectGenetic(Method):
     def solve(self, problem: Problem) -> Solution:
         """Determine the free parameters of a problem.
 
-        Raises
-        ------
-        IdentificationError
-            If the model is not Bouc–Wen.
-        ExcitationError
-            If the motion is no sine.
+        Raises `IdentificationError` if the model is not Bouc–Wen, and `ExcitationError` if the motion is no sine.
         """
         return self.solution(problem, self.genetic_search(problem))
 

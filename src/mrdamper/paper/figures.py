@@ -40,23 +40,12 @@ Drawing = FigureLayout | Figure | str  # or why there is none
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure: what it shows, where the paper has it, its axes, and the function that makes it.
-
-    Attributes
-    ----------
-    title : str
-    source : str
-        Section or equation of Qian et al. 2024; empty for figures of this study.
-    axes : sequence of (str, str)
-        Texts of the axes of each panel; of figures with several columns, those of one column.
-    make : callable
-        Of the study and the axes.
-    """
+    """A figure: what it shows, where the paper has it, its axes, and the function that makes it."""
 
     title: str
-    source: str
-    axes: Texts
-    make: Callable[[Reproduction, Texts], Drawing]
+    source: str  # section or equation of Qian et al. 2024; empty for figures of this study
+    axes: Texts  # texts of the axes of each panel; of figures with several columns, those of one column
+    make: Callable[[Reproduction, Texts], Drawing]  # of the study and the axes
 
 
 def caption(name: str) -> str:

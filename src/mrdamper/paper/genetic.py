@@ -24,21 +24,6 @@ GENERATIONS_OF_MANY = 60  # generations of a search that is one of dozens
 class GeneticSettings:
     """Settings of the search; the defaults are the paper's.
 
-    Attributes
-    ----------
-    population, generations : int
-    crossover_fraction : float
-        Share of the children, elite apart, that are crossed; the others are mutated.
-    mutation : float
-        Probability with which each number of a mutated child is drawn anew from the box.
-    elite : float
-        Share of the population that survives unchanged.
-    narrowings : int
-        Further searches, each in a box about the best point ("progressively narrower").
-    narrow_to : float
-        Width of each box over that of the one before.
-    seed : int
-
     Raises
     ------
     ParameterError
@@ -47,11 +32,11 @@ class GeneticSettings:
 
     population: int = 100
     generations: int = 500
-    crossover_fraction: float = 0.8
-    mutation: float = 0.2
-    elite: float = 0.05
-    narrowings: int = 6
-    narrow_to: float = 0.2
+    crossover_fraction: float = 0.8  # share of the children, elite apart, that are crossed; the others are mutated
+    mutation: float = 0.2  # probability with which each number of a mutated child is drawn anew from the box
+    elite: float = 0.05  # share of the population that survives unchanged
+    narrowings: int = 6  # further searches, each in a box about the best point ("progressively narrower")
+    narrow_to: float = 0.2  # width of each box over that of the one before
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -74,25 +59,13 @@ class GeneticSettings:
 
 @dataclass(frozen=True, eq=False)
 class GeneticMinimum:
-    """End of a search.
+    """End of a search."""
 
-    Attributes
-    ----------
-    point : (D,) array
-    cost : float
-    evaluations : int
-    history : (G,) array
-        Lowest cost after every generation, over all boxes.
-    boxes : tuple of (lower, upper)
-        Searched one after the other, (D,) arrays.
-    ending : StopReason
-    """
-
-    point: Floats
+    point: Floats  # (D,)
     cost: float
     evaluations: int
-    history: Floats
-    boxes: tuple[tuple[Floats, Floats], ...]
+    history: Floats  # (G,) lowest cost after every generation, over all boxes
+    boxes: tuple[tuple[Floats, Floats], ...]  # searched one after the other, (D,) arrays
     ending: StopReason = StopReason.GENERATIONS_SPENT
 
     @property

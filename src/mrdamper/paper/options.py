@@ -31,49 +31,31 @@ _LIMITS = "sines only; the parameter functions need the frequency and amplitude 
 
 @dataclass(frozen=True)
 class PaperOptions(StudyMethod):
-    """Presets, gas spring, readings of the text and search of the paper's method.
-
-    Attributes
-    ----------
-    gas : GasSpring or None
-        Gas spring of the damper [Eq. 3–8]. Unknown: k1 and m come from a regression of the in-phase
-        stiffness over the frequencies, k2 = k3 = 0.
-    A, n : float
-        Presets of the loop [-]. A scales alpha and beta and changes no force.
-    gamma : float or None
-        Preset [m^-n, for A = 1]; None ties it to beta.
-    force_amplitude, phase, offset, quadratic_stiffness, search
-        As those of the method `Paper`.
-    mass_law : {"exponential", "inverse-square", "power"}
-        Reading of Eq. 29.
-    functions : {"paper", "shorter"}
-        Refuse tests that do not determine the paper's functions, or take shorter ones in their place.
-    friction_test : {"dry", "filled"}
-        Of the virtual rig: without fluid, as in the paper, or with it, which adds the yield force without current.
-    generations : int
-        Of the genetic search, in each of its seven boxes.
-    seed : int
-        Of the genetic search.
-    alpha_box, beta_box : (float, float)
-        Bounds of the search [N/m, m^-n].
-    """
+    """Presets, gas spring, readings of the text and search of the paper's method."""
 
     name: ClassVar[str] = "paper"
 
+    # gas spring of the damper [Eq. 3–8]. Unknown: k1 and m come from a regression of the in-phase stiffness over the
+    # frequencies, k2 = k3 = 0
     gas: GasSpring | None = None
+    # A and n: presets of the loop [-]. A scales alpha and beta and changes no force
     A: float = 1.0
     n: float = 2.0
-    gamma: float | None = None
+    gamma: float | None = None  # preset [m^-n, for A = 1]; None ties it to beta
+    # force_amplitude, phase, offset, quadratic_stiffness and search: as those of the method `Paper`
     force_amplitude: AmplitudeReading = "first-harmonic"
     phase: PhaseReading = "harmonic"
     offset: OffsetReading = "extremes"
     quadratic_stiffness: Literal["kept", "dropped"] = "kept"
-    mass_law: MassLaw = "exponential"
+    mass_law: MassLaw = "exponential"  # reading of Eq. 29
+    # refuse tests that do not determine the paper's functions, or take shorter ones in their place
     functions: Literal["paper", "shorter"] = "paper"
+    # of the virtual rig: without fluid, as in the paper, or with it, which adds the yield force without current
     friction_test: FrictionTest = "dry"
     search: Search = "genetic"
-    generations: int = 500
-    seed: int = 0
+    generations: int = 500  # of the genetic search, in each of its seven boxes
+    seed: int = 0  # of the genetic search
+    # alpha_box and beta_box: bounds of the search [N/m, m^-n]
     alpha_box: tuple[float, float] = (0.0, 1e8)
     beta_box: tuple[float, float] = (0.0, 1e8)
 
@@ -124,12 +106,8 @@ class PaperOptions(StudyMethod):
     def recipe(self, train: Sequence[Run]) -> Recipe:
         """Make the recipe: every sine run by the paper's method, then its functions over the conditions.
 
-        Raises
-        ------
-        IdentificationError
-            E_PAPER_TESTS if the runs do not determine every function of the paper.
-        ParameterError
-            If the motion leaves no gas volume.
+        Raises `IdentificationError` E_PAPER_TESTS if the runs do not determine every function of the paper, and
+        `ParameterError` if the motion leaves no gas volume.
         """
         if self.functions == "paper":
             require_paper_functions(train)

@@ -40,38 +40,20 @@ Box = tuple[float, float]
 
 @dataclass(frozen=True)
 class Paper(Method):
-    """First-order harmonic balance for c and m, then a search for alpha and beta.
-
-    Attributes
-    ----------
-    force_amplitude : {"first-harmonic", "half-peak-to-peak", "maximum"}
-        Definition of F0.
-    phase : {"harmonic", "peaks"}
-        Definition of phi.
-    offset : {"extremes", "mean"}
-        Definition of f0; the paper takes maximum and minimum.
-    quadratic_stiffness : {"kept", "dropped"}
-        Whether k2 is part of the gas spring [Eq. 7].
-    search : {"genetic", "optimum"}
-        The paper's algorithm, or the least error that it approaches: a grid over beta with alpha solved for.
-    genetic : GeneticSettings
-    bounds : ((float, float), (float, float))
-        Of alpha [N/m] and beta [m^-n], the paper's [0, 1e8].
-    explain : bool
-        Note how much of c is hysteretic; takes a consistent balance besides.
-    """
+    """First-order harmonic balance for c and m, then a search for alpha and beta."""
 
     name: ClassVar[str] = "paper"
     summary: ClassVar[str] = "Qian et al. 2024 as described: c and m from the first harmonic, alpha and beta by search"
 
-    force_amplitude: AmplitudeReading = "first-harmonic"
-    phase: PhaseReading = "harmonic"
-    offset: OffsetReading = "extremes"
-    quadratic_stiffness: Literal["kept", "dropped"] = "kept"
+    force_amplitude: AmplitudeReading = "first-harmonic"  # definition of F0
+    phase: PhaseReading = "harmonic"  # definition of phi
+    offset: OffsetReading = "extremes"  # definition of f0; the paper takes maximum and minimum
+    quadratic_stiffness: Literal["kept", "dropped"] = "kept"  # whether k2 is part of the gas spring [Eq. 7]
+    # the paper's algorithm, or the least error that it approaches: a grid over beta with alpha solved for
     search: Literal["genetic", "optimum"] = "genetic"
     genetic: GeneticSettings = field(default_factory=GeneticSettings)
-    bounds: tuple[Box, Box] = ((0.0, 1e8), (0.0, 1e8))
-    explain: bool = True
+    bounds: tuple[Box, Box] = ((0.0, 1e8), (0.0, 1e8))  # of alpha [N/m] and beta [m^-n], the paper's [0, 1e8]
+    explain: bool = True  # note how much of c is hysteretic; takes a consistent balance besides
 
     def for_many_runs(self) -> Method:
         """Return the method with a short genetic search, where the paper takes 500 generations."""
@@ -80,12 +62,8 @@ class Paper(Method):
     def solve(self, problem: Problem) -> Solution:
         """Determine the free parameters of a problem.
 
-        Raises
-        ------
-        IdentificationError
-            If the model is not Bouc–Wen, or alpha or beta are held.
-        ExcitationError
-            If the motion is no sine.
+        Raises `IdentificationError` if the model is not Bouc–Wen, or alpha or beta are held, and `ExcitationError` if
+        the motion is no sine.
         """
         return self.solution(
             problem, self.genetic_search(problem) if self.search == "genetic" else _optimum(self, problem)

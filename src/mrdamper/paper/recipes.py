@@ -125,23 +125,12 @@ def chosen_functions(identifications: Sequence[Identification]) -> ModifiedFit:
 
 @dataclass(frozen=True, eq=False)
 class OnePerCurrent(Damper):
-    """Damper with one set of parameters for each current, from one motion: the traditional use.
-
-    Attributes
-    ----------
-    rig : str
-    models : tuple of (float, BoucWen)
-        Current [A] and model.
-    envelope : Envelope
-    provenance : mapping
-    coil : Coil, optional
-    uncertainty : Uncertainty, optional
-    """
+    """Damper with one set of parameters for each current, from one motion: the traditional use."""
 
     kind: ClassVar[str] = "one-per-current"
 
     rig: str
-    models: tuple[tuple[float, BoucWen], ...]
+    models: tuple[tuple[float, BoucWen], ...]  # current [A] and model
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict)
     coil: Coil | None = None

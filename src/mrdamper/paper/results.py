@@ -27,19 +27,11 @@ SAME = 0.08  # relative tolerance within which two runs have one motion
 
 @dataclass(frozen=True)
 class GeneticCheck:
-    """Genetic search with the paper's settings on one run, beside the optimum of the same error.
-
-    Attributes
-    ----------
-    condition : Condition
-    minimum : GeneticMinimum
-    reached, optimum : float
-        RMSE where it ended and the lowest there is [N].
-    seconds : float
-    """
+    """Genetic search with the paper's settings on one run, beside the optimum of the same error."""
 
     condition: Condition
     minimum: GeneticMinimum
+    # reached and optimum: RMSE where it ended and the lowest there is [N]
     reached: float
     optimum: float
     seconds: float
@@ -47,24 +39,15 @@ class GeneticCheck:
 
 @dataclass(frozen=True)
 class GeneticEnd:
-    """End of a genetic search of fewer generations on a run, over the optimum.
-
-    Attributes
-    ----------
-    run_id : str
-    seed : int
-    alpha, beta, error : float
-        Parameters and RMSE reached over those of the optimum.
-    forces, to_settle : int
-        Computed in all, and until the error is within 1 % of the final one.
-    seconds : float
-    """
+    """End of a genetic search of fewer generations on a run, over the optimum."""
 
     run_id: str
     seed: int
+    # alpha, beta and error: parameters and RMSE reached over those of the optimum
     alpha: float
     beta: float
     error: float
+    # forces and to_settle: computed in all, and until the error is within 1 % of the final one
     forces: int
     to_settle: int
     seconds: float
@@ -72,55 +55,27 @@ class GeneticEnd:
 
 @dataclass(frozen=True, eq=False)
 class Reproduction:
-    """Results of the study.
-
-    Attributes
-    ----------
-    dataset : Dataset
-    rig : VirtualRig or None
-        The true damper, where the data are synthetic.
-    gas : GasSpring or None
-    train, held_out : tuple of Run
-    friction : Run or None
-        Slow test.
-    loops : tuple of LoopAnalysis
-    readings : tuple of ForceReading
-        F0, phi, f0 of the identification runs.
-    options : PaperOptions
-    contenders : tuple of Scored
-        Methods compared; their `recipe.title` tells them apart.
-    there : mapping of (str, str) to Identification or str
-        Validation runs identified by the literal and the consistent method, by title and run id, or why not.
-    genetic : tuple of GeneticCheck
-    ended : tuple of GeneticEnd
-        One for each identification run, a seed each.
-    direct : mapping of str to int
-        Forces computed until the direct genetic search settled, by run id.
-    seed_errors : mapping of str to (S,) array
-        Median validation nrmse_pp by method, one a noise seed.
-    seed_verdicts : mapping of str to tuple of str
-        Verdicts by the key of the claim, one a noise seed.
-    sensitivity : tuple of OneAtATime
-    sobol : Sobol or None
-    notes : tuple of str
-    seconds : float
-    """
+    """Results of the study."""
 
     dataset: Dataset
-    rig: VirtualRig | None
+    rig: VirtualRig | None  # the true damper, where the data are synthetic
     gas: GasSpring | None
     train: tuple[Run, ...]
     held_out: tuple[Run, ...]
-    friction: Run | None
+    friction: Run | None  # slow test
     loops: tuple[LoopAnalysis, ...]
-    readings: tuple[ForceReading, ...]
+    readings: tuple[ForceReading, ...]  # F0, phi, f0 of the identification runs
     options: PaperOptions
-    contenders: tuple[RecipeResult, ...] = ()
+    contenders: tuple[RecipeResult, ...] = ()  # methods compared; their `recipe.title` tells them apart
+    # validation runs identified by the literal and the consistent method, by title and run id, or why not
     there: Mapping[tuple[str, str], Identification | str] = field(default_factory=dict)
     genetic: tuple[GeneticCheck, ...] = ()
-    ended: tuple[GeneticEnd, ...] = ()
+    ended: tuple[GeneticEnd, ...] = ()  # one for each identification run, a seed each
+    # forces computed until the direct genetic search settled, by run id
     direct: Mapping[str, int] = field(default_factory=dict)
+    # median validation nrmse_pp by method, one a noise seed
     seed_errors: Mapping[str, Floats] = field(default_factory=dict)
+    # verdicts by the key of the claim, one a noise seed
     seed_verdicts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     sensitivity: tuple[OneAtATime, ...] = ()
     sobol: Sobol | None = None
@@ -215,17 +170,10 @@ def cost_per_run(study: Reproduction, method: RecipeResult) -> tuple[float, floa
 
 @dataclass(frozen=True)
 class Measured:
-    """Values that a claim rests on, in the order of its limits; none where it could not be measured.
-
-    Attributes
-    ----------
-    values : tuple of float
-    evidence : str
-        Further values, or why there are none.
-    """
+    """Values that a claim rests on, in the order of its limits; none where it could not be measured."""
 
     values: tuple[float, ...] = ()
-    evidence: str = ""
+    evidence: str = ""  # further values, or why there are none
 
     @classmethod
     def of(cls, *values: float | np.floating, evidence: str = "") -> Measured:

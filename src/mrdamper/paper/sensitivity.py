@@ -29,46 +29,27 @@ _BOOTSTRAP_SAMPLES = 100  # of the intervals of the indices
 
 @dataclass(frozen=True)
 class OneAtATime:
-    """Effect of a change of one parameter on the force.
-
-    Attributes
-    ----------
-    name : str
-    change : float
-        Relative change made.
-    effect : float
-        RMS change of the force over its standard deviation, the other parameters held.
-    left : float
-        The same, once the free parameters were identified anew with this one preset wrongly; NaN if they were not.
-    """
+    """Effect of a change of one parameter on the force."""
 
     name: str
-    change: float
-    effect: float
+    change: float  # relative change made
+    effect: float  # RMS change of the force over its standard deviation, the other parameters held
+    # the same, once the free parameters were identified anew with this one preset wrongly; NaN if they were not
     left: float
 
 
 @dataclass(frozen=True, eq=False)
 class Sobol:
-    """Sobol indices of the RMS change of the force.
-
-    Attributes
-    ----------
-    names : tuple of str
-    first, total : (P,) arrays
-        Share of the variance due to a parameter alone, and with all others [-].
-    first_confidence, total_confidence : (P,) arrays
-        Half-widths at 95 %.
-    spread : float
-        Every parameter was varied by ± this share.
-    """
+    """Sobol indices of the RMS change of the force."""
 
     names: tuple[str, ...]
+    # first and total: (P,) share of the variance due to a parameter alone, and with all others [-]
     first: Floats
     total: Floats
+    # first_confidence and total_confidence: (P,) half-widths at 95 %
     first_confidence: Floats
     total_confidence: Floats
-    spread: float
+    spread: float  # every parameter was varied by ± this share
 
 
 def one_at_a_time(

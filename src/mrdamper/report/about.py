@@ -33,14 +33,7 @@ class AboutError(InputError):
 
 @dataclass(frozen=True)
 class About:
-    """The head of a report; what was not given is empty.
-
-    Attributes
-    ----------
-    title, customer, maker, type, serial, rig, operator, date, temperature_C, standard, notes : str
-    logo : str
-        The picture as a data address.
-    """
+    """The head of a report; what was not given is empty."""
 
     title: str = ""
     customer: str = ""
@@ -53,7 +46,7 @@ class About:
     temperature_C: str = ""
     standard: str = ""
     notes: str = ""
-    logo: str = ""
+    logo: str = ""  # the picture as a data address
 
     @property
     def rows(self) -> list[tuple[str, str]]:
@@ -65,20 +58,12 @@ class About:
 
 @dataclass(frozen=True)
 class Limit:
-    """A band the damping force must lie in.
-
-    Attributes
-    ----------
-    current_A, velocity_m_s : float
-    side : str
-        "rebound" or "compression".
-    lower_N, upper_N : float
-        Of the force with the gas force taken away, positive.
-    """
+    """A band the damping force must lie in."""
 
     current_A: float
     velocity_m_s: float
-    side: str
+    side: str  # "rebound" or "compression"
+    # lower_N and upper_N: of the force with the gas force taken away, positive
     lower_N: float
     upper_N: float
 
@@ -86,11 +71,8 @@ class Limit:
 def load_about(path: str | Path) -> About:
     """Read the head of a report from a TOML file.
 
-    Raises
-    ------
-    AboutError
-        If it cannot be read, holds an unknown field or a field that is no text or number, or names
-        a logo that is no PNG or JPEG or is too large.
+    Raises `AboutError` if it cannot be read, holds an unknown field or a field that is no text or number, or names a
+    logo that is no PNG or JPEG or is too large.
     """
     path = Path(path)
     table = dict(_toml(path))
@@ -103,10 +85,7 @@ def load_about(path: str | Path) -> About:
 def about_of(table: Mapping[str, Any], where: str) -> About:
     """Return the head of a report from its fields; the logo is a data address already.
 
-    Raises
-    ------
-    AboutError
-        If a field is unknown, or no text or number.
+    Raises `AboutError` if a field is unknown, or no text or number.
     """
     names = [f.name for f in fields(About)]
     for name, value in table.items():
@@ -124,10 +103,7 @@ def about_of(table: Mapping[str, Any], where: str) -> About:
 def logo_of(text: str) -> str:
     """Return a picture, given as base64, as the data address a page holds.
 
-    Raises
-    ------
-    AboutError
-        If it is no base64, no PNG or JPEG, or too large.
+    Raises `AboutError` if it is no base64, no PNG or JPEG, or too large.
     """
     try:
         data = base64.b64decode(text, validate=True)
@@ -139,11 +115,8 @@ def logo_of(text: str) -> str:
 def load_limits(path: str | Path) -> tuple[Limit, ...]:
     """Read the force limits of a limits file: one `[[limit]]` table per limit.
 
-    Raises
-    ------
-    AboutError
-        If it cannot be read, a key is unknown, a limit is incomplete, no number, of no side, or its
-        lower force above the upper, or two limits at one point exclude each other.
+    Raises `AboutError` if it cannot be read, a key is unknown, a limit is incomplete, no number, of no side, or its
+    lower force above the upper, or two limits at one point exclude each other.
     """
     path = Path(path)
     table = _toml(path)
@@ -240,10 +213,7 @@ def _picture(data: bytes, where: str) -> str:
 def parse_ladder(text: str) -> tuple[float, ...]:
     """Velocities [m/s] of a table of forces from "0.05, 0.1, 0.2"; empty for the default.
 
-    Raises
-    ------
-    AboutError
-        If one is no positive number, or over 20 are given.
+    Raises `AboutError` if one is no positive number, or over 20 are given.
     """
     words = [word for word in text.replace(",", " ").split() if word]
     try:

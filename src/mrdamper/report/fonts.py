@@ -12,18 +12,10 @@ _MAX_FILE_BYTES = 40_000_000  # size of a font file [bytes]; larger ones are not
 
 @dataclass(frozen=True)
 class Fallback:
-    """Fonts that contain further characters.
+    """Fonts that contain further characters."""
 
-    Attributes
-    ----------
-    files : tuple of (path, int)
-        Font files, each with its index within a collection.
-    missing : str
-        Characters that no installed font contains.
-    """
-
-    files: tuple[tuple[str, int], ...] = ()
-    missing: str = ""
+    files: tuple[tuple[str, int], ...] = ()  # font files, each with its index within a collection
+    missing: str = ""  # characters that no installed font contains
 
     @property
     def sentence(self) -> str:

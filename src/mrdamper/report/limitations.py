@@ -31,16 +31,9 @@ _MIN_LEVELS = 4  # number of tested currents
 
 @dataclass(frozen=True)
 class Limitation:
-    """A limitation in one sentence.
+    """A limitation in one sentence."""
 
-    Attributes
-    ----------
-    group : str
-        Heading under which a report lists it.
-    text : str
-    """
-
-    group: str
+    group: str  # heading under which a report lists it
     text: str
 
 

@@ -21,19 +21,12 @@ _MAX_WIDTH = 160  # characters of a line on a terminal
 
 @dataclass(frozen=True)
 class IntervalCheck:
-    """Prediction intervals of the peak force against measured validation runs.
+    """Prediction intervals of the peak force against measured validation runs."""
 
-    Attributes
-    ----------
-    inside, runs : int
-        Runs whose measured peak force lies inside its interval, of how many.
-    half_width : float
-        Median half width of the interval over the predicted peak force [-].
-    """
-
+    # inside and runs: runs whose measured peak force lies inside its interval, of how many
     inside: int
     runs: int
-    half_width: float
+    half_width: float  # median half width of the interval over the predicted peak force [-]
 
 
 def check_intervals(rig: RigStudy) -> IntervalCheck | None:

@@ -45,17 +45,10 @@ def create_app(
 ) -> FastAPI:
     """Make the application; raises `MissingExtraError` if the chart library is not installed.
 
-    Parameters
-    ----------
-    hosts : iterable of str
-        Values of the Host header that are this bench, with the port.
-    stopping : callable
-        Says whether the server is about to stop, so that open streams end.
-    read_ahead : bool
-        Whether the first session brings the bundled tests before they are asked for.
-    token : str, optional
-        What a page has to show to open a session: it stands in the printed address, so that other
-        users of this machine cannot. Without one, anybody who reaches the bench can.
+    `hosts`: values of the Host header that are this app, with the port. `stopping`: true once the server is about to
+    stop, so that open streams end. `read_ahead`: the first session reads the bundled tests before they are asked for.
+    `token`: what a page has to show to open a session. It is part of the printed address, so that other users of this
+    machine cannot open one; without a token, anybody who reaches the app can.
     """
     chart_library = plotly_script().read_bytes()  # sent in one piece: the first picture waits for it
     sessions = BrowserSessions()

@@ -25,12 +25,7 @@ _PROFILES_TRIED = 5  # files looked at for the first whose form can be guessed
 def read_rig_files(upload: Upload, toml: str, refused_only: bool, only: Path | None = None) -> ImportedData:
     """Read the files of a drop, those refused before or one, with a profile as TOML; empty to guess.
 
-    Raises
-    ------
-    InputError
-        If the profile cannot be read.
-    NothingTakenError
-        If every file is refused.
+    Raises `InputError` if the profile cannot be read, and `NothingTakenError` if every file is refused.
     """
     from mrdamper.rig_files.profile import parse_profile
     from mrdamper.rig_files.rig_import import import_files, to_dataset, with_unique_ids

@@ -68,12 +68,8 @@ class _List(BaseModel, extra="forbid", strict=True):
 def save_project(session: Session, state: str, shown: str | None, logo: str = "") -> bytes:
     """Return a session as such a file.
 
-    Raises
-    ------
-    SavedProjectError
-        If it would be too large to be dropped on a bench again.
-    AboutError
-        If the logo is no picture.
+    Raises `SavedProjectError` if it would be too large to be dropped on a bench again, and `AboutError` if the logo is
+    no picture.
     """
     picture = _picture(logo)
     imported, dampers = session.imported, list(session.dampers.values())
@@ -117,12 +113,8 @@ def _write_data(dataset: Dataset, archive: zipfile.ZipFile) -> None:
 def open_saved_project(path: Path, place: Path) -> SavedProject:
     """Read such a file; `place` is a folder its data may be unpacked in.
 
-    Raises
-    ------
-    SavedProjectError
-        If it is no such file, is damaged, or holds what does not belong in it.
-    InputError
-        What reading a dataset or a model says.
+    Raises `SavedProjectError` if it is no such file, is damaged, or holds what does not belong in it, and an
+    `InputError` of a dataset or a model that cannot be read.
     """
     try:
         with zipfile.ZipFile(path) as archive:

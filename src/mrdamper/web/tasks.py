@@ -59,29 +59,12 @@ def identify_rig(
 ) -> tuple[tuple[Identification, ...], RecipeResult | str, dict[str, str]]:
     """Identify a model from runs of one rig, then over their conditions.
 
-    Parameters
-    ----------
-    tell : callable
-    dataset : Dataset
-        Of one rig.
-    run_ids : sequence of str
-        Runs to identify from; empty for all identification runs with a steady sine.
-    model, method : str
-    over : str
-        How one damper is made of them: "functions" through the identified values, or "joint",
-        all forces at once.
-    free : sequence of str
-        Preset parameters to determine as well.
-    fixed : mapping of str to float
-        Parameters held at a value [SI].
+    `run_ids`: runs to identify from; empty for all identification runs with a steady sine. `over`: how one damper is
+    made of them: "functions" through the identified values, or "joint", all forces at once. `free`: preset parameters
+    to determine as well. `fixed`: parameters held at a value [SI].
 
-    Returns
-    -------
-    identifications : tuple of Identification
-        Run by run; empty for a model of one set of parameters.
-    scored : Scored or str
-        The damper over all conditions, or why the runs allow none.
-    refused : mapping of run id to reason
+    Gives the identifications, none for a model of one set of parameters; the damper over all conditions, or why the
+    runs allow none; and the reason by run for those refused.
     """
     sines, refused = usable_sines(dataset)
     runs = [run for run in sines if (run.id in run_ids if run_ids else run.split == "train")]

@@ -40,10 +40,7 @@ def init(
 def template(kind: str) -> str:
     """Return the text of a template.
 
-    Raises
-    ------
-    UnknownNameError
-        If there is no template of that name.
+    Raises `UnknownNameError` if there is no template of that name.
     """
     from importlib.resources import files
 

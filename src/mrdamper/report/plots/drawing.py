@@ -84,19 +84,12 @@ def text_width(text: str, size: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Paths and texts on a sheet.
+    """Paths and texts on a sheet."""
 
-    Attributes
-    ----------
-    width, height : float
-        [pt]
-    parts : sequence of DrawnPath or DrawnText
-        In the order in which they are drawn.
-    """
-
+    # width and height: [pt]
     width: float
     height: float
-    parts: Sequence[DrawnPath | DrawnText]
+    parts: Sequence[DrawnPath | DrawnText]  # in the order in which they are drawn
 
     def file(self, kind: str) -> bytes:
         """Write an "svg", "pdf" or "png"; the same drawing has the same bytes."""

@@ -117,14 +117,9 @@ def _decades(low: float, high: float) -> tuple[Floats, list[str]]:
 
 @dataclass(eq=False)
 class Axes:
-    """A panel: curves over two axes, a title, texts, a legend.
+    """A panel: curves over two axes, a title, texts, a legend."""
 
-    Attributes
-    ----------
-    left, top, width, height : float
-        Of the frame [pt].
-    """
-
+    # left, top, width and height: of the frame [pt]
     left: float
     top: float
     width: float

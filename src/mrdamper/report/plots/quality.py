@@ -20,26 +20,14 @@ _FLAG, _REFUSED = PALETTE[2], PALETTE[4]
 
 @dataclass(frozen=True, eq=False)
 class LoopPanel:
-    """One record's loop.
+    """One record's loop."""
 
-    Attributes
-    ----------
-    title : str
-        Name of the record.
-    note : str
-        Codes of what was found; empty for a good record.
-    displacement, force : (N,) arrays
-        [m], [N], NaN where a sample is missing.
-    flagged : (N,) bool array
-        Samples to be marked.
-    refused : bool
-    """
-
-    title: str
-    note: str
+    title: str  # name of the record
+    note: str  # codes of what was found; empty for a good record
+    # displacement and force: (N,) [m], [N], NaN where a sample is missing
     displacement: Floats
     force: Floats
-    flagged: np.ndarray
+    flagged: np.ndarray  # (N,) samples to be marked
     refused: bool = False
 
 

@@ -64,15 +64,9 @@ def thin(array: Floats, most: int = 400) -> Floats:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure as files: an SVG, its data as CSV, and further formats where they are wanted.
+    """A figure as files: an SVG, its data as CSV, and further formats where they are wanted."""
 
-    Attributes
-    ----------
-    files : mapping of str to bytes
-        By the ending of the file's name.
-    """
-
-    files: Mapping[str, bytes]
+    files: Mapping[str, bytes]  # by the ending of the file's name
 
     @classmethod
     def of(cls, figure: Figure, also: Sequence[str] = ()) -> Self:
