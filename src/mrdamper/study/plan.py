@@ -68,9 +68,10 @@ def plan_tests(
 
     Examples
     --------
-    >>> from mrdamper import load_dataset, plan_tests, run_study
+    >>> from importlib.resources import files
+    >>> from mrdamper import load_model, plan_tests
     >>> from mrdamper.study.limits import Limits
-    >>> damper = run_study(load_dataset().rig("labcontrol")).model
+    >>> damper = load_model(files("mrdamper.data.bundled") / "models/labcontrol.json")
     >>> proposals, _ = plan_tests(damper, Limits.of(damper), hours=0.5)
     >>> len(proposals) > 0
     True
