@@ -29,8 +29,8 @@ from mrdamper.rig_files.dataset_folder import load_dataset
 # of its own. The marks of pytest-xdist do not reach its scheduler under pytest 9.
 GROUPS = {
     "study": (
-        "report/test_pictures.py", "report/test_summary.py", "study/test_workflow.py", "test_docs.py::test_the_readme",
-        "test_examples.py",
+        "report/test_pictures.py", "report/test_summary.py", "study/test_workflow.py",
+        "study/test_contradictions.py::test_no_run_of_a_bundled", "test_docs.py::test_the_readme", "test_examples.py",
         "test_numbers.py",
     ),
     "fleet": ("fleet/",),

@@ -7,7 +7,11 @@ import pytest
 
 from mrdamper.study import workflow
 
-EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.py"))
+SLOW = ("07_fleet",)  # ten dampers; what it calls is tested in tests/fleet
+EXAMPLES = [
+    pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stem in SLOW))
+    for path in sorted((Path(__file__).parent.parent / "examples").glob("*.py"))
+]
 
 
 @pytest.fixture
@@ -21,7 +25,7 @@ def studied_once(bundled, bundled_study, monkeypatch):
     monkeypatch.setattr(workflow, "run_study", run_study)
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
+@pytest.mark.parametrize("path", EXAMPLES)
 @pytest.mark.usefixtures("studied_once")
 def test_example_runs(path, capsys):
     runpy.run_path(str(path), run_name="__main__")

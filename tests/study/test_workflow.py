@@ -161,17 +161,18 @@ def numbers(rig):
 def test_a_study_is_the_same_twice_and_in_another_process(small, few, tmp_path):
     beside = tuple(replace(run, id=f"other {run.id}", rig="other") for run in few)
     with several(2) as processes:
-        again, drawn = study_and_draw(Dataset((*beside, *few.runs), "both"), also=("png",), processes=processes)
+        again, drawn = study_and_draw(Dataset((*beside, *few.runs), "both"), processes=processes)
     write_study(again, tmp_path / "out", drawn=drawn)
     for name in ("rig", "other"):  # one was studied in this process
         assert numbers(again.rig(name)) == numbers(small.rigs[0])
     assert dump_model(again.rig("rig").damper) == dump_model(small.model)
+    assert sum(p.suffix == ".svg" for p in (tmp_path / "out" / "figures").iterdir()) == 22
+
+
+def test_hostile_names_are_text_in_the_report_and_every_figure_is_a_png_too(small, tmp_path):
+    write_study(small, tmp_path / "out", also=("png",))
     drawn = sorted(p.suffix for p in (tmp_path / "out" / "figures").iterdir())
-    assert drawn.count(".png") == drawn.count(".svg") == 22
-
-
-def test_hostile_names_are_text_in_the_report(small, tmp_path):
-    write_study(small, tmp_path / "out")
+    assert drawn.count(".png") == drawn.count(".svg") == 11
     assert "<script>" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     document = json.loads((tmp_path / "out" / "model.json").read_text(encoding="utf-8"))
     assert document["rig"] == "rig"
