@@ -235,5 +235,5 @@ def test_a_prediction_is_drawn_and_another_kind_of_file_is_refused(model, tmp_pa
     assert table.is_file()
     refused = mrdamper(*sine, "--plot", tmp_path / "force.gif", "--out", other)
     assert refused.returncode == 2
-    assert "[E_NAME]" in refused.stderr
+    assert "[E_OUTPUT]" in refused.stderr
     assert not other.exists()

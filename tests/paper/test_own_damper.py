@@ -29,7 +29,7 @@ from mrdamper.study.workflow import run_study
 GAS = GasSpring(1.5e6, 1.5e-4, 3.14e-4)
 MASS, OFFSET, BETA = 15.0, 120.0, 2e5  # [kg], [N], [1/m²], gamma = beta
 MOTIONS = ((0.020, 1.0), (0.020, 1.5), (0.020, 2.0), (0.050, 0.5), (0.050, 1.0), (0.050, 1.5))
-CURRENTS = (0.0, 0.5, 1.0, 1.5, 2.0)
+CURRENTS = (0.0, 1.0, 2.0)
 PHASE = np.arange(400) * 2 * np.pi / 400
 
 
@@ -50,7 +50,7 @@ def loop(amplitude, beta=BETA):
         return v - beta * abs(v) * np.abs(z) * z - beta * v * z**2
 
     times = 2 * np.pi + PHASE
-    z = solve_ivp(rate, (0, times[-1]), [0.0], t_eval=times, method="Radau", rtol=1e-8, atol=1e-12, max_step=0.05).y[0]
+    z = solve_ivp(rate, (0, times[-1]), [0.0], t_eval=times, method="LSODA", rtol=1e-8, atol=1e-12, max_step=0.05).y[0]
     return z
 
 
@@ -241,7 +241,7 @@ def test_a_damper_without_a_defect_at_the_stroke_end_does_not_show_one(monkeypat
 
 def test_a_comparison_of_models_offers_the_method():
     assert "paper" in catalogue()
-    (rig,) = compare(matrix(), ["paper", "bingham"], jobs=1).rigs
+    (rig,) = compare(matrix(), ["paper"], jobs=1).rigs
     entry = next(entry for entry in rig.entries if entry.recipe.name == "paper")
     assert entry.recipe.title == "Method of Qian et al. 2024"
     assert entry.damper.functions["c"].form == "viscous-paper"

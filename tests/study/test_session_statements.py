@@ -8,6 +8,7 @@ from support.command import mrdamper
 
 from benchmarks import synthetic_dampers
 from mrdamper.dampers.covariance import estimate_uncertainty
+from mrdamper.dampers.joint import JointProblem
 from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.uncertainty import table
 from mrdamper.data import Dataset, session_of
@@ -63,7 +64,9 @@ def require_bounded_and_usable(damper, folder):
 
 
 def test_a_small_rig_whose_runs_are_of_one_session(tmp_path):
-    require_bounded_and_usable(studied(stated_in(synthetic(4), "one")).damper, tmp_path)
+    """The model that most studies choose; the study itself is among the slow tests."""
+    runs = stated_in(synthetic(4), "one")
+    require_bounded_and_usable(estimate_uncertainty(JointProblem(runs, "play-bypass").fit().damper, runs), tmp_path)
 
 
 @pytest.mark.slow

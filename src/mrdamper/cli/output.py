@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrdamper.data.atomic import write_file
-from mrdamper.errors import InputError
+from mrdamper.errors import InputError, OutputError
 
 if TYPE_CHECKING:
     from mrdamper.physics.gas_spring import GasSpring
@@ -32,11 +32,34 @@ def put(rows: Rows, out: Path | None, as_json: bool, as_csv: Callable[[Rows], st
         target.write_text(text, encoding="utf-8")
 
 
+def figure_kind(path: Path) -> str:
+    """Return the kind of a figure from its file's name; raises `OutputError` where figures are of no such kind."""
+    from mrdamper.report.plots.style import KINDS
+
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in KINDS:
+        remedy = f"end the name in {', '.join(f'.{name}' for name in KINDS)}"
+        raise OutputError(f"{path.suffix or 'no suffix'}", where=str(path), remedy=remedy)
+    return kind
+
+
 def shortened(lines: Sequence[str], most: int, verbose: bool = False) -> list[str]:
     """Return the first lines, and the number of those that `--verbose` prints as well."""
     if verbose or len(lines) <= most:
         return list(lines)
     return [*lines[: most - 1], f"  {len(lines) - most + 1} more with --verbose"]
+
+
+def aligned(rows: Sequence[Sequence[str]], left: Collection[int] = (0,)) -> list[str]:
+    """Return the lines of a table; the columns of these numbers stand to the left, the others to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(
+            cell.ljust(width) if i in left else cell.rjust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
 
 
 def percent(share: float) -> str:

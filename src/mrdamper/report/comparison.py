@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -197,19 +197,3 @@ def _shown(rig: RigComparison) -> list[Run]:
 
 def _plain(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def text_table(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Return the ranking for a terminal."""
-    lines = [
-        f"{'':3} {'model':42} {'per run':>8} {'ident.':>6} {'CV':>8} {'worst':>6} {'valid.':>8} {'worst':>6} "
-        f"{'parameters':>10} {'s':>6}"
-    ]
-    names = ("per_run", "train", "cv", "cv_worst", "validation", "validation_worst")
-    for row in rows:
-        shown = ["–" if (s := row[f"{name}_nrmse_pp"]) is None else f"{100 * s:.2f}" for name in names]
-        lines.append(
-            f"{row['rank']:3} {row['title']:42} {shown[0]:>8} {shown[1]:>6} {shown[2]:>8} {shown[3]:>6} {shown[4]:>8} "
-            f"{shown[5]:>6} {row['parameters']:10} {row['seconds']:6.1f}"
-        )
-    return "\n".join(lines)

@@ -45,7 +45,7 @@ def check(
 
     An exported FMU is loaded and compared with its reference force.
     """
-    from mrdamper.cli.output import put
+    from mrdamper.cli.output import figure_kind, put
     from mrdamper.cli.progress import watched
     from mrdamper.data.atomic import require_writable
     from mrdamper.errors import InputError
@@ -59,7 +59,7 @@ def check(
         return
     if figure is not None:
         require_writable(figure)
-        _require_format(figure)
+        figure_kind(figure)
     verdicts = quality_table(record_of(run) for run in watched(load_dataset(data).runs, "run"))
     put([row(verdict) for verdict in verdicts], None, as_json, _text_table)
     for verdict in verdicts:
@@ -88,27 +88,15 @@ def _check_fmu(path: Path, as_json: bool) -> None:
 
 def _text_table(rows: Rows) -> str:
     """Columns of a width, the first and the last two to the left."""
-    cells = [list(_HEADINGS.values())]
-    cells += [["–" if row[name] is None else str(row[name]) for name in _HEADINGS] for row in rows]
-    widths = [max(len(line[i]) for line in cells) for i in range(len(_HEADINGS))]
-    words = {0, len(widths) - 2, len(widths) - 1}
-    lines = [
-        "  ".join(cell.ljust(width) if i in words else cell.rjust(width) for i, (cell, width) in enumerate(pairs))
-        for pairs in (zip(line, widths, strict=True) for line in cells)
-    ]
-    return "".join(line.rstrip() + "\n" for line in lines)
+    from mrdamper.cli.output import aligned
 
-
-def _require_format(figure: Path) -> None:
-    from mrdamper.errors import OutputError
-
-    if figure.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise OutputError(
-            f"{figure.suffix or 'no suffix'}", where=str(figure), remedy="end the name in .png, .svg or .pdf"
-        )
+    cells = [["–" if row[name] is None else str(row[name]) for name in _HEADINGS] for row in rows]
+    lines = aligned([list(_HEADINGS.values()), *cells], (0, len(_HEADINGS) - 2, len(_HEADINGS) - 1))
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _draw(verdicts: Sequence[Quality], path: Path) -> None:
+    from mrdamper.cli.output import figure_kind
     from mrdamper.data.atomic import write_file
     from mrdamper.report.plots.quality import LoopPanel, quality_figure
     from mrdamper.rig_files.quality.flat import flagged_samples
@@ -126,4 +114,4 @@ def _draw(verdicts: Sequence[Quality], path: Path) -> None:
         for verdict in verdicts
     ]
     with write_file(path) as target:
-        target.write_bytes(quality_figure(panels).drawn().file(path.suffix.lower()[1:]))
+        target.write_bytes(quality_figure(panels).drawn().file(figure_kind(path)))

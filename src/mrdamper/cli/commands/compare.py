@@ -11,6 +11,7 @@ import typer
 if TYPE_CHECKING:
     from mrdamper.study.comparison import Comparison
 
+_ERRORS = ("per_run", "train", "cv", "cv_worst", "validation", "validation_worst")
 _NOTES, _ROWS = 3, 12  # lines of notes, and of the tables of all rigs together, without --verbose
 
 
@@ -76,7 +77,6 @@ def compare(
 
 def _print(result: Comparison, rows: list[dict[str, Any]], name: str, verbose: bool) -> None:
     from mrdamper.cli.output import shortened
-    from mrdamper.report.comparison import text_table
 
     notes = [f"not identified: {run}: {why}" for rig in result.rigs for run, why in rig.not_identified.items()]
     notes += [f"not determined: {model}: {why}" for rig in result.rigs for model, why in rig.refused.items()]
@@ -84,5 +84,17 @@ def _print(result: Comparison, rows: list[dict[str, Any]], name: str, verbose: b
         typer.echo(note, err=True)
     for rig in result.rigs:
         print(f"{rig.rig or name}: nrmse_pp [%], median and largest; ranked by cross-validation error")
-        head, *models = text_table([row for row in rows if row["rig"] == rig.rig]).splitlines()
+        head, *models = _ranking([row for row in rows if row["rig"] == rig.rig])
         print("\n".join([head, *shortened(models, _ROWS // len(result.rigs), verbose)]))
+
+
+def _ranking(rows: list[dict[str, Any]]) -> list[str]:
+    """Return the lines of the ranking, best first."""
+    from mrdamper.cli.output import aligned
+
+    cells = [("", "model", "per run", "ident.", "CV", "worst", "valid.", "worst", "parameters", "s")]
+    for row in rows:
+        errors = [row[f"{name}_nrmse_pp"] for name in _ERRORS]
+        shown = ("–" if error is None else f"{100 * error:.2f}" for error in errors)
+        cells.append((str(row["rank"]), row["title"], *shown, str(row["parameters"]), f"{row['seconds']:.1f}"))
+    return aligned(cells, (1,))

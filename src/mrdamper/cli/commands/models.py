@@ -55,6 +55,8 @@ def _page(model) -> str:
         equation = model.__dict__.get("equation", "")
         lines = [f"{model.name}: {model.heading}", "", notes, "", *facts]
         return "\n".join([*lines, "", f"LaTeX: {equation}"] if equation else lines)
+    from mrdamper.cli.output import aligned
+
     rows = [("parameter", "unit", "bounds", "determined", "meaning")]
     for info in model.parameters():
         low, high = info.bounds
@@ -62,8 +64,7 @@ def _page(model) -> str:
         if info.preset and info.default is not None:
             way += f" {info.default:g}"
         rows.append((info.name, info.unit, f"{low:g} ... {high:g}", way, info.meaning))
-    widths = [max(len(row[i]) for row in rows) for i in range(4)]
-    table = ["  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[4]]) for row in rows]
+    table = aligned(rows, range(len(rows[0])))
     notes = (model.__doc__ or "").strip()
     return "\n".join(
         [f"{model.name}: {model.title}", "", notes.replace("\n    ", "\n"), "", *table, "", f"LaTeX: {model.equation}"]

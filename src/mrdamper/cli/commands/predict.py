@@ -139,14 +139,11 @@ def _session_known(
 
 def _write_figure(path: Path, prediction: Prediction, interval: Band | None, level: float) -> None:
     """Write a figure of the predicted force; the file appears whole or not at all."""
+    from mrdamper.cli.output import figure_kind
     from mrdamper.data.atomic import write_file
-    from mrdamper.errors import UnknownNameError
     from mrdamper.report.plots.loops import predicted_force
-    from mrdamper.report.plots.style import KINDS
 
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in KINDS:
-        raise UnknownNameError.of("kind of figure", path.suffix, [f".{name}" for name in KINDS])
+    kind = figure_kind(path)
     with write_file(path) as target:
         target.write_bytes(predicted_force(prediction, interval, level).drawn().file(kind))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,10 +104,11 @@ def _one_rig(data: Path | None, rig: str | None) -> Dataset | None:
 
 def _print(text: dict[str, Any]) -> None:
     """Print errors and times of the methods, and what became of the paper's claims."""
-    print(f"  {'validation runs, nrmse_pp':52}{'median':>9}{'worst':>9}{'s':>8}")
+    from mrdamper.cli.output import aligned, percent
+
+    rows = [("validation runs, nrmse_pp", "median", "worst", "s")]
     for row, took in zip(text["verdicts"], text["times"], strict=False):
-        errors = (row["nrmse_pp"], row["worst_nrmse_pp"])
-        shown = "".join(f"{'–':>9}" if error is None else f"{100 * error:7.2f} %" for error in errors)
-        print(f"  {row['method']:52}{shown}{took['seconds']:8.1f}")
-    for claim in text["claims"]:
-        print(f"  {claim['said']:50} {claim['claim']}")
+        errors = (math.nan if row[name] is None else row[name] for name in ("nrmse_pp", "worst_nrmse_pp"))
+        rows.append((row["method"], *map(percent, errors), f"{took['seconds']:.1f}"))
+    claims = aligned([(claim["said"], claim["claim"]) for claim in text["claims"]], (0, 1))
+    print("\n".join(f"  {line}" for line in (*aligned(rows), *claims)))
