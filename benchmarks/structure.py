@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import ast
 import tomllib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -79,23 +78,21 @@ def layers() -> list[str]:
 
 def isinstance_over_dampers() -> list[str]:
     """List the places that test a damper for its kind."""
-    trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
-    kinds = _damper_kinds(trees.values())
-    places = []
-    for path, tree in trees.items():
-        for node in ast.walk(tree):
+    kinds, places = _damper_kinds(), []
+    for name, inside in nodes().items():
+        for node in inside:
             asks = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "isinstance"
             if asks and (_names(node.args[1]) & kinds or ast.unparse(node.args[0]).split(".")[-1] == "damper"):
-                places.append(f"{path.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node)}")
+                places.append(f"{name}:{node.lineno}: {ast.unparse(node)}")
     return places
 
 
-def _damper_kinds(trees: Iterator[ast.Module] | object) -> set[str]:
+def _damper_kinds() -> set[str]:
     """Find the classes that are dampers, by their bases' names."""
     bases = {
         node.name: {name for base in node.bases for name in _names(base)}
-        for tree in trees  # type: ignore[attr-defined]
-        for node in ast.walk(tree)
+        for inside in nodes().values()
+        for node in inside
         if isinstance(node, ast.ClassDef)
     }
     kinds = {"Damper"}
@@ -125,13 +122,19 @@ def modules() -> dict[str, ast.Module]:
 
 
 @cache
+def nodes() -> dict[str, tuple[ast.AST, ...]]:
+    """List the nodes of every module, which several measures go through."""
+    return {name: tuple(ast.walk(tree)) for name, tree in modules().items()}
+
+
+@cache
 def imports() -> dict[str, frozenset[str]]:
     """List the imports of every module within the package, except the lazily loaded names of the package itself."""
     names = modules()
     graph = {}
-    for name, tree in names.items():
+    for name, inside in nodes().items():
         targets = set()
-        for node in ast.walk(tree):
+        for node in inside:
             if isinstance(node, ast.Import):
                 targets |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
@@ -175,8 +178,8 @@ def longest_chain() -> list[str]:
 def long_functions(most: int = 60) -> list[str]:
     """List the functions of more code lines than `most`, without their docstrings."""
     places = []
-    for name, tree in modules().items():
-        for node in ast.walk(tree):
+    for name, inside in nodes().items():
+        for node in inside:
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                 first = node.body[0]
                 text = (first.end_lineno or 0) - first.lineno + 1 if ast.get_docstring(node, clean=False) else 0
@@ -188,8 +191,8 @@ def long_functions(most: int = 60) -> list[str]:
 def repeated_class_names() -> dict[str, list[str]]:
     """List the class names that stand in several modules."""
     homes: dict[str, list[str]] = {}
-    for name, tree in modules().items():
-        for node in ast.walk(tree):
+    for name, inside in nodes().items():
+        for node in inside:
             if isinstance(node, ast.ClassDef):
                 homes.setdefault(node.name, []).append(name)
     return {name: places for name, places in homes.items() if len(places) > 1}
@@ -198,8 +201,8 @@ def repeated_class_names() -> dict[str, list[str]]:
 def question_openings() -> list[str]:
     """List the docstrings that begin with a question word instead of a definition or an imperative."""
     places = []
-    for name, tree in modules().items():
-        for node in ast.walk(tree):
+    for name, inside in nodes().items():
+        for node in inside:
             text = ast.get_docstring(node) if isinstance(node, Definition | ast.Module) else None
             if text and text.split()[0].rstrip(",:") in QUESTION_WORDS:
                 places.append(f"{name}.{getattr(node, 'name', '')}: {text.splitlines()[0]}")
@@ -209,8 +212,8 @@ def question_openings() -> list[str]:
 def participle_names() -> list[str]:
     """List the functions with a local variable or parameter named found, known, made, told, said or seen."""
     places = []
-    for name, tree in modules().items():
-        for function in ast.walk(tree):
+    for name, inside in nodes().items():
+        for function in inside:
             if isinstance(function, ast.FunctionDef):
                 stored = (n for n in ast.walk(function) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store))
                 names = {n.id for n in stored} | {n.arg for n in ast.walk(function) if isinstance(n, ast.arg)}
