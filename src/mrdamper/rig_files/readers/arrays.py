@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import math
 import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
@@ -39,6 +41,31 @@ _EARLY_END = (
     "truncat", "end of file", "eof", "unexpected end", "could not read", "not enough", "incomplete", "short",
     "requires a buffer", "out of range",
 )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """An array that is read from its file when it is asked for."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype
+    load: Callable[[], np.ndarray]
+
+    @property
+    def size(self) -> int:
+        """Number of items."""
+        return math.prod(self.shape)
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes."""
+        return len(self.shape)
+
+    def __array__(self, dtype=None, copy=None) -> np.ndarray:
+        return np.asarray(self.load(), dtype=dtype)
+
+
+Array = np.ndarray | Stored
 
 
 def array_table(
@@ -131,11 +158,12 @@ def expand(name: str, shape: tuple[int, ...]) -> list[tuple[str, int | None]]:
     return [(name, None)] if len(inner) <= 1 else []
 
 
-def pick(array: np.ndarray, part: int | None) -> np.ndarray:
+def pick(array: Array, part: int | None) -> np.ndarray:
     """Return the column of an array that `expand` named."""
     if part is None:
-        return array
-    return np.squeeze(array)[part] if part < 0 else np.squeeze(array)[:, part]
+        return np.asarray(array)
+    across = np.squeeze(np.asarray(array))
+    return across[part] if part < 0 else across[:, part]
 
 
 def titles_of(width: int, texts: Iterable[Sequence[str]]) -> tuple[Sequence[str], Sequence[str]] | None:

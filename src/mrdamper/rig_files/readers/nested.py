@@ -18,13 +18,14 @@ import numpy as np
 
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_clock
-from mrdamper.rig_files.readers.arrays import array_table, expand, pick, tests_across, titles_of
+from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, tests_across, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
-from mrdamper.rig_files.units import is_unit
+from mrdamper.rig_files.units import is_unit, parse_unit
 
 DEEPEST = 8  # levels
 MOST_ITEMS = 2000  # of a list
 _MOST_TEXT = 200  # characters
+_FEWEST_SAMPLES = 50  # of channels beside which as many words are a column
 _NAMES = ("name", "label", "title", "channel", "channelname", "signal", "signalname", "key", "longname", "long_name",
           "blockname")  # fmt: skip
 _DATA = ("data", "values", "value", "y", "samples", "ydata", "signaldata", "data_array")
@@ -41,7 +42,7 @@ _PORTS = frozenset(("out1", "in1", "value", "out", "in", "signal", "outport", "i
 class _Column:
     name: str
     unit: str
-    array: np.ndarray
+    array: Array
     part: int | None = None
     over: str = ""  # the channel that a column of time belongs to
 
@@ -58,25 +59,34 @@ class _Node:
     units: Mapping[str, str] = field(default_factory=dict)  # by column, as this node or one above states them
 
 
-def nested_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[RawTable]:
-    """Return the tables of a nested structure, in the order they appear; empty if it holds no array."""
-    nodes = [node for node in _walk(tree, _Node("")) if node.columns]
-    return [_table(source, node, title) for node in nodes]
+def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, together: bool = False) -> list[RawTable]:
+    """Return the tables of a nested structure, in the order they appear; empty if it holds no array.
+
+    The columns of all of them `together` are one more, for files with a node for each channel, if no node holds a test.
+    """
+    every = list(_walk(tree, _Node("")))
+    nodes = [node for node in every if node.columns]
+    tables = [_table(source, node, title) for node in nodes]
+    if together and len(nodes) > 1:
+        whole = replace(every[0], columns=[column for node in nodes for column in node.columns], remarks=[])
+        tables.append(replace(_table(source, whole, title), fallback=True))
+    return tables
 
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
     tree = _with_own_axes(_tests_of_rows(_spread({key: _object_in(value) for key, value in tree.items()})))
     node.units = {**node.units, **_stated_units(tree)}
+    sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= _FEWEST_SAMPLES}
     for key, value in _paired(tree, node.units).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
-            if split_name(key).role is not None:
+            if split_name(key).role is not None or len(value) in sizes:
                 node.columns += _across(key, "", np.array([word[:_MOST_TEXT] for word in value]))
             elif value:
                 node.lists.append(value)
         elif isinstance(value, list):
             inner += _items(key, value, node)
-        elif isinstance(value, np.ndarray):
+        elif isinstance(value, Array):
             node.columns += _across(key, "", value)
         elif isinstance(value, Mapping):
             channel = _channel(key, value)
@@ -88,7 +98,7 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
                 inner.append((key, value))
         else:
             _tell(node, {key: value}, "")
-    if "signals" in tree and isinstance(tree.get("time"), np.ndarray):  # logged by Simulink, whose time is in seconds
+    if "signals" in tree and isinstance(tree.get("time"), Array):  # logged by Simulink, whose time is in seconds
         node.columns = [replace(c, unit="s") if c.name == "time" else c for c in node.columns]
     yield node
     for key, value in inner if depth < DEEPEST else ():
@@ -121,7 +131,7 @@ def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     units = [_unit_of(axis, _UNITS, "") for axis in axes]
     if any(split_name("", unit).dimension not in (None, "time") for unit in units):
         return tree
-    if not axes or not all(isinstance(axis.get("data"), np.ndarray) for axis in axes):
+    if not axes or not all(isinstance(axis.get("data"), Array) for axis in axes):
         return tree
     timed = []
     for channel in channels:
@@ -138,16 +148,16 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
         for key, value in tree.items()
         if isinstance(value, list)
         and len(value) > 1
-        and all(isinstance(i, np.ndarray) and i.ndim == 2 and min(i.shape) > 1 for i in value)
+        and all(isinstance(i, Array) and i.ndim == 2 and min(i.shape) > 1 for i in value)
     }
     if len(lists) != 1:
         return tree
     key, matrices = next(iter(lists.items()))
     count = len(matrices)
     vectors = {
-        k: v.reshape(-1)
+        k: np.reshape(v, -1)
         for k, v in tree.items()
-        if isinstance(v, np.ndarray) and v.size == count and v.dtype.kind in "iuf"
+        if isinstance(v, Array) and v.size == count and v.dtype.kind in "iuf"
     }
     words = {k: v for k, v in tree.items() if isinstance(v, list) and k != key and all(isinstance(i, str) for i in v)}
     rest = {k: v for k, v in tree.items() if k != key and k not in vectors and k not in words}
@@ -157,14 +167,16 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     """Split tables whose rows are tests into a node each, with its own of the numbers of a vector of conditions."""
-    arrays = {k: np.squeeze(v) for k, v in tree.items() if isinstance(v, np.ndarray) and v.dtype.kind in "iuf"}
-    tables = tests_across({key: array.shape for key, array in arrays.items()})
-    count = len(arrays[tables[0]]) if tables else 0
-    conditions = [key for key, array in arrays.items() if array.shape == (count,)]
+    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf"}
+    shapes = {key: tuple(n for n in array.shape if n != 1) for key, array in numeric.items()}
+    tables = tests_across(shapes)
+    count = shapes[tables[0]][0] if tables else 0
+    conditions = [key for key, shape in shapes.items() if shape == (count,)]
     if not conditions:
         return tree
+    arrays = {key: np.squeeze(np.asarray(numeric[key])) for key in (*tables, *conditions)}
     rest = {key: value for key, value in tree.items() if key not in tables and key not in conditions}
-    clocks = {key: value for key, value in rest.items() if isinstance(value, np.ndarray)}
+    clocks = {key: value for key, value in rest.items() if isinstance(value, Array)}
     own = [
         {**clocks, **{k: arrays[k][i] for k in tables}, **{k: float(arrays[k][i]) for k in conditions}}
         for i in range(count)
@@ -185,19 +197,19 @@ def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, A
     pairs = {
         key: heads[stem]
         for key in tree
-        if (stem := _BODY.sub("", key)) in heads and _BODY.search(key) and isinstance(tree[key], np.ndarray)
+        if (stem := _BODY.sub("", key)) in heads and _BODY.search(key) and isinstance(tree[key], Array)
     }
     clocks = {bare: key for key in tree if (bare := _CLOCK.sub(r"\1", key, count=1)) != key and bare in tree}
     seconds = {"sample_rate", "start_time"} <= {key.casefold() for key in tree}  # exported by Dewesoft, in seconds
     used = {*pairs.values(), *clocks.values()}
     partners = {}
     for key, value in tree.items():
-        if key in pairs and isinstance(value, np.ndarray):
+        if key in pairs and isinstance(value, Array):
             partners[key] = {**tree[pairs[key]], "data": value}
-        elif isinstance(value, np.ndarray) and isinstance(tree.get(clocks.get(key, "")), np.ndarray):
+        elif isinstance(value, Array) and isinstance(tree.get(clocks.get(key, "")), Array):
             own = {"name": key, "unit": units.get(key, ""), "data": value, "time": tree[clocks[key]]}
             partners[key] = {**own, "timeunit": "s"} if seconds else own
-        elif isinstance(value, np.ndarray) and key in units:
+        elif isinstance(value, Array) and key in units:
             partners[key] = {"name": key, "unit": units[key], "data": value}
         elif key not in used:
             partners[key] = value
@@ -210,7 +222,7 @@ def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[s
     records = _records(mappings) if len(mappings) == len(items) else {}
     if records:
         return [(key, records)]
-    if len(items) > MOST_ITEMS and any(isinstance(item, (Mapping, np.ndarray)) for item in items):
+    if len(items) > MOST_ITEMS and any(isinstance(item, (Mapping, Array)) for item in items):
         problem = f"a list of {len(items)} objects or arrays that are no records of one form"
         raise RigFileError("E_BLOCKS", problem, remedy=f"export at most {MOST_ITEMS} tests a file")
     channels = [_channel("", item) for item in mappings]
@@ -220,7 +232,7 @@ def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[s
     number = len(items) > 1
     nodes = [(f"{key}_{i}" if number else key, item) for i, item in enumerate(items, 1) if isinstance(item, Mapping)]
     nodes = [(name, item) for name, item in nodes if not _is_plain(item)]
-    arrays = [item for item in items if isinstance(item, np.ndarray)]
+    arrays = [item for item in items if isinstance(item, Array)]
     node.columns += [
         column
         for i, array in enumerate(arrays, 1)
@@ -251,16 +263,17 @@ def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
     timed = any(name in lower for name in _TIME_UNITS)
     for name in ("points", *_DATA):  # [time, value] each
         points = lower.get(name)
-        if isinstance(points, np.ndarray) and points.ndim == 2 and points.shape[1] == 2 and (timed or name == "points"):
-            lower |= {name: None, "time": points[:, 0], "data": points[:, 1]}
+        if isinstance(points, Array) and points.ndim == 2 and points.shape[1] == 2 and (timed or name == "points"):
+            across = np.asarray(points)
+            lower |= {name: None, "time": across[:, 0], "data": across[:, 1]}
             break
-    data = next((lower[name] for name in _DATA if isinstance(lower.get(name), np.ndarray)), None)
+    data = next((lower[name] for name in _DATA if isinstance(lower.get(name), Array)), None)
     if data is None or data.size < 2:
         data = next((v["values"] for v in (lower.get("signals"),) if isinstance(v, Mapping) and "values" in v), None)
-        if not isinstance(data, np.ndarray):
+        if not isinstance(data, Array):
             return []
-    time = next((lower[name] for name in _TIMES if isinstance(lower.get(name), np.ndarray)), None)
-    arrays = [value for value in lower.values() if isinstance(value, np.ndarray) and value.size >= data.size]
+    time = next((lower[name] for name in _TIMES if isinstance(lower.get(name), Array)), None)
+    arrays = [value for value in lower.values() if isinstance(value, Array) and value.size >= data.size]
     others = [array for array in arrays if array is not data and array is not time]
     stated = next((lower[name] for name in _NAMES if isinstance(lower.get(name), str) and lower[name].strip()), "")
     if others or not (stated or key):
@@ -271,7 +284,9 @@ def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
     name = _title(stated or key)
     if split_name(name).role is None and split_name(key).role is not None:
         name = key
-    columns = [_Column(c.name, unit if is_unit(unit) else "", c.array, c.part, name) for c in _across(name, "", data)]
+    columns = [
+        _Column(c.name, unit if parse_unit(unit) else "", c.array, c.part, name) for c in _across(name, "", data)
+    ]
     stated_step = stated_clock({key: value for key, value in says.items() if isinstance(value, float)})
     if time is None and stated_step is not None:
         step, start, clock = stated_step
@@ -305,7 +320,7 @@ def _is_plain(value: Any) -> bool:
     """Tell if nothing in a node is an array or a list of nodes: it only describes the nodes beside it."""
     if isinstance(value, Mapping):
         return all(_is_plain(item) for item in value.values())
-    return not isinstance(value, (np.ndarray, list)) or (isinstance(value, list) and not value)
+    return not isinstance(value, (Array, list)) or (isinstance(value, list) and not value)
 
 
 def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
@@ -325,7 +340,7 @@ def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
             node.remarks.append(f"{key}: {value}"[:_MOST_TEXT])
 
 
-def _across(key: str, unit: str, array: np.ndarray) -> list[_Column]:
+def _across(key: str, unit: str, array: Array) -> list[_Column]:
     if array.dtype.kind == "O":
         return [_Column(key, unit, array)]
     return [_Column(name, unit, array, part) for name, part in expand(key, array.shape)]
@@ -359,7 +374,8 @@ def _one_time(columns: list[_Column]) -> list[_Column]:
     """Return the columns with one time in front, where every channel has the same."""
     times = [column for column in columns if column.over and column.name == "time"]
     same = len(times) > 1 and all(
-        t.unit == times[0].unit and np.array_equal(t.array.reshape(-1), times[0].array.reshape(-1)) for t in times
+        t.unit == times[0].unit and np.array_equal(np.reshape(t.array, -1), np.reshape(times[0].array, -1))
+        for t in times
     )
     if not same:
         return columns
