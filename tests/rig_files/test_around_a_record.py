@@ -9,7 +9,7 @@ import pytest
 from support import rig_files as rig
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.conditions import stated_in_titles, stated_rate
+from mrdamper.rig_files.conditions import stated_in_titles, stated_quantities, stated_rate
 from mrdamper.rig_files.rig_import import import_files, read_run
 
 HEAD = "time_s,displacement_mm,force_N,current_A"
@@ -127,9 +127,9 @@ def test_two_sampling_rates_are_refused(tmp_path):
     with pytest.raises(InputError) as caught:
         read_run(tmp_path / "a.csv")
     assert caught.value.code == "E_AMBIGUOUS"
-    assert stated_rate(["Abtastrate: 2 kHz"], {}) == 2000
-    assert stated_rate(["Excitation: 2 Hz"], {"dt_ms": 4.0}) == 250
-    assert stated_rate(["Frequency = 2 Hz"], {}) is None
+    assert stated_rate(stated_quantities(["Abtastrate: 2 kHz"])) == 2000
+    assert stated_rate(stated_quantities(["Excitation: 2 Hz"], {"dt_ms": 4.0})) == 250
+    assert stated_rate(stated_quantities(["Frequency = 2 Hz"])) is None
 
 
 def test_a_count_of_samples_with_a_hole_leaves_a_gap(tmp_path):

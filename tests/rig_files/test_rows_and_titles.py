@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mrdamper.rig_files.column_names import role_of
-from mrdamper.rig_files.conditions import currents_in, stated_by_lines, stated_rate, without_currents
+from mrdamper.rig_files.conditions import currents_in, stated_by_lines, stated_quantities, stated_rate, without_currents
 from mrdamper.rig_files.rig_import import import_files
 
 T = np.arange(0.0, 3.0, 0.002)
@@ -53,7 +53,7 @@ def test_a_decimal_comma_separates_no_name_from_its_number(tmp_path, title):
 
 def test_lines_of_cells_keep_their_separating_commas():
     assert [s.amperes for s in stated_by_lines(["Coil current,0.5,A", "Coil current, 0,5 A"])] == [0.5, 0.5]
-    assert stated_rate(["Abtastrate 500 Hz, Spulenstrom 0,00 A"], {}) == 500
+    assert stated_rate(stated_quantities(["Abtastrate 500 Hz, Spulenstrom 0,00 A"])) == 500
 
 
 def test_a_column_of_texts_that_state_a_current_tells_tests_apart(tmp_path):

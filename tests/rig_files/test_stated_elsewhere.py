@@ -6,6 +6,7 @@ import pytest
 from scipy.io import savemat
 
 from mrdamper.rig_files.mapping.integration import displacement_of
+from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import import_files
 
 T = np.arange(0.0, 3.0, 0.002)
@@ -92,3 +93,39 @@ def test_the_zero_of_a_transducer_of_velocity_is_no_drift(zero):
 
 def test_a_velocity_under_one_cycle_has_no_stated_position():
     assert displacement_of(T, T) is None
+
+
+def test_a_displacement_measured_in_another_file_is_surer_than_the_integral_of_a_velocity(tmp_path):
+    t = np.arange(0.0, 6.0, 0.002)
+    x, v = 10 * np.sin(2 * np.pi * t), 0.02 * np.pi * np.cos(2 * np.pi * t)
+    rows = np.column_stack([t, v, 300 * np.sign(v) + 4000 * v])
+    np.savetxt(
+        tmp_path / "rig_01_0.5A.csv", rows, delimiter=",", header="Time [s],Velocity [m/s],Force [N]", comments=""
+    )
+    alone = import_files([tmp_path])
+    assert [f.code for f in alone.records[0].findings if "integral" in f.text] == ["W_CHOSEN"]
+    moved = np.column_stack([t, x + 3.0])  # a mean position that no velocity states
+    np.savetxt(tmp_path / "lvdt_01_0.5A.csv", moved, delimiter=",", header="Time [s],Position [mm]", comments="")
+    found = import_files([tmp_path])
+    assert [refusal.error.code for refusal in found.refusals] == []
+    assert len(found.records) == 1
+    np.testing.assert_allclose(found.records[0].displacement, 1e-3 * (x + 3.0), atol=1e-9)
+    assert not any("integral" in finding.text for finding in found.records[0].findings)
+
+
+@pytest.mark.parametrize(
+    ("currents", "value", "codes"),
+    [((0.5, 0.5), 0.5, []), ((0.5, 0.5), 1.2, ["E_CURRENT_CONTRADICTS"]), ((0.2, 1.0), 0.6, ["E_CURRENT_CONTRADICTS"])],
+)
+def test_a_current_of_the_profile_is_compared_with_a_channel_that_the_profile_does_not_name(
+    tmp_path, currents, value, codes
+):
+    t = np.arange(0.0, 6.0, 0.002)
+    x, v = 10 * np.sin(2 * np.pi * t), 0.02 * np.pi * np.cos(2 * np.pi * t)
+    current = np.where(t < 3, *currents)
+    table = np.column_stack([t, x, 300 * np.sign(v) + 4000 * v, current])
+    names = "Time [s],Position [mm],Force [N],Current [A]"
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=names, comments="")
+    found = import_files([tmp_path], parse_profile(f"[file]\nblocks = 'join'\n[current]\nvalue = {value}"))
+    assert [refusal.error.code for refusal in found.refusals] == codes
+    assert [float(np.mean(record.current)) for record in found.records] == ([] if codes else [value])

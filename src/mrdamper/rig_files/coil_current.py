@@ -42,39 +42,38 @@ def current_of(
         E_AMBIGUOUS if two statements contradict each other, E_CURRENT_CONTRADICTS if one
         contradicts the channel, E_RANGE if one is no coil current.
     """
-    if profile.current is not None and profile.current.value is not None:
-        _refuse_contradiction(profile.current.value, channel, _statements(table, path), printable(table.source.name))
-        return profile.current.value, {"current_from": "profile"}
-    if profile.current is not None and profile.current.pattern is not None:
+    where, source = printable(table.source.name), profile.current
+    statements = _statements(table, path)
+    if source is not None and source.value is not None:
+        _refuse_contradiction(source.value, channel, statements, where)
+        return source.value, {"current_from": "profile"}
+    if source is not None and source.pattern is not None:
         places = (path.name, table.label, f"{path.name}/{table.label}", f"{path.as_posix()}/{table.label}".rstrip("/"))
         current = next((v for place in places if place and (v := current_in_name(place, profile)) is not None), None)
         if current is None and channel is None:
             raise ColumnError(
-                printable(f"the pattern {profile.current.pattern!r} does not match {places[-2].rstrip('/')!r}"),
-                where=printable(table.source.name), remedy="correct [current] pattern of the profile",
-                code="E_CURRENT_MISSING",
+                printable(f"the pattern {source.pattern!r} does not match {places[-2].rstrip('/')!r}"), where=where,
+                remedy="correct [current] pattern of the profile", code="E_CURRENT_MISSING",
             )  # fmt: skip
         statements = [] if current is None else [Statement(current, "name by the profile's pattern")]
-    else:
-        statements = _statements(table, path)
-        if not statements and channel is None:
-            statements = _set_points(table, rows) or stated_in_titles(table.remarks) or _folders(table, path)
-    where = printable(table.source.name)
-    remedy = "correct the name or the line that is wrong"
+    elif not statements and channel is None:
+        statements = _set_points(table, rows) or stated_in_titles(table.remarks) or _folders(table, path)
     try:
         stated = agreed(statements)
     except ValueError as error:
-        code = "E_RANGE" if "no coil current" in str(error) else "E_AMBIGUOUS"
+        code, remedy = (
+            "E_RANGE" if "no coil current" in str(error) else "E_AMBIGUOUS",
+            "correct the name or the line that is wrong",
+        )
         raise ColumnError(printable(str(error)), where=where, remedy=remedy, code=code) from None
-    if channel is not None and stated is not None:
-        mean = contradicted(channel, stated.amperes)
-        if mean is not None:
-            raise ColumnError(
-                printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A"), where=where,
-                remedy="if the channel is right, rename; else leave the channel out of the export",
-                code="E_CURRENT_CONTRADICTS",
-            )  # fmt: skip
-    if channel is not None or stated is None:
+    mean = None if channel is None or stated is None else contradicted(channel, stated.amperes)
+    if stated is not None and mean is not None:
+        raise ColumnError(
+            printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A"), where=where,
+            remedy="if the channel is right, rename; else leave the channel out of the export",
+            code="E_CURRENT_CONTRADICTS",
+        )  # fmt: skip
+    if stated is None or (channel is not None and (source is None or source.pattern is None)):
         return None, {}
     return stated.amperes, {"current_from": as_data(stated.whence)}
 
@@ -87,31 +86,49 @@ def with_value_of_name(record: Record, path: Path, profile: Profile) -> Record:
     ColumnError
         E_AMBIGUOUS if two patterns give it different currents, E_CURRENT_CONTRADICTS if the file states another.
     """
-    values = profile.current.values if profile.current is not None else {}
     patterns = profile.current.fitting(path, record.id) if profile.current is not None else []
-    if not patterns:
+    if profile.current is None or not patterns:
         return record
-    value, where = values[patterns[0]], printable(path.name)
+    values, where = profile.current.values, printable(path.name)
+    value = values[patterns[0]]
     other = next((pattern for pattern in patterns if values[pattern] != value), None)
     if other is not None:
         raise ColumnError(
             printable(f"{patterns[0]!r} and {other!r} give {record.id} {value:g} and {values[other]:g} A"), where=where,
             remedy="correct [current.values] of the profile", code="E_AMBIGUOUS",
         )  # fmt: skip
-    if record.current is None:
-        findings = tuple(finding for finding in record.findings if not finding.text.startswith(NO_CHANNEL))
-        provenance = {**record.provenance, "current_from": "profile"}
-        return replace(record, current=constant(value, record.time), findings=findings, provenance=provenance)
-    whence = record.provenance.get("current_from", "")
-    stated = [Statement(float(record.current[0]), whence)] if whence else []
-    _refuse_contradiction(value, None if whence else record.current, stated, where)
-    return record
+    return with_stated_current(record, value, "profile", where)
+
+
+def with_stated_current(record: Record, current: float, whence: str, where: str) -> Record:
+    """Return the record with the current [A] that a profile or a table of tests states; a channel that agrees stays.
+
+    Raises
+    ------
+    ColumnError
+        E_CURRENT_CONTRADICTS if the channel, name or heading of the file states another.
+    """
+    own = record.provenance.get("current_from", "")
+    mean = None if record.current is None else contradicted(record.current, current)
+    if mean is not None:
+        raise ColumnError(
+            printable(f"{whence} gives {current:g} A, {record.id} by its {own or 'current channel'} {mean:g} A"),
+            where=printable(where), remedy="correct the one that is wrong, leave it out, or rename the file",
+            code="E_CURRENT_CONTRADICTS",
+        )  # fmt: skip
+    if record.current is not None and not own:
+        return record
+    findings = tuple(finding for finding in record.findings if not finding.text.startswith(NO_CHANNEL))
+    provenance = {**record.provenance, "current_from": as_data(whence)}
+    return replace(record, current=constant(current, record.time), findings=findings, provenance=provenance)
 
 
 def _refuse_contradiction(value: float, channel: Floats | None, statements: list[Statement], where: str) -> None:
     """Refuse a profile's current that a channel, a name, a heading or a result of the file contradicts."""
-    mean = None if channel is None else contradicted(channel, value)
-    others = [f"the current channel gives {mean:g} A"] if mean is not None else []
+    finite = np.empty(0) if channel is None else channel[np.isfinite(channel)]
+    mean, change = held_current(finite) if finite.size >= 3 else (value, "")
+    others = [f"the current channel goes from {np.min(finite):.3g} to {np.max(finite):.3g} A"] if change else []
+    others += [f"the current channel gives {mean:g} A"] if not change and contradicts(mean, value) else []
     others += [f"{s.whence} gives {s.amperes:g} A" for s in statements if contradicts(s.amperes, value)]
     if others:
         raise ColumnError(
@@ -126,7 +143,7 @@ def _statements(table: RawTable, path: Path) -> list[Statement]:
     held = held_current_of(table)
     statements = [] if held is None else [Statement(held, table.stated_in or "a number in the file")]
     lines = [line for line in table.remarks if line not in table.titles]
-    statements += stated_by_lines(lines, table.form.get("decimal"))  # type: ignore[arg-type]
+    statements += stated_by_lines(lines, table.decimal)
     member = table.source.name.removeprefix(f"{path.name}:").removeprefix(f"{path.name}, sheet ")
     for text, whence in ((table.label, "the title"), (path.name, "file name"), (member, "file name")):
         stated = currents_in(text)

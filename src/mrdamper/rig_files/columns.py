@@ -81,11 +81,7 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
                 if role in REQUIRED:
                     problems.append(error)
     for role in ROLES:
-        if (
-            role in columns
-            or (role == "time" and profile.file.sample_rate_Hz)
-            or (role == "current" and profile.current and not profile.current.values)
-        ):
+        if role in columns or (role == "time" and profile.file.sample_rate_Hz):
             continue
         try:
             choice = _choose(table, role, columns.values())
@@ -134,10 +130,8 @@ def rate_of(table: RawTable, profile: Profile) -> float | None:
     """Return sampling rate [Hz] of a table without time stamps, by the profile or by what stands beside the columns."""
     if profile.file.sample_rate_Hz:
         return profile.file.sample_rate_Hz
-    decimal = table.form.get("decimal")
     try:
-        stated = stated_rate(table.remarks, table.constants, decimal if isinstance(decimal, str) else None)
-        return stated or rate_in_name(table.source.name)
+        return stated_rate(table.quantities) or rate_in_name(table.source.name)
     except ValueError as error:
         raise table.source.refuse(
             "E_AMBIGUOUS", f"two sampling rates: {error}", "set [file] sample_rate_Hz = ... in a profile"
@@ -199,10 +193,8 @@ def candidates_of(table: RawTable, role: str) -> list[int]:
         choice = None
     if choice is not None:
         return [choice]
-    headers = table.headers
-    fitting = [i for i, header in enumerate(headers) if header.dimension == DIMENSION[role]]
-    named = [i for i in fitting if headers[i].role == role]
-    return named or [i for i in fitting if says_nothing(headers[i].name)]
+    nameless = [i for i in table.columns(dimension=DIMENSION[role]) if says_nothing(table.headers[i].name)]
+    return table.columns(role, DIMENSION[role]) or nameless
 
 
 def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
@@ -261,7 +253,7 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
     shown += "" if any(header.unit for header in table.headers) else ", without units"
     remedy = 'set [channels.{}] column = "..."{} in a profile'
     fixed = {"time": " or, with a fixed rate, [file] sample_rate_Hz = ..."}
-    volts = [table.names[i] for i, header in enumerate(table.headers) if header.dimension == "voltage"]
+    volts = [table.names[i] for i in table.columns(dimension="voltage")]
     if volts:  # a column alone would not do
         shown += f"; {', '.join(volts)} in volts without a scale"
         fixed |= dict.fromkeys(("displacement", "force"), ", unit and scale (unit per volt)")
@@ -357,12 +349,8 @@ def _refuse_two_values(table: RawTable, column: int) -> None:
     same = [i for i, other in enumerate(table.headers) if own.name and (other.name.casefold(), other.dimension) == key]
     if len(same) < 2:
         return
-    try:
-        values = table.read(same).values
-        differ = any(not _agree(values[i], table.headers[i], values[column], own) for i in same)
-    except InputError:
-        differ = True
-    if differ:
+    values = table.try_read(*same)
+    if values is None or any(not _agree(values[i], table.headers[i], values[column], own) for i in same):
         raise table.source.refuse(
             "E_DUPLICATE_COLUMN",
             f"{len(same)} columns are called {own.name!r} and differ",
@@ -374,11 +362,9 @@ def _refuse_two_values(table: RawTable, column: int) -> None:
 
 def _second_clock(table: RawTable, time: Assigned) -> list[InputError]:
     """Return the refusal of a file with another time that runs otherwise."""
-    clocks = [i for i, header in enumerate(table.headers) if header.role == header.dimension == "time"]
-    for other in [i for i in clocks if i != time.column][:3]:
-        try:
-            values = table.read([time.column, other]).values
-        except InputError:
+    for other in [i for i in table.columns("time", "time") if i != time.column][:3]:
+        values = table.try_read(time.column, other)
+        if values is None:
             continue
         unit = table.headers[other].known
         one, two = time.factor * values[time.column], (unit.factor if unit else 1.0) * values[other]

@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -146,25 +148,42 @@ def rate_in_name(name: str) -> float | None:
     return 1000 * number if match["ka"] or match["kb"] else number
 
 
-def stated_rate(lines: Iterable[str], numbers: Mapping[str, float], decimal: str | None = None) -> float | None:
-    """Return the sampling rate [Hz] that lines or numbers beside the columns state, as a rate or a step, or None.
+class Quantity(NamedTuple):
+    """A quantity that a line or a single number beside the columns states."""
 
-    Raises ValueError if two of them contradict each other.
-    """
-    stated = [(key, value, unit) for line in lines for key, value, unit in _quantities(line, decimal)]
+    key: str
+    value: float  # in SI
+    unit: Unit
+
+
+def stated_quantities(
+    lines: Iterable[str], numbers: Mapping[str, float] = MappingProxyType({}), decimal: str | None = None
+) -> Iterator[Quantity]:
+    """Yield what lines, and numbers by their name, state with a unit."""
+    for line in lines:
+        yield from _quantities(line, decimal)
     for name, number in numbers.items():
         header = split_name(name)
         if header.known is not None:
-            stated.append((header.name, header.known.factor * number, header.known))
+            yield Quantity(header.name, header.known.factor * number, header.known)
+
+
+def stated_rate(quantities: Iterable[Quantity]) -> float | None:
+    """Return the sampling rate [Hz] that is stated, as a rate or a step, or None; ValueError if there are two."""
     rates = []
-    for key, value, unit in stated:
+    for key, value, unit in quantities:
         if value > 0 and unit.dimension == "frequency" and _RATE.search(key):
             rates.append(value)
         elif value > 0 and unit.dimension == "time" and _STEP.search(key):
             rates.append(1 / value)
-    if rates and max(rates) > 1.001 * min(rates):
-        raise ValueError(f"{min(rates):g} Hz and {max(rates):g} Hz")
-    return rates[0] if rates else None
+    return _only(rates, 1.001, 1.0, "Hz")
+
+
+def _only(values: Sequence[float], agree: float, shown: float, unit: str) -> float | None:
+    """Return the first of values that agree, or None; ValueError with the least and the largest where they do not."""
+    if values and max(values) > agree * min(values):
+        raise ValueError(f"{shown * min(values):g} {unit} and {shown * max(values):g} {unit}")
+    return values[0] if values else None
 
 
 _BARE_RATE = re.compile(r"(?i)f_?s|(?:sampl(?:e|ing)|scan|abtast)[ _]?(?:rate|freq(?:uency)?)")
@@ -198,10 +217,10 @@ _FREQUENCY_KEY = re.compile(_WHICH + r"(?:frequency|freq|frequenz|fréquence|fre
 _AMPLITUDE_KEY = re.compile(_WHICH + r"(?:amplitude|ampl|amplitud|ampiezza|stroke|hub|course|振幅)")
 
 
-def stated_motion(lines: Iterable[str], decimal: str | None = None) -> str:
-    """Frequency and amplitude of the motion that lines state, as a name would: 2Hz 10mm; empty if none does."""
+def stated_motion(quantities: Iterable[Quantity]) -> str:
+    """Frequency and amplitude of the motion that is stated, as a name would: 2Hz 10mm; empty if neither is."""
     words = []
-    for key, value, unit in (quantity for line in lines for quantity in _quantities(line, decimal)):
+    for key, value, unit in quantities:
         if value > 0 and unit.dimension == "frequency" and _FREQUENCY_KEY.fullmatch(key):
             words.append(f"{value:g}Hz")
         elif value > 0 and unit.dimension == "length" and _AMPLITUDE_KEY.fullmatch(key):
@@ -212,24 +231,14 @@ def stated_motion(lines: Iterable[str], decimal: str | None = None) -> str:
 _TURNS = re.compile(r"speed|rpm|drehzahl|crank|régime|vitesse|velocidad|giri|обороты|转速|回転", re.IGNORECASE)
 
 
-def stated_speed(lines: Iterable[str], numbers: Mapping[str, float], decimal: str | None = None) -> float | None:
-    """Speed of a crank [1/s] that lines or numbers beside the columns state; None if none does.
-
-    Raises ValueError if two of them contradict each other.
-    """
-    stated = [(key, value, unit) for line in lines for key, value, unit in _quantities(line, decimal)]
-    for name, number in numbers.items():
-        header = split_name(name)
-        if header.known is not None:
-            stated.append((name, header.known.factor * number, header.known))
-    speeds = [v for key, v, unit in stated if unit.dimension == "frequency" and v > 0 and _TURNS.search(key)]
-    if speeds and max(speeds) > 1.01 * min(speeds):
-        raise ValueError(f"{60 * min(speeds):g} rpm and {60 * max(speeds):g} rpm")
-    return speeds[0] if speeds else None
+def stated_speed(quantities: Iterable[Quantity]) -> float | None:
+    """Speed of a crank [1/s] that is stated; None if none is; ValueError if there are two."""
+    speeds = [v for key, v, unit in quantities if unit.dimension == "frequency" and v > 0 and _TURNS.search(key)]
+    return _only(speeds, 1.01, 60, "rpm")
 
 
-def _quantities(line: str, decimal: str | None) -> Iterator[tuple[str, float, Unit]]:
-    """Name, value in SI and unit of what a line states: one quantity, or several behind each other."""
+def _quantities(line: str, decimal: str | None) -> Iterator[Quantity]:
+    """Yield what a line states: one quantity, or several behind each other."""
     line = line[:_LONGEST_LINE]
     match = _LINE.match(line) or _SPACED.match(line)
     parts = [line] if match else re.split(r"[,;|]\s+|[{}\t]|\s{2,}", re.sub(r" *= +", "=", line))
@@ -242,7 +251,7 @@ def _quantities(line: str, decimal: str | None) -> Iterator[tuple[str, float, Un
         unit_of = parse_unit(unit)
         value = _value(match["number"], decimal)
         if unit_of is not None and value is not None:
-            yield key, unit_of.factor * value, unit_of
+            yield Quantity(key, unit_of.factor * value, unit_of)
 
 
 def _value(number: str, decimal: str | None) -> float | None:

@@ -52,8 +52,7 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
                 problems += getattr(error, "errors", (error,))
         if not records or any(table.label.startswith("block") for table in tables):
             CombinedError.raise_from(problems)
-        with path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        digest = digest_of(path)
     records = joined(records, profile, tables)
     remarks = {"file": as_data(path.name), "sha256": digest}
     if profile != Profile():
@@ -73,6 +72,12 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
     if not named:
         CombinedError.raise_from(problems)
     return named, problems
+
+
+def digest_of(path: Path) -> str:
+    """Return the SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:

@@ -96,9 +96,10 @@ def _remembered(table: RawTable) -> Callable[[tuple[int, ...]], Content]:
 
     @cache
     def every() -> Content | None:
-        wanted = [i for i, header in enumerate(table.headers) if header.role is not None or header.dimension]
         try:
-            return table.read(wanted)
+            return table.read(
+                [i for i, header in enumerate(table.headers) if header.role is not None or header.dimension]
+            )
         except InputError:
             return None  # one of them cannot be read, which matters only if it is asked for
 
@@ -125,14 +126,8 @@ def _part(
         return Content(values, _lines(content.lines, inside), content.findings)
 
     several = tuple(line for line in table.remarks if len(set(currents_in_cells(line))) > 1) if table.over else ()
-
-    def pick(values: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(values[i] for i in columns) if values else ()
-
-    return replace(
-        table, names=pick(table.names), units=pick(table.units), odd=pick(table.odd), over=(), read=part, words=None,
-        titles=several, label="_".join(part for part in (table.label, label) if part),
-    )  # fmt: skip
+    name = "_".join(part for part in (table.label, label) if part)
+    return replace(table.picked(columns, part), titles=several, label=name)
 
 
 def _lines(lines: LineNumbers | None, rows: slice | np.ndarray) -> LineNumbers | None:
@@ -164,40 +159,29 @@ def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
     if not (own_time or stated or form.blocks == "split"):
         return []
     shared = _shared(table, members)
-    read = _remembered(table)
-    return [
-        _part(
-            table,
-            read,
-            sorted({*roles.values(), *shared}),
-            cache(partial(_filled, table, read, roles, titles[key])),
-            titles[key],
-        )
-        for key, roles in members.items()
-    ]
+    return _beside(table, [(titles[key], roles, [*roles.values(), *shared]) for key, roles in members.items()])
 
 
 def _shared_motion(table: RawTable) -> list[RawTable]:
     """One motion with several forces, each of which has a title that states its current: a test each."""
-    columns = {role: [i for i, header in enumerate(table.headers) if header.role == role] for role in DIMENSION}
-    forces = [i for i in columns["force"] if table.headers[i].dimension in (None, "force")]
+    forces = [i for i in table.columns("force") if table.headers[i].dimension in (None, "force")]
     titles = [table.over[i] if table.over else "" for i in forces]
     stated = [currents_in(title) for title in titles]
-    if len(forces) < 2 or len(columns["displacement"]) != 1 or any(len(currents) != 1 for currents in stated):
+    if len(forces) < 2 or len(table.columns("displacement")) != 1 or any(len(currents) != 1 for currents in stated):
         return []
     if len(set(stated)) < len(stated):
         return []
-    read = _remembered(table)
     others = [i for i in range(len(table.names)) if i not in forces]
+    tests = zip(titles, forces, strict=True)
+    return _beside(table, [(title, {"force": i, "displacement": i}, [*others, i]) for title, i in tests])
+
+
+def _beside(table: RawTable, tests: Sequence[tuple[str, dict[str, int], list[int]]]) -> list[RawTable]:
+    """Return the table of each test, of its title, its columns by channel, and all that it is given."""
+    read = _remembered(table)
+    rows = [cache(partial(_filled, table, read, roles, title)) for title, roles, _ in tests]
     return [
-        _part(
-            table,
-            read,
-            sorted([*others, i]),
-            cache(partial(_filled, table, read, {"force": i, "displacement": i}, t)),
-            t,
-        )
-        for i, t in zip(forces, titles, strict=True)
+        _part(table, read, sorted({*columns}), own, title) for (title, _, columns), own in zip(tests, rows, strict=True)
     ]
 
 
@@ -237,12 +221,8 @@ def _key(name: str, role: str) -> str:
 def _shared(table: RawTable, members: dict[str, dict[str, int]]) -> list[int]:
     """Return the one time or current that belongs to every group."""
     grouped = {i for roles in members.values() for i in roles.values()}
-    shared = []
-    for role in ("time", "current"):
-        columns = [i for i, header in enumerate(table.headers) if header.role == role]
-        if len(columns) == 1 and columns[0] not in grouped:
-            shared.append(columns[0])
-    return shared
+    alone = [columns[0] for role in ("time", "current") if len(columns := table.columns(role)) == 1]
+    return [column for column in alone if column not in grouped]
 
 
 def _filled(table: RawTable, read: Callable[[tuple[int, ...]], Content], roles: dict[str, int], label: str) -> slice:

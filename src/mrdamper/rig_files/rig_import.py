@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from mrdamper.data import Dataset
 from mrdamper.errors import ColumnError, CombinedError, InputError
-from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, with_value_of_name
+from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.folder import files_in, is_left_out
 from mrdamper.rig_files.long_records import check_long_record
@@ -21,16 +21,16 @@ from mrdamper.rig_files.mapping.agreement import contradictions
 from mrdamper.rig_files.mapping.companions import (
     contradictions_with,
     is_list,
-    joined_columns,
-    joined_parts,
+    joined_files,
+    number_of,
     part_of,
     results_of,
     tests_by,
-    with_currents_of,
     with_legend_of,
     with_results_of,
 )
 from mrdamper.rig_files.mapping.description import is_description
+from mrdamper.rig_files.mapping.integration import is_integrated
 from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.packed_folder import unpacked
 from mrdamper.rig_files.profile import Profile, ProfileError, profile_of
@@ -219,10 +219,6 @@ class _Intake:
         """Check a test with what the table of tests says of it, or keep it until another file states its current."""
         self.met.append((path, record.id))
         problems: list[InputError] = []
-        try:
-            record = with_value_of_name(record, path, self._profile)
-        except InputError as error:
-            problems.append(error)
         if self._table is not None:
             try:
                 record = applied(record, self._table.of(path, record.id), self._table)
@@ -253,7 +249,6 @@ class _Intake:
         others = [Path(refusal.file) for refusal in self.refusals if refusal.error.code in _MAY_BE_PARTS]
         others = [path for path in dict.fromkeys(others) if path.is_file()]
         used = self._join_channels(others)
-        self.refusals = [refusal for refusal in self.refusals if Path(refusal.file) not in used]
         files = [path for path, _ in self._pending]
         for path, record in self._pending:
             self._check(path, record, [], several=files.count(path) > 1)
@@ -267,30 +262,38 @@ class _Intake:
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
             else:
                 continue
-            self.refusals = [refusal for refusal in self.refusals if Path(refusal.file) != path]
+            self._drop_refusals({path})
         self._refuse(contradictions([record for _, record in self.tests()]))
 
     def _join_channels(self, others: list[Path]) -> set[Path]:
-        """Join displacements and forces of two files, and currents that other files state; the files that were used."""
-        parts = [part for path in others if (part := part_of(path, self._profile.of_file(path.name)[1]))]
-        parts += [part for path, (run, own) in self._shares.items() if (part := part_of(path, own, run))]
+        """Join channels of several files, and currents that other files state; the files that were used."""
+        parts = [part_of(path, self._profile.of_file(path.name)[1]) for path in others]
+        parts += [part_of(path, own, run) for path, (run, own) in self._shares.items()]
+        wanted = {part.key: part.table.names for part in parts if part is not None}
+        whole = [path for path, _ in self._pending if number_of(path) in wanted]
+        whole += [  # the displacement that is measured is surer than the integral
+            path for path, record in self.tests()
+            if is_integrated(record) and "displacement" in wanted.get(number_of(path), ())
+        ]  # fmt: skip
+        parts += [part_of(path, self._profile.of_file(path.name)[1]) for path in dict.fromkeys(whole)]
         used: set[Path] = set()
-        for records, paths in joined_columns(others, self._profile):
-            used |= set(paths)
-            for record in records:
-                self._take(paths[0], record, several=len(records) > 1)
-        for record, paths in joined_parts(parts, self._profile):
-            used |= set(paths)
-            self._take(paths[0], record, several=False)
+        for group, records in joined_files([part for part in parts if part is not None], self._profile):
+            paths = {part.path for part in group}
+            used |= paths
+            self._drop_refusals(paths)
+            self._pending = [(path, record) for path, record in self._pending if path not in paths]
+            places = {self._order[str(path)] for path in paths}
+            self._found = [(place, record) for place, record in self._found if place not in places]
+            if isinstance(records, InputError):
+                self.refusals.append(Refusal(str(group[0].path), records))
+            else:
+                for record in records:
+                    self._take(group[0].path, record, several=len(records) > 1)
         for path in [path for path in self._shares if path not in used]:
             problem = f"no other file of test {self._shares[path][0]!r} has the rest of its channels on the same clock"
             error = ColumnError(problem, where=path.name, remedy="correct file = ... of the channels in the profile")
             self.refusals.append(Refusal(str(path), error))
         pending = self._pending
-        joined = with_currents_of(pending, parts) if pending and parts else None
-        if joined:
-            self._pending = [(path, record) for (path, _), (record, _) in zip(pending, joined, strict=True)]
-            return used | {path for _, path in joined}
         notes = [Path(note.file) for note in self.notes]
         for path in [path for path in (*others, *notes) if pending and path not in used]:
             results = self._results(path)
@@ -300,8 +303,12 @@ class _Intake:
             if stated:
                 self._pending = [(file, record) for (file, _), record in zip(tests, stated, strict=True)]
                 self.notes = [note for note in self.notes if Path(note.file) != path]
+                self._drop_refusals({path})
                 return used | {path}
         return used
+
+    def _drop_refusals(self, paths: Collection[Path]) -> None:
+        self.refusals = [refusal for refusal in self.refusals if Path(refusal.file) not in paths]
 
     def _numbered(self, results: Results) -> list[tuple[Path, Record]]:
         """Return the tests without a current, apart for those of a file that a column numbers as results do."""

@@ -15,7 +15,7 @@ from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, constant, current_of, without_gaps
 from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
-from mrdamper.rig_files.conditions import currents_in, stated_motion
+from mrdamper.rig_files.conditions import currents_in, stated_motion, stated_quantities
 from mrdamper.rig_files.mapping.clocks import refuse_two_rates
 from mrdamper.rig_files.mapping.session import stretches_of_session
 from mrdamper.rig_files.parts import stretches_of_time
@@ -63,8 +63,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         if len(stretches) > 1:
             text = f'cut at its rests or steps of the current into {len(stretches)} tests (blocks = "join" keeps it)'
             findings.append(Finding("W_CUT", text))
-    decimal = table.form.get("decimal")
-    motion = stated_motion(table.remarks, decimal if isinstance(decimal, str) else None)
+    motion = stated_motion(stated_quantities(table.remarks, decimal=table.decimal))
     remarks = {**_remarks(table, assigned), "time_from": rate, "motion_stated": motion if len(stretches) == 1 else ""}
     remarks = {key: text for key, text in remarks.items() if text}
     for name, why in left_out(table, profile, assigned).items():

@@ -12,9 +12,9 @@ from pathlib import Path, PurePath
 from mrdamper.data import held_current
 from mrdamper.data.strict_text import open_regular
 from mrdamper.errors import CombinedError, InputError
-from mrdamper.rig_files.coil_current import constant
+from mrdamper.rig_files.coil_current import with_stated_current
 from mrdamper.rig_files.column_names import split_name
-from mrdamper.rig_files.conditions import LARGEST_STATED, contradicted
+from mrdamper.rig_files.conditions import LARGEST_STATED
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.units import parse_unit
 
@@ -147,27 +147,9 @@ def applied(record: Record, row: StatedTest | None, table: TestsTable) -> Record
     if row is None:
         return record
     if row.current is not None:
-        record = _with_current(record, row.current, table, row.line)
+        record = with_stated_current(record, row.current, table.path.name, f"{table.path.name}, line {row.line}")
     changes = {name: value for name, value in (("split", row.split), ("rig", row.rig)) if value}
     return replace(record, provenance={**record.provenance, **row.notes}, **changes)  # type: ignore[arg-type]
-
-
-def _with_current(record: Record, current: float, table: TestsTable, line: int) -> Record:
-    whence = record.provenance.get("current_from", "current channel")
-    mean = None if record.current is None else contradicted(record.current, current)
-    if mean is not None:
-        remedy = "correct the cell, or leave it empty; if the file is wrong, correct or rename it"
-        raise TestsTableError(
-            f"line {line} gives {current:g} A, {record.id} by its {whence} {mean:g} A",
-            where=table.path.name, remedy=remedy, code="E_CURRENT_CONTRADICTS",
-        )  # fmt: skip
-    if record.current is not None and "current_from" not in record.provenance:
-        return record
-    return replace(
-        record,
-        current=constant(current, record.time),
-        provenance={**record.provenance, "current_from": table.path.name},
-    )
 
 
 def tests_text(records: Sequence[Record]) -> str:

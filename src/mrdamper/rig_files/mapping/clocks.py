@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import InputError
 from mrdamper.rig_files.conditions import stated_rate, stated_speed
 from mrdamper.rig_files.mapping.proposals import frequency_of, stated_frequencies
 from mrdamper.rig_files.profile import Profile
-from mrdamper.rig_files.readers.base import Content, RawTable
+from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.tokens import stamp
 
@@ -31,9 +29,8 @@ def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displaceme
     An export of every n-th sample has a lower rate than it was recorded at: it is taken where the frequency that
     is stated is that of the time column, or where the profile names this column and no frequency contradicts it.
     """
-    decimal = table.form.get("decimal")
     try:
-        stated = stated_rate(table.remarks, table.constants, decimal if isinstance(decimal, str) else None)
+        stated = stated_rate(table.quantities)
     except ValueError:
         return  # of several channels
     time, displacement = time[:_SAMPLES], displacement[:_SAMPLES]
@@ -60,92 +57,66 @@ def with_time_stated(table: RawTable) -> RawTable:
 
     Parts: a clock of whole seconds and thousandths; a clock of a day and its date.
     """
-    times = [i for i, header in enumerate(table.headers) if header.role == "time"]
+    times = table.columns("time")
     if len(times) == 1:
         return _with_date(_with_thousandths(table, times[0]), times[0])
     return table if times else _with_crank(table)
 
 
+def _beside(table: RawTable, clock: int, words: frozenset[str]) -> int | None:
+    """Return the one column of such a name beside a clock in seconds; None if there is none, or several."""
+    columns = [i for i, name in enumerate(table.names) if name.strip().casefold() in words]
+    return columns[0] if len(columns) == 1 and table.units[clock] == "s" else None
+
+
 def _with_thousandths(table: RawTable, clock: int) -> RawTable:
     """Stamps of whole seconds, repeated, with the milliseconds beside them."""
-    beside = [i for i, name in enumerate(table.names) if name.strip().casefold() in _THOUSANDTHS]
-    if len(beside) != 1 or table.units[clock] != "s":
-        return table
-    inner, part = table.read, beside[0]
-    try:
-        values = inner([clock, part]).values
-    except InputError:
+    part = _beside(table, clock, _THOUSANDTHS)
+    values = None if part is None else table.try_read(clock, part)
+    if part is None or values is None:
         return table
     seconds, thousandths = values[clock], values[part]
     apart = np.all(seconds == np.floor(seconds)) and np.all((thousandths >= 0) & (thousandths < 1000))
     if not apart or not np.any(np.diff(seconds) == 0):
         return table
-
-    def read(columns: Sequence[int]) -> Content:
-        content = inner(sorted({*columns, part} if clock in columns else {*columns}))
-        completed = dict(content.values)
-        if clock in completed:
-            completed[clock] = completed[clock] + completed[part] / 1000
-        return Content({i: completed[i] for i in columns}, content.lines, content.findings)
-
-    return replace(table, read=read)
+    return table.computed(clock, (clock, part), lambda values: values[clock] + values[part] / 1000)
 
 
 def _with_date(table: RawTable, clock: int) -> RawTable:
     """Return a clock that goes back at midnight, with the dates beside it."""
-    beside = [i for i, name in enumerate(table.names) if name.strip().casefold() in _DATES]
-    if len(beside) != 1 or table.units[clock] != "s" or table.words is None:
+    dates = _beside(table, clock, _DATES)
+    values = None if dates is None else table.try_read(clock)
+    if dates is None or values is None or table.words is None or not np.any(np.diff(values[clock]) < -_DAY_S / 2):
         return table
-    inner = table.read
-    try:
-        if not np.any(np.diff(inner([clock]).values[clock]) < -_DAY_S / 2):
-            return table
-        words = table.words(beside[0])
-    except InputError:
+    words = table.words(dates)
+    days = [entry[0] // 10**9 for label in words.labels if (entry := stamp(f"{label} 00:00:00")) is not None]
+    if len(days) < len(words.labels):
         return table
-    stamps = [stamp(f"{label} 00:00:00") for label in words.labels]
-    if any(entry is None for entry in stamps):
-        return table
-    days = [entry[0] // 10**9 for entry in stamps if entry is not None]
     since = np.array([float(day - days[0]) for day in days])[words.codes]
-
-    def read(columns: Sequence[int]) -> Content:
-        content = inner(columns)
-        if clock not in content.values or content.values[clock].size != since.size:
-            return content
-        return Content({**content.values, clock: content.values[clock] + since}, content.lines, content.findings)
-
-    return replace(table, read=read)
+    return table.computed(clock, (clock,), lambda values: values[clock] + since)
 
 
 def _with_crank(table: RawTable) -> RawTable:
     """Return an angle of a crank as time, at the speed that a line or a number beside the columns states."""
-    angles = [i for i, header in enumerate(table.headers) if header.dimension == "angle"]
+    angles = table.columns(dimension="angle")
     if len(angles) != 1:
         return table
-    decimal = table.form.get("decimal")
     try:
-        speed = stated_speed(table.remarks, table.constants, decimal if isinstance(decimal, str) else None)
+        speed = stated_speed(table.quantities)
     except ValueError as error:
-        raise table.source.refuse(
-            "E_AMBIGUOUS", f"two speeds of the crank: {error}", "correct the line that is wrong"
-        ) from error
+        problem = f"two speeds of the crank: {error}"
+        raise table.source.refuse("E_AMBIGUOUS", problem, "correct the line that is wrong") from error
     if speed is None:
         return table
-    inner, column, unit_of = table.read, angles[0], table.headers[angles[0]].known
-    assert unit_of is not None
+    column, unit = angles[0], table.headers[angles[0]].known
+    assert unit is not None
 
-    def read(columns: Sequence[int]) -> Content:
-        content = inner(columns)
-        if column not in content.values:
-            return content
-        angle = unit_of.factor * content.values[column]
+    def turned(values: Mapping[int, Floats]) -> Floats:
+        angle = unit.factor * values[column]
         there = np.isfinite(angle)
-        turned = np.full(angle.shape, np.nan)
-        turned[there] = np.unwrap(angle[there]) / (2 * np.pi * speed)
-        return Content({**content.values, column: turned}, content.lines, content.findings)
+        time = np.full(angle.shape, np.nan)
+        time[there] = np.unwrap(angle[there]) / (2 * np.pi * speed)
+        return time
 
-    text = f"time is the angle {table.names[column]!r} at {60 * speed:g} rpm"
-    names = tuple("time" if i == column else name for i, name in enumerate(table.names))
-    units = tuple("s" if i == column else unit for i, unit in enumerate(table.units))
-    return replace(table, names=names, units=units, read=read, findings=(*table.findings, Finding("W_UNITS", text)))
+    note = Finding("W_UNITS", f"time is the angle {table.names[column]!r} at {60 * speed:g} rpm")
+    return table.computed(column, (column,), turned).named({column: ("time", "s")}).noted(note)

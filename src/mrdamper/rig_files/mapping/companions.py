@@ -1,121 +1,92 @@
-"""Tests whose channels lie in two files, joined by the numbers in their names; and tables of results beside them."""
+"""Tests whose channels lie in several files, and tables of results and legends beside files."""
 
 from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from mrdamper.data import Floats, held_current
-from mrdamper.errors import ColumnError, InputError, printable
-from mrdamper.rig_files.coil_current import as_data, constant, current_of
-from mrdamper.rig_files.column_names import Header, role_of, split_name, words_of
+from mrdamper.data import Floats
+from mrdamper.errors import InputError
+from mrdamper.rig_files.coil_current import as_data, current_of, with_stated_current, with_value_of_name
+from mrdamper.rig_files.column_names import role_of, split_name, words_of
 from mrdamper.rig_files.columns import partly_assigned
-from mrdamper.rig_files.conditions import amperes, contradicts
-from mrdamper.rig_files.file_records import records_of_file
+from mrdamper.rig_files.conditions import amperes
+from mrdamper.rig_files.file_records import digest_of, records_of_file
 from mrdamper.rig_files.mapping.completion import completed
+from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
 from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
-from mrdamper.rig_files.profile import Profile
+from mrdamper.rig_files.profile import Channel, Profile
 from mrdamper.rig_files.readers import raw_tables
 from mrdamper.rig_files.readers.arrays import array_table
+from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding, Record
 from mrdamper.rig_files.rig_record import records_of
-from mrdamper.rig_files.units import DIMENSION
+from mrdamper.rig_files.text.spool import rescale
 
 _FEWEST_ROWS = 50  # of a record
 _LARGEST_TEXT = 2**18  # bytes
 _TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log")
 _CODE = re.compile(r"\s*([A-Za-z]{1,6}[0-9]{1,3})\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")
+_SI = {"time": "s", "displacement": "m", "force": "N", "velocity": "m/s", "acceleration": "m/s2", "current": "A",
+       "voltage": "V", "temperature": "°C", "pressure": "Pa"}  # fmt: skip
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """The channels of a file that are no whole test."""
+    """Channels of a test that lie in a file of their own."""
 
     path: Path
-    time: Floats  # (N,) [s]
-    channels: Mapping[str, Floats]  # by name, (N,) in SI
-    current: float | None = None  # [A] that the file states beside its columns
-    run: str = ""  # name of its test, where the profile says which files belong together
-
-    @property
-    def key(self) -> tuple[str, ...]:
-        """By which parts of one test belong together."""
-        return (self.run,) if self.run else number_of(self.path)
+    table: RawTable  # in memory, its columns named by their channels, in SI
+    key: tuple[str, ...]  # by which parts of one test belong together
+    test: Path  # of which the name is that of the test, where this part has its force
+    columns: str  # what was taken for its channels
 
 
 def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
-    """Return the channels with a time of a file that is no whole test; None if it has none, or several tables."""
+    """Return the channels of a file that is no whole test: several with a time, or the only one, which its name tells.
+
+    None if it has none, or several tables. Parts of one test have one `run`, or the same numbers in their names;
+    files of one column lie in one folder and have one name beside the channel's: run7_force_N.txt, run7_time_s.txt.
+    """
     try:
         with raw_tables(path, profile.file) as tables:
             if len(tables) != 1:
                 return None
-            table = completed(tables[0])
+            table, alone = completed(tables[0]), len(tables[0].names) == 1
+            if alone and not table.headers[0].name:
+                table = table.named({0: split_name(path.stem)})
             assigned = partly_assigned(table, profile)
-            if "time" not in assigned or len(assigned) < 2:
-                return None
-            raw = table.read([entry.column for entry in assigned.values()]).values
-            channels = {role: e.factor * raw[e.column] + e.offset for role, e in assigned.items()}
-            current, _ = current_of(table, profile, path, channels.get("current"), slice(None))
+            raw = table.read([entry.column for entry in assigned.values()])
+            channels = {role: rescale(raw.values[e.column], e.factor, e.offset) for role, e in assigned.items()}
+            current = None if alone else current_of(table, profile, path, channels.get("current"), slice(None))[0]
     except InputError:
         return None
-    time = channels.pop("time")
-    there = np.isfinite(time)
-    if np.count_nonzero(there) < 2 or np.any(np.diff(time[there]) <= 0):
+    if not alone and "time" in channels:
+        there = np.isfinite(channels["time"])
+        channels = {role: values[there] for role, values in channels.items()}
+    if not channels or (not alone and not _is_timed(channels)):
         return None
-    return Part(path, time[there], {role: values[there] for role, values in channels.items()}, current, run)
+    words = [word for word in words_of(split_name(path.stem).name) if role_of(word) not in assigned]
+    test = (
+        path.parent / "_".join(words) if alone and words else path.parent if alone else path.with_name(run or path.name)
+    )
+    remarks = [] if current is None else [f"current: {current!r} A"]
+    units = [_SI[role] for role in channels]
+    columns = ", ".join(f"{role} = {e.name} in {e.unit}" for role, e in assigned.items())
+    values = array_table(table.source, list(channels), units, list(channels.values()).__getitem__, remarks=remarks)
+    key = ("column", str(test)) if alone else (run,) if run else number_of(path)
+    return Part(path, values.noted(*table.findings, *raw.findings), key, test, columns)
 
 
-def joined_columns(paths: Sequence[Path], profile: Profile) -> list[tuple[list[Record], tuple[Path, ...]]]:
-    """Return tests of which every channel is a file of one column, named by its file or heading, and these files.
-
-    Files of one test lie in one folder and have one name beside the channel's: force_N.txt and time_s.txt, or
-    run7_force_N.txt and run7_time_s.txt. They hold as many samples as each other.
-    """
-    groups: dict[tuple[Path, str], dict[Path, tuple[str, str, Floats]]] = defaultdict(dict)
-    for path in paths:
-        column = _only_column(path, profile)
-        if column is not None:
-            header = column[0]
-            rest = [word for word in words_of(split_name(path.stem).name) if role_of(word) != header.role]
-            groups[path.parent, "_".join(rest)][path] = header.name, header.unit, column[1]
-    tests = []
-    for (folder, rest), columns in groups.items():
-        names, units, values = zip(*columns.values(), strict=True)
-        roles = [role_of(name) for name in names]
-        whole = {"displacement", "force"} <= set(roles) and len(set(roles)) == len(roles)
-        if not whole or len({v.size for v in values}) > 1:
-            continue
-        first, where = next(iter(columns)), folder / rest if rest else folder
-        try:
-            with raw_tables(first, profile.file) as tables:
-                table = array_table(tables[0].source, names, units, lambda i, values=values: values[i])
-                records = records_of(table, profile, where)
-        except InputError:
-            continue
-        files = {"file": as_data(where.name), "files": as_data(", ".join(path.name for path in columns))}
-        tests.append(([replace(r, provenance={**files, **r.provenance}) for r in records], tuple(columns)))
-    return tests
-
-
-def _only_column(path: Path, profile: Profile) -> tuple[Header, Floats] | None:
-    """Return the heading and numbers of a file of one column that its heading or its name says to be a channel."""
-    named = split_name(path.stem)
-    try:
-        with raw_tables(path, profile.file) as tables:
-            if len(tables) != 1 or len(tables[0].names) != 1:
-                return None
-            header = tables[0].headers[0]
-            header = header if header.name else named
-            fits = header.role is not None and header.dimension == DIMENSION.get(header.role)
-            return (header, tables[0].read([0]).values[0]) if fits else None
-    except InputError:
-        return None
+def _is_timed(channels: Mapping[str, Floats]) -> bool:
+    time = channels.get("time")
+    return len(channels) > 1 and time is not None and time.size > 1 and bool(np.all(np.diff(time) > 0))
 
 
 def number_of(path: Path) -> tuple[str, ...]:
@@ -123,68 +94,56 @@ def number_of(path: Path) -> tuple[str, ...]:
     return str(path.parent), *(str(int(number)) for number in re.findall(r"[0-9]+", path.stem))
 
 
-def with_currents_of(pending: Sequence[tuple[Path, Record]], parts: Sequence[Part]) -> list[tuple[Record, Path]] | None:
-    """Return the records with the current of the other file of their number, and that file; None if one has none."""
-    holders = [part for part in parts if "current" in part.channels and "force" not in part.channels]
-    by_number = {number_of(part.path): part for part in holders}
-    numbers = [number_of(path) for path, _ in pending]
-    if len(by_number) < len(holders) or len(set(numbers)) < len(numbers) or not set(numbers) <= set(by_number):
-        return None
-    return [
-        (_joined(record, by_number[number]), by_number[number].path)
-        for (_, record), number in zip(pending, numbers, strict=True)
-    ]
-
-
-def _joined(record: Record, part: Part) -> Record:
-    current = part.channels["current"]
-    there = np.isfinite(current)
-    held, change = held_current(current[there])
-    if change:
-        values = np.interp(record.time, part.time[there], current[there])
-        values[~np.isfinite(record.time)] = np.nan
-    else:
-        values = constant(held, record.time)
-    how = "interpolated onto the force's clock" if change else f"its mean {held:g} A"
-    text = f"the current is that of {part.path.name}, {how}"
-    provenance = {**record.provenance, "current_file": as_data(part.path.name)}
-    return replace(record, current=values, provenance=provenance).noticed(Finding("W_RASTER", text))
-
-
-def joined_parts(parts: Sequence[Part], profile: Profile) -> list[tuple[Record, tuple[Path, ...]]]:
-    """Return tests whose displacement and force lie in two files of one number and one clock, and these files."""
-    by_number: dict[tuple[str, ...], list[Part]] = defaultdict(list)
+def joined_files(parts: Sequence[Part], profile: Profile) -> Iterator[tuple[list[Part], list[Record] | InputError]]:
+    """Yield the parts that together are a test, and its records or why it cannot be used."""
+    groups: dict[tuple[str, ...], list[Part]] = defaultdict(list)
     for part in parts:
-        by_number[part.key].append(part)
-    records = []
-    for group in by_number.values():
-        loads = [part for part in group if "force" in part.channels]
-        names = [name for part in group for name in part.channels]
-        if len(group) < 2 or len(loads) != 1 or "displacement" not in names or len(set(names)) < len(names):
+        groups[part.key].append(part)
+    delays = {role: Channel(delay_ms=c.delay_ms) for role, c in profile.channels.items() if c.delay_ms}
+    own = profile.model_copy(update={"channels": delays})  # all else is done
+    for group in groups.values():
+        group.sort(key=lambda part: "force" not in part.table.names)
+        names = [part.path.name for part in group]
+        files = {"file": group[0].test.name, "files": ", ".join(names)}
+        files |= {"columns": ", ".join(part.columns for part in group)}
+        files = {key: as_data(text) for key, text in files.items()} | {"sha256": digest_of(group[0].path)}
+        try:
+            table = _together(group)
+            records = [] if table is None else records_of(table, own, group[0].test)
+            records = [with_value_of_name(record, group[0].test, profile) for record in records]
+        except InputError as error:
+            yield group, error
             continue
-        clock = loads[0].time
-        span = clock[-1] - clock[0]
-        far = [abs(part.time[i] - clock[i]) > _SAME_START * span for part in group for i in (0, -1)]
-        if any(far):
-            continue
-        channels = {
-            name: values if part is loads[0] else np.interp(clock, part.time, values)
-            for part in group
-            for name, values in part.channels.items()
-        }
-        stated = {part.current for part in group} - {None}
-        if "current" not in channels and len(stated) == 1:
-            channels["current"] = constant(stated.pop() or 0.0, clock)
-        files = [part.path.name for part in group]
-        stem = re.sub(r"[^\w.+=-]+", "_", loads[0].run or loads[0].path.stem)
-        remarks = {"file": as_data(files[0]), "files": as_data(", ".join(files)), "columns": ", ".join(names)}
-        note = Finding("W_RASTER", f"joined from {' and '.join(files)}, on the force's clock")
-        record = Record(
-            id=stem, time=clock, findings=(note,), provenance=remarks, rig=profile.rig, excitation=profile.excitation,
-            split=profile.split, **channels,  # type: ignore[arg-type]
-        )  # fmt: skip
-        records.append((record, tuple(part.path for part in group)))
-    return records
+        if records:
+            yield group, [replace(record, provenance={**record.provenance, **files}) for record in records]
+
+
+def _together(parts: Sequence[Part]) -> RawTable | None:
+    """Return the table of a test of which each part holds other channels; None if it is not whole."""
+    tables = [part.table for part in parts]
+    columns = {role: values for table in tables for role, values in zip(table.names, _arrays(table), strict=True)}
+    if all(len(table.names) == 1 for table in tables):
+        whole = {"displacement", "force"} <= set(columns) and len(columns) == len(tables)
+        if not whole or len({values.size for values in columns.values()}) > 1:
+            return None
+        units = [_SI[role] for role in columns]
+        return array_table(tables[0].source, list(columns), units, list(columns.values()).__getitem__)
+    clocks = [_arrays(table)[table.names.index("time")] for table in tables]
+    moving = [time for time, table in zip(clocks, tables, strict=True) if {"displacement", "force"} & {*table.names}]
+    span = clocks[0][-1] - clocks[0][0]
+    if any(abs(time[i] - clocks[0][i]) > _SAME_START * span for time in moving for i in (0, -1)):
+        return None
+    joined = with_joined_rasters(tables) if len(tables) > 1 else []
+    if len(joined) != 1:
+        return None
+    names = " and ".join(part.path.name for part in parts)
+    findings = [finding for table in tables for finding in table.findings]
+    table = with_one_clock(replace(joined[0], findings=tuple(findings)))
+    return table.noted(Finding("W_RASTER", f"joined from {names}, on the force's clock"))
+
+
+def _arrays(table: RawTable) -> list[Floats]:
+    return list(table.read(range(len(table.names))).values.values())
 
 
 def results_of(path: Path) -> Results | None:
@@ -218,7 +177,7 @@ def with_results_of(pending: Sequence[tuple[Path, Record]], results: Results, pa
     if len(currents) < len(pending):
         return None
     whence = f"{path.name}, {results.title}"
-    return [_with_stated(record, currents[i], whence) for i, (_, record) in enumerate(pending)]
+    return [with_stated_current(record, currents[i], whence, file.name) for i, (file, record) in enumerate(pending)]
 
 
 def _called(tests: Sequence[tuple[Path, Record]]) -> list[tuple[str, ...]]:
@@ -259,14 +218,9 @@ def with_legend_of(pending: Sequence[tuple[Path, Record]], path: Path) -> list[R
     if any(len(own) != 1 for own in stated):
         return None
     return [
-        _with_stated(record, codes[own[0]], f"{path.name}, {own[0].upper()}")
-        for (_, record), own in zip(pending, stated, strict=True)
+        with_stated_current(record, codes[own[0]], f"{path.name}, {own[0].upper()}", file.name)
+        for (file, record), own in zip(pending, stated, strict=True)
     ]
-
-
-def _with_stated(record: Record, current: float, whence: str) -> Record:
-    remarks = {**record.provenance, "current_from": as_data(whence)}
-    return replace(record, current=constant(current, record.time), provenance=remarks)
 
 
 def contradictions_with(
@@ -278,13 +232,10 @@ def contradictions_with(
         return None
     refused: dict[int, InputError] = {}
     for i, (file, record) in enumerate(tests):
-        held, change = held_current(record.current) if record.current is not None else (currents[i], "")
-        if not change and contradicts(held, currents[i]):
-            refused[i] = ColumnError(
-                printable(f"the test gives {held:g} A, {path.name} {currents[i]:g} A"), where=printable(file.name),
-                remedy="correct the one that is wrong, or take the table out of the folder",
-                code="E_CURRENT_CONTRADICTS",
-            )  # fmt: skip
+        try:
+            with_stated_current(record, currents[i], path.name, file.name)
+        except InputError as error:
+            refused[i] = error
     return refused
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from mrdamper.data import Floats
 from mrdamper.rig_files.column_names import (
     names_condition,
     names_weight,
@@ -18,7 +19,7 @@ from mrdamper.rig_files.column_names import (
     words_of,
 )
 from mrdamper.rig_files.conditions import currents_in, without_currents
-from mrdamper.rig_files.readers.base import Content, RawTable
+from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.layout import LISTED, cells_of
 from mrdamper.rig_files.text.spool import rescale
@@ -90,29 +91,21 @@ def completed(table: RawTable) -> RawTable:
 
 def _with_sense(table: RawTable) -> RawTable:
     """Return a force recorded as a magnitude, with the sign that a column of two words beside it states."""
-    forces = [i for i, header in enumerate(table.headers) if header.role == "force"]
+    forces = table.columns("force")
     senses = [i for i, name in enumerate(table.names) if name.strip().casefold() in _SENSE_NAMES]
     if len(forces) != 1 or len(senses) != 1 or table.words is None:
         return table
     words = table.words(senses[0])
     signs = [_sign_of(label, table.remarks) for label in words.labels]
-    inner, force = table.read, forces[0]
     if sorted(signs) != [-1, 1]:
         return table
-    sign = np.array(signs)[words.codes]
+    sign, force = np.array(signs)[words.codes], forces[0]
 
-    def read(columns: Sequence[int]) -> Content:
-        content = inner(columns)
-        if (
-            force not in content.values
-            or content.values[force].size != sign.size
-            or np.nanmin(content.values[force]) < 0
-        ):
-            return content
-        return Content({**content.values, force: sign * content.values[force]}, content.lines, content.findings)
+    def signed(values: Mapping[int, Floats]) -> Floats:
+        return values[force] if np.nanmin(values[force]) < 0 else sign * values[force]
 
-    text = f"the sign of the force is that of column {table.names[senses[0]]!r}"
-    return replace(table, read=read, findings=(*table.findings, Finding("W_SCALE", text)))
+    note = Finding("W_SCALE", f"the sign of the force is that of column {table.names[senses[0]]!r}")
+    return table.computed(force, (force,), signed).noted(note)
 
 
 def _sign_of(label: str, remarks: Sequence[str]) -> int:
@@ -133,11 +126,10 @@ def _with_stated_signs(table: RawTable) -> RawTable:
         for match in matches:
             stated.setdefault(role_of(match["what"]) or "", set()).add(_sign_of(match["sense"], ()))
     for role in ("displacement", "force"):
-        columns = [i for i, header in enumerate(table.headers) if header.role == role]
+        columns = table.columns(role)
         if stated.get(role) == {-1} and len(columns) == 1:
-            name, unit = table.headers[columns[0]]
             text = f"the sign of column {table.names[columns[0]]!r} is changed: the file counts compression positive"
-            table = _scaled(table, columns[0], name, unit, -1.0, text)
+            table = _scaled(table, columns[0], *table.headers[columns[0]], -1.0, text)
     return table
 
 
@@ -307,30 +299,25 @@ def _with_listed_units(table: RawTable) -> RawTable:
 
 def _with_stated_time_unit(table: RawTable) -> RawTable:
     """Return the unit of time that a line states: Horizontal Units,s; X-Unit: ms; HUnit."""
-    times = [i for i, header in enumerate(table.headers) if header.role == "time"]
+    times = table.columns("time")
     if len(times) != 1 or table.headers[times[0]].unit:
         return table
-    stated = {
-        m["unit"] for line in table.remarks if (m := _TIME_UNIT.match(line[:_LONGEST_LINE])) and is_unit(m["unit"])
-    }
-    units = [unit for unit in stated if (unit_of := parse_unit(unit)) and unit_of.dimension == "time"]
-    if len(units) != 1:
-        return table
-    return replace(table, units=tuple(units[0] if i == times[0] else u for i, u in enumerate(table.units)))
+    stated = {m["unit"] for line in table.remarks if (m := _TIME_UNIT.match(line[:_LONGEST_LINE]))}
+    units = [unit for unit in stated if is_unit(unit) and split_name("", unit).dimension == "time"]
+    return table.named({times[0]: (table.names[times[0]], units[0])}) if len(units) == 1 else table
 
 
 def _with_clocks_and_weights(table: RawTable) -> RawTable:
     """Names of clocks of microcontrollers as times, and loads that a scale shows in kg or g as forces."""
-    names, units = list(table.names), list(table.units)
-    notes = []
+    headings, notes = {}, []
     for i, header in enumerate(table.headers):
         key = re.sub(r"[\s_()]+", " ", header.name.strip().casefold()).strip()
         if not header.unit and key in _CLOCKS:
-            names[i], units[i] = "time", _CLOCKS[key]
+            headings[i] = "time", _CLOCKS[key]
         elif header.role == "force" and header.unit in _WEIGHTS and names_weight(header.name):
-            names[i], units[i] = header.name, _WEIGHTS[header.unit]
+            headings[i] = header.name, _WEIGHTS[header.unit]
             notes.append(Finding("W_UNITS", f"{header.name!r} in {header.unit} is the force of that weight"))
-    return replace(table, names=tuple(names), units=tuple(units), findings=(*table.findings, *notes))
+    return table.named(headings).noted(*notes)
 
 
 def _with_counts(table: RawTable) -> RawTable:
@@ -421,16 +408,5 @@ def _scales(line: str) -> list[tuple[str, float]]:
 
 def _scaled(table: RawTable, column: int, name: str, unit: str, factor: float, text: str) -> RawTable:
     """Return the table with a column multiplied by a number, in another unit."""
-    inner = table.read
-
-    def read(columns: Sequence[int]) -> Content:
-        content = inner(columns)
-        if column not in content.values:
-            return content
-        values = {**content.values, column: rescale(content.values[column], factor)}
-        return Content(values, content.lines, content.findings)
-
-    names, units = list(table.names), list(table.units)
-    names[column], units[column] = name, unit
-    findings = (*table.findings, Finding("W_SCALE", text))
-    return replace(table, names=tuple(names), units=tuple(units), read=read, findings=findings)
+    scaled = table.computed(column, (column,), lambda values: rescale(values[column], factor))
+    return scaled.named({column: (name, unit)}).noted(Finding("W_SCALE", text))

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from mrdamper.data import Floats
-from mrdamper.errors import InputError
-from mrdamper.rig_files.readers.base import Content, RawTable
-from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.readers.base import RawTable
+from mrdamper.rig_files.record import Finding, Record
 
+_INTEGRAL = "the displacement is the integral of"  # beginning of the finding
 _LARGEST = 64 * 2**20  # bytes of a file whose velocity is integrated
 
 
@@ -22,35 +19,26 @@ def with_integrated_velocity(table: RawTable) -> RawTable:
     Only where no column may be a displacement and the motion repeats: the whole cycles give the
     transducer's zero, and the mean position, which a velocity does not state, is zero.
     """
-    by_role = {
-        role: [i for i, h in enumerate(table.headers) if h.role == role] for role in ("time", "velocity", "force")
-    }
+    by_role = [table.columns(role) for role in ("time", "velocity", "force")]
     others = any("displacement" in (h.role, h.channel) or h.dimension == "length" for h in table.headers)
-    if others or any(len(columns) != 1 for columns in by_role.values()) or table.source.size > _LARGEST:
+    if others or any(len(columns) != 1 for columns in by_role) or table.source.size > _LARGEST:
         return table
-    clock, speed = by_role["time"][0], by_role["velocity"][0]
-    units = table.headers[clock].known, table.headers[speed].known
-    if units[0] is None or units[1] is None or (units[0].dimension, units[1].dimension) != ("time", "velocity"):
+    clock, speed = by_role[0][0], by_role[1][0]
+    units, values = (table.headers[clock].known, table.headers[speed].known), table.try_read(clock, speed)
+    if [unit and unit.dimension for unit in units] != ["time", "velocity"] or values is None:
         return table
-    inner, factors, last = table.read, (units[0].factor, units[1].factor), len(table.names)
-    try:
-        values = inner([clock, speed]).values
-        moved = displacement_of(factors[0] * values[clock], factors[1] * values[speed])
-    except InputError:
-        return table
+    moved = displacement_of(*(unit.factor * values[i] for unit, i in zip(units, (clock, speed), strict=True) if unit))
     if moved is None:
         return table
+    text = f"{_INTEGRAL} {table.names[speed]!r}, without drift and about its middle"
+    last = len(table.names)
+    table = table.computed(last, (speed,), lambda _: moved).named({last: ("displacement", "m")})
+    return table.noted(Finding("W_CHOSEN", text))
 
-    def read(columns: Sequence[int]) -> Content:
-        content = inner([i for i in columns if i != last] or [speed])
-        return Content({**content.values, last: moved}, content.lines, content.findings)
 
-    text = f"the displacement is the integral of {table.names[speed]!r}, without drift and about its middle"
-    return replace(
-        table, names=(*table.names, "displacement"), units=(*table.units, "m"), read=read, words=None,
-        odd=(*table.odd, "") if table.odd else (), over=(*table.over, "") if table.over else (),
-        findings=(*table.findings, Finding("W_CHOSEN", text)),
-    )  # fmt: skip
+def is_integrated(record: Record) -> bool:
+    """Tell if the displacement of a record is the integral of a velocity."""
+    return any(finding.code == "W_CHOSEN" and finding.text.startswith(_INTEGRAL) for finding in record.findings)
 
 
 def displacement_of(time: Floats, velocity: Floats) -> Floats | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -37,16 +37,12 @@ class Candidate:
 
 def with_unit_of_time(table: RawTable) -> RawTable:
     """Return the table with the unit of its time, where only one agrees with the frequency that the file states."""
-    times = [i for i, header in enumerate(table.headers) if header.role == "time"]
-    moved = [i for i, header in enumerate(table.headers) if header.role == "displacement"]
+    times, moved = table.columns("time"), table.columns("displacement")
     if len(times) != 1 or len(moved) != 1 or table.headers[times[0]].unit or table.source.size > _LARGEST:
         return table
     stated = set(stated_frequencies(table))
-    if len(stated) != 1:
-        return table
-    try:
-        values = table.read([times[0], moved[0]]).values
-    except InputError:
+    values = table.try_read(times[0], moved[0]) if len(stated) == 1 else None
+    if values is None:
         return table
     measured = frequency_of(values[times[0]], values[moved[0]])
     frequency = stated.pop()
@@ -54,8 +50,7 @@ def with_unit_of_time(table: RawTable) -> RawTable:
     if len(units) != 1:
         return table
     text = f"the unit of time is {units[0]}: so the motion has the {frequency:g} Hz that the file states"
-    stated_units = [units[0] if i == times[0] else unit for i, unit in enumerate(table.units)]
-    return replace(table, units=tuple(stated_units), findings=(*table.findings, Finding("W_UNITS", text)))
+    return table.named({times[0]: (table.names[times[0]], units[0])}).noted(Finding("W_UNITS", text))
 
 
 def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -> RawTable:
@@ -79,27 +74,24 @@ def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -
     rest = [candidate for candidate in ranked if _POOR <= candidate.score < _CLEAR]
     if len(good) != 1 or rest:
         return table
-    names = list(table.names)
-    chosen = []
+    headings, chosen = {}, []
     for role, columns in open_roles.items():
         if len(columns) < 2:
             continue
         own = good[0].columns[role]
         chosen.append(f"{table.names[own] or f'column {own + 1}'} as the {role}")
         for column in columns:
-            header = table.headers[column]
-            names[column] = f"{role} [{header.unit}]" if column == own else f"other {column + 1} [{header.unit}]"
+            name = role if column == own else f"other {column + 1}"
+            headings[column] = f"{name} [{table.headers[column].unit}]", ""
     text = f"{' and '.join(chosen)}: only so the force takes energy in phase with the velocity"
-    units = tuple("" if name != old else unit for name, old, unit in zip(names, table.names, table.units, strict=True))
-    return replace(table, names=tuple(names), units=units, findings=(*table.findings, Finding("W_CHOSEN", text)))
+    return table.named(headings).noted(Finding("W_CHOSEN", text))
 
 
 def ranked_candidates(table: RawTable, open_roles: dict[str, list[int]]) -> list[Candidate]:
     """Return the combinations of columns and how far each is a damper's test, the best first."""
     wanted = sorted({column for columns in open_roles.values() for column in columns})
-    try:
-        values = table.read(wanted).values
-    except InputError:
+    values = table.try_read(*wanted)
+    if values is None:
         return []
     candidates = []
     for columns in list(product(*open_roles.values()))[: _MOST_TRIED + 1]:

@@ -55,7 +55,7 @@ def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
     joined: dict[int, RawTable] = {}
     dropped: set[int] = set()
     for label, members in groups.items():
-        timed = [table for table in members if any(header.role == "time" for header in table.headers)]
+        timed = [table for table in members if table.columns("time")]
         roles = [{h.channel for h in _named(table).headers} for table in timed]
         whole = [i for i, roles_of in enumerate(roles) if {"displacement", "force"} <= roles_of]
         every = [role for roles_of in roles for role in roles_of if role not in ("time", None)]
@@ -108,7 +108,7 @@ def _joined(label: str, tables: Sequence[RawTable]) -> RawTable:
 
 
 def _time_first(table: RawTable) -> list[int]:
-    times = [i for i, header in enumerate(table.headers) if header.role == "time"][:1]
+    times = table.columns("time")[:1]
     return [*times, *(i for i in range(len(table.names)) if i not in times)]
 
 
@@ -127,14 +127,16 @@ def _clocks(table: RawTable) -> dict[int, list[int]]:
 
 def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int, int]) -> RawTable:
     read = lru_cache(maxsize=4)(lambda column: table.read([column]).values[column])
-    factor = {i: header.known.factor if header.known else 1.0 for i, header in enumerate(table.headers)}
+
+    def stamps(column: int) -> Floats:
+        return read(column) * _factor(table, column)
 
     @cache
     def common() -> tuple[slice, Floats]:
         """Rows of the force that lie within the displacement's time, if most do, and their times."""
-        target = _filled(read(clock)) * factor[clock]
+        target = _filled(stamps(clock))
         moved = next((i for i in owner if table.headers[i].channel == "displacement"), clock)
-        other = _filled(read(owner.get(moved, moved)) * factor[owner.get(moved, moved)])
+        other = _filled(stamps(owner.get(moved, moved)))
         inside = np.flatnonzero(_covered(target, other[np.isfinite(other)]))
         rows = slice(inside[0], inside[-1] + 1) if inside.size >= _FEWEST_OVERLAP * target.size else slice(target.size)
         return rows, target[rows]
@@ -144,34 +146,30 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
         rows, target = common()
         if own == clock:
             return read(column)[rows]
-        return _interpolated(table, column, target, read(own) * factor[own], read(column))
+        return _interpolated(table, column, target, stamps(own), read(column))
 
     def columns_of(columns: Sequence[int]) -> Content:
         return Content({i: on_clock(kept[i]) for i in columns})
 
-    moved = sorted({table.headers[i].name for i in kept if owner.get(i, i) != clock})
-    own, text = "on clocks of their own", f"interpolated onto the force's: {', '.join(moved[:6])}"
+    names = sorted({table.headers[i].name for i in kept if owner.get(i, i) != clock})
+    own, text = "on clocks of their own", f"interpolated onto the force's: {', '.join(names[:6])}"
     apart = _apart(table, clock, {*owner.values()} - {clock})
     if apart is not None and apart > _SAME:
         own += f", up to {1e3 * apart:.4g} ms apart"
+    resampled_table = table.picked(kept, columns_of).named({0: ("time", table.headers[clock].unit)})
     same = apart is not None and apart <= _SAME
-    return replace(
-        table,
-        names=tuple("time" if i == clock else table.names[i] for i in kept),
-        units=tuple(table.headers[i].unit if i == clock else table.units[i] for i in kept),
-        odd=tuple(table.odd[i] for i in kept) if table.odd else (),
-        over=(),
-        words=None,
-        read=columns_of,
-        findings=table.findings if same else (*table.findings, Finding("W_RASTER", f"{own}, {text}")),
-    )
+    return resampled_table if same else resampled_table.noted(Finding("W_RASTER", f"{own}, {text}"))
+
+
+def _factor(table: RawTable, column: int) -> float:
+    unit = table.headers[column].known
+    return unit.factor if unit else 1.0
 
 
 def _apart(table: RawTable, clock: int, others: Iterable[int]) -> float | None:
     """Largest difference of the stamps of a row between a clock and others [s]; None where they have no common rows."""
-    factor = {i: unit.factor if (unit := table.headers[i].known) else 1.0 for i in (clock, *others)}
     try:
-        first, *rest = (_filled(table.read([i]).values[i]) * factor[i] for i in factor)
+        first, *rest = (_filled(table.read([i]).values[i]) * _factor(table, i) for i in (clock, *others))
     except InputError:
         return None
     if any(other.size != first.size for other in rest):
@@ -181,7 +179,7 @@ def _apart(table: RawTable, clock: int, others: Iterable[int]) -> float | None:
 
 def _with_clocks_compared(table: RawTable) -> RawTable:
     """Note a second clock of a table that starts a little earlier or later than the one that all channels follow."""
-    clocks = [i for i, header in enumerate(table.headers) if header.role == header.dimension == "time"]
+    clocks = table.columns("time", "time")
     apart = _apart(table, clocks[0], clocks[1:2]) if len(clocks) == 2 else None
     if apart is None or not _SAME < apart < _TWO_STARTS:
         return table
@@ -190,7 +188,7 @@ def _with_clocks_compared(table: RawTable) -> RawTable:
         f"the clocks {one!r} and {two!r} are up to {1e3 * apart:.4g} ms apart and all channels are taken by one "
         "of them: if the force follows the other, set delay_ms in [channels.force] of a profile"
     )
-    return replace(table, findings=(*table.findings, Finding("W_RASTER", text)))
+    return table.noted(Finding("W_RASTER", text))
 
 
 def _filled(values: Floats) -> Floats:
@@ -225,6 +223,8 @@ def resampled(table: RawTable, name: str, target: Floats, time: Floats, values: 
     """
     if np.any(np.diff(time) <= 0):
         raise table.source.refuse("E_TIME_ORDER", f"the clock of {name!r} stands or runs backwards", "export it again")
+    if name and role_of(name) == "current" and time.size < target.size and not held_current(values)[1]:
+        return np.full(target.shape, held_current(values)[0])  # between its samples there is nothing but noise
     begin, end = float(np.nanmin(target)), float(np.nanmax(target))
     inside = _covered(target, time)
     if np.mean(inside) < _FEWEST_OVERLAP:
@@ -233,8 +233,6 @@ def resampled(table: RawTable, name: str, target: Floats, time: Floats, values: 
             f"{name!r} is recorded from {time[0]:.4g} to {time[-1]:.4g} s, the force from {begin:.4g} to {end:.4g} s",
             "export the channels with one clock",
         )
-    if name and role_of(name) == "current" and time.size < target.size and not held_current(values)[1]:
-        return np.full(target.shape, held_current(values)[0])  # between its samples there is nothing but noise
     resampled_values = np.interp(target, time, values)
     resampled_values[~inside] = np.nan
     return resampled_values

@@ -10,7 +10,7 @@ import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import IO, ClassVar
@@ -20,6 +20,7 @@ import numpy as np
 from mrdamper.data.arrays import Floats
 from mrdamper.errors import InputError, printable
 from mrdamper.rig_files.column_names import Header, split_name
+from mrdamper.rig_files.conditions import Quantity, stated_quantities
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.record import Finding, LineNumbers
 
@@ -137,6 +138,64 @@ class RawTable:
     def headers(self) -> tuple[Header, ...]:
         """Header of every column."""
         return tuple(split_name(name, unit) for name, unit in zip(self.names, self.units, strict=True))
+
+    @property
+    def decimal(self) -> str | None:
+        """The decimal mark, where the form of the text has one."""
+        mark = self.form.get("decimal")
+        return mark if isinstance(mark, str) else None
+
+    @cached_property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Quantities that lines and single numbers beside the columns state."""
+        return tuple(stated_quantities(self.remarks, self.constants, self.decimal))
+
+    def columns(self, role: str | None = None, dimension: str | None = None) -> list[int]:
+        """Return the columns whose name stands for a channel, whose unit is of a dimension, or both."""
+        headers = enumerate(self.headers)
+        return [i for i, h in headers if role in (None, h.role) and (dimension is None or h.dimension == dimension)]
+
+    def try_read(self, *columns: int) -> Mapping[int, Floats] | None:
+        """Return columns; None where one of them cannot be read."""
+        try:
+            return self.read(columns).values
+        except InputError:
+            return None
+
+    def noted(self, *findings: Finding) -> RawTable:
+        """Return the table with further findings."""
+        return replace(self, findings=(*self.findings, *findings))
+
+    def named(self, headings: Mapping[int, tuple[str, str]]) -> RawTable:
+        """Return the table with other names and units of some columns."""
+        both = [headings.get(i, own) for i, own in enumerate(zip(self.names, self.units, strict=True))]
+        return replace(self, names=tuple(name for name, _ in both), units=tuple(unit for _, unit in both))
+
+    def picked(self, columns: Sequence[int], read: Callable[[Sequence[int]], Content]) -> RawTable:
+        """Return some of the columns, in this order, with another way to read them; without titles and words."""
+
+        def pick(entries: tuple[str, ...]) -> tuple[str, ...]:
+            return tuple(entries[i] for i in columns) if entries else ()
+
+        odd = pick(self.odd)
+        return replace(self, names=pick(self.names), units=pick(self.units), odd=odd, over=(), words=None, read=read)
+
+    def computed(self, column: int, needs: Sequence[int], make: Callable[[Mapping[int, Floats]], Floats]) -> RawTable:
+        """Return the table with a column made of the values of others, of its own among them; the next one is added."""
+        inner = self.read
+
+        def read(columns: Sequence[int]) -> Content:
+            if column not in columns:
+                return inner(columns)
+            content = inner(list(dict.fromkeys([*needs, *(i for i in columns if i != column)])))
+            return replace(
+                content, values={i: make(content.values) if i == column else content.values[i] for i in columns}
+            )
+
+        if column < len(self.names):
+            return replace(self, read=read)
+        wider = {key: (*old, "") for key in ("names", "units", "odd", "over") if (old := getattr(self, key))}
+        return replace(self, read=read, words=None, **wider)
 
 
 class Reader(ABC):
