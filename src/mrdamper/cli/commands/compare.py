@@ -92,7 +92,9 @@ def _ranking(rows: list[dict[str, Any]]) -> list[str]:
     """Return the lines of the ranking, best first."""
     from mrdamper.cli.output import aligned
 
-    cells = [("", "model", "per run", "ident.", "CV", "worst", "valid.", "worst", "parameters", "s")]
+    cells: list[tuple[str, ...]] = [
+        ("", "model", "per run", "ident.", "CV", "worst", "valid.", "worst", "parameters", "s")
+    ]
     for row in rows:
         errors = [row[f"{name}_nrmse_pp"] for name in _ERRORS]
         shown = ("–" if error is None else f"{100 * error:.2f}" for error in errors)

@@ -106,7 +106,7 @@ def _print(text: dict[str, Any]) -> None:
     """Print errors and times of the methods, and what became of the paper's claims."""
     from mrdamper.cli.output import aligned, percent
 
-    rows = [("validation runs, nrmse_pp", "median", "worst", "s")]
+    rows: list[tuple[str, ...]] = [("validation runs, nrmse_pp", "median", "worst", "s")]
     for row, took in zip(text["verdicts"], text["times"], strict=False):
         errors = (math.nan if row[name] is None else row[name] for name in ("nrmse_pp", "worst_nrmse_pp"))
         rows.append((row["method"], *map(percent, errors), f"{took['seconds']:.1f}"))
