@@ -68,11 +68,9 @@ def current_of(
         raise ColumnError(printable(str(error)), where=where, remedy=remedy, code=code) from None
     mean = None if channel is None or stated is None else contradicted(channel, stated.amperes)
     if stated is not None and mean is not None:
-        raise ColumnError(
-            printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A"), where=where,
-            remedy="if the channel is right, rename; else leave the channel out of the export",
-            code="E_CURRENT_CONTRADICTS",
-        )  # fmt: skip
+        problem = printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A")
+        remedy = "if the channel is right, rename; else leave the channel out of the export"
+        raise ColumnError(problem, where=where, remedy=remedy, code="E_CURRENT_CONTRADICTS")
     if stated is None or (channel is not None and (source is None or source.pattern is None)):
         return None, {}
     return stated.amperes, {"current_from": as_data(stated.whence)}
@@ -111,11 +109,9 @@ def with_stated_current(record: Record, current: float, whence: str, where: str)
     own = record.provenance.get("current_from", "")
     mean = None if record.current is None else contradicted(record.current, current)
     if mean is not None:
-        raise ColumnError(
-            printable(f"{whence} gives {current:g} A, {record.id} by its {own or 'current channel'} {mean:g} A"),
-            where=printable(where), remedy="correct the one that is wrong, leave it out, or rename the file",
-            code="E_CURRENT_CONTRADICTS",
-        )  # fmt: skip
+        problem = printable(f"{whence} gives {current:g} A, {record.id} by its {own or 'current channel'} {mean:g} A")
+        remedy = "correct the one that is wrong, leave it out, or rename the file"
+        raise ColumnError(problem, where=printable(where), remedy=remedy, code="E_CURRENT_CONTRADICTS")
     if record.current is not None and not own:
         return record
     findings = tuple(finding for finding in record.findings if not finding.text.startswith(NO_CHANNEL))
@@ -131,11 +127,9 @@ def _refuse_contradiction(value: float, channel: Floats | None, statements: list
     others += [f"the current channel gives {mean:g} A"] if not change and contradicts(mean, value) else []
     others += [f"{s.whence} gives {s.amperes:g} A" for s in statements if contradicts(s.amperes, value)]
     if others:
-        raise ColumnError(
-            printable(f"the profile says {value:g} A, {others[0]}"), where=where,
-            remedy="leave [current] out of the profile; if the file is wrong, correct it, or rename it",
-            code="E_CURRENT_CONTRADICTS",
-        )  # fmt: skip
+        problem = printable(f"the profile says {value:g} A, {others[0]}")
+        remedy = "leave [current] out of the profile; if the file is wrong, correct it, or rename it"
+        raise ColumnError(problem, where=where, remedy=remedy, code="E_CURRENT_CONTRADICTS")
 
 
 def _statements(table: RawTable, path: Path) -> list[Statement]:

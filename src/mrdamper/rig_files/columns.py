@@ -267,12 +267,8 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
 
 def _ambiguous(table: RawTable, role: str, names: Sequence[str]) -> RigFileError:
     shown = " and ".join(repr(name) for name in names[:3])
-    return table.source.refuse(
-        "E_AMBIGUOUS",
-        f"{shown} may both be the {role}",
-        f'set [channels.{role}] column = "..." in a profile',
-        line=table.line,
-    )
+    remedy = f'set [channels.{role}] column = "..." in a profile'
+    return table.source.refuse("E_AMBIGUOUS", f"{shown} may both be the {role}", remedy, line=table.line)
 
 
 def _convert(table: RawTable, role: str, column: int, channel: Channel) -> Assigned | None:
@@ -333,13 +329,9 @@ def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> Non
     other = parse_unit(unit)
     if inner is None or other in (None, inner.known) or inner.dimension != DIMENSION[role]:
         return
-    raise table.source.refuse(
-        "E_AMBIGUOUS",
-        f"column {table.names[column]!r} is in {inner.unit} by its name and in {unit} by its row of units",
-        f'set one: [channels.{role}] unit = "..." in a profile',
-        line=table.line,
-        column=column + 1,
-    )
+    problem = f"column {table.names[column]!r} is in {inner.unit} by its name and in {unit} by its row of units"
+    remedy = f'set one: [channels.{role}] unit = "..." in a profile'
+    raise table.source.refuse("E_AMBIGUOUS", problem, remedy, line=table.line, column=column + 1)
 
 
 def _refuse_two_values(table: RawTable, column: int) -> None:
@@ -351,13 +343,9 @@ def _refuse_two_values(table: RawTable, column: int) -> None:
         return
     values = table.try_read(*same)
     if values is None or any(not _agree(values[i], table.headers[i], values[column], own) for i in same):
-        raise table.source.refuse(
-            "E_DUPLICATE_COLUMN",
-            f"{len(same)} columns are called {own.name!r} and differ",
-            "rename one, or set its number: column = 2 in a profile",
-            line=table.line,
-            column=same[1] + 1,
-        )
+        problem = f"{len(same)} columns are called {own.name!r} and differ"
+        remedy = "rename one, or set its number: column = 2 in a profile"
+        raise table.source.refuse("E_DUPLICATE_COLUMN", problem, remedy, line=table.line, column=same[1] + 1)
 
 
 def _second_clock(table: RawTable, time: Assigned) -> list[InputError]:

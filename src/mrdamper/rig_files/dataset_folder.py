@@ -122,18 +122,12 @@ def _load(folder: Path, name: str, *, trusted: bool = False) -> Dataset:
     samples = read_samples(folder, trusted=trusted)
     missing = [row["run_id"] for row in table if row["run_id"] not in samples]
     if missing:
-        raise DatasetError(
-            f"run {missing[0]} has no samples" + (f" (and {len(missing) - 1} more)" if missing[1:] else ""),
-            where=str(folder),
-            remedy="add them, or remove the row from runs.csv",
-        )
+        problem = f"run {missing[0]} has no samples" + (f" (and {len(missing) - 1} more)" if missing[1:] else "")
+        raise DatasetError(problem, where=str(folder), remedy="add them, or remove the row from runs.csv")
     strangers = set(samples) - {row["run_id"] for row in table}
     if strangers:
-        raise DatasetError(
-            f"samples name run {min(strangers)[:80]!r}, which runs.csv does not",
-            where=str(folder),
-            remedy="add a row to runs.csv, or correct the run_id",
-        )
+        problem = f"samples name run {min(strangers)[:80]!r}, which runs.csv does not"
+        raise DatasetError(problem, where=str(folder), remedy="add a row to runs.csv, or correct the run_id")
     path = folder / "runs.csv"
     return Dataset(tuple(run_of(row, samples[row["run_id"]], path) for row in table), name)
 
@@ -259,12 +253,8 @@ def _driven(channels: Channels, number: Callable[[str], float | None], where: st
     if volts is None:
         raise ColumnError("no current_A", where=where, remedy="add the column current_A to runs.csv or to the samples")
     if gain is None:
-        raise ColumnError(
-            "voltage_V without a gain",
-            where=where,
-            remedy="add amperes_per_volt to runs.csv: the amplifier's, or one over the coil's resistance",
-            code="E_DRIVER",
-        )
+        remedy = "add amperes_per_volt to runs.csv: the amplifier's, or one over the coil's resistance"
+        raise ColumnError("voltage_V without a gain", where=where, remedy=remedy, code="E_DRIVER")
     time, limit = channels["time_s"], number("limit_A")
     driver = Driver(
         gain,

@@ -134,12 +134,9 @@ def _refuse_bomb(size: int, path: Path) -> None:
     packed = path.stat().st_size
     most = max(_UNPACKED, _RATIO * packed)
     if size > most:
-        raise DatasetError(
-            f"{packed:,} bytes unpack to over {most:,}",
-            where=str(path),
-            remedy="a test does not compress like that; write the samples again",
-            code="E_ARCHIVE_RATIO",
-        )
+        problem = f"{packed:,} bytes unpack to over {most:,}"
+        remedy = "a test does not compress like that; write the samples again"
+        raise DatasetError(problem, where=str(path), remedy=remedy, code="E_ARCHIVE_RATIO")
 
 
 def _by_run(codes: np.ndarray, labels: tuple[str, ...], channels: Channels) -> dict[str, Channels]:
@@ -161,11 +158,8 @@ def missing_column(column: str, present: list[str], path: Path) -> ColumnError |
     quantity = column.split("_")[0]
     for other in present:
         if other.lower().startswith(quantity) and _UNIT.match(other):
-            return UnitError(
-                f"column {other!r} where {column!r} is expected",
-                where=str(path),
-                remedy="convert it to SI and rename it",
-            )
+            problem = f"column {other!r} where {column!r} is expected"
+            return UnitError(problem, where=str(path), remedy="convert it to SI and rename it")
     shown = ", ".join(name[:40] for name in present[:20])
     return ColumnError(f"column {column} is missing (found {shown})", where=str(path), remedy="add it")
 

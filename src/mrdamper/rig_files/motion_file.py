@@ -89,9 +89,6 @@ def _refuse_gap(time: Floats, path: Path) -> None:
     wide = steps > 5 * np.median(steps) if steps.size else np.zeros(0, dtype=bool)
     if wide.any():
         at = int(np.argmax(wide))
-        raise RunError(
-            f"a gap of {steps[at]:.4g} s after {time[at]:.6g} s",
-            where=str(path),
-            remedy="predict each part separately: the damper's state is unknown after a gap",
-            code="E_TIME_GAP",
-        )
+        problem = f"a gap of {steps[at]:.4g} s after {time[at]:.6g} s"
+        remedy = "predict each part separately: the damper's state is unknown after a gap"
+        raise RunError(problem, where=str(path), remedy=remedy, code="E_TIME_GAP")

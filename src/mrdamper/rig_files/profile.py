@@ -272,11 +272,9 @@ def current_in_name(name: str, profile: Profile) -> float | None:
     other = unit is not None and unit.dimension != "current" and not suffix
     if other or ("unit" not in source.model_fields_set and (unit is None or unit.dimension != "current")):
         what = f"is followed by {behind[1]!r}" if behind and other else "has no unit behind it"
-        raise ProfileError(
-            f"the pattern {source.pattern!r} finds {match['current']}, which {what}: is it a current?", where=name,
-            remedy='correct the pattern, or set [current] unit = "A"' if not other else "correct the pattern",
-            code="E_AMBIGUOUS",
-        )  # fmt: skip
+        problem = f"the pattern {source.pattern!r} finds {match['current']}, which {what}: is it a current?"
+        remedy = 'correct the pattern, or set [current] unit = "A"' if not other else "correct the pattern"
+        raise ProfileError(problem, where=name, remedy=remedy, code="E_AMBIGUOUS")
     stated = "unit" not in source.model_fields_set and unit is not None
     milli = unit.factor < 1 if stated and unit is not None else source.unit == "mA"
     return amperes(match["current"], "mA" if milli else "A")

@@ -84,12 +84,8 @@ def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> R
     """
     records = read_runs(path, profile)
     if len(records) != 1:
-        raise RigFileError(
-            "E_BLOCKS",
-            f"holds {len(records)} tests",
-            file=Path(path).name,
-            remedy='use read_runs, or set blocks = "join" under [file] of a profile',
-        )
+        remedy = 'use read_runs, or set blocks = "join" under [file] of a profile'
+        raise RigFileError("E_BLOCKS", f"holds {len(records)} tests", file=Path(path).name, remedy=remedy)
     return records[0]
 
 

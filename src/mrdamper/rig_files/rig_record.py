@@ -137,11 +137,8 @@ def _refuse_unscaled(table: RawTable, assigned: dict[str, Assigned], raw: dict[i
             continue
         some = raw.get(assigned[role].column, np.empty(0))[:_SAMPLE]
         if some.size and np.array_equal(some, np.round(some), equal_nan=True):
-            raise table.source.refuse(
-                "E_AMBIGUOUS",
-                f"{role} is whole numbers, and {key} is {value:g}: are they scaled?",
-                f"set [channels.{role}] unit and scale in a profile",
-            )
+            problem = f"{role} is whole numbers, and {key} is {value:g}: are they scaled?"
+            raise table.source.refuse("E_AMBIGUOUS", problem, f"set [channels.{role}] unit and scale in a profile")
 
 
 def _refuse_tiny_currents(table: RawTable, assigned: dict[str, Assigned], channels: dict[str, Floats]) -> None:
@@ -151,12 +148,9 @@ def _refuse_tiny_currents(table: RawTable, assigned: dict[str, Assigned], channe
     largest = max((float(np.max(np.abs(piece), initial=0.0, where=np.isfinite(piece)))
                    for _, piece in chunks(channels["current"])), default=0.0)  # fmt: skip
     if 0 < largest < _LEAST_CURRENT:
-        raise table.source.refuse(
-            "E_AMBIGUOUS",
-            f"the current in MA is {1e3 * largest:.3g} at most: milliamperes would be no current of a coil",
-            'set [channels.current] unit = "A" or unit = "mA" in a profile',
-            column=assigned["current"].column + 1,
-        )
+        problem = f"the current in MA is {1e3 * largest:.3g} at most: milliamperes would be no current of a coil"
+        remedy = 'set [channels.current] unit = "A" or unit = "mA" in a profile'
+        raise table.source.refuse("E_AMBIGUOUS", problem, remedy, column=assigned["current"].column + 1)
 
 
 def _integrated(time: Floats, velocity: Floats) -> Floats:

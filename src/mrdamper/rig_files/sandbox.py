@@ -70,11 +70,8 @@ class _Asked:
     def __call__(self, request: dict[str, Any]) -> dict[str, Any]:
         answer = self._sandbox.read(request, self._patience)
         if answer is None and self._sandbox.slain:
-            raise self._source.refuse(
-                "E_READER_KILLED",
-                "the process that reads it was killed from outside, or by a system short of memory",
-                "run the same command again",
-            )
+            problem = "the process that reads it was killed from outside, or by a system short of memory"
+            raise self._source.refuse("E_READER_KILLED", problem, "run the same command again")
         if answer is None:
             raise self._source.refuse(
                 "E_FORMAT",

@@ -80,11 +80,9 @@ class TestsTable:
             if len(fitting) > 1:
                 what = " ".join(filter(None, (row.file, row.run)))
                 shown = ", ".join(sorted("/".join(path.parts[-2:]) for path in fitting)[:4])
-                raise TestsTableError(
-                    f"{what!r} names tests of {len(fitting)} files: {shown}",
-                    where=f"{self.path.name}, line {row.line}",
-                    remedy="write the file with its folder, and one row for each",
-                )  # fmt: skip
+                problem = f"{what!r} names tests of {len(fitting)} files: {shown}"
+                remedy = "write the file with its folder, and one row for each"
+                raise TestsTableError(problem, where=f"{self.path.name}, line {row.line}", remedy=remedy)
         absent = [
             row
             for row in self.rows

@@ -61,11 +61,9 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     if all(_same(motions[0], other) for other in motions) or (held and not all(regular for *_, regular in motions)):
         return whole
     if len(parts) > MOST_TESTS:
-        raise ColumnError(
-            f"rests cut the record into {len(parts)} tests of several conditions, more than {MOST_TESTS}",
-            remedy='export it in parts, or set blocks = "join" under [file] of a profile to keep it whole',
-            code="E_BLOCKS",
-        )
+        problem = f"rests cut the record into {len(parts)} tests of several conditions, more than {MOST_TESTS}"
+        remedy = 'export it in parts, or set blocks = "join" under [file] of a profile to keep it whole'
+        raise ColumnError(problem, remedy=remedy, code="E_BLOCKS")
     return parts
 
 

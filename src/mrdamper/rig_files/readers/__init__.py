@@ -86,11 +86,8 @@ def reader_of(source: Source) -> Reader:
         remedy = f"rename it to {reader.suffixes[0]}" if reader else "rename it to .csv" if text else "export it as CSV"
         if foreign in _PICTURES:
             remedy = "give the numbers it was drawn from"
-        raise source.refuse(
-            "E_FORMAT",
-            f"the name says {named.title if named else source.suffix or 'nothing'}, the content is {is_now}",
-            remedy,
-        )
+        problem = f"the name says {named.title if named else source.suffix or 'nothing'}, the content is {is_now}"
+        raise source.refuse("E_FORMAT", problem, remedy)
     return reader()
 
 

@@ -107,11 +107,8 @@ def check_sizes(source: Source, members: list[zipfile.ZipInfo]) -> None:
 
 def bomb(source: Source) -> RigFileError:
     """Return the refusal of a file that unpacks to too much."""
-    return source.refuse(
-        "E_ARCHIVE_RATIO",
-        f"unpacks to over {MOST_RATIO} times its size, or over {MOST_UNPACKED // 10**9} GB",
-        "give the unpacked file",
-    )
+    problem = f"unpacks to over {MOST_RATIO} times its size, or over {MOST_UNPACKED // 10**9} GB"
+    return source.refuse("E_ARCHIVE_RATIO", problem, "give the unpacked file")
 
 
 def _unzip(source: Source) -> Source:

@@ -239,11 +239,8 @@ def tests_across(shapes: Mapping[str, tuple[int, ...]]) -> tuple[str, ...]:
 def check_unpacked(source: Source, size: int) -> None:
     """Refuse tables that are far larger than their file: E_ARCHIVE_RATIO."""
     if size > RATIO_MATTERS_FROM and (size > MOST_RATIO * source.size or size > 10 * MOST_UNPACKED):
-        raise source.refuse(
-            "E_ARCHIVE_RATIO",
-            f"{size / 1e6:.0f} MB of numbers in a file of {source.size / 1e6:.3g} MB",
-            "export only the channels and the time needed",
-        )
+        problem = f"{size / 1e6:.0f} MB of numbers in a file of {source.size / 1e6:.3g} MB"
+        raise source.refuse("E_ARCHIVE_RATIO", problem, "export only the channels and the time needed")
 
 
 def load(library: str, title: str) -> ModuleType:

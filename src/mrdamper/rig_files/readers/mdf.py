@@ -66,11 +66,8 @@ def _table(source: Source, file: Any, places: list, title: str, *, fallback: boo
         name, _, group, index = places[column]
         signal = file.get(name, group=group, index=index, ignore_invalidation_bits=True)
         if stamps and not any(np.array_equal(signal.timestamps, other) for other in stamps.values()):
-            raise source.refuse(
-                "E_RASTER",
-                f"channel {name!r} is recorded at other times than the others",
-                "export the channels with one raster",
-            )
+            problem = f"channel {name!r} is recorded at other times than the others"
+            raise source.refuse("E_RASTER", problem, "export the channels with one raster")
         stamps[group] = signal.timestamps
         samples = np.asarray(signal.samples)
         invalid = getattr(signal, "invalidation_bits", None)

@@ -74,11 +74,8 @@ def _check_headers(source: Source) -> dict[str, tuple[str, ...]]:
                 read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
                 shape, _, dtype = read(stream)
             if dtype.hasobject:
-                raise source.refuse(
-                    "E_UNSAFE",
-                    f"array {name!r} holds pickled objects, which run code when loaded",
-                    "save plain arrays of numbers",
-                )
+                problem = f"array {name!r} holds pickled objects, which run code when loaded"
+                raise source.refuse("E_UNSAFE", problem, "save plain arrays of numbers")
             if int(np.prod(shape, dtype=object)) * dtype.itemsize > member.file_size:
                 raise damaged(source, Npz.title, f"array {name!r} is incomplete")
             if dtype.names:

@@ -66,11 +66,8 @@ def _table(source: Source, group: Any, properties: dict[str, Any], title: str) -
     timed = any(name.casefold().startswith(("time", "zeit")) for name in names)
     if not timed and (len(steps) > 1 or len(begins) > 1):
         what = "steps" if len(steps) > 1 else "starts"
-        raise source.refuse(
-            "E_RASTER",
-            f"the channels of group {group.name!r} have different {what} of time",
-            "export them with one clock",
-        )
+        problem = f"the channels of group {group.name!r} have different {what} of time"
+        raise source.refuse("E_RASTER", problem, "export them with one clock")
     step = next(iter(steps), None)
     wave = step is not None and len(sizes) == 1 and not timed
     if wave:

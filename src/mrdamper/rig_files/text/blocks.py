@@ -67,12 +67,9 @@ def _units_below(stream: TextStream, layout: Layout, start: int, header_line: in
             break
         units = units_in(text, layout)
         if units and units != layout.units:
-            raise stream.source.refuse(
-                "E_AMBIGUOUS",
-                f"the block from here on is in {', '.join(units)}, the first is in {', '.join(layout.units)}",
-                "split the file here, or export all blocks in one set of units",
-                line=header_line,
-            )
+            problem = f"the block from here on is in {', '.join(units)}, the first is in {', '.join(layout.units)}"
+            remedy = "split the file here, or export all blocks in one set of units"
+            raise stream.source.refuse("E_AMBIGUOUS", problem, remedy, line=header_line)
         size, lines = size + len(raw), lines + 1
     return size, lines
 

@@ -82,12 +82,9 @@ def field_count(form: RowFormat, fields: int, line: int, final: bool) -> RigFile
     """Return the refusal of a row with another number of cells than the others."""
     width = form.layout.width
     if final and fields < width:
-        return form.stream.source.refuse(
-            "E_TRUNCATED",
-            f"the file ends inside a row: {fields} of {width} fields",
-            "copy or export the file again, or remove the last line",
-            line=line,
-        )
+        problem = f"the file ends inside a row: {fields} of {width} fields"
+        remedy = "copy or export the file again, or remove the last line"
+        return form.stream.source.refuse("E_TRUNCATED", problem, remedy, line=line)
     comma = fields > width and form.layout.separator == ","
     return form.stream.source.refuse(
         "E_FIELD_COUNT",
@@ -166,13 +163,9 @@ def _stamps(cells: Sequence[str], column: int, lines: Sequence[int], form: RowFo
             continue
         form.first = form.first or read
         if read[1] != form.first[1]:
-            raise form.stream.source.refuse(
-                "E_AMBIGUOUS",
-                "time stamps with and without a time zone",
-                "export all stamps with their offset, or none",
-                line=lines[i],
-                column=column + 1,
-            )
+            problem = "time stamps with and without a time zone"
+            remedy = "export all stamps with their offset, or none"
+            raise form.stream.source.refuse("E_AMBIGUOUS", problem, remedy, line=lines[i], column=column + 1)
         values[i] = (read[0] - form.first[0]) / 1e9
     return values
 

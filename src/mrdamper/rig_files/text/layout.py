@@ -429,19 +429,12 @@ def _decimal(rows: Sequence[Sequence[str]], source: Source, first: int) -> str:
     if len(commas) <= few:
         return "."  # the strict reader refuses the few others, with their place
     if len(dots) > few:
-        raise source.refuse(
-            "E_AMBIGUOUS",
-            f"{dots[0]!r} beside {commas[0]!r}: point or comma for decimals?",
-            "write one decimal mark throughout, without separators of thousands",
-            line=first + 1,
-        )
+        problem = f"{dots[0]!r} beside {commas[0]!r}: point or comma for decimals?"
+        remedy = "write one decimal mark throughout, without separators of thousands"
+        raise source.refuse("E_AMBIGUOUS", problem, remedy, line=first + 1)
     if all(_GROUPED.fullmatch(c) for c in commas):
-        raise source.refuse(
-            "E_AMBIGUOUS",
-            f"{commas[0]!r} may be a decimal comma or thousands",
-            'say decimal = "," or decimal = "." under [file] of a profile',
-            line=first + 1,
-        )
+        remedy = 'say decimal = "," or decimal = "." under [file] of a profile'
+        raise source.refuse("E_AMBIGUOUS", f"{commas[0]!r} may be a decimal comma or thousands", remedy, line=first + 1)
     return ","
 
 

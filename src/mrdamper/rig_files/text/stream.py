@@ -108,12 +108,9 @@ class TextStream:
         at = block.index(strange[:1])
         line += block.count(b"\n", 0, at)
         if 0 in strange:
-            raise self.source.refuse(
-                "E_NUL",
-                "zero bytes in the text",
-                "export the file again: it was damaged while it was written or copied",
-                line=line + block.count(b"\n", at, block.index(0)),
-            )
+            problem = "zero bytes in the text"
+            remedy = "export the file again: it was damaged while it was written or copied"
+            raise self.source.refuse("E_NUL", problem, remedy, line=line + block.count(b"\n", at, block.index(0)))
         raise self.source.refuse(
             "E_ENCODING", f"byte 0x{strange[0]:02X}, which no text holds", "export the file again as text", line=line
         )
@@ -145,12 +142,8 @@ def open_text(source: Source, form: FileForm) -> TextStream:
 
 def too_long(source: Source, line: int | None) -> RigFileError:
     """Return the refusal of an endless line."""
-    return source.refuse(
-        "E_LINE_TOO_LONG",
-        f"a line over {LONGEST_LINE // 1024} KiB",
-        "write one sample a line; is this a text file?",
-        line=line,
-    )
+    problem = f"a line over {LONGEST_LINE // 1024} KiB"
+    return source.refuse("E_LINE_TOO_LONG", problem, "write one sample a line; is this a text file?", line=line)
 
 
 def _encoding(source: Source, head: bytes, form: FileForm) -> tuple[str, int]:
@@ -212,12 +205,9 @@ def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[IO[bytes], int]:
         try:
             text = carry + decoder.decode(block)
         except UnicodeDecodeError as error:
-            raise source.refuse(
-                "E_ENCODING",
-                f"bytes that are no {encoding} ({error.reason})",
-                "export the file again, as UTF-8 if you can choose",
-                line=line,
-            ) from error
+            problem = f"bytes that are no {encoding} ({error.reason})"
+            remedy = "export the file again, as UTF-8 if you can choose"
+            raise source.refuse("E_ENCODING", problem, remedy, line=line) from error
         carry = "\r" if block and text.endswith("\r") else ""
         text = text[: len(text) - len(carry)].replace("\r\n", "\n").replace("\r", "\n")
         line += text.count("\n")
