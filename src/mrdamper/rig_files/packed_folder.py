@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-import stat
 import tarfile
 import zipfile
-import zlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import IO
@@ -18,9 +16,10 @@ from mrdamper.rig_files.readers.archive import (
     as_it_is,
     bomb,
     check_member,
-    check_sizes,
+    files_among,
     is_junk,
     opened,
+    zip_members,
 )
 from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RigFileError, Source
 
@@ -53,13 +52,9 @@ def is_packed_folder(path: Path) -> bool:
         return False
     try:
         with zipfile.ZipFile(path) as archive:
-            return len(_members(archive.infolist())) > 1
+            return len(files_among(archive.infolist())) > 1
     except UNREADABLE_ZIP:
         return False
-
-
-def _members(members: list[zipfile.ZipInfo]) -> list[zipfile.ZipInfo]:
-    return [member for member in members if not member.is_dir() and not is_junk(member.filename)]
 
 
 def _folder_of(path: Path, stack: contextlib.ExitStack) -> Path:
@@ -76,23 +71,11 @@ def _folder_of(path: Path, stack: contextlib.ExitStack) -> Path:
 
 
 def _unzip(source: Source, top: Path) -> None:
-    try:
-        with zipfile.ZipFile(source.file) as archive:
-            everything = archive.infolist()
-            for member in everything:
-                check_member(source, member.filename, link=stat.S_ISLNK(member.external_attr >> 16))
-            members = _members(everything)
-            check_sizes(source, members)
-            if any(member.flag_bits & 1 for member in members):
-                raise source.refuse("E_ARCHIVE", "a member is encrypted", "unpack it first")
-            room = _Room(source, top)
-            for member in members:
-                with archive.open(member) as stream:
-                    room.write(member.filename, stream)
-    except RigFileError:
-        raise
-    except (*UNREADABLE_ZIP, RuntimeError, EOFError, zlib.error) as error:
-        raise source.refuse("E_ARCHIVE", f"damaged or unusual archive ({error})", "pack it again") from error
+    with zip_members(source) as (archive, members):
+        room = _Room(source, top)
+        for member in members:
+            with archive.open(member) as stream:
+                room.write(member.filename, stream)
 
 
 def _untar(source: Source, top: Path) -> None:

@@ -112,12 +112,28 @@ def bomb(source: Source) -> RigFileError:
 
 
 def _unzip(source: Source) -> Source:
+    with zip_members(source) as (archive, members):
+        if len(members) != 1:
+            remedy = "read it as a folder: mrdamper import, or unpack it first"
+            raise source.refuse("E_ARCHIVE", f"{len(members)} members", remedy)
+        inner, packed = members[0].filename, max(1, members[0].compress_size)
+        with archive.open(members[0]) as stream:
+            file, size = _unpacked(source, iter(lambda: stream.read(_PIECE), b""), packed)
+    return Source(source.path, f"{source.name}:{inner}", PurePosixPath(inner).suffix.lower(), file, size, source.keep)
+
+
+@contextlib.contextmanager
+def zip_members(source: Source) -> Iterator[tuple[zipfile.ZipFile, list[zipfile.ZipInfo]]]:
+    """Yield a zip and the files in it, once their names and sizes are checked; refuse what cannot be read of them."""
     try:
         with zipfile.ZipFile(source.file) as archive:
-            member = _one_member(source, archive.infolist())
-            check_sizes(source, [member])
-            with archive.open(member) as stream:
-                file, size = _unpacked(source, iter(lambda: stream.read(_PIECE), b""), max(1, member.compress_size))
+            for member in archive.infolist():
+                check_member(source, member.filename, link=stat.S_ISLNK(member.external_attr >> 16))
+            members = files_among(archive.infolist())
+            if any(member.flag_bits & 1 for member in members):
+                raise source.refuse("E_ARCHIVE", "a member is encrypted", "unpack it first")
+            check_sizes(source, members)
+            yield archive, members
     except RigFileError:
         raise
     except EOFError as error:
@@ -128,21 +144,11 @@ def _unzip(source: Source) -> Source:
         if isinstance(error, zipfile.BadZipFile) and directory not in source.file.read(70_000):
             raise _cut(source) from error
         raise source.refuse("E_ARCHIVE", f"damaged or unusual archive ({error})", "pack it again") from error
-    inner = member.filename
-    return Source(source.path, f"{source.name}:{inner}", PurePosixPath(inner).suffix.lower(), file, size, source.keep)
 
 
-def _one_member(source: Source, members: list[zipfile.ZipInfo]) -> zipfile.ZipInfo:
-    for member in members:
-        check_member(source, member.filename, link=stat.S_ISLNK(member.external_attr >> 16))
-    files = [member for member in members if not member.is_dir() and not is_junk(member.filename)]
-    if len(files) != 1:
-        raise source.refuse(
-            "E_ARCHIVE", f"{len(files)} members", "read it as a folder: mrdamper import, or unpack it first"
-        )
-    if files[0].flag_bits & 1:
-        raise source.refuse("E_ARCHIVE", "the member is encrypted", "unpack it first")
-    return files[0]
+def files_among(members: Iterable[zipfile.ZipInfo]) -> list[zipfile.ZipInfo]:
+    """Return the members of a zip that are files, without those that systems add."""
+    return [member for member in members if not member.is_dir() and not is_junk(member.filename)]
 
 
 def is_junk(name: str) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -268,6 +268,19 @@ def refusing_damage(source: Source, title: str) -> Iterator[None]:
         raise
     except BaseException as error:  # a library's panic is no Exception
         raise damaged(source, title, str(error)) from error
+
+
+def stated_array(source: Source, file: IO[bytes], what: str, size: int) -> tuple[tuple[int, ...], np.dtype]:
+    """Shape and type of a NumPy array by its header; one of objects is refused, and one that the bytes do not hold."""
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, kind = read(file)
+    if kind.hasobject:
+        problem = f"{what} holds pickled objects, which run code when loaded"
+        raise source.refuse("E_UNSAFE", problem, "save plain arrays of numbers")
+    if math.prod(shape) * kind.itemsize > size:
+        raise damaged(source, "NumPy file", f"{what} is incomplete")
+    return shape, kind
 
 
 def twice(source: Source, name: str) -> RigFileError:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, damaged, expand, pick, refusing_damage
+from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, expand, pick, refusing_damage, stated_array
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 
 
@@ -24,15 +26,8 @@ class Npy(Reader):
         """Return the one table."""
         with refusing_damage(source, self.title):
             source.file.seek(0)
-            version = np.lib.format.read_magic(source.file)
-            read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-            shape, _, dtype = read(source.file)
-        if dtype.hasobject:
-            raise source.refuse("E_UNSAFE", "pickled objects, which run code when loaded", "save plain numbers")
-        size = int(np.prod(shape, dtype=object)) * dtype.itemsize
-        if size > source.size:
-            raise damaged(source, self.title, "the array is incomplete")
-        check_unpacked(source, size)
+            shape, dtype = stated_array(source, source.file, "the array", source.size)
+        check_unpacked(source, math.prod(shape) * dtype.itemsize)
         with refusing_damage(source, self.title):
             source.file.seek(0)
             array = np.lib.format.read_array(source.file, allow_pickle=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_arrays, zipped_names
-from mrdamper.rig_files.readers.arrays import damaged, refusing_damage, twice
+from mrdamper.rig_files.readers.arrays import damaged, refusing_damage, stated_array, twice
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 
@@ -70,14 +70,7 @@ def _check_headers(source: Source) -> dict[str, tuple[str, ...]]:
             raise twice(source, next(name for name in names if names.count(name) > 1))
         for member, name in zip(members, names, strict=True):
             with archive.open(member) as stream:
-                version = np.lib.format.read_magic(stream)
-                read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-                shape, _, dtype = read(stream)
-            if dtype.hasobject:
-                problem = f"array {name!r} holds pickled objects, which run code when loaded"
-                raise source.refuse("E_UNSAFE", problem, "save plain arrays of numbers")
-            if int(np.prod(shape, dtype=object)) * dtype.itemsize > member.file_size:
-                raise damaged(source, Npz.title, f"array {name!r} is incomplete")
+                _, dtype = stated_array(source, stream, f"array {name!r}", member.file_size)
             if dtype.names:
                 fields[name] = dtype.names
     return fields
