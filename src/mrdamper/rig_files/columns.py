@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -48,27 +49,10 @@ class Assigned:
 
 
 def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
-    """Find the channels of a table.
+    """Find the channels of a table, all the required ones among them; the profile wins over what the names say.
 
-    Parameters
-    ----------
-    table : RawTable
-    profile : Profile
-        Wins over what the names say.
-
-    Returns
-    -------
-    dict
-        `Assigned` by channel; the required ones are all there.
-
-    Raises
-    ------
-    ColumnError
-        E_COLUMN if a channel is not there or two may be it.
-    UnitError
-        E_UNITS_MISSING, E_UNITS_DIMENSION.
-    RigFileError
-        E_DUPLICATE_COLUMN if columns of one name differ.
+    Raises `ColumnError` if a channel is not there or two may be it, `UnitError`, its code E_UNITS_MISSING or
+    E_UNITS_DIMENSION, and `RigFileError`, E_DUPLICATE_COLUMN, if columns of one name differ.
     """
     columns: dict[str, int] = {}
     problems: list[InputError] = []
@@ -114,16 +98,17 @@ def partly_assigned(table: RawTable, profile: Profile) -> dict[str, Assigned]:
     """Return the channels of a table that is no whole test, as far as they are known beyond doubt."""
     assigned: dict[str, Assigned] = {}
     for role in ROLES:
-        try:
-            stated = profile.channel(role).column
-            column = _choose(table, role, [e.column for e in assigned.values()]) if stated is None else None
-            column = column_called(table, stated, role) if stated is not None else column
-            entry = None if column is None else _convert(table, role, column, profile.channel(role))
-        except InputError:
-            continue
-        if entry is not None:
-            assigned[role] = entry
+        with contextlib.suppress(InputError):
+            column = _stated_or_chosen(table, role, profile, [e.column for e in assigned.values()])
+            if column is not None and (entry := _convert(table, role, column, profile.channel(role))) is not None:
+                assigned[role] = entry
     return assigned
+
+
+def _stated_or_chosen(table: RawTable, role: str, profile: Profile, taken: Collection[int]) -> int | None:
+    """Return the column of a channel by the profile, else by its name and unit."""
+    stated = profile.channel(role).column
+    return _choose(table, role, taken) if stated is None else column_called(table, stated, role)
 
 
 def rate_of(table: RawTable, profile: Profile) -> float | None:
@@ -154,9 +139,8 @@ def left_out(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]
     for role in OPTIONAL:
         if role in assigned or (role == "current" and profile.current and not profile.current.values):
             continue
-        stated = profile.channel(role).column
         try:
-            column = _choose(table, role, taken) if stated is None else column_called(table, stated, role)
+            column = _stated_or_chosen(table, role, profile, taken)
         except ColumnError as error:
             reasons[role] = error.found
             continue
@@ -169,30 +153,21 @@ def left_out(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]
 
 def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
     """Column and unit of every channel as far as the file says them, for a profile to be completed."""
-    proposed: dict[str, tuple[int | None, str]] = {}
-    taken: set[int] = set()
+    proposed: dict[str, tuple[int | None, str]] = {role: (None, "") for role in REQUIRED}
     for role in ROLES:
-        try:
-            choice = _choose(table, role, taken)
-        except InputError:
-            choice = None
-        if choice is not None:
-            taken.add(choice)
-            header = table.headers[choice]
-            proposed[role] = choice, header.unit if header.dimension == DIMENSION[role] else ""
-        elif role in REQUIRED:
-            proposed[role] = None, ""
+        with contextlib.suppress(InputError):
+            choice = _choose(table, role, [column for column, _ in proposed.values() if column is not None])
+            if choice is not None:
+                header = table.headers[choice]
+                proposed[role] = choice, header.unit if header.dimension == DIMENSION[role] else ""
     return proposed
 
 
 def candidates_of(table: RawTable, role: str) -> list[int]:
     """Return the columns that may be a channel: the one its name tells, else all of its unit that name nothing else."""
-    try:
-        choice = _choose(table, role, ())
-    except InputError:
-        choice = None
-    if choice is not None:
-        return [choice]
+    with contextlib.suppress(InputError):
+        if (choice := _choose(table, role, ())) is not None:
+            return [choice]
     nameless = [i for i in table.columns(dimension=DIMENSION[role]) if says_nothing(table.headers[i].name)]
     return table.columns(role, DIMENSION[role]) or nameless
 

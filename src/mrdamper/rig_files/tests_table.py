@@ -16,6 +16,7 @@ from mrdamper.rig_files.coil_current import with_stated_current
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import LARGEST_STATED
 from mrdamper.rig_files.record import Record
+from mrdamper.rig_files.text.short import decoded
 from mrdamper.rig_files.units import parse_unit
 
 NAME = "tests.csv"
@@ -180,11 +181,9 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
             content = file.read(_LARGEST + 1)  # no more, whatever it is
         if len(content) > _LARGEST:
             raise TestsTableError("over 4 MiB", where=path.name, remedy="is this a table of tests?")
-        text = _decoded(content)
+        text = decoded(content)
     except OSError as error:
         raise TestsTableError(error.strerror or str(error), where=str(path), remedy="give a CSV file") from error
-    except UnicodeDecodeError as error:
-        raise TestsTableError("is no text", where=path.name, remedy="save it as CSV UTF-8") from error
     first = text.split("\n", 1)[0]
     separator = max(";\t,", key=first.count)
     try:
@@ -200,16 +199,6 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
     if len(rows) < 2:
         raise TestsTableError("no rows", where=path.name, remedy=f"write one row a test: {', '.join(COLUMNS)}")
     return rows
-
-
-def _decoded(content: bytes) -> str:
-    """UTF-8, UTF-16 with its mark, or what spreadsheets write without being asked."""
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return content.decode("utf-16")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("cp1252")
 
 
 def _key(name: str) -> str:

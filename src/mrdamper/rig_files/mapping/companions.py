@@ -26,10 +26,10 @@ from mrdamper.rig_files.readers.arrays import array_table
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding, Record
 from mrdamper.rig_files.rig_record import records_of
+from mrdamper.rig_files.text.short import short_lines
 from mrdamper.rig_files.text.spool import rescale
 
 _FEWEST_ROWS = 50  # of a record
-_LARGEST_TEXT = 2**18  # bytes
 _TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log")
 _CODE = re.compile(r"\s*([A-Za-z]{1,6}[0-9]{1,3})\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")
 _SI = {"time": "s", "displacement": "m", "force": "N", "velocity": "m/s", "acceleration": "m/s2", "current": "A",
@@ -148,27 +148,14 @@ def _arrays(table: RawTable) -> list[Floats]:
 
 def results_of(path: Path) -> Results | None:
     """Return the table of results that a file holds; None if it holds none."""
+    if path.suffix.lower() in _TEXTS:
+        return results_in(short_lines(path))
     try:
-        if path.suffix.lower() in _TEXTS:
-            with path.open("rb") as file:
-                content = file.read(_LARGEST_TEXT + 1)
-            if len(content) > _LARGEST_TEXT:
-                return None
-            return results_in(_decoded(content).splitlines())
         with raw_tables(path) as tables:
             tables_of_results = [results for table in tables[:20] if (results := results_in(lines_of(table)))]
             return tables_of_results[0] if len(tables_of_results) == 1 else None
-    except (InputError, OSError, UnicodeError):
+    except InputError:
         return None
-
-
-def _decoded(content: bytes) -> str:
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return content.decode("utf-16")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("cp1252")
 
 
 def with_results_of(pending: Sequence[tuple[Path, Record]], results: Results, path: Path) -> list[Record] | None:
@@ -207,9 +194,8 @@ def with_legend_of(pending: Sequence[tuple[Path, Record]], path: Path) -> list[R
 
     None unless the name of every file holds one of the codes, between separators.
     """
-    if path.suffix.lower() not in _TEXTS or path.stat().st_size > _LARGEST_TEXT:
-        return None
-    matches = [match for line in _decoded(path.read_bytes()).splitlines() if (match := _CODE.match(line))]
+    lines = short_lines(path) if path.suffix.lower() in _TEXTS else []
+    matches = [match for line in lines if (match := _CODE.match(line))]
     codes = {match[1].casefold(): amperes(match[2], match[3]) for match in matches}
     if len(codes) < 2 or len(codes) < len(matches):
         return None

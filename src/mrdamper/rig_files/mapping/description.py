@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 from mrdamper.rig_files.conditions import stated_by_lines
 from mrdamper.rig_files.mapping.completion import scaled_columns, states_scale
 from mrdamper.rig_files.readers.base import RawTable
+from mrdamper.rig_files.text.short import short_lines
 from mrdamper.rig_files.units import is_unit
 
 _LARGEST = 2**16  # bytes
@@ -29,18 +30,16 @@ def with_notes(table: RawTable, path: Path) -> RawTable:
     if not scaled_columns(table):
         return table
     texts = sorted(p for p in path.parent.iterdir() if _README.fullmatch(p.name) and p.is_file() and p != path)
-    lines = []
-    for text in texts:
-        if text.suffix.lower() in ("", ".txt", ".md", ".rst") and text.stat().st_size <= _LARGEST:
-            lines += text.read_bytes().decode("utf-8-sig", "replace").splitlines()
-    return replace(table, remarks=(*table.remarks, *(line for line in lines if states_scale(line))))
+    texts = [text for text in texts if text.suffix.lower() in ("", ".txt", ".md", ".rst")]
+    lines = [line for text in texts for line in short_lines(text) if states_scale(line)]
+    return replace(table, remarks=(*table.remarks, *lines))
 
 
 def with_description(table: RawTable, path: Path) -> RawTable:
     """Return the table with what the XML file of its name, or the only other file of its folder, states."""
     other = _only_other(path)
     if other is not None and is_description(other):
-        return replace(table, remarks=(*table.remarks, *_decoded(other).splitlines()))
+        return replace(table, remarks=(*table.remarks, *short_lines(other)))
     elements = _elements(path, other)
     if not elements:
         return table
@@ -66,15 +65,8 @@ def _unit(attributes: dict[str, str]) -> str:
 
 def is_description(path: Path) -> bool:
     """Tell if a file is a short text that states quantities, and no record: Coil_Current, 0.5, A."""
-    if path.suffix.lower() not in _TEXTS or not path.is_file() or path.stat().st_size > _LARGEST:
-        return False
-    lines = [line for line in _decoded(path).splitlines() if line.strip()]
-    return len(lines) < _FEWEST_ROWS and bool(stated_by_lines(lines, "."))
-
-
-def _decoded(path: Path) -> str:
-    content = path.read_bytes()
-    return content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig", "replace")
+    lines = short_lines(path) if path.suffix.lower() in _TEXTS and path.is_file() else []
+    return sum(bool(line.strip()) for line in lines) < _FEWEST_ROWS and bool(stated_by_lines(lines, "."))
 
 
 def _only_other(path: Path) -> Path | None:

@@ -102,7 +102,7 @@ def array_table(
     def words(column: int) -> Words:
         with refusing_damage(source, title):
             array = np.asarray(load(column))
-        return words_of([_word(item) for item in array.reshape(-1).tolist()])
+        return words_of([text_of(item) for item in array.reshape(-1).tolist()])
 
     return RawTable(
         source, tuple(names), tuple(units), read, label=label, fallback=fallback, constants=constants or {},
@@ -117,7 +117,8 @@ def words_of(cells: Sequence[str]) -> Words:
     return Words(codes, tuple(indices))
 
 
-def _word(item: object) -> str:
+def text_of(item: object) -> str:
+    """Return one item of an array or an attribute as text."""
     if isinstance(item, bytes):
         return item.decode("utf-8", "replace").strip()
     return f"{item:g}" if isinstance(item, float) else str(item).strip()
@@ -207,7 +208,7 @@ def counts_of(says: Mapping[str, Any]) -> tuple[float, float] | None:
 def _formula_of(says: Mapping[str, Any]) -> tuple[float, float] | None:
     """Factor and offset of whole numbers whose conversion a text states: physical = raw * gain + offset."""
     texts = [
-        _word(np.reshape(value, -1)[0])
+        text_of(np.reshape(value, -1)[0])
         for value in says.values()
         if np.asarray(value).dtype.kind in "SUO" and np.size(value) == 1
     ]

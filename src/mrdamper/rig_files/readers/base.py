@@ -204,6 +204,7 @@ class Reader(ABC):
     name: ClassVar[str]
     title: ClassVar[str]
     suffixes: ClassVar[tuple[str, ...]]
+    marks: ClassVar[tuple[bytes, ...]] = ()  # with which files of the format begin
     binary: ClassVar[bool] = True
     library: ClassVar[str] = ""  # that damaged files can crash or hang: read in a process of its own
     seconds_per_byte: ClassVar[float] = 4e-7  # it may take there
@@ -212,9 +213,9 @@ class Reader(ABC):
         """Start what the library starts once, such as threads, before a file's share of memory is counted."""
         return
 
-    @abstractmethod
     def recognises(self, source: Source) -> bool:
-        """Tell if the content, not the name, is of this format."""
+        """Tell if the content, not the name, is of this format: by its mark, unless a reader knows more."""
+        return source.head(16).startswith(self.marks)
 
     @abstractmethod
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:

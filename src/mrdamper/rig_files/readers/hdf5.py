@@ -11,7 +11,15 @@ import numpy as np
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_clock
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import Stored, check_unpacked, counts_of, load, refusing_damage, unpacked
+from mrdamper.rig_files.readers.arrays import (
+    Stored,
+    check_unpacked,
+    counts_of,
+    load,
+    refusing_damage,
+    text_of,
+    unpacked,
+)
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 from mrdamper.rig_files.units import is_unit
@@ -34,10 +42,7 @@ class Hdf5(Reader):
     title = "HDF5"
     suffixes = (".h5", ".hdf5", ".hdf", ".he5", ".nxs", ".nc")
     library = "h5py"
-
-    def recognises(self, source: Source) -> bool:
-        """By the mark at the start."""
-        return source.head(8) == HDF5_MARK
+    marks = (HDF5_MARK,)
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a group of datasets, and one of all together if no group holds a test."""
@@ -51,10 +56,7 @@ def hdf5_tables(source: Source, title: str) -> list[RawTable]:
         file = h5py.File(source.path, "r")
         source.keep.callback(file.close)
         tree = _Walk(source).group(file, 0)
-    tables = nested_tables(source, tree, title, together=True)
-    if not tables:
-        raise source.refuse("E_NO_DATA", "no array of numbers", "save the channels as arrays of numbers")
-    return tables
+    return nested_tables(source, tree, title, together=True)
 
 
 class _Walk:
@@ -226,4 +228,4 @@ def _words(values: Any) -> list[str]:
 def _text(value: object) -> str:
     if isinstance(value, np.ndarray):
         value = value.reshape(-1)[0] if value.size else ""
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value or "")
+    return text_of(value or "")

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import damaged, twice
-from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, RigFileError, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 from mrdamper.rig_files.text.tokens import stamp
 
@@ -41,11 +41,16 @@ class Json(Reader):
         if isinstance(tree, Mapping) and _SAVED_MODEL in map(str, tree.values()):
             remedy = "give it to mrdamper predict, validate or export; tests are what import reads"
             raise NoTableError("E_FORMAT", "a saved model", file=source.name, remedy=remedy)
-        tables = nested_tables(source, tree if isinstance(tree, Mapping) else {"": tree}, self.title)
-        if not any(len(table.names) > 1 for table in tables):
-            remedy = "export it as CSV, or the samples of every channel as a list"
-            raise NoTableError("E_FORMAT", "JSON without lists of numbers", file=source.name, remedy=remedy)
-        return tables
+        try:
+            tables = nested_tables(source, tree if isinstance(tree, Mapping) else {"": tree}, self.title)
+        except RigFileError as error:
+            if error.code != "E_NO_DATA":
+                raise
+            tables = []
+        if any(len(table.names) > 1 for table in tables):
+            return tables
+        remedy = "export it as CSV, or the samples of every channel as a list"
+        raise NoTableError("E_FORMAT", "JSON without lists of numbers", file=source.name, remedy=remedy)
 
 
 def _parsed(source: Source, content: bytes) -> Any:

@@ -51,14 +51,8 @@ class Matlab(Reader):
             )
         others = [name for name, _, kind in variables if kind in _OBJECTS]
         tree = {name: _tree(values[name]) for name in wanted if name in values}
-        tables = nested_tables(source, tree, self.title)
-        if not tables:
-            code, what = ("E_UNSAFE", f"only objects ({others[0]})") if others else ("E_NO_DATA", "no array of numbers")
-            raise source.refuse(code, what, "save the channels as arrays of numbers")
-        if others:  # refused if one is asked for
-            objects = {name: np.empty(2, dtype=object) for name in others}
-            tables = nested_tables(source, {**tree, **objects}, self.title)
-        return tables
+        objects = {name: np.empty(2, dtype=object) for name in others}  # refused if one is asked for
+        return nested_tables(source, {**tree, **objects}, self.title)
 
 
 def _tree(value: Any, depth: int = 0) -> Any:

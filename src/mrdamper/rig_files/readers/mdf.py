@@ -20,10 +20,7 @@ class Mdf(Reader):
     title = "MDF"
     suffixes = (".mf4", ".mdf", ".mf3")
     library = "asammdf"
-
-    def recognises(self, source: Source) -> bool:
-        """By the mark at the start, also of a file that was not closed."""
-        return source.head(8) in (b"MDF     ", b"UnFinMF ")
+    marks = (b"MDF     ", b"UnFinMF ")  # the second of a file that was not closed
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """Return the groups as tables."""

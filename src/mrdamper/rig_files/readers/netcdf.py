@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import check_unpacked, refusing_damage, unpacked
+from mrdamper.rig_files.readers.arrays import check_unpacked, refusing_damage, text_of, unpacked
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 
@@ -19,10 +19,7 @@ class NetCdf(Reader):
     title = "classic netCDF"
     suffixes = (".nc", ".cdf")
     library = "scipy.io"
-
-    def recognises(self, source: Source) -> bool:
-        """By the mark at the start."""
-        return source.head(4) in (b"CDF\x01", b"CDF\x02")
+    marks = (b"CDF\x01", b"CDF\x02")
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """Return one table, or one a test where rows are tests: single numbers and attributes stand beside it."""
@@ -38,22 +35,15 @@ class NetCdf(Reader):
                 for name, variable in file.variables.items()
                 if variable.shape == () and np.asarray(variable.data).dtype.kind in "iuf"
             }
-            says = {name: _text(value) for name, value in file._attributes.items()}
+            says = {name: text_of(value) for name, value in file._attributes.items()}
             columns = {
                 name: unpacked(v._attributes, np.array(v[:]).astype(v[:].dtype.newbyteorder("=")))
                 for name, v in arrays.items()
             }
         units = {name: _unit_of(variable) for name, variable in arrays.items()}
-        tables = nested_tables(source, {**says, **columns, **single, "units": units}, self.title)
-        if not tables:
-            raise source.refuse("E_NO_DATA", "no array of numbers", "export the file again")
-        return tables
+        return nested_tables(source, {**says, **columns, **single, "units": units}, self.title)
 
 
 def _unit_of(variable: Any) -> str:
     """Return the unit of a variable: that of a time is followed by the date it counts from."""
-    return _text(getattr(variable, "units", "")).partition(" since ")[0]
-
-
-def _text(value: object) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    return text_of(getattr(variable, "units", "")).partition(" since ")[0]

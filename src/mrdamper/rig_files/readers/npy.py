@@ -17,10 +17,7 @@ class Npy(Reader):
     name = "npy"
     title = "NumPy array"
     suffixes = (".npy",)
-
-    def recognises(self, source: Source) -> bool:
-        """By the mark at the start."""
-        return source.head(6) == b"\x93NUMPY"
+    marks = (b"\x93NUMPY",)
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """Return the one table."""

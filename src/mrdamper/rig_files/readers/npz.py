@@ -9,7 +9,7 @@ import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_arrays, zipped_names
-from mrdamper.rig_files.readers.arrays import damaged, refusing_damage, stated_array, twice
+from mrdamper.rig_files.readers.arrays import damaged, refusing_damage, stated_array, text_of, twice
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 
@@ -38,10 +38,7 @@ class Npz(Reader):
             with np.load(source.file, allow_pickle=False) as archive:
                 tree = {name: _value(archive[name]) for name in archive.files if name not in fields}
                 tree |= {field: archive[name][field] for name, inner in fields.items() for field in inner}
-        tables = nested_tables(source, tree, self.title)
-        if not tables:
-            raise source.refuse("E_NO_DATA", "no array of numbers", "save the channels as arrays")
-        return tables
+        return nested_tables(source, tree, self.title)
 
 
 def _value(array: np.ndarray) -> Any:
@@ -50,8 +47,8 @@ def _value(array: np.ndarray) -> Any:
     if array.size == 1 and kind in "iuf":
         return float(array.reshape(-1)[0])
     if kind in "US" and array.size <= MOST_COLUMNS:
-        words = [w.decode("utf-8", "replace") if isinstance(w, bytes) else w for w in array.reshape(-1).tolist()]
-        return [word.strip() for word in words] if array.size > 1 else "".join(words)
+        words = [text_of(item) for item in array.reshape(-1).tolist()]
+        return words if array.size > 1 else "".join(words)
     return {"unit": "s", "data": array} if kind in "Mm" else array
 
 

@@ -27,7 +27,7 @@ class _Frame:
     library = "polars"
     title: ClassVar[str]
     short: ClassVar[str]  # what polars calls it
-    magic: ClassVar[bytes]
+    marks: ClassVar[tuple[bytes, ...]]
     least: ClassVar[int]  # bytes of a whole file
     given: ClassVar[type[bytes | io.BytesIO]]  # how polars is given the content
     options: ClassVar[Mapping[str, bool]] = MappingProxyType({})
@@ -36,16 +36,12 @@ class _Frame:
         """Start the threads and their allocators."""
         _warm()
 
-    def recognises(self, source: Source) -> bool:
-        """By the mark at the start."""
-        return source.head(len(self.magic)) == self.magic
-
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """Return the one table."""
         import polars as pl
 
-        source.file.seek(max(0, source.size - len(self.magic)))
-        if source.size < self.least or source.file.read(len(self.magic)) != self.magic:
+        source.file.seek(max(0, source.size - len(self.marks[0])))
+        if source.size < self.least or source.file.read(len(self.marks[0])) != self.marks[0]:
             raise damaged(source, self.title, "the file ends early, truncated")
         source.file.seek(0)
         content = source.file.read()
@@ -66,7 +62,7 @@ class Parquet(_Frame, Reader):
     name = short = "parquet"
     title = "Parquet"
     suffixes = (".parquet", ".pq")
-    magic, least, given = b"PAR1", 12, bytes
+    marks, least, given = (b"PAR1",), 12, bytes
     options = MappingProxyType({"use_statistics": False})
 
 
@@ -76,7 +72,7 @@ class Feather(_Frame, Reader):
     name, short = "feather", "ipc"
     title = "Feather"
     suffixes = (".feather", ".arrow", ".ipc")
-    magic, least, given = b"ARROW1", 24, io.BytesIO
+    marks, least, given = (b"ARROW1",), 24, io.BytesIO
 
 
 @cache

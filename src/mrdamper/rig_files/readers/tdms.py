@@ -23,10 +23,7 @@ class Tdms(Reader):
     title = "TDMS"
     suffixes = (".tdms",)
     library = "nptdms"
-
-    def recognises(self, source: Source) -> bool:
-        """By the mark at the start."""
-        return source.head(4) == b"TDSm"
+    marks = (b"TDSm",)
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a group; raw volts are refused later, by their unit."""

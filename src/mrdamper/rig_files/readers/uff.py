@@ -60,10 +60,7 @@ class Uff(Reader):
                     above = {f"{channel['name']} {key}": text for key, text in texts.items()}
                     trees[-1] |= {**above, str(channel["name"]): channel}
         inner = {f"test {i}": tree for i, tree in enumerate(trees, 1)} if len(trees) > 1 else trees[0]
-        tables = nested_tables(source, inner, self.title)
-        if not tables:
-            raise source.refuse("E_NO_DATA", "no functions of time (data sets 58)", "export the time histories")
-        return tables
+        return nested_tables(source, inner, self.title)
 
 
 def _function(lines: list[str]) -> tuple[dict[str, object], dict[str, object]]:
