@@ -11,7 +11,6 @@ from mrdamper.errors import ColumnError, CombinedError, InputError, printable
 from mrdamper.rig_files.coil_current import as_data, with_value_of_name
 from mrdamper.rig_files.column_names import names_computed
 from mrdamper.rig_files.columns import assign, partly_assigned
-from mrdamper.rig_files.folder import is_left_out
 from mrdamper.rig_files.mapping.clocks import with_time_stated
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.description import with_description, with_notes
@@ -82,7 +81,7 @@ def digest_of(path: Path) -> str:
 
 def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
     """Split and complete the tables of a file until each holds one test, or none."""
-    kept = [table for table in tables if not (table.label and is_left_out(table.label, profile))]
+    kept = [table for table in tables if not (table.label and profile.leaves_out(table.label))]
     if tables and not kept:
         raise tables[0].source.refuse("E_NO_DATA", "every table is left out", "correct [file] leave_out of the profile")
     tables = kept

@@ -189,6 +189,10 @@ class Profile(Table):
         own = self.model_copy(update={"channels": channels}) if stated else self
         return runs.pop() if len(runs) == 1 else "", own
 
+    def leaves_out(self, name: str) -> bool:
+        """Tell if files or tables of this name are no tests."""
+        return any(fnmatchcase(name.casefold(), pattern.casefold()) for pattern in self.file.leave_out)
+
     def channel(self, name: str) -> Channel:
         """Return the settings of a channel."""
         return self.channels.get(name, Channel())

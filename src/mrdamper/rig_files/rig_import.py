@@ -15,7 +15,7 @@ from mrdamper.data import Dataset
 from mrdamper.errors import ColumnError, CombinedError, InputError
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data
 from mrdamper.rig_files.file_records import records_of_file
-from mrdamper.rig_files.folder import files_in, is_left_out
+from mrdamper.rig_files.folder import files_in, unpacked
 from mrdamper.rig_files.long_records import check_long_record
 from mrdamper.rig_files.mapping.agreement import contradictions
 from mrdamper.rig_files.mapping.companions import (
@@ -32,7 +32,6 @@ from mrdamper.rig_files.mapping.companions import (
 from mrdamper.rig_files.mapping.description import is_description
 from mrdamper.rig_files.mapping.integration import is_integrated
 from mrdamper.rig_files.mapping.results import Results
-from mrdamper.rig_files.packed_folder import unpacked
 from mrdamper.rig_files.profile import Profile, ProfileError, profile_of
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
 from mrdamper.rig_files.record import Record, Refusal
@@ -148,8 +147,8 @@ def import_files(
             tests = beside[0]
         table = tests if tests is None or isinstance(tests, TestsTable) else load_tests(tests)
         files, left_out = files_in(given)
-        left_out += [path for path in files if is_left_out(path.name, profile)]
-        files = [path for path in files if not is_left_out(path.name, profile)]
+        left_out += [path for path in files if profile.leaves_out(path.name)]
+        files = [path for path in files if not profile.leaves_out(path.name)]
         intake = _Intake(profile, table)
         for number, path in enumerate(files):
             progress(path.name, number / len(files))

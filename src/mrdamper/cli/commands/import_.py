@@ -233,8 +233,7 @@ def _on_terminal() -> bool:
 
 
 def _print_tree(files: list[Path], settings: Profile) -> None:
-    from mrdamper.rig_files.mapping.tree import tree_lines
-    from mrdamper.rig_files.preview import scan
+    from mrdamper.rig_files.preview import scan, tree_lines
 
     print("In the files:")
     for line in tree_lines(scan(files, settings)):

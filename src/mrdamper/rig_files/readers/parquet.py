@@ -21,13 +21,11 @@ if TYPE_CHECKING:
 _CALLS = (("read", "_schema"), ("scan", ""), ("read", ""))
 
 
-class _Frame:
+class _Frame(Reader):
     """A file of polars: one table of typed columns, between two marks."""
 
     library = "polars"
-    title: ClassVar[str]
     short: ClassVar[str]  # what polars calls it
-    marks: ClassVar[tuple[bytes, ...]]
     least: ClassVar[int]  # bytes of a whole file
     given: ClassVar[type[bytes | io.BytesIO]]  # how polars is given the content
     options: ClassVar[Mapping[str, bool]] = MappingProxyType({})
@@ -56,7 +54,7 @@ class _Frame:
         return [_table(source, self.title, schema, rows, loaded)]
 
 
-class Parquet(_Frame, Reader):
+class Parquet(_Frame):
     """Tables of columns as polars, pandas, Spark and others write them."""
 
     name = short = "parquet"
@@ -66,7 +64,7 @@ class Parquet(_Frame, Reader):
     options = MappingProxyType({"use_statistics": False})
 
 
-class Feather(_Frame, Reader):
+class Feather(_Frame):
     """Feather and Arrow files: tables of columns as pandas, R and others hand them on."""
 
     name, short = "feather", "ipc"
