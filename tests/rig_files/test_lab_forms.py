@@ -252,7 +252,7 @@ def test_a_stated_rate_that_contradicts_the_time_column_is_refused(tmp_path, hea
     by_column = import_files([path], parse_profile('[channels.time]\ncolumn = "Time [s]"\n'))
     assert [r.error.code for r in by_column.refusals] == (codes if "4 Hz" in heading else [])
     by_rate = import_files([path], parse_profile("[file]\nsample_rate_Hz = 800\n"))
-    assert not by_rate.refusals
+    assert [r.error.code for r in by_rate.refusals] == ["E_MOTION_CONTRADICTS"] * ("1 Hz" in heading)
 
 
 def test_a_profile_that_answers_for_one_channel_leaves_the_others_to_physics(tmp_path):

@@ -24,7 +24,8 @@ from mrdamper.rig_files.profile import Profile, profile_hash
 from mrdamper.rig_files.readers import raw_tables
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import REQUIRED, Finding, Record
-from mrdamper.rig_files.rig_record import joined, records_of
+from mrdamper.rig_files.rig_record import records_of
+from mrdamper.rig_files.sequences import joined
 
 _ROWS_OF_A_TEST = 0.25  # share of the rows of another test of the file that a test has at least
 

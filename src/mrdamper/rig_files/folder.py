@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import shutil
 import tarfile
 import zipfile
@@ -52,12 +53,13 @@ def files_in(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
         if not path.is_dir():
             files.append(path)
             continue
-        inside = sorted(
+        inside = [
             Path(folder) / name
             for folder, _, names in os.walk(path)
             for name in names
             if not name.startswith((".", "~$")) and name != TESTS
-        )
+        ]
+        inside.sort(key=_by_number)
         inside = [file for file in inside if file.is_file() and not _is_packed_folder(file)]  # no pipes
         recognised = [file for file in inside if file.suffix.lower() in suffixes()]
         recognised = recognised or [
@@ -72,6 +74,11 @@ def files_in(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
         remedy = "export them as CSV, or give another folder" if others else "give another folder"
         raise RigFileError("E_NO_DATA", problem, file=where, remedy=remedy)
     return files, others
+
+
+def _by_number(path: Path) -> list[list[int | str]]:
+    """Return the key of an order in which test 2 comes before test 10."""
+    return [[int(text) if i % 2 else text for i, text in enumerate(re.split(r"([0-9]+)", part))] for part in path.parts]
 
 
 def _is_table(path: Path) -> bool:

@@ -35,6 +35,7 @@ from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.profile import Profile, ProfileError, profile_of
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
 from mrdamper.rig_files.record import Record, Refusal
+from mrdamper.rig_files.sequences import follows, goes_on, tests_of_files
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests
 
@@ -172,6 +173,7 @@ class _Intake:
     def __init__(self, profile: Profile, table: TestsTable | None):
         self._profile, self._table = profile, table
         self._order: dict[str, int] = {}
+        self._parts: list[tuple[Path, list[Record]]] = []  # the last file and those that it continues, with their tests
         self._pending: list[tuple[Path, Record]] = []
         self._found: list[tuple[int, Record]] = []
         self.refusals: list[Refusal] = []
@@ -207,6 +209,25 @@ class _Intake:
                 self.refusals += refusals
             return
         self.refusals += [Refusal(str(path), problem) for problem in problems]
+        split = profile.file.blocks == "split" or (self._table and self._table.of_file(path))
+        if problems or split or not goes_on(records):
+            self._take_parts()
+            self._take_all(path, records)
+            return
+        if not (self._parts and follows(*self._parts[-1], path, records)):
+            self._take_parts()
+        self._parts.append((path, records))
+
+    def _take_parts(self) -> None:
+        """Take the tests of the last file, or those of the files that are parts of one record."""
+        parts, self._parts = self._parts, []
+        if len(parts) > 1:
+            self.met += [(path, record.id) for path, records in parts for record in records]
+            parts = [(parts[0][0], tests_of_files(parts))]
+        for path, records in parts:
+            self._take_all(path, records)
+
+    def _take_all(self, path: Path, records: list[Record]) -> None:
         for record in records:
             self._take(path, record, several=len(records) > 1)
 
@@ -241,6 +262,7 @@ class _Intake:
 
     def join(self) -> None:
         """Join tests with what other files state of them, check what was waiting, and compare tests with each other."""
+        self._take_parts()
         others = [Path(refusal.file) for refusal in self.refusals if refusal.error.code in _MAY_BE_PARTS]
         others = [path for path in dict.fromkeys(others) if path.is_file()]
         used = self._join_channels(others)

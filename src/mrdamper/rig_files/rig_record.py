@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, constant, current_of, without_gaps
 from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
-from mrdamper.rig_files.conditions import currents_in, stated_motion, stated_quantities
+from mrdamper.rig_files.conditions import stated_motion, stated_quantities
 from mrdamper.rig_files.mapping.clocks import refuse_two_rates
 from mrdamper.rig_files.mapping.session import stretches_of_session
 from mrdamper.rig_files.parts import stretches_of_time
@@ -28,7 +27,6 @@ from mrdamper.rig_files.units import Unit
 
 _KEPT = {"temperature": "C", "pressure": "Pa", "voltage": "V", "acceleration": "m_s2", "length": "m", "force": "N"}
 _SCALES = frozenset(("scale", "scaling", "gain", "factor", "sensitivity", "slope", "calibration", "lsb", "faktor"))
-_HZ = re.compile(r"(?<![\w.,])([0-9]{1,4}(?:[.,][0-9]{1,4})?) ?Hz(?![A-Za-z])")
 _SAMPLE = 10_000  # samples looked at
 _LEAST_CURRENT = 0.02  # [A] largest of a record: less is no current of a coil
 _MOST_FURTHER = 12  # channels
@@ -276,39 +274,6 @@ def _remarks(table: RawTable, assigned: dict[str, Assigned]) -> dict[str, str]:
     if ignored:
         remarks["ignored_columns"] = ", ".join(ignored[:20]) + (" ..." if len(ignored) > 20 else "")
     return {key: as_data(text) for key, text in remarks.items()}
-
-
-def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> list[Record]:
-    """Blocks whose time goes on are one test, unless the profile says otherwise."""
-    if len(records) < 2 or profile.file.blocks == "split" or not all(t.label.startswith("block") for t in tables):
-        return records
-    names = [n for n in ("time", "displacement", "force", *OPTIONAL) if all(getattr(r, n) is not None for r in records)]
-    partly: dict[str, Floats | None] = {name: None for name in OPTIONAL if name not in names}
-    if profile.file.blocks != "join" and _state_different_conditions(tables):
-        return records
-    time = np.concatenate([record.time for record in records])
-    if profile.file.blocks != "join" and not np.all(np.diff(time[np.isfinite(time)]) > 0):
-        return records
-    lines = (
-        np.concatenate([np.asarray(r.lines) for r in records]) if all(r.lines is not None for r in records) else None
-    )
-    channels = {name: np.concatenate([getattr(record, name) for record in records]) for name in names}
-    if "current" in partly and "current_from" in records[0].provenance:  # a page's heading states it once
-        stated = {float(r.current[0]) for r in records if r.current is not None}
-        partly["current"] = constant(stated.pop(), time) if len(stated) == 1 else None
-    alike = [name for name in records[0].further if all(name in record.further for record in records)]
-    further = {name: np.concatenate([record.further[name] for record in records]) for name in alike}
-    findings = dict.fromkeys(finding for record in records for finding in record.findings)
-    return [replace(records[0], findings=tuple(findings), lines=lines, further=further, **channels, **partly)]
-
-
-def _state_different_conditions(tables: list[RawTable]) -> bool:
-    """Return whether the titles of blocks state different currents or frequencies: each is a test."""
-    for values_in in (currents_in, lambda line: tuple(_HZ.findall(line[:255]))):
-        stated = {tuple(value for line in table.remarks for value in values_in(line)) for table in tables} - {()}
-        if len(stated) > 1:
-            return True
-    return False
 
 
 def _run_id(table: RawTable, path: Path) -> str:

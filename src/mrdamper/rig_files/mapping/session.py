@@ -13,7 +13,7 @@ from mrdamper.rig_files.quality.strokes import find_strokes
 MOST_TESTS = 500  # of a record: more is a cut at noise
 _BLOCK_S = 0.1  # [s] in which a motion at rest stays within a share of its range
 _REST = 0.03  # of the motion's range
-_OFF_S, _OFF_STEPS = 1.0, 20  # a gap in time that is longer than both is a rest: the recording was off [s], [steps]
+OFF_S, OFF_STEPS = 1.0, 20  # a gap in time that is longer than both is a rest: the recording was off [s], [steps]
 _FEWEST_BLOCKS = 3  # of a rest
 _FEWEST_REVERSALS = 3  # of a test
 _FEWEST_REVERSALS_HELD = 5  # of a test at a current that steps to the next without a rest
@@ -73,7 +73,7 @@ def _with_soft_ends(parts: list[slice], time: Floats, x: Floats) -> list[slice]:
     short = False
     for part in parts:
         few = find_strokes(time[part], x[part]).reversals.size < _FEWEST_REVERSALS
-        near = bool(joined) and joined[-1].stop == part.start and time[part.start] - time[part.start - 1] <= _OFF_S
+        near = bool(joined) and joined[-1].stop == part.start and time[part.start] - time[part.start - 1] <= OFF_S
         if near and (short or (few and part is parts[-1])):
             joined[-1], short = slice(joined[-1].start, part.stop), short and few
         else:
@@ -115,7 +115,7 @@ def _boundaries(time: Floats, x: Floats) -> list[int]:
     """Middles of the rests of a motion, and the gaps in its time."""
     steps = np.diff(time)
     step = float(np.median(steps))
-    off = np.flatnonzero(steps > max(_OFF_S, _OFF_STEPS * step)) + 1
+    off = np.flatnonzero(steps > max(OFF_S, OFF_STEPS * step)) + 1
     size = max(2, round(_BLOCK_S / step))
     count = x.size // size
     blocks = x[: count * size].reshape(count, size)

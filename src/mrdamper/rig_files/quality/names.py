@@ -17,7 +17,10 @@ _AMPLITUDES = (0.25, 1.6)
 
 
 def agrees_with_its_name(view: View) -> Iterator[Finding]:
-    """Report a motion of another frequency or amplitude than a name or heading states; refuse one of both."""
+    """Report a motion of another frequency or amplitude than a name or heading states.
+
+    One of both is refused, and one of another frequency where time is nothing but a sampling rate that is stated.
+    """
     motion = view.motion
     if motion is None:
         return
@@ -31,6 +34,13 @@ def agrees_with_its_name(view: View) -> Iterator[Finding]:
     if amplitude is not None and not _AMPLITUDES[0] < 1e3 * measured.amplitude_m / amplitude < _AMPLITUDES[1]:
         contradictions.append(
             (f"{amplitude:g} mm", f"an amplitude of {1e3 * measured.amplitude_m:.3g} mm", "displacement")
+        )
+    rate = notes.get("time_from", "")
+    if len(contradictions) == 1 and rate and contradictions[0][2] == "time":
+        stated, has, _ = contradictions[0]
+        problem = f"the name or heading states {stated}, and by the sampling rate ({rate}) the motion has {has}"
+        raise view.refused(
+            "E_MOTION_CONTRADICTS", problem, "set [file] sample_rate_Hz = ... in a profile, or correct the name"
         )
     if len(contradictions) > 1:
         stated, has, channels = (" and ".join(words) for words in zip(*contradictions, strict=True))
