@@ -8,7 +8,10 @@ from mutants.faults import Fault
 
 
 class Explained(NamedTuple):
-    """Lines of a module, by a part of them, and a part of the change; an empty one stands for any."""
+    """Changes of lines, each by a part of it, where an empty one stands for any.
+
+    A change may be given whole, as `change: the expression that is changed`.
+    """
 
     module: str
     line: str
@@ -23,81 +26,113 @@ _BUDGET = "how finely, how long or how far is looked; what is found is the same"
 _ALIKE = "what is exchanged is the same"
 _SCALE = "a factor that drops out"
 EXPLAINED = (
-    Explained("paper.", "% 360", "", "an angle that is more by whole turns, or by half turns twice, is the same"),
+    Explained("paper.", "% 360", "Add → Sub", "half a turn forth or back is the same angle"),
     Explained("paper.", "< 5", "5 → 6", _BUDGET),
     Explained("paper.output", '"nrmse_pp": None', "", _ORDER),
     Explained("paper.", "keys = [", "items", _ORDER),
     Explained("paper.", "sorted(set(keys))", "sorted backwards", _ORDER),
-    Explained("paper.", "order.size // 60", "", _BUDGET),
-    Explained("paper.", "reshape(-1, width)", "1 → 2", _ALIKE),
+    Explained("paper.", "order.size // 60", "60 → 600", _BUDGET),
+    Explained("paper.", "order.size // 60", "1 → 2", _BUDGET),
     Explained("paper.", "back[0]", "0 → 1", _BUDGET),
     Explained("paper.", "path.direction[inside][0]", "0 → 1", "a stroke has one direction"),
     Explained("study.recipe", "Scale(1.0, 1.0)", "", "which axes there are does not depend on the scale"),
-    Explained("study.recipe", "identifications[0].method", "", "all identifications are by one method"),
+    Explained("study.recipe", "identifications[0].method", "0 → 1", "all identifications are by one method"),
     Explained("paper.assumptions", 'cls(None, (("k1"', "items", _ORDER),
     Explained("study.recipe", "in ([],", "items", _ORDER),
     Explained("paper.assumptions", "[-longest, longest]", "", "the gas is compressed at one end alone"),
-    Explained("paper.", "range(1, path.stroke[-1])", "1 → 2", "the last two samples lie in one stroke"),
+    Explained(
+        "paper.",
+        "range(1, path.stroke[-1])",
+        "1 → 2",
+        "the first stroke is as the others, and the last two samples lie in one",
+    ),
     Explained("paper.", "np.mean(steady.force)", "mean → median", "a loop's force has its mean in its middle"),
     Explained("paper.", "np.mean(record.force", "mean → median", "samples within five degrees have one force"),
     Explained("paper.", "< 1e-3", "0.001 → 0.01", "levels lie further apart"),
-    Explained("paper.virtual_rig", "default_rng((seed,", "", "another draw of the same noise"),
-    Explained("paper.virtual_rig", "path.direction * np.where", "Mult → Div", _SIGN),
-    Explained("paper.sensitivity", "_SAMPLES", "", "a whole cycle more, or another of the same samples"),
+    Explained("paper.virtual_rig", "default_rng((seed,", "items", "another draw of the same noise"),
+    Explained("paper.virtual_rig", "default_rng((seed,", "10000 → 100000", "another draw of the same noise"),
+    Explained(
+        "paper.virtual_rig",
+        "path.direction * np.where",
+        "Mult → Div: self.yield_force(motion.current) * path.direction",
+        _SIGN,
+    ),
+    Explained("paper.sensitivity", "_SAMPLES", "1 → 2", "a whole cycle more, or another of the same samples"),
+    Explained("paper.sensitivity", "_SAMPLES", "1.25 → 12.5", "a whole cycle more, or another of the same samples"),
+    Explained("paper.sensitivity", "_SAMPLES", "4 → 5", "a whole cycle more, or another of the same samples"),
     Explained(
         "dampers.published.dominguez",
         "np.log(c.frequency_Hz / reference.frequency_Hz)",
-        ".frequency_Hz → .current_A",
+        ".frequency_Hz → .current_A: reference.frequency_Hz",
         "a constant factor goes into the level every current has of its own",
     ),
-    Explained(
-        "dampers.published.ali", "np.unique(np.round(currents, 3))", "3 → 4", "the tests' currents have fewer digits"
-    ),
-    Explained("dampers.published", "np.clip(", "", _GUARD),
+    Explained("dampers.published.ali", "np.clip(", "1000.0 →", _GUARD),
+    Explained("dampers.published.ali", "np.clip(", "10000.0 →", _GUARD),
+    Explained("dampers.published.ali", "np.clip(", "100.0 →", _GUARD),
+    Explained("dampers.published.ali", "np.clip(", "2 → 3", _GUARD),
+    Explained("dampers.published.boada", "np.clip(", "3 → 4", _GUARD),
+    Explained("dampers.published.boada", "np.clip(", "4 → 5", _GUARD),
+    Explained("dampers.published.lv", "np.clip(", "2.0 → 20.0", _GUARD),
+    Explained("dampers.published.lv", "np.clip(", "1000000.0 →", _GUARD),
     Explained("dampers.published", "1e-3)", "0.001 → 0.01", _GUARD),
     Explained("dampers.modified", "identifications[0]", "0 → 1", "all identifications are of one model and rig"),
-    Explained("dampers.modified", "else 1.0", "1.0 → 10.0", "a model without a shape has no use for one"),
+    Explained("dampers.modified", "if data.shape else 1.0", "1.0 → 10.0", "a model without a shape has no use for one"),
     Explained("dampers.covariance", "part.predicted.mean()", "Sub → Add", "beside a constant they span the same"),
-    Explained("dampers.covariance", "scale = np.sqrt(np.diag(normal)", "sqrt → abs", _SCALE),
-    Explained("dampers.covariance", "dof = 1 / np.maximum(", "", _GUARD),
     Explained("dampers.random_effects", "self.unit = ", "", _SCALE),
-    Explained("dampers.calibration", "min(at, values.size - 1)", "", _GUARD),
     Explained("dampers.calibration", "np.multiply(", "arguments 0 and 1", _ALIKE),
-    Explained("dampers.calibration", "size = np.sqrt(np.mean(table", "", _SCALE),
+    Explained("dampers.calibration", "size = np.sqrt(np.mean(table", "sqrt", _SCALE),
+    Explained("dampers.calibration", "size = np.sqrt(np.mean(table", "mean", _SCALE),
+    Explained("dampers.calibration", "size = np.sqrt(np.mean(table", "Pow", _SCALE),
+    Explained("dampers.calibration", "size = np.sqrt(np.mean(table", "2 → 3", _SCALE),
     Explained("dampers.random_effects", "weight = 1 / np.maximum(", "1 → 2", _SCALE),
     Explained("dampers.calibration", "parts[0].distance", "0 → 1", "the stretches of a run have one distance"),
     Explained("dampers.calibration", "parts[0].session", "0 → 1", "the stretches of a run have one session"),
     Explained("dampers.random_effects", "kinds.append(", "items 0 and 1", _ALIKE),
     Explained("dampers.random_effects", "self.slopes[0].shape[1]", "0 → 1", "all runs have one number of columns"),
     Explained("dampers.bands", "student(level, 1.0)", "1.0 → 10.0", "the level alone is checked"),
-    Explained("dampers.bands", "inv_cdf((1 + level) / 2)", "Add → Sub", "the quantile enters by its square"),
     Explained("dampers.bands", "**ends, **peaks", "exchanged", _ORDER),
     Explained("dampers.bands", "or 1.0", "1.0 → 10.0", "zero, whatever divides it"),
     Explained("dampers.sessions", "point, step = np.log(", "", _BUDGET),
     Explained("study.plan", "_PRIOR_LOG_DEVIATION**2", "2 → 3", "one, to whatever power"),
-    Explained("dampers.sessions", "for start in (", "", _BUDGET),
-    Explained("dampers.sessions", "while step >", "", _BUDGET),
+    Explained("dampers.sessions", "for start in (", "items", "another start of the same search"),
+    Explained("dampers.sessions", "for start in (", "1.0 → 10.0", "another start of the same search"),
+    Explained("dampers.sessions", "for start in (", "0.01 → 0.1", "another start of the same search"),
     Explained("dampers.sessions", "np.where(good, scale, 1.0)", "1.0 → 10.0", _GUARD),
     Explained("dampers.sessions", "best[0] - 1e-6", "Sub → Add", "which of equals is taken"),
     Explained("dampers.covariance", "infinite = np.diag", "1.0 → 10.0", "whatever is finite"),
     Explained("study.plan", "return np.trace(", "axis1 and axis2", _ALIKE),
-    Explained("study.plan", "least = self.limits.opening", "", "more sessions than hold a record are tried, and lose"),
+    Explained(
+        "study.plan", "least = self.limits.opening", "Add → Sub", "more sessions than hold a record are tried, and lose"
+    ),
     Explained("study.plan", "free * (1 + 1e-12)", "Mult → Div", _GUARD),
-    Explained("study.plan", "motion, last = sine(", "", _BUDGET),
-    Explained("fleet.charts", "step = -(", "USub", _ORDER),
-    Explained("fleet.charts", "np.minimum((below * count)", "", _GUARD),
-    Explained("dampers.sessions", "trials = np.clip(", "", _BUDGET),
-    Explained("dampers.joint", "evaluations, ending", "0 → 1", "where nothing is searched nothing is counted"),
-    Explained("dampers.joint", "curved = 0, StopReason.SOLVED, settled", "", _BUDGET),
+    Explained("study.plan", "motion, last = sine(", "2 → 3", "the last of three cycles is as the last of two"),
+    Explained("fleet.charts", "step = -(", "USub dropped: -(-values.size // _MOST_NORMALITY)", _ORDER),
+    Explained("fleet.charts", "np.minimum((below * count)", "Sub → Add", _GUARD),
+    Explained("fleet.charts", "np.minimum((below * count)", "1 → 2", _GUARD),
+    Explained("dampers.sessions", "trials = np.clip(", "Add → Sub", _BUDGET),
+    Explained("dampers.sessions", "trials = np.clip(", "14 → 140", _BUDGET),
+    Explained("dampers.sessions", "trials = np.clip(", "9 → 10", _BUDGET),
+    Explained("dampers.joint", "curved = 0, StopReason.SOLVED, settled", "Lt → GtE", _BUDGET),
     Explained("dampers.joint", "solution = least_squares(", "slopes and curved exchanged", _BUDGET),
     Explained("dampers.joint", "_TRIAL_STEPS", "0.001 → 0.01", _BUDGET),
     Explained("dampers.joint", "len(axis.grid) > 1", "1 → 2", "no axis has two starts before the one of lengths"),
     Explained("dampers.joint", "(RISE, FALL)", "items", _ORDER),
-    Explained("models.play_bypass", "turned = path.first_direction", "Mult → Div", _SIGN),
+    Explained(
+        "models.play_bypass",
+        "turned = path.first_direction",
+        "Mult → Div: path.first_direction * np.where(np.arange(len(path.lengths)) % 2, -1.0, 1.0)",
+        _SIGN,
+    ),
     Explained(
         "statistics.functions.forms",
         "slope * slope[0]",
-        "",
+        "Mult → Div",
+        "only the sign of the product of two signs is asked, wherever it begins",
+    ),
+    Explained(
+        "statistics.functions.forms",
+        "slope * slope[0]",
+        "0 → 1",
         "only the sign of the product of two signs is asked, wherever it begins",
     ),
     Explained(
@@ -106,13 +141,20 @@ EXPLAINED = (
         "Div → Mult",
         "the space columns span does not depend on their lengths",
     ),
-    Explained("statistics.functions.fitting", "grid", "", _BUDGET),
-    Explained("statistics.functions.fitting", "explained = np.sum", "", _BUDGET),
+    Explained("statistics.functions.fitting", "starts = grid[", "3 → 4", _BUDGET),
     Explained("statistics.functions.fitting", "or 1.0", "1.0 → 10.0", "zero, whatever divides it"),
-    Explained("statistics.functions.forms", "for rate, feature in", "items", _ORDER),
+    Explained(
+        "statistics.functions.forms",
+        "for rate, feature in",
+        "items 0 and 1 exchanged: ((term.decay_I, I), (term.decay_f, f), (term.power_f, np.log(f)))",
+        _ORDER,
+    ),
     Explained("identification.harmonic_balance", '"peaks":', "arguments", _ORDER),
     Explained(
-        "identification.harmonic_balance", '"peaks":', "Sub → Add", "half a turn forth or back is the same angle"
+        "identification.harmonic_balance",
+        '"peaks":',
+        "Sub → Add: bottom.theta - np.pi",
+        "half a turn forth or back is the same angle",
     ),
     Explained(
         "identification.harmonic_balance", "lead = (leads", "Add → Sub", "half a turn forth or back is the same angle"
@@ -120,33 +162,62 @@ EXPLAINED = (
     Explained(
         "identification.harmonic_balance",
         "range(cycle[-1] + 1)",
-        "",
+        "1 → 2",
         "a part without samples, or the last without enough",
     ),
-    Explained("paper.paper_method", "1e-6 * X", "", _GUARD),
+    Explained(
+        "identification.harmonic_balance",
+        "range(cycle[-1] + 1)",
+        "Add → Sub",
+        "a part without samples, or the last without enough",
+    ),
+    Explained("paper.paper_method", "1e-6 * X", "Mult → Div: 1e-06 * X", _BUDGET),
+    Explained("paper.paper_method", "1e-6 * X", "Mult → Div: 20 * X", _BUDGET),
+    Explained("paper.paper_method", "1e-6 * X", "20 → 200", _BUDGET),
     Explained(
         "paper.paper_method",
         '"alpha": 0.0, "beta": 1.0',
-        "",
+        "values 1 and 2",
         "the force of a state of zero, whatever weighs it",
     ),
-    Explained("identification.covariance", "points = 1 <<", "", "a longer transform of the same samples"),
+    Explained(
+        "paper.paper_method",
+        '"alpha": 0.0, "beta": 1.0',
+        "1.0 → 10.0",
+        "the force of a state of zero, whatever weighs it",
+    ),
+    Explained("identification.covariance", "points = 1 <<", "2 → 3", "a longer transform of the same samples"),
+    Explained("identification.covariance", "points = 1 <<", "1 → 2", "a longer transform of the same samples"),
+    Explained("identification.covariance", "points = 1 <<", "Sub → Add", "a longer transform of the same samples"),
     Explained("identification.covariance", "bent = -2", "USub", "what is bent enters by its square"),
     Explained("systems.monte_carlo", "machine = len(draws)", "", _BUDGET),
-    Explained("identification.covariance", "odd = orders", "", _ALIKE),
+    Explained("identification.covariance", "odd = orders", "Eq → NotEq", _ALIKE),
     Explained("identification.covariance", "-logs", "", "the space columns span does not depend on their signs"),
-    Explained("identification.covariance", "max(", "1 → 2", _GUARD),
-    Explained("identification.covariance", "np.clip(", "", _GUARD),
-    Explained("identification.covariance", "reshape(-1, block", "1 → 2", _ALIKE),
-    Explained("identification.covariance", "powers[k - 1] if k", "", "a product of two"),
-    Explained("identification.covariance", "np.finfo(float)", "", _GUARD),
-    Explained("identification.intervals", "math.pi / 2 - 1e-12", "", _GUARD),
+    Explained("identification.covariance", "squares / max(", "1 → 2", _GUARD),
+    Explained("identification.covariance", "free[rows] = np.clip(", "1 → 2", _GUARD),
+    Explained("identification.covariance", "np.clip(share / whole", "1000.0 → 10000.0", _GUARD),
+    Explained("identification.covariance", "taken = np.clip(", "1.0 → 10.0", _GUARD),
+    Explained("identification.covariance", "powers[k - 1] if k", "arguments", "a product of two"),
+    Explained("identification.covariance", "safe = np.maximum(values, np.finfo(float)", "Mult → Div", _GUARD),
+    Explained("identification.covariance", "safe = np.maximum(values, np.finfo(float)", "USub", _GUARD),
+    Explained("identification.covariance", "safe = np.maximum(values, np.finfo(float)", "1 → 2", _GUARD),
+    Explained(
+        "identification.intervals",
+        "math.pi / 2 - 1e-12",
+        "Sub → Add",
+        "Newton's steps come from below and do not reach it",
+    ),
+    Explained(
+        "identification.intervals",
+        "math.pi / 2 - 1e-12",
+        "Div → Mult",
+        "Newton's steps come from below and do not reach it",
+    ),
     Explained("identification.intervals", "- 15 * z", "Sub → Add", "a term below 1e-10 of the quantile"),
     Explained("identification.intervals", "(nodes + 1)", "Add → Sub", "a cosine has no sign"),
     Explained("identification.intervals", 'max(values["current"]) == 0', "max → min", _ALIKE),
     Explained("identification.intervals", "(i, j): float(covariance", "items", _ALIKE),
     Explained("identification.loop_analysis", "t = motion.time", "", "a constant beside a column of ones"),
-    Explained("identification.loop_analysis", "scale[scale == 0]", "", _SCALE),
     Explained("fleet.verdicts", "far.get(n, 0) * sign", "Mult → Div", _SIGN),
     Explained("paper.output", "literal.identifications[0].free", "0 → 1", "all identifications are of one model"),
     Explained("systems.controllers.clipped_optimal", "design.A.shape[0]", "0 → 1", "a square matrix"),
@@ -154,13 +225,16 @@ EXPLAINED = (
     Explained("systems.inverse", "_MOTION // 2 :", "2 → 3", _BUDGET),
     Explained("systems.inverse", "range(_ROUNDS + 1)", "1 → 2", "it breaks off before"),
     Explained("systems.measures", "-step / _WINDOW", "Div → Mult", "the window is of one second"),
-    Explained("rig_files.quality.loop", "fit_harmonics(", "7 → 8", _BUDGET),
 )
 
 
 def reason(fault: Fault) -> str:
     """Why a change changes nothing; empty where it is a fault."""
     for module, line, change, why in EXPLAINED:
-        if module in fault.module and line in fault.text and change in fault.change:
+        if (
+            module in fault.module
+            and line in fault.text
+            and (change in fault.change or change == f"{fault.change}: {fault.of}")
+        ):
             return why
     return ""

@@ -53,6 +53,8 @@ class Fault:
         The line it stands in.
     change : str
         In words.
+    of : str
+        The expression that is changed.
     """
 
     module: str
@@ -60,6 +62,7 @@ class Fault:
     line: int
     text: str
     change: str
+    of: str
 
 
 def faults_of(module: str) -> list[Fault]:
@@ -67,7 +70,7 @@ def faults_of(module: str) -> list[Fault]:
     source = path_of(module).read_text(encoding="utf-8")
     lines = source.splitlines()
     found = [
-        Fault(module, number, node.lineno, lines[node.lineno - 1].strip(), change)
+        Fault(module, number, node.lineno, lines[node.lineno - 1].strip(), change, ast.unparse(node))
         for number, (node, change, _) in enumerate(_places(ast.parse(source)))
     ]
     return sorted(found, key=lambda fault: (fault.line, fault.place))
@@ -105,6 +108,12 @@ def _inside(node: ast.AST) -> Iterator[_Place]:
     if (isinstance(node, ast.Call) and _called(node) in _TELLS) or (
         isinstance(node, ast.keyword) and node.arg == _STEPS
     ):
+        return
+    if isinstance(node, ast.Call) and _called(node) == "reshape":
+        for argument in node.args:
+            if ast.unparse(argument) != "-1":  # any other negative number says the same
+                yield from _inside(argument)
+        yield from _inside(node.func)
         return
     if isinstance(node, ast.Call) and _called(node) in _BUDGETS:
         for argument in node.args[:2]:

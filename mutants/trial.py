@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator
 from types import CodeType, FrameType, FunctionType
 from typing import Any
@@ -16,6 +17,8 @@ import pytest
 
 from mutants.faults import Fault, path_of, planted
 from mutants.fork import in_fork
+
+_UNKNOWN = 255  # exit status of a fork whose test has no number that fits in one
 
 
 class Trial:
@@ -40,6 +43,7 @@ class Trial:
         self.through: dict[tuple[str, str, int], set[str]] = {}  # function → tests and fixtures that run through it
         self.running: list[str] = []
         self.functions: list[FunctionType] = []
+        self.kills: Counter[str] = Counter()  # faults a test has noticed
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
@@ -78,16 +82,16 @@ class Trial:
                 self.through.setdefault(_key(code), set()).update(self.running)
 
         sys.settrace(trace)
-        for item in session.items:
+        for item, nextitem in _in_turn(session.items):
             self.running, begin = [item.nodeid], time.process_time()
-            item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
+            item.config.hook.pytest_runtest_protocol(item=item, nextitem=nextitem)
             self.seconds[item.nodeid] = time.process_time() - begin
             if session.testsfailed:
                 return item.nodeid
         return self.seconds, self.through
 
     def _try_all(self, session: pytest.Session) -> None:
-        begin, running = time.perf_counter(), {}
+        begin, running = time.perf_counter(), dict[int, tuple[Fault, list[pytest.Item]]]()
         for number, fault in enumerate(self.faults, 1):
             changed = _changed_code(fault)
             tests = self._answering(session, changed)
@@ -100,7 +104,7 @@ class Trial:
                 signal.setitimer(signal.ITIMER_PROF, limit)  # of processor time: a busy machine notices nothing
                 signal.alarm(10 * int(limit))  # one that waits for ever uses none
                 os._exit(_noticed(session, self.functions, changed, tests))
-            running[child] = fault
+            running[child] = fault, tests
             while len(running) >= self.jobs:
                 self._reap(running)
             os.write(self.console, f"\r{number} of {len(self.faults)}, {time.perf_counter() - begin:.0f} s ".encode())
@@ -108,22 +112,25 @@ class Trial:
             self._reap(running)
         os.write(self.console, b"\n")
 
-    def _reap(self, running: dict[int, Fault]) -> None:
+    def _reap(self, running: dict[int, tuple[Fault, list[pytest.Item]]]) -> None:
         child, status = os.wait()
-        fault = running.pop(child)
-        if os.waitstatus_to_exitcode(status) == 0:
+        fault, tests = running.pop(child)
+        noticed_by = os.waitstatus_to_exitcode(status)
+        if noticed_by == 0:
             self._survives(fault, "")
+        elif 0 < noticed_by < _UNKNOWN:
+            self.kills[tests[noticed_by - 1].nodeid] += 1
 
     def _survives(self, fault: Fault, why: str) -> None:
         self.survivors.append(fault)
-        text = f"\nsurvives: {fault.module}:{fault.line}: {fault.change}: {fault.text} {why}\n"
+        text = f"\nsurvives: {fault.module}:{fault.line}: {fault.change} in {fault.of}: {fault.text} {why}\n"
         os.write(self.console, text.encode())
 
     def _answering(self, session: pytest.Session, changed: list[tuple[CodeType, CodeType]]) -> list[pytest.Item]:
-        """Tests that run through a function the fault changes, the quickest first."""
+        """Tests that run through a function the fault changes; the quick ones that noticed other faults first."""
         names = set().union(*(self.through.get(_key(old), set()) for old, _ in changed))
         found = [i for i in session.items if i.nodeid in names or not names.isdisjoint(_fixtures(i))]
-        return sorted(found, key=self._cost)
+        return sorted(found, key=lambda item: self._cost(item) / (1 + self.kills[item.nodeid]))
 
     def _cost(self, item: pytest.Item) -> float:
         return self.seconds[item.nodeid] + sum(self.seconds.get(name, 0.0) for name in _fixtures(item))
@@ -135,19 +142,25 @@ def _noticed(
     changed: list[tuple[CodeType, CodeType]],
     tests: list[pytest.Item],
 ) -> int:
-    """1 where a test fails with the fault planted, 0 where none does."""
+    """Number of the first test, from 1, that fails with the fault planted; 0 where none does."""
+    number = 0
     try:
         new = dict(changed)
         for function in functions:
             if function.__code__ in new:
                 function.__code__ = new[function.__code__]
-        for item in tests:
-            item.config.hook.pytest_runtest_protocol(item=item, nextitem=None)
+        for number, (item, nextitem) in enumerate(_in_turn(tests), 1):
+            item.config.hook.pytest_runtest_protocol(item=item, nextitem=nextitem)
             if session.testsfailed:
-                return 1
+                return min(number, _UNKNOWN)
     except BaseException:
-        return 1
+        return min(max(number, 1), _UNKNOWN)
     return 0
+
+
+def _in_turn(items: list[pytest.Item]) -> Iterator[tuple[pytest.Item, pytest.Item | None]]:
+    """Every test and the next, for which pytest keeps the fixtures they share."""
+    return zip(items, [*items[1:], None], strict=True)
 
 
 def _changed_code(fault: Fault) -> list[tuple[CodeType, CodeType]]:
