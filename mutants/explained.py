@@ -38,6 +38,8 @@ EXPLAINED = (
     Explained("study.recipe", "Scale(1.0, 1.0)", "", "which axes there are does not depend on the scale"),
     Explained("study.recipe", "identifications[0].method", "0 → 1", "all identifications are by one method"),
     Explained("paper.assumptions", 'cls(None, (("k1"', "items", _ORDER),
+    Explained("paper.options", "for name, (low, high) in", "items 0 and 1", _ORDER),
+    Explained("systems.inverse", "status, outputs, memory = 1", "1 → 2", "any status but 0 is a refusal"),
     Explained("study.recipe", "in ([],", "items", _ORDER),
     Explained("paper.assumptions", "[-longest, longest]", "", "the gas is compressed at one end alone"),
     Explained(

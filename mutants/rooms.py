@@ -62,13 +62,14 @@ ROOMS = (
     _room("study.plan", "study/test_plan.py"),
     _room(
         "systems.controllers.hooks systems.controllers.add systems.controllers.clipped_optimal systems.inverse",
-        "systems/test_laws_by_hand.py systems/test_control.py systems/test_loop.py",
+        "systems/test_laws_by_hand.py systems/test_control.py",
+        "preview skyhook never_in_reach",
     ),
     _room("systems.measures", "systems/test_measures.py"),
     _room("systems.monte_carlo", "systems/test_uncertainty.py"),
     _room("fleet.charts", "fleet/test_charts.py"),
     _room("fleet.verdicts", "fleet/test_verdicts.py", "page charted no_column lower_limit another_rig"),
-    _room("paper.options paper.assumptions paper.recipes", "paper/test_functions.py paper/test_measured.py"),
+    _room("paper.options paper.assumptions paper.recipes", "paper/test_ways.py study/test_recipe.py"),
     _room("paper.virtual_rig", "paper/test_virtual_rig.py"),
     _room(
         "report.tables study.recipe study.cross_validation",

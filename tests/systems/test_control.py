@@ -122,11 +122,11 @@ def test_the_inverse_gives_the_force_that_is_wanted(case):
         assert np.abs(np.diff(current[200:])).max() < 0.12 * highest
 
 
-def linear_in_current(*fy, coil=None):
+def linear_in_current(*fy, c=(800.0,), coil=None):
     """A damper of 800 N s/m, an offset of 30 N, and friction by its current."""
-    form = "linear-current" if len(fy) == 2 else "quadratic-current"
-    functions = {"c": ParameterFunction("constant", (800.0,)), "fy": ParameterFunction(form, fy),
-                 "f0": ParameterFunction("constant", (30.0,))}  # fmt: skip
+    forms = ("constant", "linear-current", "quadratic-current")
+    functions = {name: ParameterFunction(forms[len(values) - 1], values)
+                 for name, values in (("c", c), ("fy", fy), ("f0", (30.0,)))}  # fmt: skip
     return ModifiedModel("bench", ParameterMap(model_type("bingham"), functions), ENVELOPE, coil=coil)
 
 
@@ -177,6 +177,31 @@ def test_a_force_that_falls_back_is_refused_with_its_current(fy, said):
     with pytest.raises(ParameterError, match=said) as refused:
         check_monotone(linear_in_current(*fy))
     assert refused.value.code == "E_NOT_MONOTONE"
+
+
+def test_a_force_that_falls_back_at_high_velocities_only_is_refused_with_its_current():
+    """Friction alone rises least at low currents; with a viscous part that falls, the force turns back at high ones."""
+    with pytest.raises(ParameterError, match=r"above 0\.8 A"):
+        check_monotone(linear_in_current(100.0, 300.0, 100.0, c=(-1100.0, 0.0, 3000.0)))
+
+
+@pytest.mark.parametrize("frequency_Hz", [0.8, 3.0])
+def test_the_reachable_interval_is_that_at_the_highest_velocity_of_the_tests(frequency_Hz):
+    """A viscous part of 500 N s/m per ampere: the tested frequency or the tested velocity is what limits it."""
+    damper = linear_in_current(100.0, c=(500.0, 800.0))
+    slow = replace(damper, envelope=replace(ENVELOPE, frequency_Hz=(0.5, frequency_Hz)))
+    highest = min(2 * np.pi * frequency_Hz * ENVELOPE.amplitude_m[1], ENVELOPE.peak_velocity_m_s[1])
+    assert check_monotone(slow) == pytest.approx(500.0 * ENVELOPE.current_A[1] * highest, rel=1e-4)
+
+
+@pytest.mark.parametrize("damper", [joint_damper(), DAMPERS["spencer, coil"][0]], ids=["no number", "no program"])
+def test_a_sample_without_an_answer_is_refused_and_forgotten(damper):
+    inverse, other = invert(damper), invert(damper)
+    for each in (inverse, other):
+        each.step(0.001, 0.1, 0.0, 300.0, 1e-3)
+    with pytest.raises(ParameterError, match="no force at"):
+        inverse.step(1e300, 1e300, 1e300, 300.0, 1e-3)
+    assert inverse.step(0.0011, 0.1, 0.0, 300.0, 1e-3) == other.step(0.0011, 0.1, 0.0, 300.0, 1e-3)
 
 
 def test_out_of_reach_is_clipped_and_said():

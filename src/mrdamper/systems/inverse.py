@@ -192,7 +192,7 @@ class Inverse:
             status, outputs, memory = self._advance((), self._derived, self._memory, sample)
         except (ValueError, ArithmeticError):
             status, outputs, memory = 1, (), self._memory
-        if status:
+        if status or not all(map(math.isfinite, outputs)):
             raise ParameterError(f"no force at {sample}", where=self.title, remedy="come nearer to the last sample")
         self._memory = memory
         return Demand(*outputs)
