@@ -25,7 +25,7 @@ from mutants.rooms import CERTAIN, CERTAIN_FAULT, ROOMS, Room
 
 ROOT = Path(__file__).parent.parent
 MOST = 0.05  # of the faults may survive
-PATIENCE = 4.0  # a fault may make tests this much slower [s], beyond five times
+PATIENCE = 2.0  # a fault may make tests this much slower [s], beyond five times and the longest test
 LIBRARIES = ("numpy", "scipy.optimize", "scipy.special", "scipy.signal", "scipy.stats", "polars", "matplotlib.figure",
              "pydantic", "typer.testing", "jinja2", "pytest")  # fmt: skip
 

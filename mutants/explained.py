@@ -103,6 +103,7 @@ EXPLAINED = (
     Explained("dampers.sessions", "best[0] - 1e-6", "Sub → Add", "which of equals is taken"),
     Explained("dampers.covariance", "infinite = np.diag", "1.0 → 10.0", "whatever is finite"),
     Explained("study.plan", "return np.trace(", "axis1 and axis2", _ALIKE),
+    Explained("study.plan", "affordable = takewhile(", "60 → 600", "sessions that hold no record are tried, and lose"),
     Explained(
         "study.plan", "least = self.limits.opening", "Add → Sub", "more sessions than hold a record are tried, and lose"
     ),

@@ -59,7 +59,7 @@ ROOMS = (
         "cover_what_they_say scatter_of_repeated",
     ),
     _room("identification.intervals", "identification/test_intervals.py"),
-    _room("study.plan", "study/test_plan.py"),
+    _room("study.plan", "study/test_plan.py", "beats_chance read_back first_matrix limits_that too_many"),
     _room(
         "systems.controllers.hooks systems.controllers.add systems.controllers.clipped_optimal systems.inverse",
         "systems/test_laws_by_hand.py systems/test_control.py",

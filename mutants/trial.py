@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import gc
 import importlib
+import inspect
 import os
 import signal
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from types import CodeType, FrameType, FunctionType
 from typing import Any
 
@@ -44,6 +45,7 @@ class Trial:
         self.running: list[str] = []
         self.functions: list[FunctionType] = []
         self.kills: Counter[str] = Counter()  # faults a test has noticed
+        self.made: dict[str, Any] = {}  # values of shared fixtures that run through no planted function
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
@@ -59,6 +61,7 @@ class Trial:
             self.why = f"fail without any fault ({answer}): correct them first"
             return True
         self.seconds, self.through = answer
+        self._make_fixtures(session)
         gc.unfreeze()  # what the tests' conftest froze is not among the objects otherwise
         alive = (f for f in gc.get_objects() if isinstance(f, FunctionType))
         self.functions = [f for f in alive if f.__code__.co_filename in files]
@@ -66,14 +69,38 @@ class Trial:
         self._try_all(session)
         return True
 
-    @pytest.hookimpl(hookwrapper=True)
-    def pytest_fixture_setup(self, fixturedef: Any) -> Iterator[None]:
+    @pytest.hookimpl(wrapper=True)
+    def pytest_fixture_setup(self, fixturedef: Any, request: Any) -> Generator[None, Any, Any]:
         """A shared fixture's calls and time count for every test that uses it."""
         begin = time.process_time()
-        self.running.append(f"fixture {fixturedef.baseid}::{fixturedef.argname}")
-        yield
-        name = self.running.pop()
-        self.seconds[name] = self.seconds.get(name, 0.0) + time.process_time() - begin
+        self.running.append(_fixture(fixturedef))
+        try:
+            return (yield)
+        finally:
+            name = self.running.pop()
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.process_time() - begin
+
+    def _make_fixtures(self, session: pytest.Session) -> None:
+        """Make what forks share: fixtures of modules and of the session that are made of one another alone."""
+        planted = set().union(*self.through.values())
+        for item in session.items:
+            definitions = {name: found[-1] for name, found in item._fixtureinfo.name2fixturedefs.items()}
+            for name in sorted(definitions, key=lambda name: self.seconds.get(_fixture(definitions[name]), 0.0)):
+                self._make_fixture(name, definitions, planted)
+
+    def _make_fixture(self, name: str, definitions: dict[str, Any], planted: set[str]) -> None:
+        one = definitions.get(name)
+        if one is None or (key := _fixture(one)) in self.made or key in planted:
+            return
+        if one.scope not in ("module", "session") or one.params or inspect.isgeneratorfunction(one.func):
+            return
+        for argument in one.argnames:
+            self._make_fixture(argument, definitions, planted)
+        arguments = [definitions.get(argument) for argument in one.argnames]
+        if all(d is not None and _fixture(d) in self.made for d in arguments):
+            values = [self.made[_fixture(d)] for d in arguments]
+            self.made[key] = one.func(*values)
+            one.func = lambda *given, **named: self.made[key]
 
     def _healthy(self, session: pytest.Session, files: set[str]) -> Any:
         def trace(frame: FrameType, event: str, argument: object) -> None:
@@ -98,12 +125,9 @@ class Trial:
             if not tests:
                 self._survives(fault, "no test runs through it")
                 continue
-            limit = self.patience + 5 * sum(self._cost(item) for item in tests)
             child = os.fork()
             if child == 0:
-                signal.setitimer(signal.ITIMER_PROF, limit)  # of processor time: a busy machine notices nothing
-                signal.alarm(10 * int(limit))  # one that waits for ever uses none
-                os._exit(_noticed(session, self.functions, changed, tests))
+                os._exit(self._noticed(session, changed, tests))
             running[child] = fault, tests
             while len(running) >= self.jobs:
                 self._reap(running)
@@ -126,6 +150,28 @@ class Trial:
         text = f"\nsurvives: {fault.module}:{fault.line}: {fault.change} in {fault.of}: {fault.text} {why}\n"
         os.write(self.console, text.encode())
 
+    def _noticed(
+        self, session: pytest.Session, changed: list[tuple[CodeType, CodeType]], tests: list[pytest.Item]
+    ) -> int:
+        """Number of the first test, from 1, that fails with the fault planted; 0 where none does."""
+        number, new = 0, dict(changed)
+        # Any test may have to make what another made and kept in the healthy run.
+        limit = self.patience + max(map(self._cost, tests))
+        try:
+            for function in self.functions:
+                if function.__code__ in new:
+                    function.__code__ = new[function.__code__]
+            for number, (item, nextitem) in enumerate(_in_turn(tests), 1):
+                limit += 5 * self._cost(item)
+                signal.setitimer(signal.ITIMER_PROF, limit - time.process_time())  # a busy machine notices nothing
+                signal.alarm(10 * int(limit) + 10)  # one that waits for ever uses none
+                item.config.hook.pytest_runtest_protocol(item=item, nextitem=nextitem)
+                if session.testsfailed:
+                    return min(number, _UNKNOWN)
+        except BaseException:
+            return min(max(number, 1), _UNKNOWN)
+        return 0
+
     def _answering(self, session: pytest.Session, changed: list[tuple[CodeType, CodeType]]) -> list[pytest.Item]:
         """Tests that run through a function the fault changes; the quick ones that noticed other faults first."""
         names = set().union(*(self.through.get(_key(old), set()) for old, _ in changed))
@@ -134,28 +180,6 @@ class Trial:
 
     def _cost(self, item: pytest.Item) -> float:
         return self.seconds[item.nodeid] + sum(self.seconds.get(name, 0.0) for name in _fixtures(item))
-
-
-def _noticed(
-    session: pytest.Session,
-    functions: list[FunctionType],
-    changed: list[tuple[CodeType, CodeType]],
-    tests: list[pytest.Item],
-) -> int:
-    """Number of the first test, from 1, that fails with the fault planted; 0 where none does."""
-    number = 0
-    try:
-        new = dict(changed)
-        for function in functions:
-            if function.__code__ in new:
-                function.__code__ = new[function.__code__]
-        for number, (item, nextitem) in enumerate(_in_turn(tests), 1):
-            item.config.hook.pytest_runtest_protocol(item=item, nextitem=nextitem)
-            if session.testsfailed:
-                return min(number, _UNKNOWN)
-    except BaseException:
-        return min(max(number, 1), _UNKNOWN)
-    return 0
 
 
 def _in_turn(items: list[pytest.Item]) -> Iterator[tuple[pytest.Item, pytest.Item | None]]:
@@ -187,4 +211,8 @@ def _key(code: CodeType) -> tuple[str, str, int]:
 
 def _fixtures(item: pytest.Item) -> set[str]:
     found = item._fixtureinfo.name2fixturedefs
-    return {f"fixture {d.baseid}::{name}" for name, definitions in found.items() for d in definitions}
+    return {_fixture(definition) for definitions in found.values() for definition in definitions}
+
+
+def _fixture(definition: Any) -> str:
+    return f"fixture {definition.baseid}::{definition.argname}"

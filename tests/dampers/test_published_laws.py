@@ -1,11 +1,13 @@
 """Every "-type" law against the formula written down once more, at conditions that tell its exponents apart."""
 
 import math
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from mrdamper.dampers.envelope import Envelope
-from mrdamper.dampers.published import all_published
+from mrdamper.dampers.published import all_published, dominguez
 from mrdamper.data import Condition
 
 REFERENCE = Condition(0.3, 1.1, 0.012)
@@ -177,6 +179,26 @@ def test_branches_of_lei_meet_where_quadratics_cross():
     assert model.values() == pytest.approx(wanted.values(), rel=1e-12)
     weak = damper("lei-type", {**c, "cpo0": -5.0, "cpr0": 900.0, "fy0": -3.0, "v00": -1.0}).model_at(CONDITIONS[0])
     assert weak.values() == pytest.approx(type(model).from_wereley(0.0, 900.0, 1.0, 0.0, 0.0).values(), rel=1e-12)
+
+
+def test_one_current_gives_a_level_and_no_slope():
+    values = np.array([1.0, 2.0, 9.0])
+    assert dominguez._line(np.full(3, 0.5), values) == pytest.approx([0.0, 4.0])  # of least squares: the mean
+    assert dominguez._line(np.array([0.0, 1.0, 2.0]), 3 * np.arange(3.0) + 1) == pytest.approx([3.0, 1.0])
+
+
+def test_lv_starts_at_the_damping_and_speed_of_the_middle_run():
+    """One run far from the others does not move the start; the stress at one speed is that of the viscous force."""
+    runs = [
+        SimpleNamespace(condition=Condition(I, f, 0.01), model=SimpleNamespace(values=lambda c=c, I=I: {
+            "c": c, "fy": 100 + 200 * I, "f0": 5.0}))
+        for I, f, c in ((0.0, 1.0, 800.0), (0.5, 2.0, 900.0), (1.0, 9.0, 9000.0))
+    ]  # fmt: skip
+    start = all_published()["lv-type"].start(runs, REFERENCE)
+    speed = 2 * np.pi * 2.0 * 0.01
+    assert math.exp(start["consistency_log"]) == pytest.approx(900.0 * speed**0.2 / 3)
+    assert [start[f"fy{i}"] for i in range(3)] == pytest.approx([100.0, 200.0, 0.0], abs=1e-6)
+    assert (start["m"], start["f0"]) == (0.8, 5.0)
 
 
 @pytest.mark.parametrize(("given", "index"), [(0.01, 0.1), (7.0, 2.0), (0.6, 0.6)])

@@ -1,9 +1,11 @@
 """Sessions: what runs of a day share is learnt, corrects others of that day, and nothing else."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 from mrdamper.dampers.joint import damper_of
 from mrdamper.dampers.sessions import GainOffset, RecordingTime, RunScatter, Sessions, known_errors, sessions_known
@@ -97,6 +99,34 @@ def test_the_three_spreads_are_found_from_many_days():
     assert found.total == pytest.approx(truth.total, rel=0.15)
     assert found.session == pytest.approx(truth.session, rel=0.35)
     assert 0.004 < found.run < 0.02
+
+
+@pytest.mark.parametrize(
+    "shares", [(3.0, 0.3, 0.1), (0.3, 3.0, 0.1), (0.02, 0.02, 1.0), (1.0, 0.02, 1.0), (2.0, 2.0, 2.0)]
+)
+def test_no_other_shares_of_the_scatter_are_likelier(shares):
+    """Among all on a grid, and beside those found by a twentieth either way; the likelihood by SciPy."""
+    when = [RecordingTime(f"day {day}", 24.0 * day + hour) for day in range(8) for hour in (0, 0.5, 3)]
+    truth = RunScatter(*(0.01 * s for s in shares), 2.0)
+    K = truth.covariance(when, when)
+    np.fill_diagonal(K, truth.total**2)
+    values = np.linalg.cholesky(K) @ np.random.default_rng(7).standard_normal(len(when))
+    found = RunScatter.likeliest(when, values)
+
+    def unlikely(session, hour, run, hours):
+        scatter = RunScatter(session, hour, run, hours)
+        K = scatter.covariance(when, when)
+        np.fill_diagonal(K, scatter.total**2)
+        return -2 * multivariate_normal(cov=K).logpdf(values)
+
+    best = unlikely(found.session, found.hour, found.run, found.hours)
+    steps = [(a, b, c) for a in (0.95, 1, 1.05) for b in (0.95, 1, 1.05) for c in (0.95, 1, 1.05)]
+    assert best < 0.01 + min(
+        unlikely(a * found.session, b * found.hour, c * found.run, found.hours) for a, b, c in steps
+    )
+    sizes = 0.01 * np.array([0.05, 0.3, 1.0, 3.0])
+    grid = product(sizes, sizes, sizes, (0.5, 2.0, 8.0))
+    assert best < 0.01 + min(unlikely(*point) for point in grid)
 
 
 def test_what_is_given_is_the_conditional_normal():

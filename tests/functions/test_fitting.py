@@ -1,5 +1,6 @@
 """Fits beside NumPy's least squares, errors at left-out conditions beside refits, forms beside their formulas."""
 
+from itertools import product
 from math import exp
 from types import SimpleNamespace
 
@@ -12,6 +13,26 @@ from mrdamper.statistics.functions import fitting
 from mrdamper.statistics.functions.fitting import FunctionFit, assess, choose_function, fit_function, require_determined
 from mrdamper.statistics.functions.forms import FORMS, ParameterFunction
 from mrdamper.statistics.functions.selection import fold_groups
+
+
+@pytest.mark.parametrize("name", [name for name, form in FORMS.items() if form.rate_bounds])
+def test_rates_are_refined_from_the_three_best_points_of_a_grid_of_their_logarithms(monkeypatch, name):
+    form, starts, refine = FORMS[name], [], fitting.least_squares
+    monkeypatch.setattr(fitting, "least_squares", lambda f, u, *a, **k: starts.append(u) or refine(f, u, *a, **k))
+    matrix = [(I, f, A) for I in (0.0, 0.3, 0.7, 1.5, 2.0) for f, A in ((0.5, 0.02), (1.0, 0.012), (3.0, 0.005))]
+    I, f, A = np.array(matrix).T
+    values = 3 + np.sin(9 * I + 5 * f + 300 * A)
+    weight = np.linspace(1.0, 2.0, I.size)
+    fitting._best_rates(form, I, f, A, values, weight)
+    grid = np.array(list(product(*(np.linspace(*np.log(ends), 6) for ends in form.rate_bounds))))
+
+    def left(u):
+        table = form.columns(I, f, A, tuple(np.exp(u))) * weight[:, None]
+        return np.sum((table @ np.linalg.lstsq(table, values * weight, rcond=None)[0] - values * weight) ** 2)
+
+    best = sorted(left(u) for u in grid)[:3]
+    assert [left(u) for u in starts] == pytest.approx(best, rel=1e-6)
+
 
 I, f, A, r, s = 1.3, 0.7, 0.06, 0.9, 2.1  # no two products of their powers are alike
 # Every form once more, term by term.

@@ -60,6 +60,21 @@ def test_force_is_that_of_the_equations(current, more, sign):
     assert np.sqrt(np.mean((ours - hand) ** 2)) < 1e-3 * np.ptp(hand)
 
 
+@pytest.mark.parametrize(("current", "share"), [(0.3, 1 - 0.4 - 0.35 * 0.3), (3.0, 0.0)])
+def test_a_damper_held_at_rest_keeps_what_does_not_fade_with_velocity(current, share):
+    """Moved out by far more than its lost motion and held: the share 1 − h of the yield force, h being 1 at most."""
+    t = np.linspace(0, 0.2, 401)
+    x = np.minimum(0.05 * t, 0.005)
+    v = np.where(t < 0.1, 0.05, 0.0)
+    motion = Excitation(t, x, v, np.zeros_like(t), np.full(t.size, current))
+    held = simulate(PlayBypass(**P, **PRESET), motion).force
+    assert np.isfinite(held).all()
+    fy = P["fy0"] + P["fy1"] * current * (1 - math.exp(-current / PRESET["Ic"]))
+    assert held[-1] == pytest.approx(
+        P["f0"] + P["k"] * 0.005 * (1 - share) + fy * share * (1 + P["asymmetry"]), rel=1e-6
+    )
+
+
 @pytest.mark.parametrize("name", [n for n in P if n != "f0"])
 def test_every_parameter_moves_the_force(name):
     t = np.linspace(0, 1.0, 2001)

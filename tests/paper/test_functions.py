@@ -133,6 +133,11 @@ def test_a_gamma_that_is_held_ends_where_it_leaves_nothing_for_beta():
     def longest(**fixed):
         return paper._Remainder(SimpleNamespace(fixed=fixed), None, None).longest
 
+    def rho(beta, **fixed):
+        return paper._Remainder(SimpleNamespace(fixed=fixed), None, None).shape(beta).rho
+
+    assert rho(7e3, gamma=2e3, n=3.0) == pytest.approx(-5 / 9) == -rho(2e3, gamma=7e3, n=3.0)
+    assert rho(7e3) == 0.0  # tied to beta
     assert longest(gamma=0.5, n=2.0) == pytest.approx(0.999 * 0.5**-0.5)
     assert longest(gamma=8e3, n=3.0) == pytest.approx(0.999 / 20)
     assert longest(n=2.0) == longest(gamma=0.0, n=2.0) == np.inf

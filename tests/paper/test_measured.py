@@ -43,6 +43,16 @@ def test_friction_is_half_the_force_between_the_strokes_where_both_were_measured
     assert friction == pytest.approx(50 + 1000 * found, abs=0.5)
 
 
+def test_noise_of_the_samples_is_averaged_before_strokes_are_compared():
+    """2000 samples a stroke in 60 means: 20 N of noise leave some 2.5 N."""
+    motion = triangle(Condition(0.0, 0.01, 0.02), 1.25, 4000)
+    noise = 20 * np.random.default_rng(0).standard_normal(motion.time.size)
+    _, friction = friction_along(
+        Run("slow", motion.time, motion.displacement, 50 * np.sign(motion.velocity) + noise, 0.0)
+    )
+    assert np.std(friction - 50) < 5
+
+
 def test_friction_is_compared_where_both_strokes_were():
     x = np.concatenate([np.linspace(0, -0.02, 500), np.linspace(-0.02, 0.02, 2000), np.linspace(0.02, -0.01, 1500)])
     force = 60 * np.sign(np.gradient(x)) + 2e3 * x
@@ -165,11 +175,15 @@ def test_the_phase_counts_runs_in_the_band_and_the_motion_that_changes_most():
 def test_the_stroke_end_compares_the_fastest_with_the_slowest_motion_at_the_highest_current():
     speeds = {"slow": 0.5, "fast": 2.0, "middle": 1.0, "other": 9.0}
     conditions = [Condition(2.0 if name != "other" else 1.95, f, 0.02) for name, f in speeds.items()]
-    models = [SimpleNamespace(c=100.0 + n, k1=0.0, m=0.0) for n in range(4)]
+    models = [SimpleNamespace(c=100.0 + n, k1=900.0 + n, m=8.0) for n in range(4)]
     consistent = SimpleNamespace(identifications=[SimpleNamespace(model=m) for m in models])
-    lengths = {("slow", 100.0): 0.002, ("fast", 101.0): 0.005}
+    # In phase are k1 − m ω².
+    lengths = {
+        ("slow", 100.0, round(900 - 8 * (2 * np.pi * 0.5) ** 2, 6)): 0.002,
+        ("fast", 101.0, round(901 - 8 * (2 * np.pi * 2.0) ** 2, 6)): 0.005,
+    }
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(claims_on_tests, "lost_length", lambda run, c, stiffness: lengths[run, c])
+        patch.setattr(claims_on_tests, "lost_length", lambda run, c, k: lengths[run, c, round(k, 6)])
         study = study_of({CONSISTENT: consistent}, conditions=conditions, train=list(speeds))
         found = claims_on_tests.stroke_end(study)
     assert list(found.values) == pytest.approx([2.5])

@@ -82,9 +82,11 @@ def test_what_is_left_is_of_the_changed_force(monkeypatch):
     assert (found.left, asked) == (0.3, [(MODEL, pytest.approx(1.1 * MODEL.n), condition)])
     monkeypatch.undo()
     other = replace(MODEL, f0=150.0)
-    monkeypatch.setattr(sensitivity, "identify", lambda *_, **__: SimpleNamespace(model=replace(other, c=1500.0)))
+    monkeypatch.setattr(
+        sensitivity, "identify", lambda *_, **__: SimpleNamespace(model=replace(other, c=1500.0, f0=130.0))
+    )
     left = sensitivity._left_after_refit(MODEL, other, condition)
-    missed = 60 * 2 * np.pi * 1.3 * 0.05 / np.sqrt(2)
+    missed = np.hypot(60 * 2 * np.pi * 1.3 * 0.05 / np.sqrt(2), 20)
     assert left == pytest.approx(missed / np.std(loop_by_hand(other, condition)), rel=3e-3)
 
 

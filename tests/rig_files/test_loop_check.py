@@ -103,6 +103,21 @@ def test_exchanged_channels_are_told_by_which_moves_like_a_sine():
                 assert loop._exchanged(still) is (size < 0.04)
 
 
+@pytest.mark.parametrize(("steady", "cycles", "by_form"), [(None, 0.9, False), (None, 9, True), ((0, 9), 0.9, True)])
+def test_channels_are_told_by_their_form_where_a_steady_part_or_enough_cycles_show_it(
+    monkeypatch, steady, cycles, by_form
+):
+    """The channel called force is a sine and the other is not, but neither moves by more than the other."""
+    phase = 2 * np.pi * np.arange(64) / 64
+    forms = SimpleNamespace(
+        displacement=SimpleNamespace(loop=np.sign(np.cos(phase))), force=SimpleNamespace(loop=np.cos(phase))
+    )
+    monkeypatch.setattr(loop, "steady_cycles", lambda view: forms)
+    monkeypatch.setattr(loop, "cycles_of", lambda view: cycles)
+    run = SimpleNamespace(displacement=np.array([0.0, 0.02]), force=np.array([0.0, 0.02]))
+    assert loop._exchanged(SimpleNamespace(strokes=SimpleNamespace(steady=steady), run=run)) is by_form
+
+
 def levels(turning, out, back, dip=0.0, share=0.0, count=1000):
     """A force at three levels by the velocity, of which a share dips."""
     velocity = np.cos(2 * np.pi * (np.arange(count) + 0.5) / count * 4)
@@ -131,6 +146,8 @@ def levels(turning, out, back, dip=0.0, share=0.0, count=1000):
 )
 def test_a_rectified_force_is_nearer_to_zero_at_the_reversals_than_in_either_stroke(made, rectified):
     assert bool(loop._is_rectified(made)) is rectified
+    slow = SimpleNamespace(run=made.run, moving=SimpleNamespace(velocity=0.15 * made.moving.velocity))
+    assert bool(loop._is_rectified(slow)) is rectified  # whatever the speed of the test
 
 
 @pytest.mark.parametrize("mirrored", [1.0, -1.0])
@@ -248,6 +265,7 @@ def test_a_force_that_is_from_somewhere_on_times_another_number_is_refused(times
         # Where the force is small either sign is near; a force that is weak for a while has not turned.
         (lambda p, n, t: 100 * np.where((n == 2) & (abs(p - 4.5 * np.pi) < 0.29), -1, 1) * np.cos(p), 4.0, None),
         (lambda p, n, t: np.where((n == 2) & (p < 4.2 * np.pi), 0.3, 1) * np.cos(p), 4.0, None),
+        (lambda p, n, t: np.where(abs(np.cos(p)) < 0.7, np.where(n == 2, -0.05, 0.05), np.cos(p)), 4.0, None),
         # The rest of a record beyond its last whole cycle.
         (lambda p, n, t: np.where(n == 2, -1.0, 1.0) * np.cos(p), 2.6, None),
     ],

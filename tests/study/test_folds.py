@@ -52,6 +52,11 @@ def test_only_a_lowest_current_below_which_others_can_be_asked_for_ranks_models(
     assert kinds["no current"] == [[0, 1, 2]]
 
 
+def test_a_current_either_way_is_one_level():
+    kinds = folds_by_kind(rig_tests((-0.4, 0.0, 0.4, 1.0)))
+    assert kinds["current"] == [[0, 1, 2, 6, 7, 8], [9, 10, 11]]
+
+
 @pytest.mark.parametrize(
     ("runs", "absent"),
     [

@@ -4,6 +4,7 @@ import csv
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from mrdamper.errors import ConditionError, InputError
 from mrdamper.rig_files.motion_file import load_motion
 from mrdamper.study.first_matrix import first_matrix
 from mrdamper.study.limits import Limits
-from mrdamper.study.plan import ExperimentDesign, plan_tests
+from mrdamper.study.plan import ExperimentDesign, _slopes, least_informative_runs, plan_tests
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from benchmarks.planning import designs, reckoned
@@ -156,6 +157,88 @@ def test_a_plan_says_what_its_numbers_are(reckoning, damper):
     assert design(damper, "c1").summary(own) == shown
 
 
+def small(records, minutes, *, sessions=1, opening=0.0, known=1e-9, session=1e12):
+    """A design with records of known information on each parameter, and a gain that a session adds to all of them.
+
+    records : C rows of the information on P parameters; known : that of today.
+    """
+    records = np.asarray(records, dtype=float)
+    size = records.shape[1]
+    grams = np.zeros((len(records), 1, size + 2, size + 2))
+    for gram, row in zip(grams, records, strict=True):
+        gram[0] = np.diag([*row, row.sum(), 1e-9])
+        gram[0, :size, size] = gram[0, size, :size] = row
+    return ExperimentDesign(
+        SimpleNamespace(opening=opening, sessions=sessions, minutes=lambda at: minutes[at]), range(len(records)),
+        tuple("abc"[:size]), known * np.eye(size), np.eye(size), grams, np.array([session, 1.0]), "", 0.0,
+    )  # fmt: skip
+
+
+def test_the_next_record_is_the_one_that_reduces_the_variance_most_for_its_time():
+    """With sessions that are alike every variance is one over a sum: today's 1, then 0.45 of a, 0.3 of b, 0.55 of b."""
+    made = small([(0.45, 0.0), (0.0, 0.3), (0.0, 0.55)], (1.0, 1.0, 2.0), known=1.0)
+    assert made.chosen(1 / 60) == [[0]]
+    filled = made._filled(1, 5 / 60)
+    played, information = [], np.ones(2)
+    while sum(made.minutes[i] for i in played) < 5:
+        left = 5 - sum(made.minutes[i] for i in played)
+        gains = [
+            (np.sum(1 / information) - np.sum(1 / (information + row))) / minutes if minutes <= left else -1
+            for row, minutes in (((0.45, 0.0), 1.0), ((0.0, 0.3), 1.0), ((0.0, 0.55), 2.0))
+        ]
+        played.append(int(np.argmax(gains)))
+        information = information + ((0.45, 0.0), (0.0, 0.3), (0.0, 0.55))[played[-1]]
+    assert filled == [played]
+    assert made.variance(made.precision(filled)) == pytest.approx(np.sum(1 / information))
+
+
+@pytest.mark.parametrize("sessions", [1, 2, 3])
+def test_every_session_gets_a_record_and_none_that_fits_is_left(sessions):
+    """Two minutes open a session; a long record in the first would leave the others empty."""
+    made = small([(1.0,), (9.0,)], (1.0, 3.0), sessions=3, opening=2.0)
+    for minutes in np.arange(3.0 * sessions, 3.0 * sessions + 9, 0.5):
+        played = made._filled(sessions, minutes / 60)
+        assert all(played)
+        spent = 2.0 * sessions + sum(made.minutes[rows].sum() for rows in played)
+        assert minutes - 1.0 < spent <= minutes + 1e-9
+
+
+def test_an_exchange_never_raises_the_variance_and_none_is_left_for_the_last_record():
+    """The record that is best alone adds nothing where another has told it."""
+    made = small([(1.0, 0.0), (0.0, 3.0), (0.6, 0.6)], (1.0, 1.0, 1.0), known=1.0)
+    for played in ([[0, 1]], [[1, 1]], [[2, 0, 1]], [[0, 0, 0]], [[0, 1], [1]], [[2], [2, 2]]):
+        before = made.spread(played)
+        exchanged = made._exchanged([list(rows) for rows in played])
+        assert made.spread(exchanged) <= before * (1 + 1e-12)
+        others = [*exchanged[:-1], exchanged[-1][:-1]]
+        trials = [made.spread([*others[:-1], [*others[-1], i]]) for i in range(3)]
+        assert made.spread(exchanged) == pytest.approx(min(trials))
+    assert made._exchanged([[0, 1]]) == [[0, 1]]
+    slow = small([(1.0,), (9.0,)], (1.0, 3.0))
+    assert (slow._exchanged([[0]]), slow._exchanged([[1]])) == ([[0]], [[1]])  # no longer than the one it replaces
+
+
+def test_the_number_of_sessions_is_the_best_of_those_the_hours_hold():
+    """Where the gain of a session is all that is not known, every record beyond its first is lost."""
+    for session, most, minutes, count in ((1.0, 3, 9.0, 3), (1.0, 2, 9.0, 2), (1.0, 5, 8.9, 2), (1e12, 3, 9.0, 1)):
+        made = small([(1e4,), (1e4,)], (1.0, 5.0), sessions=most, opening=2.0, session=session)
+        assert len(made.chosen(minutes / 60)) == count
+
+
+def test_a_record_counts_by_samples_spread_evenly_over_a_steady_cycle(damper):
+    condition = FEW[1]
+    names = damper.uncertainty.names
+    table = _slopes(damper, damper.uncertainty, names, condition)[0]
+    assert table.shape == (24, len(names) + 2)
+    steady = damper.predict(condition).force
+    force, half = table[:, -2] / table[:, -1], np.ptp(steady) / 2
+    assert table[:, -1] == pytest.approx(1 / half, rel=0.02)
+    assert (np.mean(force), np.std(force)) == pytest.approx(
+        (np.mean(steady), np.std(steady)), rel=0.05, abs=0.02 * half
+    )
+    assert np.abs(np.fft.fft(force)[1]) == pytest.approx(12 * np.abs(np.fft.fft(steady)[1]) / steady.size * 2, rel=0.02)
+
+
 def test_a_first_matrix_has_a_reason_for_every_row():
     made = first_matrix(LIMITS, 1.0)
     assert len({item.reason for item in made}) == len(made) > 8
@@ -199,6 +282,13 @@ def test_hours_that_hold_no_record_and_models_that_know_nothing_are_refused(damp
             plan_tests(damper, LIMITS, hours)
     with pytest.raises(InputError, match="E_CERTAINTY"):
         plan_tests(joint_damper(), LIMITS, 1.0)
+
+
+def test_the_least_informative_runs_are_those_of_the_smallest_shares(damper):
+    shares = {"a": 0.4, "b": 0.1, "c": 0.3, "d": 0.2}
+    told = replace(damper, uncertainty=replace(damper.uncertainty, information=shares))
+    assert least_informative_runs(told, 3) == [("b", 0.1), ("d", 0.2), ("c", 0.3)]
+    assert least_informative_runs(told, 4) == least_informative_runs(joint_damper()) == []
 
 
 def test_the_records_are_read_back(damper, tmp_path):

@@ -280,6 +280,31 @@ def test_joint_ways_hand_on_what_their_fits_make(monkeypatch):
     assert recipes.fit_published(law, "abc", []).damper == (["a", "b", "c"], [], {"identification runs": "3"})
 
 
+def test_laws_of_the_current_alone_are_fitted_without_the_motion(monkeypatch):
+    identifications, asked = [SimpleNamespace(method="balance")] * 2, []
+    fit = SimpleNamespace(damper="damper")
+    monkeypatch.setattr(
+        recipes, "fit_modified_jointly", lambda *given, **named: asked.append((given, named)) or (fit, "refit")
+    )
+    made_ = recipes.fit_current_laws("ab", identifications)
+    assert (made_.damper, made_.refit, made_.fit) == ("damper", "refit", fit)
+    about = {"method": "balance", "identification runs": "2", "functions": "current laws"}
+    assert asked == [(("ab", identifications, about), {"any_motion": False})]
+
+
+def test_a_recipe_that_depends_on_the_runs_is_completed_by_them():
+    plain = Recipe("memory", None, remember)
+    completed = replace(plain, complete=lambda sines: replace(plain, notes=tuple(sines)))
+    assert plain.for_runs("ab") is plain
+    assert completed.for_runs("ab").notes == ("a", "b")
+
+
+def test_a_study_method_has_its_options_from_text_and_the_gas_that_is_known():
+    gas = GasSpring(1.5e6, 1.5e-4, 3e-4)
+    assert recipes.study_method("paper", {"n": "3", "phase": "peaks"}, gas) == PaperOptions(gas, n=3.0, phase="peaks")
+    assert recipes.study_method("paper") == PaperOptions()
+
+
 def test_steps_tell_how_far_they_are_and_take_pure_sines_where_they_must(monkeypatch):
     monkeypatch.setattr(recipes, "analyse_motion", lambda run: SimpleNamespace(is_sine=run.id != "sweep"))
     told, found, given = [], {}, []

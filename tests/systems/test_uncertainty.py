@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.errors import InputError
 from mrdamper.models import model_type
 from mrdamper.statistics.functions.forms import ParameterFunction
+from mrdamper.systems import monte_carlo as many
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inputs.record import record
@@ -51,7 +53,7 @@ def test_parameters_of_other_sizes_are_drawn_alike():
 def test_draws_have_the_variance_of_student(dof):
     """Of d degrees of freedom: d / (d - 2) times the square of the spread, for numbers as for sessions."""
     damper = certain(joint_damper(), ("f0", "k"), [2.0, 30.0], gain=0.04, offset=6.0)
-    few = replace(damper.uncertainty, dof=np.full(2, dof), session_dof=dof)
+    few = replace(damper.uncertainty, dof=np.array([dof, 1e6]), session_dof=dof)  # the fewest count for all
     drawn = [row["d"] for row in draw({"d": replace(damper, uncertainty=few)}, 20_000, seed=3)]
     wider = np.sqrt(dof / (dof - 2))
     for values, spread in (
@@ -62,6 +64,28 @@ def test_draws_have_the_variance_of_student(dof):
     ):
         assert np.mean(values) == pytest.approx(0.0, abs=0.05 * spread)
         assert np.std(values) == pytest.approx(wider * spread, rel=0.06)
+
+
+def test_draws_are_correlated_as_the_covariance_says_be_a_parameter_a_logarithm_or_not():
+    damper = certain(joint_damper(), ("f0", "vh"), [2.0, 0.1])
+    assert damper.uncertainty.logs == (False, True)
+    covariance = np.array([[4.0, 0.16], [0.16, 0.01]])
+    drawn = draw({"d": replace(damper, uncertainty=replace(damper.uncertainty, covariance=covariance))}, 4000)
+    values = np.array([[row["d"].numbers["f0"], np.log(row["d"].numbers["vh"])] for row in drawn])
+    assert np.corrcoef(values.T)[0, 1] == pytest.approx(0.8, abs=0.03)
+
+
+@pytest.mark.parametrize(("found", "taken"), [(1e-4, 2.5e-4), (4e-4, 8e-4)])
+def test_draws_take_twice_the_step_of_the_mean_but_not_less_than_half_the_first(monkeypatch, found, taken):
+    steps = []
+    monkeypatch.setattr(many, "measures", lambda done: {})
+    monkeypatch.setattr(many, "changed", lambda coarse, fine: {})
+    run = lambda step, **_: steps.append(step) or SimpleNamespace(peaks={})  # noqa: E731
+    loop = SimpleNamespace(first_step=5e-4, run=run, links=(), stages=(), system=None)
+    monkeypatch.setattr(many, "_numbers", lambda loop, one: one)
+    bands = monte_carlo(loop, [{}, {}], SimpleNamespace(step=found, peaks={}))
+    assert steps == pytest.approx([taken] * 3)
+    assert bands.step == pytest.approx(taken)
 
 
 def test_two_draws_are_the_fewest():
