@@ -228,6 +228,32 @@ EXPLAINED = (
     Explained("systems.inverse", "_MOTION // 2 :", "2 → 3", _BUDGET),
     Explained("systems.inverse", "range(_ROUNDS + 1)", "1 → 2", "it breaks off before"),
     Explained("systems.measures", "-step / _WINDOW", "Div → Mult", "the window is of one second"),
+    Explained("quality.loop", "x = np.mean(cycles.displacement", "mean → median", "cycles of one motion are alike"),
+    Explained("quality.loop", "np.linspace(-1, 1, POINTS)", "1 → 2", "beside a constant they span the same"),
+    Explained("quality.loop", "leap = float(", "mean → median", "sizes that are compared are even"),
+    Explained("quality.loop", "0.01 * (force.size - 1)", "1 → 2", _BUDGET),
+    Explained("published.boada", "in zip(factors, values", "arguments", "a product of two"),
+    Explained("published.dominguez", "np.log(np.maximum(force, 1.0))", "1.0 → 10.0", _GUARD),
+    Explained("published.dominguez", 'np.maximum(given["beta"], 1.0)', "1.0 → 10.0", _GUARD),
+    Explained("published.dominguez", "np.log(total)", "log → log1p", "a loop's beta + gamma is far above one"),
+    Explained("published.lv", "max(viscous, 1.0)", "1.0 → 10.0", _GUARD),
+    Explained("identification.covariance", "np.median(np.diff(time))", "median → mean", "samples are even, or nearly"),
+    Explained("dampers.modified", "ends = zip(function.rates", "arguments", "nearness of two"),
+    Explained("dampers.joint", "reach = _DIFFERENCE_RATIO * (upper", "Sub → Add", _BUDGET),
+    Explained("dampers.joint", "point, 1, _REFIT_STEPS", "1 → 2", "weights are found once more"),
+    Explained("dampers.random_effects", "unit: Floats = np.sqrt(", "", _SCALE),
+    Explained("paper.paper_method", "issubclass(problem.model_type", "arguments", "no model is another's subclass"),
+    Explained("paper.paper_method", 'values["c"] > 0', "0 → 1", "a damper has more than 1 N s/m"),
+    Explained("dampers.sessions", "while step > 0.02", "0.02 → 0.2", _BUDGET),
+    Explained("dampers.sessions", "trials = np.clip(", "0 → 1", "directions that span the plane lead to one point"),
+    Explained("dampers.sessions", "trials = np.clip(", "1 → 2", "directions that span the plane lead to one point"),
+    Explained("dampers.sessions", "step /= 2", "2 → 3", _BUDGET),
+    Explained("study.plan", "axis=(0, 1, 2)", "items", _ALIKE),
+    Explained("study.plan", "uncertainty.covariance + 1e-12", "Add → Sub", _GUARD),
+    Explained("study.plan", "range(_DRAWS + 1)", "1 → 2", _BUDGET),
+    Explained(
+        "study.plan", "n.value * math.exp(s)", "Mult → Div: n.value * math.exp(s)", "a draw is as likely the other way"
+    ),
 )
 
 

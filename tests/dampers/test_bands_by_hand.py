@@ -51,7 +51,11 @@ PREDICTION = Prediction(MOTION, FORCE, CONDITION, ())
 
 @pytest.fixture(autouse=True)
 def _slopes(monkeypatch):
-    monkeypatch.setattr(bands, "force_slopes", lambda damper, prediction, names: SLOPES)
+    def slopes(damper, prediction, names):
+        assert isinstance(prediction, Prediction)
+        return SLOPES
+
+    monkeypatch.setattr(bands, "force_slopes", slopes)
 
 
 def reach(level, *parts):

@@ -7,7 +7,7 @@ import pytest
 
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.calibration import Calibration, PredictedRun, StandardizedErrors, model_error
-from mrdamper.dampers.covariance import _within, estimate_uncertainty
+from mrdamper.dampers.covariance import _determined, _within, estimate_uncertainty
 from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.envelope import UNTESTED
 from mrdamper.dampers.joint import JointDamper
@@ -54,6 +54,22 @@ def fitted(runs, size=1.0):
         c, fy, f0 = np.linalg.solve(normal, right)
         damper = bingham(c, fy, f0)
     return damper
+
+
+def test_columns_that_no_run_shows_are_unseen_and_the_unit_of_a_parameter_changes_nothing():
+    """Two columns that do the same are told as such in newtons and in millionths of one."""
+    parts = [RunResiduals.of(TRUTH, run) for run in runs_of(conditions=CONDITIONS[:2])]
+    shown = [np.column_stack([np.sin(p.picked), np.cos(p.picked), np.sin(p.picked) + 1e-3]) for p in parts]
+    for size in (np.ones(3), np.array([1e6, 1e-6, 1.0])):
+        keep, unseen, alike, inverse = _determined([table * size for table in shown], parts, 3)
+        assert (keep, unseen, alike) == ([0, 1, 2], [], [])
+        normal = normal_matrix([table * size for table in shown], parts)
+        assert inverse @ normal == pytest.approx(np.eye(3), abs=1e-4 * max(np.outer(1 / size, size).ravel()))
+    nothing = [np.zeros((p.picked.size, 3)) for p in parts]
+    assert _determined(nothing, parts, 3)[:3] == ([], [0, 1, 2], [])
+    twice = [np.column_stack([table[:, 0], 1e6 * table[:, 0], table[:, 1]]) for table in shown]
+    keep, unseen, alike, _ = _determined(twice, parts, 3)
+    assert (len(keep), unseen, [sorted(group) for group in alike]) == (2, [], [[0, 1]])
 
 
 def test_what_enters_of_a_run_is_its_last_cycles_thinned():

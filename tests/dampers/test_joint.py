@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from export import c_bench
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.dampers import joint_damper
@@ -286,6 +287,40 @@ def test_what_a_search_without_some_runs_foresees_is_where_it_goes(problem, fit)
     found = problem.refit(fit, rows, 1e-6)
     assert np.linalg.norm(point - found.point) < 0.3 * np.linalg.norm(fit.point - found.point)
     assert errors == pytest.approx(found.nrmse_pp, rel=0.05)
+
+
+@pytest.mark.parametrize("far", [False, True])
+def test_a_refit_begins_where_the_derivatives_lead_unless_that_is_worse(problem, fit, monkeypatch, far):
+    """By the sum of squares over the runs that are kept."""
+    rows, begins = [0, 3, 5, 7, 8, 11], []
+    lower, upper = problem.box()
+    errors, near = problem.linearised(fit).extrapolate_refit(rows, problem.box())
+    away = lower + 0.9 * (upper - lower) if far else near
+    monkeypatch.setattr(joint.Linearisation, "extrapolate_refit", lambda self, rows, box: (errors, away))
+    monkeypatch.setattr(JointProblem, "_search", lambda self, table, parts, point, *rest: begins.append((parts, point)))
+    problem.refit(fit, rows[::-1])
+    ((parts, point),) = begins
+    assert parts == [problem.parts[i] for i in rows]
+    assert point is (fit.point if far else near)
+
+
+@pytest.mark.skipif(not c_bench.COMPILERS, reason="no C compiler on this machine")
+def test_slopes_by_the_search_axes_are_those_of_the_force(runs, problem, fit):
+    motion = sine(MATRIX[5], 3, 20_000)
+    picked = np.arange(0, motion.time.size, 97)
+    slopes = problem.force_slopes(fit.point, fit.damper.one_model, motion, picked)
+    linear = {info.name for info in PlayBypass.parameters() if info.linear}
+    held = {name: getattr(fit.damper.one_model, name) for name in linear}
+    for i, axis in enumerate(problem.axes):
+        step = np.where(np.arange(fit.point.size) == i, 1e-5, 0.0)
+        ends = [replace(problem.without_linear(fit.point + s * step), **held) for s in (-1, 1)]
+        low, high = (simulate(end, motion).force[picked] for end in ends)
+        expected = (high - low) / 2e-5
+        assert slopes[:, i] == pytest.approx(expected, abs=2e-3 * np.max(np.abs(expected))), axis.name
+    changing = replace(runs[3], id="changing", current=np.linspace(0.1, 0.9, runs[3].time.size))
+    lagging = JointProblem([*runs[:3], changing], "play-bypass")
+    start = np.append(fit.point, np.log([0.01, 0.01]))
+    assert lagging.force_slopes(start, fit.damper.one_model, motion, picked) is None
 
 
 def test_samples_of_some_runs_are_those_they_have_among_all(problem, fit):

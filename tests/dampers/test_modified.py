@@ -198,6 +198,46 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
     assert (asked["rows"], again.envelope) == ([0, 5], Envelope.of([CONDITIONS[0], CONDITIONS[5]]))
 
 
+@pytest.mark.parametrize("any_motion", [True, False])
+def test_decays_are_tried_relative_to_the_highest_current_where_a_parameter_may_change(any_motion):
+    def candidates(model, highest):
+        conditions = [Condition(I * highest, 1.0, 0.02) for I in (0.0, -1.0, 0.5)]
+        data = SimpleNamespace(conditions=conditions, model_type=model, shape="yield_displacement", linear=("m",))
+        return modified._candidates(data, any_motion)
+
+    rates = [0.4, 0.8, 1.5, 2.5, 4.0]
+    for model in (BoucWen, Bingham):
+        for highest, given in (
+            (2.0, candidates(model, 2.0)),
+            (5.0, candidates(model, 5.0)),
+            (1.0, candidates(model, 0)),
+        ):
+            for name, forms in model.map_forms().items():
+                plain = [law for law in given[name] if isinstance(law, str)]
+                tried = [law for law in given[name] if not isinstance(law, str)]
+                assert plain == [
+                    f for f in forms
+                    if (any_motion or not FORMS[f].follows_motion)
+                    and (name == "yield_displacement" or not FORMS[f].rate_bounds)
+                ]  # fmt: skip
+                may = name in ("c", "yield_force", "fy") and len(plain) > 1
+                assert tried == ([("decaying-current", (pytest.approx(r / highest),)) for r in rates] if may else [])
+            assert "m" in given
+
+
+def test_a_function_that_is_meant_for_larger_amplitudes_is_followed_to_twice_the_tested():
+    damped, constant = damper(), ParameterFunction("constant", (1.0,))
+    parts = {name: constant for name in ("c", "fy", "f0")}
+
+    def followed(functions):
+        return replace(damped, parameters=replace(damped.parameters, functions=functions)).followed_amplitudes
+
+    low, high = damped.envelope.amplitude_m
+    viscous = ParameterFunction("viscous-paper", (1.0,) * len(FORMS["viscous-paper"].terms))
+    assert followed(parts) == (low, high)
+    assert followed(parts | {"c": viscous}) == (low, 2 * high)
+
+
 def test_identifications_of_two_models_or_rigs_are_refused():
     here, there = identified(linear), identified(linear, rig="other")
     with pytest.raises(IdentificationError, match="1 models and 2 rigs"):

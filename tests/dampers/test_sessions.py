@@ -121,12 +121,12 @@ def test_no_other_shares_of_the_scatter_are_likelier(shares):
 
     best = unlikely(found.session, found.hour, found.run, found.hours)
     steps = [(a, b, c) for a in (0.95, 1, 1.05) for b in (0.95, 1, 1.05) for c in (0.95, 1, 1.05)]
-    assert best < 0.01 + min(
+    assert best < 0.003 + min(
         unlikely(a * found.session, b * found.hour, c * found.run, found.hours) for a, b, c in steps
     )
     sizes = 0.01 * np.array([0.05, 0.3, 1.0, 3.0])
     grid = product(sizes, sizes, sizes, (0.5, 2.0, 8.0))
-    assert best < 0.01 + min(unlikely(*point) for point in grid)
+    assert best < 0.003 + min(unlikely(*point) for point in grid)
 
 
 def test_what_is_given_is_the_conditional_normal():
