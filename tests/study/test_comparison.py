@@ -94,9 +94,10 @@ def test_every_entry_is_judged_on_the_same_runs(compared, dataset):
 
 
 def test_one_process_gives_the_same_bits(compared, dataset):
-    alone = compare(dataset, ["bingham", "bouc-wen", "dahl:joint", "lei-type", "kernel"], jobs=1)
-    for a, b in zip(alone.rigs[0].entries, compared.rigs[0].entries, strict=True):
-        assert a.recipe.name == b.recipe.name
+    alone = compare(dataset, ["bouc-wen", "dahl:joint", "kernel"], jobs=1)
+    together = {entry.recipe.name: entry for entry in compared.rigs[0].entries}
+    for a in alone.rigs[0].entries:
+        b = together[a.recipe.name]
         assert [i.model for i in a.identifications] == [i.model for i in b.identifications]
         assert [r.scores for r in a.cross_validated.runs] == [r.scores for r in b.cross_validated.runs]
         assert [r.scores for r in a.validation.runs] == [r.scores for r in b.validation.runs]

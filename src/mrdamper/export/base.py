@@ -38,13 +38,7 @@ class Exporter(ABC):
 
     @abstractmethod
     def export(self, damper: Damper | Model, name: str) -> Written:
-        """Make the files.
-
-        Parameters
-        ----------
-        name : str
-            Begins the names of files and symbols; an identifier in C.
-        """
+        """Make the files; their names and symbols begin with `name`, an identifier in C."""
 
 
 def write_export(written: Written, out: str | Path, suffix: str) -> list[Path]:

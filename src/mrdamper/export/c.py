@@ -55,14 +55,7 @@ class _ConstantsWriter(CWriter):
 def program_sources(traced: Program, name: str, title: str) -> dict[str, str]:
     """Header and source of any program of one sample, by file name: a control law, an inverse.
 
-    Parameters
-    ----------
-    traced : Program
-        With dt among its inputs; its parameters are written as constants.
-    name : str
-        Prefix of files and symbols.
-    title : str
-        For the comment at the top.
+    dt is among its inputs; its parameters are written as constants. The title is for the comment at the top.
     """
     word = identifier(name)
     writer = _ConstantsWriter(traced)

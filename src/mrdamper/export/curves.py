@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -13,6 +11,7 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Condition, Floats
+from mrdamper.data.encoding import csv_text
 from mrdamper.errors import InputError
 from mrdamper.export.base import Exporter, Written
 from mrdamper.export.templates import render
@@ -32,12 +31,12 @@ class TableExporter(Exporter):
     def export(self, damper: Damper | Model, name: str) -> Written:
         curves = force_velocity(damper)
         rows = [
-            (repr(c.current_A), repr(c.amplitude_m), repr(float(v)), repr(float(f)), repr(float(p)), int(t))
+            (c.current_A, c.amplitude_m, *map(float, forces), int(tested))
             for c in curves
-            for v, f, p, t in zip(c.velocity, c.force, c.peak_force, c.tested, strict=True)
+            for *forces, tested in zip(c.velocity, c.force, c.peak_force, c.tested, strict=True)
         ]
         heads = ["velocity_m_s", *(f"force_N_at_{c.current_A:g}_A" for c in curves)]
-        grid = [[repr(float(v)), *(repr(float(c.force[i])) for c in curves)] for i, v in enumerate(curves[0].velocity)]
+        grid = [[float(v), *(float(c.force[i]) for c in curves)] for i, v in enumerate(curves[0].velocity)]
         note = f"sines of {1e3 * curves[0].amplitude_m:.3g} mm, force at mid-stroke; no hysteresis in such a table"
         files = {f"{name}_force_velocity.csv": _csv(COLUMNS, rows), f"{name}_grid.csv": _csv(heads, grid)}
         return Written(files, (note,))
@@ -130,9 +129,5 @@ def _curve(damper: Damper, current: float, amplitude: float, speeds: Floats) -> 
     )
 
 
-def _csv(head, rows) -> bytes:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows(rows)
-    return text.getvalue().encode()
+def _csv(head: Sequence[str], rows: Sequence[Sequence[float]]) -> bytes:
+    return csv_text([dict(zip(head, row, strict=True)) for row in rows]).encode()

@@ -17,6 +17,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
 from mrdamper.dampers.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.data import Floats
+from mrdamper.data.encoding import csv_text
 from mrdamper.errors import InputError
 from mrdamper.export.base import Exporter, Written, identifier
 from mrdamper.export.c import c_facts, c_sources, reference_motion
@@ -39,15 +40,10 @@ _TESTED = (
 
 @dataclass(frozen=True)
 class FMUExporter(Exporter):
-    """An FMU for co-simulation.
+    """An FMU for co-simulation of FMI 2 or 3.
 
-    Parameters
-    ----------
-    fmi : 2 or 3
-        Version of the standard.
-    platforms : tuple of str, optional
-        Names of the platforms to compile for, as FMI 3.0 calls them. Default: all that a
-        compiler on this machine can make; none gives sources alone.
+    Binaries are compiled for `platforms`, named as FMI 3.0 does; default: all that a compiler on this machine can make.
+    None gives sources alone.
     """
 
     name: ClassVar[str] = "fmu"
@@ -213,18 +209,8 @@ def all_texts(
 ) -> dict[str, bytes]:
     """Collect the texts of an FMU by path: C sources and those of an instance, its description, its reference.
 
-    Parameters
-    ----------
-    facts : mapping
-        For the templates.
-    sources : mapping of str to str
-        C of what is inside.
-    instance, page : str
-        Templates of what FMI asks around it, and of its documentation.
-    time : (N,) array
-        Of the reference [s].
-    given, found : mapping of str to (N,) array
-        Its inputs and outputs.
+    `facts` are for the templates, `instance` and `page` the templates of what FMI asks around the sources, and of its
+    documentation. `time` [s], `given` and `outputs` are the reference, (N,) each.
     """
     name, fmi = facts["name"], facts["fmi"]
     sources = {
@@ -249,4 +235,4 @@ def all_texts(
 def _csv_table(columns: Mapping[str, np.ndarray]) -> str:
     """Rows of numbers under their names, all digits."""
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return "".join(f"{','.join(row)}\n" for row in [columns, *(map(repr, row) for row in rows)])
+    return csv_text([dict(zip(columns, row, strict=True)) for row in rows])

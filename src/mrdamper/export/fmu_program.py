@@ -33,29 +33,11 @@ def write_program_fmu(
     start: Sequence[float] = (),
     exporter: FMUExporter | None = None,
 ) -> tuple[list[Path], tuple[str, ...]]:
-    """Write a program as an FMU, whole or not at all.
+    """Write a program as an FMU, whole or not at all; gives the files, and notes, such as platforms left out.
 
-    Raises `OutputError` if it cannot be written.
-
-    Parameters
-    ----------
-    traced : Program
-        With dt as its last input; its parameters are written as constants.
-    name, title : str
-        Of files and symbols; for people.
-    units : mapping of str to str
-        Of every input but dt, and every output.
-    period : float
-        Between two samples [s]; 0: a sample every communication step.
-    start : sequence of float
-        Outputs before the first sample.
-    exporter : FMUExporter, optional
-        With version and platforms.
-
-    Returns
-    -------
-    list of Path, tuple of str
-        What was written; notes, such as platforms left out.
+    dt is the program's last input; its parameters are written as constants. `units` are those of every input but dt,
+    and every output; `period` the time between two samples [s], 0 for a sample every communication step; `start` the
+    outputs before the first sample. Raises `OutputError` if it cannot be written.
     """
     kind, word = exporter or FMUExporter(), identifier(name)
     facts = _facts(traced, word, title, units, period, tuple(start) or (0.0,) * len(traced.outputs), kind.fmi)

@@ -126,12 +126,7 @@ def drift(values: Floats, sessions: Sequence[str], serials: Sequence[str], golde
     if np.sum(np.isfinite(watched)) < 3:
         change, sure = _trend(share, everyone)
         if not sure:
-            return Drift(
-                "none",
-                np.nan,
-                change,
-                "No drift is found; without master dampers, drifts could cancel.",
-            )
+            return Drift("none", np.nan, change, "No drift is found; without master dampers, drifts could cancel.")
         text = f"Forces change by {100 * change:+.1f} %, but cannot tell drift of the rig apart: test master dampers."
         return Drift("cannot tell", np.nan, np.nan, text)
     rig, rig_sure = _trend(share, watched)

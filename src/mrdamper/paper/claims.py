@@ -190,19 +190,9 @@ def _checked(study: Reproduction, key: str, row: _Row, measured: Measured) -> Cl
 
 
 def verdict_on(key: str, values: Sequence[float]) -> Verdict:
-    """Return the verdict on a claim.
+    """Return the verdict on a claim of `ROWS`; raises `UnknownNameError` if there is no such claim.
 
-    Parameters
-    ----------
-    key : str
-        Of `ROWS`.
-    values : sequence of float
-        In the order of its limits; NaN where one is missing, none where it could not be measured.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such claim.
+    The values come in the order of its limits; NaN where one is missing, none where it could not be measured.
     """
     if key not in ROWS:
         raise UnknownNameError.of("claim", key, ROWS)
@@ -217,15 +207,7 @@ def verdict_on(key: str, values: Sequence[float]) -> Verdict:
 
 
 def in_words(verdict: Verdict, kind: Kind, *, virtual: bool) -> str:
-    """Word a verdict for the reader, with the damper it rests on.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    kind : {"method", "damper", "built in"}
-    virtual : bool
-        The data are of the virtual damper.
-    """
+    """Word a verdict for the reader, with the damper it rests on."""
     if verdict not in _RECOVERED:
         return verdict
     if virtual and kind == "damper":

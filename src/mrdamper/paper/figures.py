@@ -25,7 +25,7 @@ from mrdamper.physics.simulation import simulate
 from mrdamper.report.plots.comparison import overlaid_loops
 from mrdamper.report.plots.figure import Figure
 from mrdamper.report.plots.rig_tests import test_analysis, test_matrix
-from mrdamper.report.plots.style import MEASURED, MM, PALETTE, Picture, current_colours, powered, thin
+from mrdamper.report.plots.style import MEASURED, MM, PALETTE, Picture, current_colours, motion_name, powered, thin
 from mrdamper.statistics.functions.fitting import fit_function
 from mrdamper.statistics.functions.forms import ParameterFunction, features
 from mrdamper.study.recipe import Progress
@@ -157,8 +157,7 @@ def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]
             lines.append(_loop(runs[i], forces[i], {**style, "ls": "--"}))
         first, name = conditions[members[0]], "" if above else "Force (N)"
         over_x, over_v = zip(*lines, strict=True)
-        title = f"{first.frequency_Hz:.2g} Hz, {MM * first.amplitude_m:.3g} mm"
-        above.append(Panel((axes[0][0], name and axes[0][1]), over_x, title))
+        above.append(Panel((axes[0][0], name and axes[0][1]), over_x, motion_name(first)))
         below.append(Panel((axes[1][0], name and axes[1][1]), over_v))
     return FigureLayout([*above, *below], 5.2, rows=2, margins={"right": 0.9})
 
@@ -215,7 +214,7 @@ def _over_current(name: str, form: str, study: Reproduction, axes: Texts) -> Dra
                 Series(dense, scale * function(dense, first.frequency_Hz, first.amplitude_m) * np.ones(60), style=style)
             )
         style |= {**_POINTS, "ls": "" if function is None else "-"}
-        lines.append(Series([], [], f"{_named(first)}: {text}" if text else _named(first), style))
+        lines.append(Series([], [], f"{motion_name(first)}: {text}" if text else motion_name(first), style))
     title = f"R² {whole.r2:.3f} over all runs" if whole and form == "whole" else ""
     return FigureLayout([Panel((x, y), lines, title, "y" if log else "")], 3.4, margins=_LIST)
 
@@ -251,7 +250,7 @@ def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> 
         with suppress(IdentificationError):
             conditions = [study.conditions[i] for i in group]
             fit = fit_function(form, conditions, values[group], log=name == "beta")
-            shares[_named(conditions[0]).replace(", ", "\n")] = fit.r2
+            shares[motion_name(conditions[0]).replace(", ", "\n")] = fit.r2
     if not shares:
         return "too few currents at every motion"
     marks = Series(range(len(shares)), list(shares.values()), "R²", {**_POINTS, "ls": ":", "color": MEASURED})
@@ -278,7 +277,7 @@ def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Dr
     shades, dash = current_colours([c.peak_velocity for c in firsts]), {"mark": "_", "ms": 11, "mew": 1.4, "ls": ""}
     lines = []
     for c, at, value, curve in zip(firsts, u, power * level, power * fitted, strict=True):
-        lines.append(Series([at], [value], _named(c), {**_POINTS, "ls": "", "color": shades[c.peak_velocity]}))
+        lines.append(Series([at], [value], motion_name(c), {**_POINTS, "ls": "", "color": shades[c.peak_velocity]}))
         lines.append(Series([at], [curve], style={**dash, "color": shades[c.peak_velocity]}))
     dense = np.linspace(min(u), max(u), 40)
     amplitudes = {round(np.log(c.amplitude_m) / SAME): c.amplitude_m for c in firsts}
@@ -300,10 +299,6 @@ def beside_current_law(function: ParameterFunction, conditions: Sequence[Conditi
 def _r2(values: Floats, fitted: Floats) -> float:
     spread = float(np.sum((values - values.mean()) ** 2))
     return 1 - float(np.sum((fitted - values) ** 2)) / spread if spread > 0 else float("nan")
-
-
-def _named(c: Condition) -> str:
-    return f"{c.frequency_Hz:.2g} Hz, {MM * c.amplitude_m:.3g} mm"
 
 
 # Methods compared, searches, noise seeds, sensitivities.

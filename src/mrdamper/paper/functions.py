@@ -33,14 +33,8 @@ def paper_functions(
     """Fit the paper's functions by plain least squares.
 
     Shorter ones replace those that the tests do not determine. c is fitted through the viscous part of F0, as in the
-    paper [Eq. 24–26]. beta spans decades and must stay positive: its function gives the logarithm.
-
-    Parameters
-    ----------
-    identifications : sequence of Identification
-    mass_law : {"exponential", "inverse-square", "power"}
-        Reading of Eq. 29, which the text leaves open.
-    provenance : mapping, optional
+    paper [Eq. 24–26]. beta spans decades and must stay positive: its function gives the logarithm. `mass_law` is the
+    reading of Eq. 29, which the text leaves open.
     """
     forms = {**PAPER_FORMS, "m": f"mass-{mass_law}"}
     conditions = tuple(i.condition for i in identifications)

@@ -80,18 +80,8 @@ def genetic(
 ) -> GeneticMinimum:
     """Minimise a cost inside a box, then inside ever narrower ones about the best point.
 
-    Parameters
-    ----------
-    cost : callable
-        (P, D) points -> (P,) costs: a whole generation at once.
-    lower, upper : (D,) arrays
-        Linear scale, as the paper searches.
-    settings : GeneticSettings, optional
-
-    Raises
-    ------
-    ParameterError
-        If a lower bound is not below its upper bound.
+    The cost takes a whole generation of (P, D) points and gives (P,) values; the bounds (D,) are searched on a linear
+    scale, as in the paper. Raises `ParameterError` if a lower bound is not below its upper bound.
     """
     chosen = settings or GeneticSettings()
     low, high = np.array(lower, dtype=float), np.array(upper, dtype=float)
@@ -157,18 +147,8 @@ def rank_scaling(costs: ArrayLike, parents: int) -> Floats:
 def stochastic_uniform(expectation: Floats, parents: int, draw: float) -> np.ndarray:
     """Choose parents by equal steps along a line on which each point takes its expectation.
 
-    Parameters
-    ----------
-    expectation : (P,) array
-        Summing to `parents`.
-    parents : int
-    draw : float
-        Random number in 0...1: start in the first step.
-
-    Returns
-    -------
-    (parents,) int array
-        Indices, ascending.
+    The expectations (P,) sum to the number of parents; `draw`, within 0...1, is the start in the first step. Gives the
+    indices, ascending.
     """
     wheel = np.cumsum(expectation) / parents
     pointers = (draw + np.arange(parents)) / parents

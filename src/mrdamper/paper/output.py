@@ -41,29 +41,10 @@ def write_reproduction(
     png: bool = False,
     processes: Processes = IN_PROCESS,
 ) -> list[Path]:
-    """Write reproduction.html, tables/ and figures/.
+    """Write reproduction.html, tables/ and figures/, and return the files, the page first.
 
-    Parameters
-    ----------
-    study : Reproduction
-    folder : path
-        Made if missing; files of the same names are replaced together at the end.
-    progress : callable
-        Called with the name of the step and the share done.
-    png : bool
-        Every figure as PNG beside the SVG.
-    processes : Processes
-        Where figures are drawn.
-
-    Returns
-    -------
-    list of Path
-        Written files, the page first.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be written to.
+    The folder is made if missing; files of the same names are replaced together at the end. Figures are drawn in
+    `processes`, with `png` as PNG beside the SVG. Raises `OutputError` if the folder cannot be written to.
     """
     claims, names, parts = check_claims(study), tuple(FIGURES), 2 * processes.count
     drawn: dict[str, Picture | str] = {}

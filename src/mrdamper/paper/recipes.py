@@ -54,13 +54,7 @@ def recipes_of_paper(
 ) -> Steps:
     """Return the recipes that are compared, but for the costly ones, and the identification runs of each.
 
-    Parameters
-    ----------
-    train, held_out : sequence of Run
-    assumptions : PaperAssumptions
-    options : PaperOptions
-    explain : bool
-        The literal method states for every run how much of its c is hysteretic.
+    With `explain` the literal method states for every run how much of its c is hysteretic.
     """
     literal = replace(options.method("optimum"), explain=explain)
     half = replace(literal, force_amplitude="half-peak-to-peak", explain=False)

@@ -61,21 +61,9 @@ def one_at_a_time(
 ) -> tuple[OneAtATime, ...]:
     """Change one parameter after the other, and identify the others anew for those that may be preset.
 
-    Parameters
-    ----------
-    model : BoucWen
-    condition : Condition
-    names : sequence of str
-        Coordinates, and "A", the factor of v that the model keeps at 1.
-    change : float
-        Relative change; of the asymmetry, which runs from -1 to 1, a difference.
-    refit : sequence of str
-        Parameters whose change the others may make up for.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such parameter.
+    `names` are coordinates, and "A", the factor of v that the model keeps at 1. The change is relative; of the
+    asymmetry, which runs from -1 to 1, it is a difference. The others may make up for a change of those in `refit`.
+    Raises `UnknownNameError` if there is no such parameter.
     """
     base = _loop(model, condition)
     effects = []
@@ -97,21 +85,8 @@ def sobol(
 ) -> Sobol:
     """Compute Sobol indices by Saltelli's scheme.
 
-    Parameters
-    ----------
-    model : BoucWen
-    condition : Condition
-    names : sequence of str
-    spread : float
-        Parameters vary uniformly by ± this share of their value.
-    samples : int
-        A power of two; samples · (P + 2) loops are computed.
-    seed : int
-
-    Raises
-    ------
-    ParameterError
-        If the spread is not within 0...1.
+    Parameters vary uniformly by ± `spread` of their value. The number of samples is a power of two; samples · (P + 2)
+    loops are computed. Raises `ParameterError` if the spread is not within 0...1.
     """
     if not 0 < spread < 1:
         raise ParameterError(f"spread is {spread}", remedy="give a share between 0 and 1")

@@ -329,11 +329,7 @@ def _sensitivities(
     try:
         one = assumptions.basis(Balance()).identify(middle)
         assert isinstance(one.model, BoucWen)
-        return (
-            one_at_a_time(one.model, one.condition),
-            sobol(one.model, one.condition, samples=SOBOL_SAMPLES),
-            (),
-        )
+        return (one_at_a_time(one.model, one.condition), sobol(one.model, one.condition, samples=SOBOL_SAMPLES), ())
     except InputError as error:
         return (), None, (f"sensitivity was left out: {error}",)
 

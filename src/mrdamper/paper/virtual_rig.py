@@ -188,12 +188,7 @@ def true_runs(
 def friction_test(rig: VirtualRig, seed: int = 0, *, filled: bool = False) -> Run:
     """Test one cycle of 20 mm at 0.01 mm/s without current [Qian et al. 2024, section 2]; synthetic.
 
-    Parameters
-    ----------
-    rig : VirtualRig
-    seed : int
-    filled : bool
-        With fluid in the damper. The paper's test is without: no yield and no viscous force is in it.
+    The paper's test is without fluid: no yield and no viscous force is in it. With `filled` the fluid is in the damper.
     """
     if not filled:
         rig = replace(rig, yield_off=0.0, yield_per_ampere=0.0, viscosity=0.0, viscosity_per_ampere=0.0)

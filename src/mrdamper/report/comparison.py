@@ -27,26 +27,10 @@ _LOOPS, _OVERLAID = 3, 5
 def write_comparison(
     comparison: Comparison, folder: str | Path, progress: Progress = lambda what, share: None, *, png: bool = False
 ) -> list[Path]:
-    """Write the comparison, whole or not at all.
+    """Write the comparison, whole or not at all, and return the files, the page first.
 
-    Parameters
-    ----------
-    comparison : Comparison
-    folder : path
-        Made if missing; files of the same names are replaced together at the end.
-    progress : callable
-    png : bool
-        Every figure as PNG beside the SVG.
-
-    Returns
-    -------
-    list of Path
-        What was written, the page first.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be written to.
+    The folder is made if missing; files of the same names are replaced together at the end. With `png` every figure is
+    written as PNG beside the SVG. Raises `OutputError` if the folder cannot be written to.
     """
 
     def fill(work: Path) -> None:
@@ -86,15 +70,8 @@ def run_rows(comparison: Comparison) -> list[dict[str, Any]]:
     for rig in comparison.rigs:
         for entry in rig.entries:
             head = {"rig": rig.rig, "model": entry.recipe.name}
-            for identification in entry.identifications:
-                rows.append(
-                    {
-                        **head,
-                        "set": "per run",
-                        "run_id": identification.run_id,
-                        "nrmse_pp": identification.scores.nrmse_pp,
-                    }
-                )
+            fits = [{"run_id": one.run_id, "nrmse_pp": one.scores.nrmse_pp} for one in entry.identifications]
+            rows += [{**head, "set": "per run", **fit} for fit in fits]
             sets = {"train": entry.train, "cross-validation": entry.cross_validated, "validation": entry.validation}
             for name, validation in sets.items():
                 rows += [{**head, "set": name, **score_row(run)} for run in validation.runs]

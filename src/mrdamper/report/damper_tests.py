@@ -37,27 +37,11 @@ def write_test_report(
 ) -> list[Path]:
     """Write report.html, report.pdf, forces.csv, tests.csv and figures/ of one or several specimens.
 
-    Parameters
-    ----------
-    specimens : mapping of str to Dataset
-        Tests of one damper each, by the name in the report.
-    folder : path
-    about : About, optional
-    limits : sequence of Limit
-        Limits of the damping force; pass or fail is stated only against these.
-    ladder : sequence of float
-        Velocities of the force table [m/s]; default: round values within the tests of the first specimen.
-    png : bool
-        Also write every figure as PNG.
-    paper : str
-        Size of the pages of report.pdf: "a4" or "letter".
-
-    Raises
-    ------
-    IdentificationError
-        If a specimen holds no steady cycle, or the tests of several dampers.
-    OutputError
-        If the folder cannot be written to.
+    `specimens` are the tests of one damper each, by the name in the report. Pass or fail is stated only against
+    `limits` of the damping force. `ladder` holds the velocities of the force table [m/s]; default: round values within
+    the tests of the first specimen. Pages of report.pdf have the size `paper`, "a4" or "letter". Raises
+    `IdentificationError` if a specimen holds no steady cycle, or the tests of several dampers, and `OutputError` if the
+    folder cannot be written to.
     """
     from mrdamper.report.pdf import pdf_of
 

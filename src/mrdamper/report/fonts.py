@@ -29,14 +29,7 @@ class Fallback:
 
 
 def fallback_fonts(text: str, bundled: str) -> Fallback:
-    """Find installed fonts for the characters of a text that a bundled font does not contain.
-
-    Parameters
-    ----------
-    text : str
-    bundled : path
-        The font in which the text is set.
-    """
+    """Find installed fonts for the characters of a text that the font it is set in, `bundled`, does not contain."""
     missing = {c for c in text if c.isprintable() and not c.isspace()} - _characters(bundled, 0)
     files = []
     for path in installed_fonts() if missing else ():

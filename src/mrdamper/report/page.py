@@ -16,16 +16,7 @@ from mrdamper.data import Dataset
 
 
 def render_page(template: str, title: str, footer: str, **facts: object) -> str:
-    """Render a template.
-
-    Parameters
-    ----------
-    template : str
-        Name of a file in `templates/`.
-    title : str
-    footer : str
-        How the page was made.
-    """
+    """Render a template of `templates/`; the footer states how the page was made."""
     return _ENVIRONMENT.get_template(template).render(title=title, footer=footer, **facts)
 
 

@@ -108,29 +108,11 @@ class _Paper(FPDF):
 
 
 def pdf_of(page: str, figures: Mapping[str, bytes], paper: str = "a4") -> bytes:
-    """Convert a page to PDF.
+    """Convert a page of `render_page` to PDF, with bookmarks and numbered pages of a size "a4" or "letter".
 
-    Characters that the bundled font does not contain are set in an installed font; those of no
-    installed font are named on the last page.
-
-    Parameters
-    ----------
-    page : str
-        HTML as `render_page` makes it.
-    figures : mapping of str to bytes
-        Each figure of the page as a PDF of one page, by the `id` of its `figure` element.
-    paper : str
-        "a4" or "letter".
-
-    Returns
-    -------
-    bytes
-        With bookmarks and numbered pages.
-
-    Raises
-    ------
-    UnknownNameError
-        If the paper size is neither "a4" nor "letter".
+    Each figure of the page is given as a PDF of one page, by the `id` of its `figure` element. Characters that the
+    bundled font does not contain are set in an installed font; those of no installed font are named on the last page.
+    Raises `UnknownNameError` if there is no such paper size.
     """
     if paper not in PAPERS:
         raise UnknownNameError.of("paper size", paper, PAPERS)

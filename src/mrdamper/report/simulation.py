@@ -24,27 +24,10 @@ _ROWS = 20_000  # of histories.csv
 def write_simulation(
     done: Simulation, folder: str | Path, beside: ControllerComparison | None = None, bands: Bands | None = None
 ) -> list[Path]:
-    """Write a simulation, whole or not at all.
+    """Write a simulation, whole or not at all, and return the files, the page first.
 
-    Parameters
-    ----------
-    done : Simulation
-    folder : path
-        Made if missing.
-    beside : ControllerComparison, optional
-        Controllers to show beside it.
-    bands : Bands, optional
-        Of draws of its dampers.
-
-    Returns
-    -------
-    list of Path
-        What was written, the page first.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be written to.
+    `beside` holds controllers to show beside it, `bands` the ranges over draws of its dampers. The folder is made if
+    missing. Raises `OutputError` if it cannot be written to.
     """
     runs: dict[str, Simulation] = {type(done.controller).title: done}
     if beside is not None:

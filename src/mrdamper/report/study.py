@@ -192,20 +192,10 @@ def _validation_table(study: Study) -> str:
     rows = []
     for rig in study.rigs:
         for candidate in rig.candidates:
-            for split, validation in (
-                ("cross-validation", candidate.cross_validated),
-                ("validation", candidate.validation),
-            ):
-                for run in validation.runs:
-                    rows.append(
-                        {
-                            "rig": rig.rig,
-                            "model": candidate.recipe.model,
-                            "way": candidate.recipe.way,
-                            "set": split,
-                            **score_row(run),
-                        }
-                    )
+            head = {"rig": rig.rig, "model": candidate.recipe.model, "way": candidate.recipe.way}
+            sets = {"cross-validation": candidate.cross_validated, "validation": candidate.validation}
+            for name, validation in sets.items():
+                rows += [{**head, "set": name, **score_row(run)} for run in validation.runs]
     return csv_text(rows)
 
 

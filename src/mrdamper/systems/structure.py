@@ -142,13 +142,7 @@ def shear_building(
 
 
 def building(
-    name: str,
-    floors: Sequence[str],
-    M: Floats,
-    C: Floats,
-    K: Floats,
-    links: Sequence[Link] = (),
-    title: str = "",
+    name: str, floors: Sequence[str], M: Floats, C: Floats, K: Floats, links: Sequence[Link] = (), title: str = ""
 ) -> System:
     """Make a structure on ground that accelerates, by its matrices; drifts are from floor to floor."""
     below = ("ground", *floors[:-1])

@@ -178,13 +178,7 @@ class Job:
 
 def refusal(error: InputError) -> dict[str, str]:
     """Return an error of the input in the parts the page shows."""
-    return {
-        "text": str(error),
-        "found": error.found,
-        "where": error.where,
-        "remedy": error.remedy,
-        "code": error.code,
-    }
+    return {"text": str(error), "found": error.found, "where": error.where, "remedy": error.remedy, "code": error.code}
 
 
 def _end_group(process: Any) -> None:

@@ -28,9 +28,7 @@ def compare(
         False, "--genetic", help="Also identify by genetic algorithm, 60 generations (minutes)."
     ),
     gas: str | None = typer.Option(
-        None,
-        "--gas",
-        help="Known gas spring, for the model paper: pressure MPa, volume cm3, rod area mm2 as P,V,A.",
+        None, "--gas", help="Known gas spring, for the model paper: pressure MPa, volume cm3, rod area mm2 as P,V,A."
     ),
     setting: list[str] = typer.Option(
         [], "--set", help="OPTION=VALUE of the model paper, as for study --model paper; may be repeated."

@@ -70,16 +70,12 @@ def predict(
     damper = _load(model, coil_lag)
     prediction = _predict(damper, motion, current, frequency, amplitude)
     for flag in prediction.extrapolation:
-        typer.echo(
-            f"warning: {WARNINGS.get(flag, f'{flag} lies outside the tested range (extrapolation)')}",
-            err=True,
-        )
+        typer.echo(f"warning: {WARNINGS.get(flag, f'{flag} lies outside the tested range (extrapolation)')}", err=True)
     interval = band(damper, prediction, level)
     if check_run:
         prediction, interval = _session_known(damper, prediction, check_run, data, level)
     typer.echo(
-        _said(prediction, interval, level, scope(damper, level)) if interval else f"note: {no_band(damper)}",
-        err=True,
+        _said(prediction, interval, level, scope(damper, level)) if interval else f"note: {no_band(damper)}", err=True
     )
     if plot is not None:
         _write_figure(plot, prediction, interval, level)

@@ -14,9 +14,7 @@ def register(app: typer.Typer) -> None:
     app.command(epilog="Example: mrdamper schema model > model.schema.json")(schema)
 
 
-def schema(
-    name: str = typer.Argument(..., help=f"File format: {', '.join(_FORMATS)}."),
-) -> None:
+def schema(name: str = typer.Argument(..., help=f"File format: {', '.join(_FORMATS)}.")) -> None:
     """Print the JSON Schema of a file format."""
     from mrdamper.errors import UnknownNameError
 

@@ -9,7 +9,7 @@ from mrdamper.identification.characteristics import Characteristics
 from mrdamper.identification.loop_analysis import whole_cycles
 from mrdamper.physics.motion import analyse_motion, measured_motion
 from mrdamper.report.plots.figure import Figure
-from mrdamper.report.plots.style import MM, current_colours, thin
+from mrdamper.report.plots.style import MM, current_colours, motion_name, thin
 
 _MARKS = ("o", "s", "^", "D", "v", "P")
 
@@ -19,12 +19,8 @@ def peak_velocity_plot(
 ) -> Figure:
     """Draw peak force over peak velocity (PVP), rebound above and compression below, gas force subtracted.
 
-    Parameters
-    ----------
-    specimens : mapping of str to Characteristics
-        Currents are distinguished by colour, specimens by mark.
-    limits : sequence of (float, float, float, float)
-        Current [A], velocity [m/s], lower and upper force [N] of each limit, drawn as a bar.
+    Currents are distinguished by colour, specimens by mark. Limits are current [A], velocity [m/s], lower and upper
+    force [N], each drawn as a bar.
     """
     figure = Figure(1, 1, 4.2, right=1.9)
     (axes,) = figure.axes
@@ -34,16 +30,10 @@ def peak_velocity_plot(
             strokes = specimen.at(current)
             for side, sign in ((0, 1.0), (1, -1.0)):
                 ordered = sorted(strokes, key=lambda s: s.peak_velocity[side])
-                axes.plot(
-                    [s.peak_velocity[side] for s in ordered],
-                    [sign * specimen.damping_force(s, side) for s in ordered],
-                    mark,
-                    ms=3.5,
-                    lw=1.0,
-                    ls="-" if mark == _MARKS[0] else "--",
-                    color=colours[current],
-                    label=_key(name, current, specimens) if side == 0 else "",
-                )
+                x = [s.peak_velocity[side] for s in ordered]
+                y = [sign * specimen.damping_force(s, side) for s in ordered]
+                style = {"ms": 3.5, "lw": 1.0, "ls": "-" if mark == _MARKS[0] else "--", "color": colours[current]}
+                axes.plot(x, y, mark, label="" if side else _key(name, current, specimens), **style)
     for current, velocity, lower, upper in limits:
         near = min(colours, key=lambda level: abs(level - current))
         axes.plot([velocity, velocity], [lower, upper], color=colours[near], lw=1.4)
@@ -71,8 +61,7 @@ def continuous_velocity_plot(dataset: Dataset, specimen: Characteristics) -> Fig
         size = min(one.stop, round(whole.stop / max(1.0, analyse_motion(run).cycles)) + 1)
         last = slice(max(0, whole.stop - size), whole.stop)
         x, v, force = (thin(array[last]) for array in (motion.displacement, motion.velocity, run.force))
-        c = stroke.condition
-        name = f"{current:g} A, {c.frequency_Hz:.2g} Hz, {MM * c.amplitude_m:.3g} mm"
+        name = f"{current:g} A, {motion_name(stroke.condition)}"
         axes[0].plot(v, force, color=colours[current], label=name)
         axes[1].plot(MM * x, force, color=colours[current], label=name)
     axes[0].label("Velocity (m/s)", "Force (N)")

@@ -15,13 +15,7 @@ from mrdamper.report.plots.style import MEASURED, MM, PALETTE
 
 
 def ranking(scores: Mapping[str, tuple[float, float, float]]) -> Figure:
-    """Draw the median error of every model: identification, cross-validation, validation runs.
-
-    Parameters
-    ----------
-    scores : mapping of title to three fractions
-        Best first.
-    """
+    """Draw the median error of every model, best first: identification, cross-validation, validation runs."""
     figure = Figure(1, 1, 0.9 + 0.24 * len(scores), left=2.6, right=0.3)
     (axes,) = figure.axes
     rows = np.arange(len(scores))[::-1]
@@ -39,14 +33,7 @@ def ranking(scores: Mapping[str, tuple[float, float, float]]) -> Figure:
 
 
 def overlaid_loops(runs: Sequence[Run], dampers: Mapping[str, Damper]) -> Figure:
-    """Last measured cycle of each run with the loops of some dampers over it.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        One row each.
-    dampers : mapping of title to Damper
-    """
+    """Draw the last measured cycle of each run, a row each, with the loops of some dampers over it."""
     figure = Figure(len(runs), 2, 0.7 + 2.5 * len(runs))
     for row, run in enumerate(runs):
         sine = equivalent_sine(run)

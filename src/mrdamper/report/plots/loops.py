@@ -97,20 +97,7 @@ def plot_force(what: Run | Prediction, axes: Axes | None = None, **line: Any) ->
 
 
 def predicted_force(prediction: Prediction, interval: Band | None = None, level: float = 0.9) -> Figure:
-    """Draw a prediction with its interval: both loops of a sine, force over time of any other motion.
-
-    Parameters
-    ----------
-    prediction : Prediction
-    interval : Band, optional
-        Of that prediction, as `mrdamper.dampers.bands.band` gives it.
-    level : float
-        Coverage of the interval [-], for the legend.
-
-    Returns
-    -------
-    Figure
-    """
+    """Draw a prediction with its interval of coverage `level`: both loops of a sine, force over time of others."""
     motion = prediction.motion
     abscissas = [("Time (s)", motion.time)]
     if prediction.is_sine:

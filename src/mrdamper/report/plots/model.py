@@ -21,6 +21,7 @@ from mrdamper.report.plots.style import (
     PREDICTED,
     current_colours,
     levels,
+    motion_name,
     powered,
     speed_colours,
     thin,
@@ -58,15 +59,12 @@ def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
         curves: list[tuple[Floats, dict[str, Any]]] = [(run.force[last], {"color": MEASURED, "label": "measured"})]
         if around := band(damper, prediction, BAND_LEVEL, last):
             edge = {"color": PREDICTED, "lw": 0.6, "ls": ":"}
-            curves += [
-                (around.low, edge),
-                (around.high, {**edge, "label": f"{100 * BAND_LEVEL:.0f} % interval"}),
-            ]
+            curves += [(around.low, edge), (around.high, {**edge, "label": f"{100 * BAND_LEVEL:.0f} % interval"})]
         curves.append((prediction.force[last], {"color": PREDICTED, "label": "predicted"}))
         for force, look in curves:
             over_x.plot(MM * x, thin(force), **look)
             over_v.plot(v, thin(force), **look)
-        over_x.size = over_v.size = 9.0 if columns == 2 else 8.0
+        over_x.size = over_v.size = 9.0 if columns == 2 else 7.0  # a condition as title fits its column
         over_x.label("Displacement (mm)", "Force (N)" if column == 0 else "", str(prediction.condition))
         over_v.label("Velocity (m/s)", "Force (N)" if column == 0 else "")
     for unused in range(len(runs), columns * -(-len(runs) // columns)):
@@ -99,9 +97,8 @@ def parameter_curves(fit: ModifiedFit) -> Figure:
         for group in groups:
             first = fit.conditions[group[0]]
             currents = [fit.conditions[i].current_A for i in group]
-            key = f"{first.frequency_Hz:.2g} Hz, {MM * first.amplitude_m:.3g} mm"
             values = more * scale * fit.values[name][group]
-            panel.plot(currents, values, "o", ms=3.5, color=shades[first.peak_velocity], label=key)
+            panel.plot(currents, values, "o", ms=3.5, color=shades[first.peak_velocity], label=motion_name(first))
         for condition, curve in zip(lines, curves, strict=True):
             panel.plot(dense, more * curve, lw=0.9, color=shades[condition.peak_velocity] if few else MEASURED)
         panel.y.log = function.log

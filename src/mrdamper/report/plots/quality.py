@@ -32,13 +32,7 @@ class LoopPanel:
 
 
 def quality_figure(panels: Sequence[LoopPanel]) -> Figure:
-    """Force over displacement of every record, refused ones in another colour, flagged samples marked.
-
-    Parameters
-    ----------
-    panels : sequence of LoopPanel
-        The first eighty are drawn.
-    """
+    """Draw the loops of the first eighty records, refused ones in another colour, flagged samples marked."""
     shown = panels[:_MOST_PANELS]
     columns = min(_COLUMNS, max(1, len(shown)))
     rows = max(1, math.ceil(len(shown) / columns))
@@ -46,10 +40,7 @@ def quality_figure(panels: Sequence[LoopPanel]) -> Figure:
     for panel, place in zip(shown, figure.axes, strict=False):
         thin = slice(None, None, max(1, panel.displacement.size // _MOST_POINTS))
         place.plot(
-            MM * panel.displacement[thin],
-            panel.force[thin],
-            color=_REFUSED if panel.refused else MEASURED,
-            lw=0.6,
+            MM * panel.displacement[thin], panel.force[thin], color=_REFUSED if panel.refused else MEASURED, lw=0.6
         )
         if panel.flagged.any():
             place.plot(MM * panel.displacement[panel.flagged], panel.force[panel.flagged], ".", color=_FLAG, ms=3)

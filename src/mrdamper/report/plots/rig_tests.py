@@ -11,15 +11,7 @@ from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, wh
 from mrdamper.physics.motion import measured_motion
 from mrdamper.report.plots.drawing import INCH
 from mrdamper.report.plots.figure import Axes, Figure
-from mrdamper.report.plots.style import (
-    KN,
-    MM,
-    MOST_NAMED,
-    current_colours,
-    levels,
-    speed_colours,
-    thin,
-)
+from mrdamper.report.plots.style import KN, MM, MOST_NAMED, current_colours, levels, motion_name, speed_colours, thin
 
 _BESIDE = 0.07  # inches between the marks of two currents
 
@@ -35,26 +27,13 @@ def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
         # Marks of one motion stand beside each other, one place a current.
         aside = (number - (len(colours) - 1) / 2) * _BESIDE
         for split, face in (("train", colour), ("validate", "none")):
-            chosen = [
-                loop.condition
-                for step, loop in zip(steps, loops, strict=True)
-                if step == current and loop.split == split
-            ]
+            pairs = zip(steps, loops, strict=True)
+            chosen = [loop.condition for step, loop in pairs if step == current and loop.split == split]
             if not chosen:
                 continue
-            points = np.array([(c.frequency_Hz, MM * c.amplitude_m) for c in chosen])
+            x, y = [c.frequency_Hz for c in chosen], [MM * c.amplitude_m for c in chosen]
             name = f"{current:g} A" + ("" if split == "train" else ", validation")
-            axes.plot(
-                points[:, 0],
-                points[:, 1],
-                "o",
-                ms=5,
-                color=colour,
-                mfc=face,
-                mew=1.1,
-                shift=aside,
-                label=name,
-            )
+            axes.plot(x, y, "o", ms=5, color=colour, mfc=face, mew=1.1, shift=aside, label=name)
     axes.label("Frequency (Hz)", "Amplitude (mm)")
     wide, beside = axes.width / INCH, (len(colours) / 2 + 1) * _BESIDE
     axes.x.margin = beside / (wide - 2 * beside)
@@ -78,9 +57,8 @@ def measured_loops(dataset: Dataset, loops: Sequence[LoopAnalysis]) -> Figure:
     over_motion = _over_motion(loops)
     shades = current_colours([loop.condition.peak_velocity for loop in over_motion])
     for loop in over_motion:
-        condition = loop.condition
-        name = f"{condition.frequency_Hz:.2g} Hz, {MM * condition.amplitude_m:.3g} mm"
-        _draw_loop(axes[2], axes[3], dataset, loop, name, shades[condition.peak_velocity])
+        name, colour = motion_name(loop.condition), shades[loop.condition.peak_velocity]
+        _draw_loop(axes[2], axes[3], dataset, loop, name, colour)
     axes[2].title = f"{over_motion[0].condition.current_A:.3g} A"
     axes[3].legend("right")
     return figure
@@ -103,15 +81,9 @@ def test_analysis(loops: Sequence[LoopAnalysis], ranges: Sequence[DynamicRange])
         for group in groups:
             condition = group[0].condition
             ordered = sorted(group, key=lambda loop: loop.condition.current_A)
-            panel.plot(
-                [loop.condition.current_A for loop in ordered],
-                [value(loop) for loop in ordered],
-                "o",
-                ls="-",
-                ms=3.5,
-                color=shades[condition.peak_velocity],
-                label=f"{condition.frequency_Hz:.2g} Hz, {MM * condition.amplitude_m:.3g} mm",
-            )
+            currents, text = [loop.condition.current_A for loop in ordered], motion_name(condition)
+            style = {"ls": "-", "ms": 3.5, "color": shades[condition.peak_velocity], "label": text}
+            panel.plot(currents, [value(loop) for loop in ordered], "o", **style)
         panel.label("Current (A)", name)
         panel.y.low = 0.0
     for entry in ranges:

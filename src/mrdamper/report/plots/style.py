@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from mrdamper.data import Floats, current_levels
+from mrdamper.data import Condition, Floats, current_levels
 from mrdamper.data.encoding import csv_text
 from mrdamper.report.plots.figure import Figure, power_of_ten
 
@@ -33,6 +33,11 @@ def current_colours(values: Sequence[float]) -> dict[float, str]:
     """One colour a value, dark to light with rising value."""
     steps = sorted(set(values))
     return {step: _shade(number / max(len(steps) - 1, 1)) for number, step in enumerate(steps)}
+
+
+def motion_name(condition: Condition) -> str:
+    """Name a motion by its frequency and amplitude."""
+    return f"{condition.frequency_Hz:.2g} Hz, {MM * condition.amplitude_m:.3g} mm"
 
 
 def levels(currents: Sequence[float]) -> list[float]:
