@@ -99,18 +99,8 @@ def invert_on(
 ) -> Demand:
     """Write the inverse of a damper on a tape.
 
-    Parameters
-    ----------
-    prefix : str
-        Of the names of its memory.
-    motion : dict of str to expression
-        displacement, velocity, acceleration, dt.
-    wanted : expression
-        [N]
-    width : float
-        As `check_monotone` gives it [N].
-    highest : float
-        Largest current [A].
+    The names of its memory begin with `prefix`; the motion holds displacement, velocity, acceleration and dt; the
+    wanted force and the width from `check_monotone` are in N, the highest current in A.
     """
     bare = stream(replace(damper, coil=None)).step
     copy = ProgramCopy(bare, tape, prefix, "current", **motion)
@@ -158,11 +148,8 @@ def _searched(tape: Tape, copy: ProgramCopy, ends: list[tuple[Any, Any]], target
 class Inverse:
     """A damper asked for a force, sample by sample; made by `invert`.
 
-    Parameters
-    ----------
-    program : Program
-        From displacement [m], velocity [m/s], acceleration [m/s²], wanted force [N] and dt [s] to
-        current [A], force [N] and the reachable interval [N].
+    Its program goes from displacement [m], velocity [m/s], acceleration [m/s²], wanted force [N] and dt [s] to current
+    [A], force [N] and the reachable interval [N].
     """
 
     units: ClassVar[Mapping[str, str]] = {

@@ -87,13 +87,8 @@ class ElementParameters:
 def interpreted_loop(elements: Sequence[LoopElement], control: LoopElement | None) -> Callable[..., int]:
     """Return the loop for these stages in the interpreter: `walk` without its first two arguments.
 
-    Parameters
-    ----------
-    elements : sequence of LoopElement
-        Inputs displacement [m], velocity [m/s], acceleration [m/s²], command [A], dt [s];
-        outputs force [N] and flags.
-    control : LoopElement, optional
-        From signals and dt to one command [A] an element.
+    Elements go from displacement [m], velocity [m/s], acceleration [m/s²], command [A] and dt [s] to force [N] and
+    flags, the control from signals and dt to one command [A] an element.
     """
     ends = np.cumsum([[0, 0, 0], *([2 + p, d, m] for p, d, m in (e.sizes for e in elements))], axis=0).tolist()
 

@@ -114,21 +114,11 @@ def monte_carlo(
     mean: Simulation,
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> Bands:
-    """Run a loop again with other numbers of its dampers; it is traced and compiled once.
+    """Run a loop made with `free` again with other parameters of its dampers; it is traced and compiled once.
 
-    Raises `StepError` (E_STEP_LOST) if over a tenth of the draws have no solution.
-
-    Parameters
-    ----------
-    loop : SystemLoop
-        Made with `free`.
-    draws : sequence of mapping of str to Draw
-        By link, as `draw` gives them.
-    mean : Simulation
-        Of the dampers themselves. Draws take twice its step, or half the loop's first one if that is
-        longer: the last halvings for a peak after a switch are worth less than more draws.
-    progress : callable
-        Told what is being done and the share done, 0...1.
+    Draws come by link from `draw`; `mean` is the simulation of the dampers themselves. Draws take twice its step, or
+    half the loop's first one if that is longer: the last halvings for a peak after a switch are worth less than more
+    draws. Raises `StepError` (E_STEP_LOST) if over a tenth of the draws have no solution.
     """
     machine = len(draws) > 5 or None
     step = max(2 * mean.step, loop.first_step / 2)

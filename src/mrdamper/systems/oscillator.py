@@ -60,19 +60,10 @@ class Oscillator:
                 raise ParameterError(f"{name} = {getattr(self, name):g}", where="oscillator", remedy=remedy)
 
     def response(self, force: Floats, sample_rate: float, *, periodic: bool = False) -> Floats:
-        """Displacement [m] under a force, from rest; of a periodic force, over one settled period.
+        """Return the displacement [m] under a force (N,) [N], from rest; of a periodic force, over one settled period.
 
-        Raises `RecordError` if the force is no record of numbers. Raises `StepError` (E_RUNAWAY) if the state runs
-        away.
-
-        Parameters
-        ----------
-        force : (N,) array
-            [N]; band-limited between samples where it is periodic, else smooth.
-        sample_rate : float
-            [Hz]
-        periodic : bool
-            The record is one period of a force that has always been there.
+        The force is sampled at `sample_rate` [Hz], band-limited between samples where it is periodic, else smooth.
+        Raises `RecordError` if it is no record of numbers, and `StepError` (E_RUNAWAY) if the state runs away.
         """
         return self._response(force, sample_rate, periodic, _STEPS)
 

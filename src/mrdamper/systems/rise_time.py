@@ -25,18 +25,11 @@ class RiseTimes:
 
 
 def rise_times(damper: Damper, current: float | None = None, velocity: float | None = None) -> RiseTimes:
-    """Force at constant velocity after steps of current, up and down.
+    """Measure the times of the force at constant velocity after steps of current, up and down.
 
-    Raises `ParameterError` if the force does not change with the current.
-
-    Parameters
-    ----------
-    damper : Damper
-        With a coil; without one the answer is the model's own.
-    current : float, optional
-        Switched on and off [A]. Default: the highest tested.
-    velocity : float, optional
-        [m/s]. Default: half the highest tested.
+    The current is switched on and off [A]; default: the highest tested. The velocity is half the highest tested [m/s]
+    unless given. Without a coil the answer is the model's own. Raises `ParameterError` if the force does not change
+    with the current.
     """
     current = damper.envelope.current_A[1] if current is None else current
     velocity = 0.5 * damper.envelope.peak_velocity_m_s[1] if velocity is None else velocity

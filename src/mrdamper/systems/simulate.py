@@ -143,18 +143,10 @@ class SystemLoop:
         return whole / math.ceil(whole / step - 1e-9)
 
     def run(self, dt: float, machine: bool | None = None, numbers: ElementParameters | None = None) -> Simulation:
-        """Simulate the whole input at one step.
+        """Simulate the whole input at one step dt [s].
 
-        Raises `StepError` if there are too many steps, or one has no solution.
-
-        Parameters
-        ----------
-        dt : float
-            [s]
-        machine : bool, optional
-            Compiled, where there is a compiler. Default: where steps are many.
-        numbers : Numbers, optional
-            Other parameters of the links than the dampers' own.
+        `machine`: compiled, where there is a compiler; by default where steps are many. `numbers` are other parameters
+        of the links than the dampers' own. Raises `StepError` if there are too many steps, or one has no solution.
         """
         system, n = self.system, len(self.system.coordinates)
         samples = int(min(self.source.duration / dt, 2.0 * _MAX_STEPS) + 1e-6) + 1 if 0 < dt < math.inf else 0

@@ -166,16 +166,8 @@ def quarter_car(
 ) -> System:
     """Make a quarter of a car: body on spring and damper, wheel on a tyre that lifts off.
 
-    Parameters
-    ----------
-    body, wheel : float
-        Masses [kg].
-    spring, tyre : float
-        Stiffnesses [N/m].
-    tyre_damping, damping : float
-        Of the tyre, and of a passive damper beside the controlled one [N s/m].
-    stop : (float, float), optional
-        Free travel either way [m] and stiffness [N/m] of bump stops.
+    Masses in kg, stiffnesses in N/m, damping of the tyre and of a passive damper beside the controlled one in N s/m;
+    `stop` is the free travel either way [m] and the stiffness [N/m] of bump stops.
     """
     axle = _Axle("", "body", "wheel", "road", wheel, spring, damping, tyre, body)
     M = np.diag([body, wheel])
