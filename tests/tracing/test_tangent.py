@@ -51,6 +51,15 @@ def test_tangents_of_a_damper_are_what_small_changes_do(motion, model):
         assert np.mean(off) < 0.01, name  # all but the samples that a corner lies between
 
 
+def test_picked_samples_are_those_of_the_whole_record(motion, model):
+    picked = np.array([0, 1, 7, 2000, 3998])
+    some = recorded.force_tangents(model, motion, NAMES, picked)
+    whole = recorded.force_tangents(model, motion, NAMES)
+    assert some is not None
+    assert whole is not None
+    assert np.array_equal(some, whole[:, picked])
+
+
 def test_every_operation_has_the_slope_of_its_values():
     tape = Tape()
     p, x = cast(Any, tape.parameter("p", 0.4)), cast(Any, tape.input("x"))

@@ -20,6 +20,7 @@ from mrdamper.data import Condition, Floats, Run, index_at
 from mrdamper.errors import RunError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.models.base import Model
+from mrdamper.models.recorded import force_tangents
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.sines import centred_motion, equivalent_sine
 from mrdamper.statistics.levenberg_marquardt import forward_differences, least_squares
@@ -267,9 +268,17 @@ class JointResiduals:
         """
         if self._columns_at is None or not np.array_equal(self._columns_at[0], point):
             reduced = self.problem.without_linear(point)
-            motion, state = self._followed(reduced, point)
-            self._columns_at = point, reduced, *linear_table(reduced, self.problem.linear, motion, state)
+            self._columns_at = point, reduced, *self._linear_table(reduced, point)
         return self._columns_at[1:]
+
+    def _linear_table(self, reduced: Model, point: Floats) -> tuple[Floats, Floats]:
+        """Force of a model without linear parameters, and what one unit of each adds: in one pass where it can be."""
+        motion, linear = self.concatenated.with_field_current(self.problem.coil_at(point)), self.problem.linear
+        names = [info.name for info in type(reduced).parameters() if info.linear]  # one program for all problems
+        rows = force_tangents(reduced, motion, names, self.picked)
+        if rows is None:
+            return linear_table(reduced, linear, *self._followed(reduced, point))
+        return rows[0], rows[[1 + names.index(info.name) for info in linear]].T
 
     def solve(self, point: Floats) -> LinearSolution:
         """Linear parameters of least weighted squares at a point of the search axes; remembered for the last."""
@@ -390,8 +399,8 @@ def project_out(slopes: Floats, columns: Floats) -> Floats:
     scale = np.sqrt(np.diag(gram))
     scale = np.where(scale > 0, scale, 1.0)
     normal = gram / scale / scale[:, None] + _RIDGE * np.eye(scale.size)
-    taken = columns @ (np.linalg.solve(normal, columns.T @ slopes / scale[:, None]) / scale[:, None])
-    return np.subtract(slopes, taken, out=taken)
+    taken = (np.linalg.solve(normal, columns.T @ slopes / scale[:, None]) / scale[:, None]).T @ columns.T
+    return np.subtract(slopes, taken.T, out=taken.T)
 
 
 def concatenate(motions: Iterable[Excitation]) -> Excitation:

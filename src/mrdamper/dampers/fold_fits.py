@@ -38,9 +38,19 @@ class FoldFits:
         self.problem, self.searched = problem, tuple(searched)
         self.blocks = _blocks(folds, len(problem.parts))
         self._starts: dict[frozenset[int], list[JointFit]] = {}
+        self._fits: dict[tuple[int, ...], JointFit] = {}
 
     def refit(self, rows: Sequence[int]) -> JointFit:
-        """Fit the runs at some indices: of the ends from the best starts the one that describes these runs best."""
+        """Fit the runs at some indices: of the ends from the best starts the one that describes these runs best.
+
+        A record alone is a condition and a kind of fold: fits are remembered.
+        """
+        if (key := tuple(sorted(rows))) not in self._fits:
+            self._fits[key] = self._fit(rows)
+        return self._fits[key]
+
+    def _fit(self, rows: Sequence[int]) -> JointFit:
+        """Fit the runs at some indices from the starts of the block of the others."""
         left = frozenset(range(len(self.problem.parts))) - set(rows)
         block = next((block for block in self.blocks if left <= block), left)
         if block not in self._starts:

@@ -395,8 +395,9 @@ class JointProblem:
         for left in reversed(range(rounds)):
             if self.axes:
                 solution = least_squares(
-                    table.solved_residual, point, *self.box(), most_steps, settled, slopes=table.slopes, curved=curved
-                )
+                    table.solved_residual, point, *self.box(), most_steps, settled,
+                    slopes=table.slopes, curved=curved, lengthened=True,
+                )  # fmt: skip
                 point, ending = solution.point, solution.ending
                 evaluations += solution.evaluations
                 if to_the_last_digit and not left:
@@ -505,7 +506,8 @@ class JointProblem:
         lower, upper = self.box()
         reach = _DIFFERENCE_RATIO * (upper - lower)
         inside = self.without_linear(np.clip(point, lower + reach, upper - reach))
-        tangents = force_tangents(replace(model, **{name: getattr(inside, name) for name in names}), motion, names)
+        moved = replace(model, **{name: getattr(inside, name) for name in names})
+        tangents = force_tangents(moved, motion, names, picked)
         if tangents is None:
             return None
         slopes = np.zeros((point.size, len(names)))
@@ -514,7 +516,7 @@ class JointProblem:
                 slopes[i] = self._moved_along(i, point, names)
             else:
                 slopes[i, names.index(axis.name)] = axis.value(float(point[i])) if axis.log else 1.0
-        return (slopes @ tangents[1:, picked]).T
+        return (slopes @ tangents[1:]).T
 
     @cached_property
     def _entangled_axes(self) -> frozenset[int]:

@@ -7,6 +7,7 @@ from functools import wraps
 from typing import Any, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.data import Floats
 from mrdamper.physics.motion.excitation import Excitation
@@ -38,13 +39,16 @@ def recorded(state: S) -> S:
     return cast(S, along)
 
 
-def force_tangents(model: Any, motion: Excitation, names: Sequence[str]) -> Floats | None:
-    """(K, N) derivatives of the force by K parameters along a motion, memory included, in one compiled pass.
+def force_tangents(
+    model: Any, motion: Excitation, names: Sequence[str], picked: NDArray[np.intp] | None = None
+) -> Floats | None:
+    """(1 + K, N) force and its derivatives by K parameters along a motion, memory included, in one compiled pass.
 
-    None where there is no compiler, the motion is short, or the model has no derivative of this kind.
+    Of all samples, or of those at some ascending indices. None where there is no compiler, the motion is short, or
+    the model has no derivative of this kind.
     """
     return _along(
-        model, motion, tuple(names), lambda free, traced, tape: with_tangents(tape, _force(free, traced), names)
+        model, motion, tuple(names), lambda free, traced, tape: with_tangents(tape, _force(free, traced), names), picked
     )
 
 
@@ -60,6 +64,7 @@ def _along(
     motion: Excitation,
     names: tuple[str, ...] | None,
     outputs: Callable[[Any, Any, Tape], Mapping[str, Any]],
+    picked: NDArray[np.intp] | None = None,
 ) -> Floats | None:
     """(K, N) outputs of a program of the model along a motion; programs are kept by the names of their tangents."""
     kind: type = model.__class__
@@ -80,7 +85,7 @@ def _along(
             return None
         derived = record.prepare(given)
         programs.append(record)
-    result = derived is not None and record.compiled_along(given, derived, record.starts, channels(motion))
+    result = derived is not None and record.compiled_along(given, derived, record.starts, channels(motion), picked)
     return result.outputs if result and result.failed < 0 else None
 
 

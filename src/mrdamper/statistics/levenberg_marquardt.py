@@ -26,6 +26,8 @@ _STEP_TOLERANCE, _ROUNDING_STEP = (
 _FLAT_CURVATURE = 1e-12  # share of the largest curvature
 _POLISHING = 25  # steps
 _WORTHLESS = 1e-3  # share of the tolerated gain below which a step is not even tried
+_EXCEEDED = 1.3  # gain over the promised one, from which a step is lengthened
+_LENGTHENINGS, _MAX_LENGTHENING = 2, 4.0  # of a step, and the factor of each
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ def least_squares(
     *,
     slopes: Callable[[Floats], Floats] | None = None,
     curved: bool = False,
+    lengthened: bool = False,
 ) -> Minimum:
     """Minimise |residual(point)|² inside a box, until a step gains less than `tolerance` of it.
 
@@ -77,6 +80,9 @@ def least_squares(
         Learn from the change of the gradient what curvature the Jacobian alone leaves out. Where
         much residual remains, Gauss–Newton's steps shrink by the same factor again and again;
         these do not [Dennis, Gay and Welsch 1981, ACM Trans. Math. Software 7, 348].
+    lengthened : bool
+        Lengthen a step that gains more than the Jacobian promised: of residuals with narrow peaks, as those of fronts
+        that must shift, it overestimates the curvature, and a step costs many more operations than a residual.
     """
     width = upper - lower
     point = np.clip(start, lower, upper)
@@ -103,8 +109,12 @@ def least_squares(
             trial = np.clip(point + step, lower, upper)
             r_trial = residual(trial)
             evaluations += 1
-            if float(r_trial @ r_trial) < cost:
+            gain = cost - float(r_trial @ r_trial)
+            if gain > 0:
                 better, damping = (trial, r_trial), max(damping / 10, 1e-12)
+                if lengthened and gain > _EXCEEDED * promised:
+                    better, tried = _lengthened(residual, point, step, better, cost, promised, lower, upper)
+                    evaluations += tried
             else:
                 damping *= 10
         if better is None:
@@ -118,6 +128,32 @@ def least_squares(
             ending = StopReason.SETTLED
             break
     return Minimum(point, r, cost, evaluations, ending)
+
+
+def _lengthened(
+    residual: Callable[[Floats], Floats],
+    point: Floats,
+    step: Floats,
+    reached: tuple[Floats, Floats],
+    cost: float,
+    promised: float,
+    lower: Floats,
+    upper: Floats,
+) -> tuple[tuple[Floats, Floats], int]:
+    """Lengthen a step to where the parabola through its gains leads, while it gains: point, residual, evaluations."""
+    length, gain, tried = 1.0, cost - float(reached[1] @ reached[1]), 0
+    for tried in range(1, _LENGTHENINGS + 1):
+        curvature = max((2 * length * promised - gain) / (length**2 * promised), 1e-3)
+        length = float(np.clip(1 / curvature, 1.5 * length, _MAX_LENGTHENING * length))
+        trial = np.clip(point + length * step, lower, upper)
+        r = residual(trial)
+        further = cost - float(r @ r)
+        if further <= gain:
+            return reached, tried
+        reached, gain = (trial, r), further
+        if gain <= _EXCEEDED * length * promised:
+            break
+    return reached, tried
 
 
 def newton_refine(gradient: Callable[[Floats], Floats], point: Floats, lower: Floats, upper: Floats) -> Floats:

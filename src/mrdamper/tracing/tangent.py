@@ -89,11 +89,11 @@ def _slope(tape: Tape, node: Expression, slopes: Mapping[int, Any]) -> Any:
     if node.op == "add":
         return _plus(da, db)
     if node.op == "subtract":
-        return _plus(da, _times(db, -1.0))
+        return _minus(da, db)
     if node.op == "multiply":
         return _plus(_times(da, b), _times(db, a))
     if node.op == "divide":
-        return _plus(da, _times(_times(db, node), -1.0)) / b
+        return _minus(da, _times(db, node)) * (1.0 / b)  # one division for all that is differentiated by it
     if node.op == "minimum":
         return tape.select(a < b, da, db)
     if node.op == "maximum":
@@ -107,6 +107,11 @@ def _slope(tape: Tape, node: Expression, slopes: Mapping[int, Any]) -> Any:
 def _plus(a: Any, b: Any) -> Any:
     zero = [isinstance(value, float) and value == 0.0 for value in (a, b)]
     return b if zero[0] else a if zero[1] else a + b
+
+
+def _minus(a: Any, b: Any) -> Any:
+    zero = [isinstance(value, float) and value == 0.0 for value in (a, b)]
+    return a if zero[1] else -b if zero[0] else a - b
 
 
 def _times(a: Any, b: Any) -> Any:

@@ -69,13 +69,21 @@ class RecordProgram:
         return self.interpreted_along(given, derived, memory, arrays)
 
     def compiled_along(
-        self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], channels: Sequence[ArrayLike]
+        self,
+        given: Sequence[float],
+        derived: Sequence[float],
+        memory: Sequence[float],
+        channels: Sequence[ArrayLike],
+        picked: NDArray[np.intp] | None = None,
     ) -> Along | None:
-        """Compute the same as `along`, compiled whatever the length; None without a usable compiler."""
+        """Compute the same as `along`, compiled whatever the length; None without a usable compiler.
+
+        Outputs are those of all samples, or of some at ascending indices.
+        """
         if (library := self._library) is None:
             return None
         arrays = [np.asarray(channel, dtype=float) for channel in channels]
-        return _compiled_along(library, self.program, given, derived, memory, arrays)
+        return _compiled_along(library, self.program, given, derived, memory, arrays, picked)
 
     def interpreted_along(
         self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], arrays: Sequence[Floats]
@@ -137,16 +145,18 @@ def _compiled_along(
     derived: Sequence[float],
     memory: Sequence[float],
     arrays: Sequence[Floats],
+    picked: NDArray[np.intp] | None = None,
 ) -> Along:
     p, d, s = (np.array([*values, 0.0], dtype=float) for values in (given, derived, memory))
     size = arrays[0].size
-    outputs = np.empty((len(program.outputs), size))
+    outputs = np.empty((len(program.outputs), size if picked is None else picked.size))
     places = np.array([array.ctypes.data for array in arrays], dtype=np.uintp)
     strides = np.array([array.strides[0] // 8 for array in arrays], dtype=np.int64)
-    ends = np.array([row.ctypes.data for row in outputs], dtype=np.uintp)
+    indices = None if picked is None else np.ascontiguousarray(picked, dtype=np.int64)
     along = library.along
     along.restype = ctypes.c_longlong
     failed = along(
-        address(p), address(d), address(s), ctypes.c_longlong(size), address(places), address(strides), address(ends)
+        address(p), address(d), address(s), ctypes.c_longlong(size), address(places), address(strides),
+        None if indices is None else address(indices), ctypes.c_longlong(outputs.shape[1]), address(outputs),
     )  # fmt: skip
     return Along(outputs, tuple(s[:-1].tolist()), int(failed))

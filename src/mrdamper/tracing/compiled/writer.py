@@ -61,11 +61,12 @@ static inline real read_table(const real *nodes, const real (*cells)[7], int cou
 """
 
 _RECORD = """
+/* Outputs at every sample, or at the `count` samples whose ascending indices are picked. */
 EXPORT whole along(const real *p, const real *d, real *memory, whole samples, const real *const *inputs,
-    const whole *strides, real *const *outputs)
+    const whole *strides, const whole *picked, whole count, real *outputs)
 {{
     real s[{memory}], u[{inputs}], out[{outputs}], m[{kept}];
-    whole i, k;
+    whole i, k, at = 0;
     memcpy(s, memory, sizeof s);
     for (k = 0; k < {kept}; k++) {{
         m[k] = NAN;
@@ -77,8 +78,11 @@ EXPORT whole along(const real *p, const real *d, real *memory, whole samples, co
         if (!step_0(p, d, s, u, out, m)) {{
             break;
         }}
-        for (k = 0; k < {outputs}; k++) {{
-            outputs[k][i] = out[k];
+        if (at < count && i == (picked ? picked[at] : i)) {{
+            for (k = 0; k < {outputs}; k++) {{
+                outputs[k * count + at] = out[k];
+            }}
+            at++;
         }}
     }}
     memcpy(memory, s, sizeof s);
