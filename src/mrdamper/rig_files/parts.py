@@ -47,8 +47,11 @@ def _run_column(table: RawTable, form: FileForm) -> int | None:
     if wanted is None:
         words = [[word.casefold().rstrip("0123456789") for word in words_of(name[:60])] for name in table.names]
         named = [i for i, of in enumerate(words) if _RUN_WORDS & {*of} and {*of} <= _RUN_WORDS | _NUMBER_WORDS]
-        if named or table.words is None:
-            return named[0] if named and table.words is not None else None
+        if table.words is None:
+            return None
+        named = [i for i in named if len(table.words(i).labels) > 1] if len(named) > 1 else named
+        if named:
+            return named[0]
         stated = [(i, table.words(i).labels[:_MOST_LEVELS]) for i, cell in enumerate(table.odd) if currents_in(cell)]
         return next((i for i, labels in stated if all(len(currents_in(label)) == 1 for label in labels)), None)
     if isinstance(wanted, int):
@@ -125,7 +128,7 @@ def _part(
         values = {i: np.array(content.values[columns[i]][inside]) for i in wanted}
         return Content(values, _lines(content.lines, inside), content.findings)
 
-    several = tuple(line for line in table.remarks if len(set(currents_in_cells(line))) > 1) if table.over else ()
+    several = tuple(line for line in table.remarks if len(set(currents_in_cells(line))) > 1)
     name = "_".join(part for part in (table.label, label) if part)
     return replace(table.picked(columns, part), titles=several, label=name)
 

@@ -13,8 +13,9 @@ from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.tokens import stamp
+from mrdamper.rig_files.units import is_unit, parse_unit
 
-_THOUSANDTHS = frozenset(("ms", "msec", "millisecond", "milliseconds", "millisekunden"))
+_FRACTIONS = {"millisekunden": "ms"}
 _DATES = frozenset(
     ("date", "datum", "data", "fecha", "dato", "дата", "日期", "日付", "날짜", "tarih", "dátum", "päivä")
 )
@@ -57,38 +58,37 @@ def with_time_stated(table: RawTable) -> RawTable:
 
     Parts: a clock of whole seconds and thousandths; a clock of a day and its date.
     """
-    times = table.columns("time")
+    times = table.columns("time") or [i for i in table.columns(dimension="time") if not table.names[i]]
     if len(times) == 1:
-        return _with_date(_with_thousandths(table, times[0]), times[0])
+        return _with_date(_with_fractions(table, times[0]), times[0])
     return table if times else _with_crank(table)
 
 
-def _beside(table: RawTable, clock: int, words: frozenset[str]) -> int | None:
-    """Return the one column of such a name beside a clock in seconds; None if there is none, or several."""
-    columns = [i for i, name in enumerate(table.names) if name.strip().casefold() in words]
-    return columns[0] if len(columns) == 1 and table.units[clock] == "s" else None
-
-
-def _with_thousandths(table: RawTable, clock: int) -> RawTable:
-    """Stamps of whole seconds, repeated, with the milliseconds beside them."""
-    part = _beside(table, clock, _THOUSANDTHS)
-    values = None if part is None else table.try_read(clock, part)
-    if part is None or values is None:
+def _with_fractions(table: RawTable, clock: int) -> RawTable:
+    """Stamps of whole seconds, repeated, with the milliseconds or microseconds beside them."""
+    over = table.over or ("",) * len(table.names)
+    names = [(name or title).strip(" ()[]").casefold() for name, title in zip(table.names, over, strict=True)]
+    names = [_FRACTIONS.get(name, name) for name in names]
+    units = {i: parse_unit(name) for i, name in enumerate(names) if is_unit(name) and i != clock}
+    beside = [(i, u.factor) for i, u in units.items() if u is not None and u.dimension == "time" and u.factor < 0.01]
+    part, factor = beside[0] if len(beside) == 1 and table.units[clock] == "s" else (clock, 0.0)
+    values = table.try_read(clock, part) if part != clock else None
+    if values is None:
         return table
-    seconds, thousandths = values[clock], values[part]
-    apart = np.all(seconds == np.floor(seconds)) and np.all((thousandths >= 0) & (thousandths < 1000))
+    seconds, fractions = values[clock], factor * values[part]
+    apart = np.all(seconds == np.floor(seconds)) and np.all((fractions >= 0) & (fractions < 1))
     if not apart or not np.any(np.diff(seconds) == 0):
         return table
-    return table.computed(clock, (clock, part), lambda values: values[clock] + values[part] / 1000)
+    return table.computed(clock, (clock, part), lambda values: values[clock] + factor * values[part])
 
 
 def _with_date(table: RawTable, clock: int) -> RawTable:
     """Return a clock that goes back at midnight, with the dates beside it."""
-    dates = _beside(table, clock, _DATES)
-    values = None if dates is None else table.try_read(clock)
-    if dates is None or values is None or table.words is None or not np.any(np.diff(values[clock]) < -_DAY_S / 2):
+    dates = [i for i, name in enumerate(table.names) if name.strip().casefold() in _DATES]
+    values = table.try_read(clock) if len(dates) == 1 and table.units[clock] == "s" else None
+    if values is None or table.words is None or not np.any(np.diff(values[clock]) < -_DAY_S / 2):
         return table
-    words = table.words(dates)
+    words = table.words(dates[0])
     days = [entry[0] // 10**9 for label in words.labels if (entry := stamp(f"{label} 00:00:00")) is not None]
     if len(days) < len(words.labels):
         return table

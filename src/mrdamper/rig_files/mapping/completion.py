@@ -74,6 +74,7 @@ _COUNTED = (  # force positive in compression; Force (compression positive)
 )
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _LONGEST_LINE = 300
+_FEWEST_PATHS = 3  # that have a beginning in common
 
 
 def completed(table: RawTable) -> RawTable:
@@ -82,11 +83,19 @@ def completed(table: RawTable) -> RawTable:
         table = _with_indexed_names(_with_listed_names(table))
     if not any(table.names):
         return table
-    table = _with_numbered_channels(table)
+    table = _with_numbered_channels(_without_shared_path(table))
     table = _with_titles(_with_keyed_units(_with_row_of_currents(table)))
     table = _with_stated_time_unit(_with_listed_units(_with_keyed_axis(table)))
     table = _with_stated_signs(_with_clocks_and_weights(table))
     return _with_sense(_with_scales(_with_counts(table)))
+
+
+def _without_shared_path(table: RawTable) -> RawTable:
+    """Names without the path that all signals of a model have in common: Platform()://Rig/Model Root/."""
+    paths = {i: name.split("/") for i, name in enumerate(table.names) if name.count("/") > 1}
+    differ = (n for n, level in enumerate(zip(*paths.values(), strict=False)) if len(set(level)) > 1)
+    shared = next(differ, 0) if len(paths) >= _FEWEST_PATHS else 0
+    return table.named({i: ("/".join(path[shared:]), table.units[i]) for i, path in paths.items()}) if shared else table
 
 
 def _with_sense(table: RawTable) -> RawTable:

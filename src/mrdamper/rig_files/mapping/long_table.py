@@ -16,8 +16,8 @@ _VALUE = frozenset(
     ("value", "values", "wert", "messwert", "valeur", "valor", "valore", "reading", "значение", "数值", "值", "値")
 )
 _CHANNEL = frozenset(
-    ("channel", "kanal", "signal", "variable", "sensor", "quantity", "parameter", "canal", "grandeur", "name", "tag",
-     "messgröße", "magnitud", "канал", "通道", "チャンネル")
+    ("channel", "kanal", "signal", "variable", "sensor", "quantity", "parameter", "field", "canal", "grandeur", "name",
+     "tag", "messgröße", "magnitud", "канал", "通道", "チャンネル")
 )  # fmt: skip
 _UNIT = frozenset(("unit", "units", "einheit", "unité", "unidad", "unità", "единица", "单位", "単位"))
 _MOST_CHANNELS = 60
@@ -31,7 +31,7 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
     RigFileError
         E_RASTER, when the table is read, if the channels have other times or other tests than the force.
     """
-    names = [name.strip().casefold() for name in table.names]
+    names = [name.strip(" _").casefold() for name in table.names]
     value = [i for i, name in enumerate(names) if name in _VALUE]
     channel = [i for i, name in enumerate(names) if name in _CHANNEL]
     if table.words is None or len(value) != 1 or len(channel) != 1:

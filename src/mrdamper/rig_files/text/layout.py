@@ -10,7 +10,7 @@ import csv
 import re
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from typing import Literal
@@ -100,6 +100,8 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         raise source.refuse("E_TOO_MANY_COLUMNS", f"{width} columns", "is one sample one line?", line=first + 1)
     rows = _rows(lines[first:], separator, width, trailing)
     decimal = form.decimal or _decimal(rows, source, first)
+    if _counts(row[0] for row in rows):
+        lines = [*_with_name_of_numbers(lines[:first], separator, width), *lines[first:]]
     header, unit_row = _header_lines(lines, first, separator, width, source, form)
     if header is not None and not is_comment(lines[header]):
         try:
@@ -107,12 +109,16 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         except csv.Error as error:
             raise source.refuse("E_QUOTE", "a quote is not closed", "close or remove it", line=header + 1) from error
     names = form.names or (_cells(lines[header], separator, width) if header is not None else ("",) * width)
+    if header is not None and not form.names:
+        index = _name_of_index(names, _below_names(lines, header, unit_row, first), separator, width)
+        names = (index or names[0], *names[1:])
     levels = [] if header is None or form.names else _levels(lines[:header], separator, width)
     names, titles = _with_levels(names, levels)
     trailing |= header is not None and separator != SPACES and _names_notes(cells_of(lines[header], separator), width)
     if len(names) != width:
         raise _mismatch(source, separator, len(names), width, first, lines)
     units = _cells(lines[unit_row], separator, width) if unit_row is not None else ("",) * width
+    units = ("" if units[0].casefold() in _UNIT_KEYS else units[0], *units[1:])
     columns = [[row[i] for row in rows if len(row) > i] for i in range(width)]
     written = rows if as_written is lines else _rows(as_written[first:], separator, width, trailing)
     behind = tuple(_unit_behind([row[i] for row in written if len(row) > i]) for i in range(width))
@@ -131,7 +137,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         None if unit_row is None else unit_row + 1,
         first + 1,
         trailing,
-        lines[header] if header is not None and not is_comment(lines[header]) else "",
+        "" if header is None else lines[header],
         tuple(next(filter(None, c), "") if k == "text" else "" for c, k in zip(columns, kinds, strict=True)),
         (
             *(line for line in (*above, *_below_names(lines, header, unit_row, first)) if line.strip()),
@@ -147,6 +153,27 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
 def _below_names(lines: Sequence[str], header: int | None, units: int | None, first: int) -> list[str]:
     """Return the comments between the names of columns and the first row: lines that are no units."""
     return [] if header is None else [lines[i] for i in range(header + 1, min(first, len(lines))) if i != units]
+
+
+def _counts(cells: Iterable[str]) -> bool:
+    """Tell if cells count the rows, from one or zero on."""
+    numbers = [int(bare) if (bare := cell.strip('"')).isascii() and bare.isdigit() else -1 for cell in cells]
+    numbers = numbers[:_SAMPLE]
+    return len(numbers) > 1 and numbers[0] in (0, 1) and numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+
+
+def _with_name_of_numbers(above: Sequence[str], separator: str, width: int) -> list[str]:
+    """Lines above the rows, an empty name before the names if these are one too few: R names no row numbers."""
+    named = [i for i in _plain(above) if len(_roles(cells_of(above[i], separator))) >= _TELLING]
+    if len(named) != 1 or len(cells_of(above[named[0]], separator)) != width - 1:
+        return list(above)
+    return [f'""{separator}{line}' if i == named[0] else line for i, line in enumerate(above)]
+
+
+def _name_of_index(names: tuple[str, ...], below: Sequence[str], separator: str, width: int) -> str:
+    """Return the name of the first column that stands alone in a line below the others: pandas puts the index there."""
+    alone = [cells[0] for line in below if len(cells := _cells(line, separator, width)) == width and not any(cells[1:])]
+    return alone[-1] if len(alone) == 1 and not _roles(names[:1]) else ""
 
 
 def _levels(above: Sequence[str], separator: str, width: int) -> list[tuple[str, ...]]:
@@ -205,10 +232,12 @@ def _without_units(lines: Sequence[str]) -> Sequence[str]:
 
 def _bare_row(line: str, separator: str) -> str:
     """Return a row of which at least two cells are numbers with units, without the units; empty if it is none."""
-    matches = [_QUANTITY.fullmatch(cell) for cell in cells_of(line, separator) if cell]
-    if len(matches) < 2 or not all(match and is_unit(match[2]) for match in matches):
+    cells = cells_of(line, separator)
+    matches = [match if (match := _QUANTITY.fullmatch(cell)) and is_unit(match[2]) else None for cell in cells]
+    others = [cell for cell, match in zip(cells, matches, strict=True) if cell and not match]
+    if len(cells) - cells.count("") - len(others) < 2 or any(stamp(cell) is None for cell in others):
         return ""
-    return separator.join(match[1] for match in matches if match)
+    return separator.join(match[1] if match else cell for cell, match in zip(cells, matches, strict=True))
 
 
 def _unit_behind(cells: Sequence[str]) -> str:
@@ -265,7 +294,7 @@ def is_footer(line: str, layout: Layout) -> bool:
     if not any(cells):
         return False
     at = next(i for i, cell in enumerate(cells) if cell)
-    worded = _WORD.match(cells[at].lstrip("[<(*=-")) is not None and cells[at].lower() not in MISSING
+    worded = _WORD.match(cells[at].lstrip("[<(*=-'")) is not None and cells[at].lower() not in MISSING
     return worded and (at >= layout.width or layout.kinds[at] != "text")
 
 

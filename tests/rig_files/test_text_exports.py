@@ -1,0 +1,97 @@
+"""Texts as programs of laboratories export them: each gives the samples it was made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+
+from mrdamper import import_files
+
+T = np.arange(1001) / 200.0
+X = 12.0 * np.sin(2 * np.pi * T)
+V = np.gradient(X, T)
+
+
+def force(amperes: float) -> np.ndarray:
+    return (200 + 500 * amperes) * np.tanh(V / 5) + 2 * V + np.random.default_rng(3).normal(0, 1, T.size)
+
+
+def lines(write: Callable[[int, float, float, float], str], amperes: float = 0.5) -> str:
+    return "".join(write(i, *row) + "\n" for i, row in enumerate(zip(T, X, force(amperes), strict=True)))
+
+
+START = datetime(2025, 2, 3, 23, 10, 4)
+
+
+def clock(seconds: float) -> datetime:
+    return START + timedelta(seconds=round(seconds, 6))
+
+
+EXPORTS = {
+    "a last line in quotes": "'Rig 7\ntime (s),stroke (mm),force (N)\n"
+    + lines(lambda i, t, x, f: f"{t:.3f},{x:.6f},{f:.4f}")
+    + "'end of test",
+    "units behind numbers beside a stamp": '"Time","Load","Stroke"\n'
+    + lines(lambda i, t, x, f: f'"{clock(t):%Y-%m-%d %H:%M:%S.%f}","{f:.4f} N","{x:.6f} mm"'),
+    "stamps of seconds with microseconds": "date and time;us;stroke;load\n;;mm;N\n"
+    + lines(lambda i, t, x, f: f"{clock(t):%Y-%m-%d %H:%M:%S};{clock(t).microsecond};{x:.6f};{f:.4f}"),
+    "the name of the index below the others": "level,stroke,load\nunits,mm,N\nt [s],,\n"
+    + lines(lambda i, t, x, f: f"{t:.3f},{x:.6f},{f:.4f}"),
+    "numbers of rows without a name": "t.s,stroke.mm,load.N\n"
+    + lines(lambda i, t, x, f: f'"{i + 1}",{t:.3f},{x:.6f},{f:.4f}'),
+    "paths of a model": "time,Rig model/plant/Ref/x_ref,Rig model/plant/Sensor/stroke,Rig model/plant/Sensor/load\n"
+    + "s,mm,mm,N\n"
+    + lines(lambda i, t, x, f: f"{t:.3f},{x:.4f},{x:.6f},{f:.4f}"),
+}
+
+
+@pytest.mark.parametrize("export", EXPORTS)
+def test_an_export_gives_the_samples_it_was_made_of(tmp_path, export):
+    (tmp_path / "run_0.5A.csv").write_text(EXPORTS[export])
+    result = import_files([tmp_path])
+    assert not [str(refusal.error) for refusal in result.refusals]
+    (record,) = result.records
+    size = record.time.size
+    assert size >= T.size - 1  # a last row without a line end is left out
+    np.testing.assert_allclose(record.time - record.time[0], T[:size], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(record.displacement, 1e-3 * X[:size], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(record.force, force(0.5)[:size], rtol=0, atol=1e-4)
+
+
+def test_comments_with_names_of_columns_begin_a_test_each(tmp_path):
+    text = "# rig 7\n"
+    for amperes in (0.0, 0.5):
+        text += f"# coil {amperes} A\n# t/s stroke/mm load/N\n"
+        text += lines(lambda i, t, x, f: f"{t:.3f} {x:.6f} {f:.4f}", amperes) + "\n\n"
+    (tmp_path / "all.dat").write_text(text)
+    records = import_files([tmp_path]).records
+    assert [float(np.mean(record.current)) for record in records] == [0.0, 0.5]
+    np.testing.assert_allclose(records[1].force, force(0.5), rtol=0, atol=1e-4)
+
+
+def test_a_line_of_conditions_below_the_names_belongs_to_groups_of_columns(tmp_path):
+    text = "time\tstroke\tload\ttime\tstroke\tload\ns\tmm\tN\ts\tmm\tN\n\t\tI = 0.2 A, 1 Hz\t\t\tI = 0.9 A, 1 Hz\n"
+    text += "".join(
+        f"{t:.3f}\t{x:.6f}\t{a:.4f}\t{t:.3f}\t{x:.6f}\t{b:.4f}\n"
+        for t, x, a, b in zip(T, X, force(0.2), force(0.9), strict=True)
+    )
+    (tmp_path / "book.txt").write_text(text)
+    assert [float(np.mean(record.current)) for record in import_files([tmp_path]).records] == pytest.approx([0.2, 0.9])
+
+
+def test_a_long_table_of_a_data_base_is_told_apart_by_the_tag_that_has_several_values(tmp_path):
+    text = "_time,_value,_field,_measurement,test\n"
+    for name, amperes, start in (("A", 0.0, 0.0), ("B", 0.5, 60.0)):
+        channels = {"stroke_mm": X, "load_N": force(amperes), "coil_current_A": np.full(T.size, amperes)}
+        for field, values in channels.items():
+            text += "".join(
+                f"{clock(start + t):%Y-%m-%dT%H:%M:%S.%f}Z,{v:.6f},{field},rig,{name}\n"
+                for t, v in zip(T, values, strict=True)
+            )
+    (tmp_path / "query.csv").write_text(text)
+    records = import_files([tmp_path]).records
+    assert [record.id for record in records] == ["query_A", "query_B"]
+    np.testing.assert_allclose(records[1].force, force(0.5), rtol=0, atol=1e-4)
