@@ -38,6 +38,12 @@ EXPLAINED = (
     Explained("study.recipe", "Scale(1.0, 1.0)", "", "which axes there are does not depend on the scale"),
     Explained("study.recipe", "identifications[0].method", "0 → 1", "all identifications are by one method"),
     Explained("paper.assumptions", 'cls(None, (("k1"', "items", _ORDER),
+    Explained(
+        "paper.recipes",
+        "for title, speed in",
+        "items 0 and 1 exchanged: ((TRADITIONAL, _peak_velocity(held_out)), (SLOWEST, 0.0))",
+        _ORDER,
+    ),
     Explained("paper.options", "for name, (low, high) in", "items 0 and 1", _ORDER),
     Explained("systems.inverse", "status, outputs, memory = 1", "1 → 2", "any status but 0 is a refusal"),
     Explained("study.recipe", "in ([],", "items", _ORDER),
@@ -232,6 +238,14 @@ EXPLAINED = (
     Explained("quality.loop", "np.linspace(-1, 1, POINTS)", "1 → 2", "beside a constant they span the same"),
     Explained("quality.loop", "leap = float(", "mean → median", "sizes that are compared are even"),
     Explained("quality.loop", "0.01 * (force.size - 1)", "1 → 2", _BUDGET),
+    Explained("quality.loop", "sides > 0.2 * low.size > 1", "1 → 2", _GUARD),
+    Explained("published.boada", "if row.ndim == 1", "1 → 2", "numbers as a list or an array"),
+    Explained(
+        "published.dominguez", ".amplitude_m / reference", "Div → Mult", "a constant factor goes into the levels"
+    ),
+    Explained(
+        "published.dominguez", "c.frequency_Hz / reference", "Div → Mult", "a constant factor goes into the levels"
+    ),
     Explained("published.boada", "in zip(factors, values", "arguments", "a product of two"),
     Explained("published.dominguez", "np.log(np.maximum(force, 1.0))", "1.0 → 10.0", _GUARD),
     Explained("published.dominguez", 'np.maximum(given["beta"], 1.0)', "1.0 → 10.0", _GUARD),

@@ -185,6 +185,7 @@ def folded(back=1.0, lag=0.6, steep=4.0):
     [
         (folded(), True),
         (folded(back=0.8), True),
+        (folded(back=1.25), True),
         (folded(back=0.7), False),  # strokes that differ by a third of the larger are two forces
         (lambda p, n, t: -folded()(p, n, t), True),
         (lambda p, n, t: np.tanh(4 * np.cos(p - 0.6)), False),
@@ -194,13 +195,27 @@ def folded(back=1.0, lag=0.6, steep=4.0):
         (lambda p, n, t: 0.6 + 0.4 * folded()(p, n, t), False),
     ],
 )
-def test_a_folded_force_has_zeros_on_either_side_and_strokes_alike(force, refused):
-    made = view(lambda p, n, t: force(p, n, t) + 0.02 * np.cos(p))  # dissipative by a little
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_a_folded_force_has_zeros_on_either_side_and_strokes_alike(force, refused, size):
+    made = view(lambda p, n, t: size * (force(p, n, t) + 0.02 * np.cos(p)))  # dissipative by a little
     if not refused:
         return dissipates(made)
     with pytest.raises(QualityError) as told:
         dissipates(made)
     assert told.value.code == "E_RECTIFIED"
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_strokes_of_a_folded_force_are_over_half_of_its_largest(size):
+    phase = 2 * np.pi * np.arange(800) / 200
+    force = folded()(phase, 0, 0)
+    force[100] = 1.0 / 0.55
+    seen = SimpleNamespace(run=SimpleNamespace(displacement=np.sin(phase)))
+    assert loop._is_folded(seen, size * force, size, 0.95 * size)
+    for out, back in ((1.0, 1.7), (1.7, 1.0)):
+        assert not loop._is_folded(seen, size * force, out * size, back * size)
+    force[100] = 1.0 / 0.45
+    assert not loop._is_folded(seen, size * force, size, 0.95 * size)
 
 
 @pytest.mark.parametrize(
@@ -261,7 +276,9 @@ def test_a_force_that_is_from_somewhere_on_times_another_number_is_refused(times
         # Where the force is large and positive too, and a short stretch beside a long one.
         (lambda p, n, t: np.where((n == 2) & (p < 4.2 * np.pi), -1, 1) * np.cos(p), 4.0, "1 of 4"),
         (lambda p, n, t: np.where((n == 2) & ((p < 4.2 * np.pi) | (abs(p - 5 * np.pi) < 0.02)), -1, 1) * np.cos(p), 4.0,
-         "1 of 4"),
+         r"from 4.6 s on \(1 of 4"),
+        (lambda p, n, t: np.where((n == 2) & ((p > 5.8 * np.pi) | (abs(p - 5 * np.pi) < 0.02)), -1, 1) * np.cos(p), 4.0,
+         r"from 5.3\d* s on \(1 of 4"),
         # Where the force is small either sign is near; a force that is weak for a while has not turned.
         (lambda p, n, t: 100 * np.where((n == 2) & (abs(p - 4.5 * np.pi) < 0.29), -1, 1) * np.cos(p), 4.0, None),
         (lambda p, n, t: np.where((n == 2) & (p < 4.2 * np.pi), 0.3, 1) * np.cos(p), 4.0, None),

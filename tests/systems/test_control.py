@@ -122,11 +122,11 @@ def test_the_inverse_gives_the_force_that_is_wanted(case):
         assert np.abs(np.diff(current[200:])).max() < 0.12 * highest
 
 
-def linear_in_current(*fy, c=(800.0,), coil=None):
-    """A damper of 800 N s/m, an offset of 30 N, and friction by its current."""
+def linear_in_current(*fy, c=(800.0,), f0=(30.0,), coil=None):
+    """A damper of 800 N s/m, an offset of 30 N, and friction by its current; of its square first, where three."""
     forms = ("constant", "linear-current", "quadratic-current")
     functions = {name: ParameterFunction(forms[len(values) - 1], values)
-                 for name, values in (("c", c), ("fy", fy), ("f0", (30.0,)))}  # fmt: skip
+                 for name, values in (("c", c), ("fy", fy), ("f0", f0))}  # fmt: skip
     return ModifiedModel("bench", ParameterMap(model_type("bingham"), functions), ENVELOPE, coil=coil)
 
 
@@ -183,6 +183,30 @@ def test_a_force_that_falls_back_at_high_velocities_only_is_refused_with_its_cur
     """Friction alone rises least at low currents; with a viscous part that falls, the force turns back at high ones."""
     with pytest.raises(ParameterError, match=r"above 0\.8 A"):
         check_monotone(linear_in_current(100.0, 300.0, 100.0, c=(-1100.0, 0.0, 3000.0)))
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_force_that_dips_by_over_half_a_per_cent_in_either_direction_is_refused(way):
+    """Of 1000 I² − a I at currents in steps of 0.2 A, in extension or in compression alone."""
+    for a, dips in ((211.0, False), (227.0, True)):
+        damper = linear_in_current(500.0, -a / 2, 400.0, f0=(way * 500.0, -way * a / 2, 30.0))
+        if dips:
+            with pytest.raises(ParameterError, match="above 0 A"):
+                check_monotone(damper)
+        else:
+            assert check_monotone(damper) == pytest.approx(1000 - a + 0.2 * a - 40)
+
+
+def test_the_reachable_interval_of_a_hysteretic_damper_is_that_of_the_sine():
+    """500 N s/m per ampere at 0.3 m/s and 600 N of yield force, which has the sign of the velocity at mid-stroke."""
+    assert check_monotone(modified_damper()) == pytest.approx(500 * 0.3 + 600, rel=1e-4)
+
+
+@pytest.mark.parametrize("sample", [(np.nan, 0.1, 0.0, 300.0, 1e-3), (0.0, 0.1, 0.0, np.inf, 1e-3),
+                                    (0.0, 0.1, 0.0, 300.0, 0.0), (0.0, 0.1, 0.0, 300.0, -1e-3)])  # fmt: skip
+def test_samples_that_are_no_numbers_or_have_no_step_are_refused(sample):
+    with pytest.raises(ParameterError, match="positive time step"):
+        invert(linear_in_current(600.0, 100.0)).step(*sample)
 
 
 @pytest.mark.parametrize("frequency_Hz", [0.8, 3.0])

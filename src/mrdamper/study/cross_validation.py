@@ -62,7 +62,7 @@ def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
     sines = [i for i, motion in enumerate(motions) if motion.is_sine and not pieces[i].current_changes]
     conditions = [motions[i].condition for i in sines]
     folds: dict[str, list[list[int]]] = {}
-    levels = np.array(current_levels([abs(c.current_A) for c in conditions]))
+    levels = np.array(current_levels([c.current_A for c in conditions]))
     if np.unique(levels).size > 2:
         by_level = {level: [sines[k] for k in np.flatnonzero(levels == level)] for level in np.unique(levels)}
         folds["current"] = [group for level, group in by_level.items() if level > 0]
