@@ -108,12 +108,10 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
             split(lines[header], separator)
         except csv.Error as error:
             raise source.refuse("E_QUOTE", "a quote is not closed", "close or remove it", line=header + 1) from error
-    names = form.names or (_cells(lines[header], separator, width) if header is not None else ("",) * width)
+    names, titles = form.names or ("",) * width, ()
+    below = _below_names(lines, header, unit_row, first)
     if header is not None and not form.names:
-        index = _name_of_index(names, _below_names(lines, header, unit_row, first), separator, width)
-        names = (index or names[0], *names[1:])
-    levels = [] if header is None or form.names else _levels(lines[:header], separator, width)
-    names, titles = _with_levels(names, levels)
+        names, titles = _names_and_titles(lines, header, below, separator, width)
     trailing |= header is not None and separator != SPACES and _names_notes(cells_of(lines[header], separator), width)
     if len(names) != width:
         raise _mismatch(source, separator, len(names), width, first, lines)
@@ -140,7 +138,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         "" if header is None else lines[header],
         tuple(next(filter(None, c), "") if k == "text" else "" for c, k in zip(columns, kinds, strict=True)),
         (
-            *(line for line in (*above, *_below_names(lines, header, unit_row, first)) if line.strip()),
+            *(line for line in (*above, *below) if line.strip()),
             *_stated_for_all(lines[:first], separator, width),
             *_notes_beside(rows),
         ),
@@ -170,10 +168,15 @@ def _with_name_of_numbers(above: Sequence[str], separator: str, width: int) -> l
     return [f'""{separator}{line}' if i == named[0] else line for i, line in enumerate(above)]
 
 
-def _name_of_index(names: tuple[str, ...], below: Sequence[str], separator: str, width: int) -> str:
-    """Return the name of the first column that stands alone in a line below the others: pandas puts the index there."""
+def _names_and_titles(
+    lines: Sequence[str], header: int, below: Sequence[str], separator: str, width: int
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the names of columns, of several levels of headings and of an index alone below them, and the titles."""
+    names = _cells(lines[header], separator, width)
     alone = [cells[0] for line in below if len(cells := _cells(line, separator, width)) == width and not any(cells[1:])]
-    return alone[-1] if len(alone) == 1 and not _roles(names[:1]) else ""
+    if len(alone) == 1 and alone[0] and not _roles(names[:1]):  # pandas puts the name of the index there
+        names = (alone[0], *names[1:])
+    return _with_levels(names, _levels(lines[:header], separator, width))
 
 
 def _levels(above: Sequence[str], separator: str, width: int) -> list[tuple[str, ...]]:
