@@ -144,8 +144,6 @@ BAD = {
     "page.csv": (lambda: b"<html><table><tr><td>1</td></tr></table></html>", "E_FORMAT"),
     "document.csv": (lambda: b"%PDF-1.7\n1 0 obj", "E_FORMAT"),
     "data.csv": (lambda: b'{"time": [1, 2, 3]}', "E_FORMAT"),
-    "text.xlsx": (lambda: CLEAN.encode(), "E_FORMAT"),
-    "text.mat": (lambda: CLEAN.encode(), "E_FORMAT"),
     "cut.csv.gz": (lambda: gzip.compress(CLEAN.encode())[:-500], "E_TRUNCATED"),
     "wrong.csv.gz": (lambda: gzip.compress(CLEAN.encode())[:-8] + bytes(8), "E_ARCHIVE"),
     "members.csv.gz": (lambda: gzip.compress(CLEAN.encode()) * 2, "E_ARCHIVE"),

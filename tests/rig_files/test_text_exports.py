@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from mrdamper import import_files
+from mrdamper.errors import InputError
+from mrdamper.rig_files.rig_import import read_run
 
 T = np.arange(1001) / 200.0
 X = 12.0 * np.sin(2 * np.pi * T)
@@ -95,3 +97,38 @@ def test_a_long_table_of_a_data_base_is_told_apart_by_the_tag_that_has_several_v
     records = import_files([tmp_path]).records
     assert [record.id for record in records] == ["query_A", "query_B"]
     np.testing.assert_allclose(records[1].force, force(0.5), rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["run_0.5A.xls", "run_0.5A.mat", "run_0.5A.tdms"])
+def test_the_content_decides_what_a_text_of_another_name_is(tmp_path, name):
+    rows = lines(lambda i, t, x, f: f"{t:.3f}\t{x:.6f}\t{f:.4f}")
+    (tmp_path / name).write_text("t (s)\tstroke (mm)\tload (N)\n" + rows)
+    np.testing.assert_allclose(read_run(tmp_path / name).force, force(0.5), rtol=0, atol=1e-4)
+    (tmp_path / name).write_bytes(b"t (s)\tstroke\x00 (mm)\tload (N)\n" + rows.encode())
+    with pytest.raises(InputError, match="E_FORMAT"):
+        read_run(tmp_path / name)
+
+
+def saved_by_octave(**variables: np.ndarray | float | str) -> str:
+    text = "# Created by Octave 9.1.0, Mon Feb 03 2025\n"
+    for name, value in variables.items():
+        if isinstance(value, np.ndarray):
+            text += f"# name: {name}\n# type: matrix\n# rows: {value.size}\n# columns: 1\n"
+            text += "".join(f" {v:.10g}\n" for v in value) + "\n\n"
+        elif isinstance(value, str):
+            text += f"# name: {name}\n# type: string\n# elements: 1\n# length: {len(value)}\n{value}\n\n\n"
+        else:
+            text += f"# name: {name}\n# type: scalar\n{value:.10g}\n\n\n"
+    return text
+
+
+def test_variables_saved_by_octave_as_text_are_read_and_a_cut_one_is_refused(tmp_path):
+    text = saved_by_octave(who="lab 2", t_s=T, stroke_mm=X, load_N=force(0.7), I_A=0.7)
+    (tmp_path / "run.mat").write_text(text)
+    record = read_run(tmp_path / "run.mat")
+    np.testing.assert_allclose(record.force, force(0.7), rtol=1e-9)
+    assert record.current is not None
+    assert float(np.mean(record.current)) == pytest.approx(0.7)
+    (tmp_path / "run.mat").write_text(text[: len(text) * 3 // 4])
+    with pytest.raises(InputError, match="E_TRUNCATED"):
+        read_run(tmp_path / "run.mat")

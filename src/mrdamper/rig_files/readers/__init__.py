@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -41,6 +42,7 @@ _FOREIGN = MappingProxyType(
     }
 )
 _PICTURES = ("PNG image", "JPEG image", "GIF image")
+_CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")  # no text has them
 _PICKLE = tuple(bytes((0x80, protocol)) for protocol in range(2, 6))
 
 
@@ -77,13 +79,13 @@ def reader_of(source: Source) -> Reader:
     named = next((r for r in readers.values() if source.suffix in r.suffixes), None)
     reader = next((r for r in readers.values() if r.binary and r().recognises(source)), None)
     foreign = next((title for magic, title in _FOREIGN.items() if head.lstrip().startswith(magic)), None)
-    if reader is None and foreign is None and (named is None or not named.binary):
+    text = reader is None and foreign is None and _CONTROL.search(head) is None
+    if reader is None and foreign is None and (text or named is None or not named.binary):
         listed = [r for r in readers.values() if not r.binary and r.name != "text"]  # formats of laboratories
         return next((r() for r in listed if r().recognises(source)), readers["text"]())
     if reader is None or (named is not None and source.suffix not in reader.suffixes):
-        text = reader is None and foreign is None and b"\0" not in head
-        is_now = reader.title if reader is not None else foreign or ("text" if text else "something else")
-        remedy = f"rename it to {reader.suffixes[0]}" if reader else "rename it to .csv" if text else "export it as CSV"
+        is_now = reader.title if reader is not None else foreign or "something else"
+        remedy = f"rename it to {reader.suffixes[0]}" if reader else "export it as CSV"
         if foreign in _PICTURES:
             remedy = "give the numbers it was drawn from"
         problem = f"the name says {named.title if named else source.suffix or 'nothing'}, the content is {is_now}"
