@@ -7,6 +7,8 @@ from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.errors import StepError
 from mrdamper.models import model_type
+from mrdamper.systems import result, simulate
+from mrdamper.systems.controllers import controller_type
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inputs.record import record
@@ -86,6 +88,25 @@ def test_tyres_lift_off_and_stops_are_touched_and_energy_still_balances():
     total = done.links[tyre].stiffness * done.stroke[:, tyre] + done.force[:, tyre]
     assert total[in_air] == pytest.approx(340 * 9.81, rel=1e-6)  # nothing holds the wheel but its weight
     assert done.energy_gap < 1e-9
+
+
+@pytest.mark.parametrize("machine", [False, True])
+def test_a_record_walked_in_parts_is_the_record_walked_at_once(machine, monkeypatch):
+    car = quarter_car("car", 300, 40, 20e3, 200e3, stop=(0.03, 2e5))
+    bump = load_input("bump", {"height_m": 0.12, "bump_m": 1.0, "speed_m_s": 8.0, "length_s": 1.0})
+    values = {"f0": 0, "k": 1e3, "c0": 800, "c1": 200, "fy0": 150, "fy1": 600, "d": 2e-4, "e": 5e-5, "cb": 3e4}
+    model = model_type("play-bypass").build({**values, "h0": 0.4, "h1": 0.1, "vh": 0.01, "T": 5e-3})
+    damper = JointDamper("bench", model, ("c0",), ENVELOPE, {})
+    loop = SystemLoop(car, bump, {"damper": damper}, controller_type("skyhook")(), 0.5)
+    whole = loop.run(5e-4, machine)
+    for module in (simulate, result):
+        monkeypatch.setattr(module, "PART", 50)
+    parts = loop.run(5e-4, machine)
+    assert np.ptp(whole.current) > 0
+    assert np.count_nonzero(whole.flags) > 0
+    for name in ("x", "v", "a", "force", "stroke", "current", "flags", "load"):
+        assert getattr(parts, name) == pytest.approx(getattr(whole, name), rel=1e-9, abs=1e-12), name
+    assert parts.energy["damper"] == pytest.approx(whole.energy["damper"], rel=1e-9)
 
 
 def test_the_rear_axle_follows_the_front():

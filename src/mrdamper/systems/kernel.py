@@ -111,6 +111,11 @@ def _numbers(values: Floats) -> tuple[float, ...]:
     return tuple(values.tolist())
 
 
+def slope_and_scale(count: int) -> tuple[Floats, Floats]:
+    """Slopes of the elements' forces [N s/m] and their largest forces [N], as a search begins with them."""
+    return np.zeros(count), np.full(count, 1e-6)
+
+
 def search(evaluate, j, p, d, memory, later, state, free, compliance, current, dt, slope, scale):
     """End velocity and force of one element: where its force meets the structure's line.
 
@@ -155,10 +160,13 @@ def search(evaluate, j, p, d, memory, later, state, free, compliance, current, d
 
 
 def walk(
-    evaluate, command, dt, every, P, Q, R, G, B, loads, road, road_rate, H, driven, p, d, memory, cp, cd, cm, currents,
-    x, v, f, flags,
+    evaluate, command, dt, every, P, Q, R, G, B, loads, road, road_rate, H, driven, p, d, memory, cp, cd, cm, slope,
+    scale, currents, x, v, f, flags,
     ):  # fmt: skip
     """Fill x, v (N, n), f, currents, flags (N, E) from their first rows on; the step that failed, or −1.
+
+    A record may be walked in parts: `memory`, `cm`, `slope` and `scale` (E,) are left as the next part begins with
+    them, and the last row of one part is the first of the next.
 
     End velocity of the points is 2 (P v + Q x + load − R f_mean) − v. `loads` (N, n) is the
     response to the mean load of the step that ends there, `road` and `road_rate` (N, E) what
@@ -167,7 +175,6 @@ def walk(
     samples, n = x.shape
     count = f.shape[1]
     later = memory.copy()
-    slope, scale = np.zeros(count), np.full(count, 1e-6)
     mean, free = np.zeros(n), np.zeros(count)
     signals, held = np.zeros(H.shape[0] + 1), currents[0].copy()
     for i in range(1, samples):

@@ -5,8 +5,9 @@
 #define MOST_SWEEPS 50
 #define TOLERANCE 1e-8
 
-static int search(whole j, const real *p, const real *d, const real *memory, real *later, real x0, real u0, real f0,
-    real drift, real free, real compliance, real current, real dt, real *slope, real scale, real *force, real *flags)
+static int search(whole j, const real *p, const real *d, const real *memory, real *later, real *kept, real x0,
+    real u0, real f0, real drift, real free, real compliance, real current, real dt, real *slope, real scale,
+    real *force, real *flags)
 {
     real low = -INFINITY, high = INFINITY, gap_low = 0.0, gap_high = 0.0, s = *slope;
     const real stiff = 1.0 / compliance;
@@ -16,8 +17,8 @@ static int search(whole j, const real *p, const real *d, const real *memory, rea
     *flags = 0.0;
     for (k = 0; k < MOST_TRIES; k++) {
         real line, gap;
-        if (!evaluate(j, p, d, memory, later, x0 + 0.5 * dt * (u + u0) + drift, u, (u - u0) / dt, current, dt, &f, flags)
-            || !isfinite(f)) {
+        if (!evaluate(j, p, d, memory, later, kept, x0 + 0.5 * dt * (u + u0) + drift, u, (u - u0) / dt, current, dt, &f,
+                flags) || !isfinite(f)) {
             *slope = s;
             return 0;
         }
@@ -59,23 +60,24 @@ static int search(whole j, const real *p, const real *d, const real *memory, rea
     return 0;
 }
 
-/* Memory of all elements after the step. `work` has room for 3 n + 3 count + 2 signals + 2 memory numbers. */
+/* One part of a record; `memory`, `slope`, `scale` and the last rows are what the next part goes on from. `work` has
+ * room for 3 n + 3 count + signals + 1 + memory numbers. */
 EXPORT whole walk(real dt, const whole *sizes, const real *const *in, real *const *out, real *work)
 {
     const whole samples = sizes[0], n = sizes[1], count = sizes[2], seeing = sizes[3], every = sizes[4];
     const whole remembered = sizes[5];
     const real *P = in[0], *Q = in[1], *S = in[2], *G = in[3], *B = in[4], *loads = in[5], *road = in[6];
     const real *road_rate = in[7], *H = in[8], *seen = in[9], *p = in[10], *d = in[11], *cp = in[12], *cd = in[13];
-    real *memory = out[0], *cm = out[1], *currents = out[2], *x = out[3], *v = out[4], *f = out[5], *flags = out[6];
-    real *later = work, *slope = later + remembered, *scale = slope + count, *mean = scale + count;
+    real *memory = out[0], *cm = out[1], *slope = out[2], *scale = out[3], *currents = out[4];
+    real *x = out[5], *v = out[6], *f = out[7], *flags = out[8], *later = work, *mean = later + remembered;
     real *free = mean + n, *signals = free + count, *held = signals + seeing + 1, *state = held + count;
+    real kept[KEPT];
     whole i, j, k, r, s;
     int sweep;
     memcpy(later, memory, sizeof(real) * (size_t)remembered);
-    for (j = 0; j < count; j++) {
-        slope[j] = 0.0;
-        scale[j] = 1e-6;
-        held[j] = currents[j];
+    memcpy(held, currents, sizeof(real) * (size_t)count);
+    for (k = 0; k < KEPT; k++) {
+        kept[k] = NAN;
     }
     for (i = 1; i < samples; i++) {
         const real *x_before = x + (i - 1) * n, *v_before = v + (i - 1) * n, *f_before = f + (i - 1) * count;
@@ -138,7 +140,7 @@ EXPORT whole walk(real dt, const whole *sizes, const real *const *in, real *cons
                         line -= G[j * count + k] * f_now[k];
                     }
                 }
-                if (!search(j, p, d, memory, later, x0, u0, f_before[j], drift, line, G[j * count + j],
+                if (!search(j, p, d, memory, later, kept, x0, u0, f_before[j], drift, line, G[j * count + j],
                         currents[i * count + j], dt, slope + j, scale[j], &force, flags + i * count + j)) {
                     return i;
                 }

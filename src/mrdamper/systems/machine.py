@@ -9,18 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
-from mrdamper.systems.kernel import LoopElement, interpreted_loop
+from mrdamper.systems.kernel import ElementParameters, LoopElement, interpreted_loop, slope_and_scale
 from mrdamper.tracing.compiled.cache import load
 from mrdamper.tracing.compiled.record import address
-from mrdamper.tracing.compiled.writer import PREAMBLE, functions
+from mrdamper.tracing.compiled.writer import PREAMBLE, ArrayWriter, functions
 
 _LOOP = Path(__file__).with_name("loop.c")
 _STEPS = 40  # steps over which a new library is compared with the interpreter
 _MAX_RELATIVE_DIFFERENCE = 1e-9  # relative difference allowed there
 
 _EVALUATE = """
-static int evaluate(whole j, const real *p, const real *d, const real *memory, real *later, real x, real v, real a,
-    real current, real dt, real *force, real *flags)
+#define KEPT {kept}
+
+static int evaluate(whole j, const real *p, const real *d, const real *memory, real *later, real *kept, real x, real v,
+    real a, real current, real dt, real *force, real *flags)
 {{
     const real u[5] = {{x, v, a, current, dt}};
     real out[2];
@@ -32,7 +34,7 @@ static int evaluate(whole j, const real *p, const real *d, const real *memory, r
 """
 _CASE = """    case {index}:
         memcpy(later + {m}, memory + {m}, {size} * sizeof(real));
-        if (!step_{program}(p + {p} + 2, d + {d}, later + {m}, u, out)) {{
+        if (!step_{program}(p + {p} + 2, d + {d}, later + {m}, u, out, kept + {kept})) {{
             return 0;
         }}
         *force = p[{p}] * out[0] + p[{p} + 1];
@@ -64,13 +66,15 @@ def _library(elements: tuple[LoopElement, ...], control: LoopElement | None) -> 
 def _source(elements: Sequence[LoopElement], control: LoopElement | None) -> str:
     programs = list({id(stage.program): stage.program for stage in elements}.values())
     places = {id(program): index for index, program in enumerate(programs)}
-    begins = np.cumsum([[0, 0, 0], *([2 + p, d, m] for p, d, m in (e.sizes for e in elements))], axis=0).tolist()
+    kept = [ArrayWriter(programs[places[id(e.program)]], keep=True).kept for e in elements]
+    sizes = ([2 + p, d, m, k] for (p, d, m), k in zip((e.sizes for e in elements), kept, strict=True))
+    begins = np.cumsum([[0, 0, 0, 0], *sizes], axis=0).tolist()
     cases = "".join(
-        _CASE.format(index=i, program=places[id(stage.program)], p=p, d=d, m=m, size=len(stage.start))
-        for i, (stage, (p, d, m)) in enumerate(zip(elements, begins, strict=False))
+        _CASE.format(index=i, program=places[id(stage.program)], p=p, d=d, m=m, kept=k, size=len(stage.start))
+        for i, (stage, (p, d, m, k)) in enumerate(zip(elements, begins, strict=False))
     )
-    text = PREAMBLE + "".join(functions(program, index) for index, program in enumerate(programs))
-    text += _EVALUATE.format(cases=cases)
+    text = PREAMBLE + "".join(functions(program, index, keep=True) for index, program in enumerate(programs))
+    text += _EVALUATE.format(cases=cases, kept=begins[-1][3] + 1)
     body = "return 1;"
     if control is not None:
         text += functions(control.program, len(programs))
@@ -83,18 +87,17 @@ def _walk_of(library: ctypes.CDLL) -> Callable[..., int]:
     run.restype = ctypes.c_longlong
 
     def walk(
-        dt: float, every: int, P, Q, R, G, B, loads, road, road_rate, H, driven, p, d, memory, cp, cd, cm, currents,
-        x, v, f, flags,
+        dt: float, every: int, P, Q, R, G, B, loads, road, road_rate, H, driven, p, d, memory, cp, cd, cm, slope, scale,
+        currents, x, v, f, flags,
     ) -> int:  # fmt: skip
         samples, n = x.shape
         count, signals = f.shape[1], H.shape[0]
         sizes = np.array([samples, n, count, signals, every, memory.size], dtype=np.int64)
         given = [np.ascontiguousarray(a) for a in (P, Q, R, G, B, loads, road, road_rate, H, driven, p, d, cp, cd)]
-        kept = cm.copy()
-        work = np.zeros(3 * n + 5 * count + signals + memory.size + 1)
+        work = np.zeros(3 * n + 3 * count + signals + memory.size + 1)
         inputs, outputs = (
             np.array([a.ctypes.data for a in arrays], dtype=np.uintp)
-            for arrays in (given, (memory, kept, currents, x, v, f, flags))
+            for arrays in (given, (memory, cm, slope, scale, currents, x, v, f, flags))
         )
         return int(run(ctypes.c_double(dt), address(sizes), address(inputs), address(outputs), address(work)))
 
@@ -105,8 +108,6 @@ def _alike(
     one: Callable[..., int], other: Callable[..., int], elements: Sequence[LoopElement], control: LoopElement | None
 ) -> bool:
     """Tell if two loops give the same motion of one mass on a spring, with all elements beside it, for some steps."""
-    from mrdamper.systems.kernel import ElementParameters
-
     count, dt = len(elements), 1e-3
     numbers, law = ElementParameters.of(elements), ElementParameters.of([] if control is None else [control])
     mass, stiffness = 300.0, 2e4
@@ -125,7 +126,7 @@ def _alike(
             failed = walk(
                 dt, 1, S * 2 / dt * mass, -S * stiffness, R, B @ R, B, loads, still, still.copy(), H,
                 np.zeros((_STEPS, H.shape[0])), numbers.given, numbers.derived, numbers.start.copy(), law.given,
-                law.derived, law.start, currents, x, v, f, flags,
+                law.derived, law.start.copy(), *slope_and_scale(count), currents, x, v, f, flags,
             )  # fmt: skip
         except (ValueError, ArithmeticError):
             return True  # of the interpreter, where compiled code goes on with what is not finite

@@ -145,7 +145,7 @@ def monte_carlo(
         {name: np.array([row[name] for row in values]) for name in names},
         lost,
         step,
-        changed(loop.run(step, machine=machine), mean),
+        changed(loop.run(step, machine=machine).peaks, mean.peaks),
     )
 
 

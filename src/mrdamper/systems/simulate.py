@@ -13,15 +13,16 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, StepError, StructureError, numbers, validate_arguments
+from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.controllers.preview import NonCausalOptimum
 from mrdamper.systems.inputs import Input
-from mrdamper.systems.kernel import ElementParameters, LoopElement, interpreted_loop
+from mrdamper.systems.kernel import ElementParameters, LoopElement, interpreted_loop, slope_and_scale
 from mrdamper.systems.linear import aims, linear_system
 from mrdamper.systems.links import contact_stage, damper_stage, stage_of
 from mrdamper.systems.machine import compiled_loop
-from mrdamper.systems.result import HALVING, Simulation
+from mrdamper.systems.result import HALVING, PART, Simulation
 from mrdamper.systems.structure import System
 
 PERIOD = 1e-3  # s between two looks of a control law, as usual on a real-time target
@@ -34,6 +35,7 @@ _LINES_PER_STEP = 60  # of the loop itself
 _MAX_STEPS = 20_000_000
 
 
+@on_one_blas_thread
 @validate_arguments("step")
 def simulate_system(
     system: System,
@@ -81,17 +83,18 @@ def simulate_system(
     """
     loop = SystemLoop(system, source, dampers, controller or Passive(), highest)
     dt = loop.first_step if step is None else numbers(step)[0]
-    coarse, first, first_step, last = loop.run(dt), None, dt, math.inf
+    peaks, first, first_step, last = loop.run(dt).peaks, None, dt, math.inf
     while True:
         fine = loop.run(dt / 2)
-        change = changed(coarse, fine)
+        change = changed(peaks, fine.peaks)
         first = change if first is None else first
         lost = (
             dt <= first_step / 4 and change > _MAX_CHANGE_RATIO * last
         )  # sensitive to the smallest change: no step will do
         if change <= HALVING or dt / 2 <= _MIN_STEP_S or fine.time.size > _MAX_HALVED_SAMPLES or lost:
             break
-        coarse, dt, last = fine, dt / 2, change
+        peaks, dt, last = fine.peaks, dt / 2, change
+        del fine  # its histories, before those of the next are made
     if step is not None and dt < step:
         raise StepError(
             f"halving the step of {step:g} s changes a peak by {100 * first:.2g} %",
@@ -148,7 +151,7 @@ class SystemLoop:
         `machine`: compiled, where there is a compiler; by default where steps are many. `numbers` are other parameters
         of the links than the dampers' own. Raises `StepError` if there are too many steps, or one has no solution.
         """
-        system, n = self.system, len(self.system.coordinates)
+        system = self.system
         samples = int(min(self.source.duration / dt, 2.0 * _MAX_STEPS) + 1e-6) + 1 if 0 < dt < math.inf else 0
         if not 2 < samples <= _MAX_STEPS:
             raise StepError(
@@ -159,46 +162,62 @@ class SystemLoop:
         if machine is None:
             lines = _LINES_PER_STEP + 3 * sum(stage.lines for stage in (*self.stages, *self._controllers))
             machine = 3 * samples * lines > _MAX_INTERPRETED_LINES  # this run, and one at half
-        time: Floats = dt * np.arange(samples, dtype=np.float64)
-        ground, road, road_rate = self._driven(time)
-        load = self._load(ground, road, road_rate)
+        done = self._at_rest(dt * np.arange(samples, dtype=np.float64))
         S: Any = np.linalg.inv(2 / dt * system.M + system.C + dt / 2 * system.K)
-        R = S @ self.B.T
+        numbers, control = numbers or self.numbers, ElementParameters.of(self._controllers)
+        memory = (numbers.given, numbers.derived, numbers.start.copy(), control.given, control.derived, control.start)
+        memory = (*memory, *slope_and_scale(len(self.links)))
+        every = max(1, round(self.period / dt))
+        # In parts that stay in the processor's cache, each of whole looks of the control law.
+        size = samples if isinstance(self.controller, NonCausalOptimum) else every * max(1, PART // every)
+        for begin in range(0, samples - 1, size):
+            self._fill(done, slice(begin, begin + size + 1), S, every, memory, machine)
+        return done
+
+    def _at_rest(self, time: Floats) -> Simulation:
+        """Return a simulation in which nothing has moved yet."""
+        shapes = [(time.size, width) for width in (len(self.system.coordinates), len(self.links))]
+        x, v, a, load = (np.zeros(shapes[0]) for _ in range(4))
+        force, current = (np.zeros(shapes[1]) for _ in range(2))
+        road, road_rate = (np.zeros((time.size, len(self.system.channels))) for _ in range(2))
+        current[0] = self.control.start
+        return Simulation(
+            self.system, time, x, v, a, self.links, force, current, np.zeros(shapes[1], np.uint8), road, road_rate,
+            load, self.controller, self.control.limits,
+        )  # fmt: skip
+
+    def _fill(
+        self, done: Simulation, part: slice, S: Floats, every: int, memory: tuple[Floats, ...], machine: bool
+    ) -> None:
+        """Go through the samples of a part, from its first on, which is known."""
+        system, dt, failed = self.system, done.step, -1
+        ground, done.road[part], done.road_rate[part] = self._driven(done.time[part])
+        road, rate = done.road[part], done.road_rate[part]
+        done.load[part] = load = self._load(ground, road, rate)
         mean_load = np.zeros_like(load)
         mean_load[1:] = 0.5 * (load[1:] + load[:-1]) @ S.T
-        H, driven = self._sight(ground, road, road_rate)
-        x, v = np.zeros((samples, n)), np.zeros((samples, n))
-        force, current, flags = (np.zeros((samples, len(self.links))) for _ in range(3))
-        current[:] = self.control.start
+        x, v, force = done.x[part], done.v[part], done.force[part]
         if isinstance(self.controller, NonCausalOptimum):
             self._previewed(dt, S, mean_load, load, road, x, v, force)
-            failed = -1
         else:
-            numbers = numbers or self.numbers
-            control = ElementParameters.of(self._controllers)
-            every = max(1, round(self.period / dt))
+            R, flags = S @ self.B.T, done.flags[part].astype(float)
             rows = (S @ (2 / dt * system.M), -S @ system.K, R, self.B @ R, self.B, mean_load)
-            rows = (*rows, road @ self.D.T, road_rate @ self.D.T, H, driven)
-            held = (numbers.given, numbers.derived, numbers.start.copy(), control.given, control.derived, control.start)
-            written = (current, x, v, force, flags)
+            rows = (*rows, road @ self.D.T, rate @ self.D.T, *self._sight(ground, road, rate))
+            written = (done.current[part], x, v, force, flags)
             try:
-                failed = self._walk(machine)(float(dt), every, *map(np.ascontiguousarray, rows), *held, *written)
+                failed = self._walk(machine)(dt, every, *map(np.ascontiguousarray, rows), *memory, *written)
             except ArithmeticError:  # of the interpreter, where machine code goes on with what is not finite
                 failed = int(np.flatnonzero(x.any(axis=1))[-1]) + 1 if x.any() else 1
+            done.flags[part] = flags
         if failed >= 0 or not np.isfinite(x).all():
             raise StepError(
-                f"no solution at {time[max(failed, 0)]:.6g} s",
+                f"no solution at {done.time[part][max(failed, 0)]:.6g} s",
                 where=system.name,
                 remedy="shorten the step, and check the damper's range against the motion",
                 code="E_STEP_LOST",
             )
         relative = (load - v @ system.C - x @ system.K - force @ self.B) @ np.linalg.inv(system.M)
-        absolute = relative if system.ground is None else relative + np.outer(ground, system.ground)
-        return Simulation(
-            system, time, x, v, absolute, self.links, force, x @ self.B.T + road @ self.D.T,
-            v @ self.B.T + road_rate @ self.D.T, current, flags.astype(np.int64), road, road_rate,
-            load, self.controller, self.control.limits,
-        )  # fmt: skip
+        done.a[part] = relative if system.ground is None else relative + np.outer(ground, system.ground)
 
     def _previewed(
         self, dt: float, S: Floats, mean_load: Floats, load: Floats, road: Floats, x: Floats, v: Floats, force: Floats
@@ -301,10 +320,10 @@ def _fit(system: System, source: Input, dampers: Mapping[str, Damper]) -> None:
             )
 
 
-def changed(coarse: Simulation, fine: Simulation) -> float:
+def changed(coarse: Mapping[str, Floats], fine: Mapping[str, Floats]) -> float:
     """Largest relative change of a peak, over the largest peak of its kind."""
     worst = 0.0
-    for kind, values in fine.peaks.items():
+    for kind, values in fine.items():
         if values.size and (largest := float(values.max())) > 0:
-            worst = max(worst, float(np.abs(values - coarse.peaks[kind]).max()) / largest)
+            worst = max(worst, float(np.abs(values - coarse[kind]).max()) / largest)
     return worst
