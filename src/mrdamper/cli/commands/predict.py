@@ -102,9 +102,10 @@ def _predict(
     """Predict along the motion of a file, or at a condition [A, Hz, mm]."""
     from mrdamper.data import Condition
     from mrdamper.errors import InputError
-    from mrdamper.rig_files.motion_file import load_motion
 
     if motion is not None:
+        from mrdamper.rig_files.motion_file import load_motion
+
         if frequency is not None or amplitude is not None:
             raise InputError("--motion together with --frequency or --amplitude", remedy="give one of them")
         return damper.predict_run(load_motion(motion, current))
