@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from typing import Literal, TypeVar
 from weakref import WeakKeyDictionary
@@ -224,17 +224,23 @@ class Run(Displayable):
         """Return the samples start..stop-1 as a run of their own; the run itself where these are all."""
         if start == 0 and stop == self.time.size:
             return self
+        time = self.time[start:stop]
+        if time.size < 3:
+            raise RunError(f"{time.size} samples", where=self._where, remedy="a run needs at least 3")
         inner = [(max(a, start) - start, min(b, stop) - start) for a, b in self.segments]
-        return replace(
-            self,
-            time=self.time[start:stop],
+        part: Run = object.__new__(type(self))  # samples that were checked with the whole run
+        values = {name: getattr(self, name) for name in self.__dataclass_fields__} | dict(
+            time=time,
             displacement=self.displacement[start:stop],
             force=self.force[start:stop],
             current=self.current[start:stop],
             velocity=None if self.velocity is None else self.velocity[start:stop],
             further={name: values[start:stop] for name, values in self.further.items()},
-            segments=tuple((a, b) for a, b in inner if b > a),
+            segments=tuple((a, b) for a, b in inner if b > a) or ((0, time.size),),
         )
+        for name, value in values.items():
+            object.__setattr__(part, name, value)
+        return part
 
     @property
     def _where(self) -> str:

@@ -167,7 +167,24 @@ def nonnegative_least_squares(table: Floats, right: Floats) -> tuple[Floats, flo
 
 def solve_lower_triangle(triangle: NDArray[np.floating[Any]], right: Floats) -> Floats:
     """Solve with a matrix of which the lower triangle alone is looked at."""
-    return import_module("scipy.linalg").solve_triangular(triangle, right, lower=True)
+    solution, failed = _lapack("trtrs", triangle.dtype.char)(triangle, right, lower=True)
+    if failed:
+        raise np.linalg.LinAlgError("the triangle is singular")
+    return solution
+
+
+def solve_with_determinant(matrix: Floats, right: Floats) -> tuple[Floats, float]:
+    """Solution of a linear system, and the logarithm of the magnitude of its determinant, of one factorisation."""
+    factors, _, solution, failed = _lapack("gesv", "d")(matrix, right)
+    if failed:
+        raise np.linalg.LinAlgError("the matrix is singular")
+    return solution, float(np.sum(np.log(np.abs(np.diagonal(factors)))))
+
+
+@cache
+def _lapack(name: str, dtype: str) -> Any:
+    """Return a routine of LAPACK: around such small matrices SciPy's checks take ten times as long as the work."""
+    return import_module("scipy.linalg").get_lapack_funcs(name, dtype=np.dtype(dtype))
 
 
 @contextmanager

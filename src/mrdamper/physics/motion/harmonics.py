@@ -107,31 +107,30 @@ def fundamental_frequency(time: Floats, signal: Floats, orders: int = 3) -> floa
         guess = ladder[int(np.argmin(_single_sine_costs(t[few], signal[few], ladder)))]
     orders = orders if guess * t[-1] >= 3 else 1
     # Most steps on few samples: the last ones, on all, decide.
-    near = float(guess)
+    near, coefficients = float(guess), None
     if t.size > 4 * _FEW:
         some = slice(None, None, t.size // _FEW)
-        near = _refined(t[some], signal[some], near, orders, 1e-6)
-    return _refined(t, signal, near, orders, 1e-11)
+        near, coefficients = _refined(t[some], signal[some], near, orders, 1e-6)
+    return _refined(t, signal, near, orders, 1e-11, coefficients)[0]
 
 
-def _refined(t: Floats, signal: Floats, frequency: float, orders: int, tolerance: float) -> float:
+def _refined(
+    t: Floats, signal: Floats, frequency: float, orders: int, tolerance: float, coefficients: Floats | None = None
+) -> tuple[float, Floats]:
     """Gauss–Newton on frequency and coefficients, until a step is below a share of the frequency."""
 
-    def waves(part: slice) -> Floats:
-        return _rows(t[part], frequency, orders, drift=True)
+    def rows(part: slice) -> Floats:
+        return _rows(t[part], frequency, orders, True, coefficients)
 
-    def with_slope(part: slice) -> Floats:
-        rows = waves(part)
-        return np.vstack([rows, _frequency_derivative(t[part], rows, coefficients, orders)])
-
-    coefficients = _solved(t.size, signal, waves)
+    if coefficients is None:
+        coefficients = _solved(t.size, signal, rows)
     for _ in range(30):
-        solution = _solved(t.size, signal, with_slope)
+        solution = _solved(t.size, signal, rows)
         coefficients, step = solution[:-1], float(solution[-1])
         frequency += float(np.clip(step, -0.1 * frequency, 0.1 * frequency))
         if abs(step) < tolerance * frequency:
             break
-    return frequency
+    return frequency, coefficients
 
 
 def _solved(size: int, signal: Floats, rows: Callable[[slice], Floats]) -> Floats:
@@ -186,12 +185,17 @@ def _crossings(wave: Floats) -> int:
 
 def _waves(angle: Floats, orders: int) -> tuple[Floats, Floats]:
     """Sines and cosines of 1...orders times an angle, (K, N) each: powers of one complex number."""
-    sine, cosine = np.empty((orders, angle.size)), np.empty((orders, angle.size))
-    sine[0], cosine[0] = np.sin(angle), np.cos(angle)
-    for k in range(1, orders):
+    sine, cosine = np.empty((2, orders, angle.size))
+    _fill_waves(angle, sine, cosine)
+    return sine, cosine
+
+
+def _fill_waves(angle: Floats, sine: Floats, cosine: Floats) -> None:
+    np.sin(angle, out=sine[0])
+    np.cos(angle, out=cosine[0])
+    for k in range(1, len(sine)):
         sine[k] = sine[k - 1] * cosine[0] + cosine[k - 1] * sine[0]
         cosine[k] = cosine[k - 1] * cosine[0] - sine[k - 1] * sine[0]
-    return sine, cosine
 
 
 @lru_cache
@@ -199,13 +203,20 @@ def _cycle(orders: int) -> tuple[Floats, Floats]:
     return _waves(np.linspace(0, 2 * np.pi, 2048, endpoint=False), orders)
 
 
-def _rows(t: Floats, frequency: float, orders: int, drift: bool) -> Floats:
-    """(L, N) mean, drift, sines and cosines; the transpose of a least-squares table, whose rows are long."""
-    sine, cosine = _waves(2 * np.pi * frequency * t, orders)
-    return np.concatenate([np.stack([np.ones_like(t), t] if drift else [np.ones_like(t)]), sine, cosine])
+def _rows(t: Floats, frequency: float, orders: int, drift: bool, coefficients: Floats | None = None) -> Floats:
+    """(L, N) mean, drift, sines and cosines: the transpose of a least-squares table, whose rows are long.
 
-
-def _frequency_derivative(t: Floats, rows: Floats, coefficients: Floats, orders: int) -> Floats:
-    k = np.arange(1, orders + 1)
-    sine, cosine = np.reshape(coefficients[2:], (2, orders))
-    return 2 * np.pi * t * ((k * sine) @ rows[2 + orders :] - (k * cosine) @ rows[2 : 2 + orders])
+    With coefficients, the derivative of their sum with respect to the frequency as a last row.
+    """
+    lead, last = 1 + drift, 1 + drift + 2 * orders
+    rows = np.empty((last + (coefficients is not None), t.size))
+    rows[0] = 1.0
+    if drift:
+        rows[1] = t
+    sine, cosine = rows[lead : lead + orders], rows[lead + orders : last]
+    _fill_waves(2 * np.pi * frequency * t, sine, cosine)
+    if coefficients is not None:
+        k = np.arange(1, orders + 1)
+        of_sine, of_cosine = np.reshape(coefficients[lead:], (2, orders))
+        rows[-1] = 2 * np.pi * t * ((k * of_sine) @ cosine - (k * of_cosine) @ sine)
+    return rows

@@ -6,6 +6,7 @@ Everything is computed from the motion that was measured, never from the one tha
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from mrdamper.physics.motion.excitation import Excitation
 _UNIFORM = 1e-8  # spread of the sampling interval, relative, up to which it counts as one
 _ROUNDING = 4 * float(np.finfo(float).eps)  # of the largest value: a slope per sample below is made of rounding
 _CELLS = 4_000_000  # numbers of all windows that are held at a time
+_CACHED_CELLS = 8_000  # the same, where they are to stay in the processor's cache
 
 
 @once_per_run
@@ -76,8 +78,8 @@ def _fits(time: Floats, signal: Floats, half: int, width: int, spacing: float) -
     return c
 
 
-def _blocks(size: int, width: int) -> Iterator[slice]:
-    step = max(1, _CELLS // width)
+def _blocks(size: int, width: int, cells: int = _CELLS) -> Iterator[slice]:
+    step = max(1, cells // width)
     return (slice(begin, min(begin + step, size)) for begin in range(0, size, step))
 
 
@@ -101,23 +103,30 @@ def _fits_uniform(signal: Floats, half: int) -> Floats:
     Windows are taken relative to their sample and the two sides in pairs, so that a signal at rest, or
     one that turns symmetrically about a sample, has a slope of exactly zero there.
     """
-    tau = np.arange(-half, half + 1.0)
-    fit = np.linalg.pinv(np.column_stack([np.ones_like(tau), tau, tau**2])).T  # (width, 3)
+    tau, fit = _quadratic(half)
     last = signal.size - half
-    middle = signal[half:last]
-    inside = np.zeros((3, middle.size))
-    for step, (level, slope, bend) in enumerate(fit[half + 1 :], 1):
-        after, before = signal[half + step : last + step] - middle, signal[half - step : last - step] - middle
-        both = after + before
-        inside += np.stack([level * both, slope * (after - before), bend * both])
-    c = np.empty((signal.size, 3))
-    c[half:last] = inside.T
+    windows = np.lib.stride_tricks.sliding_window_view
+    after, before = windows(signal[half + 1 :], half), windows(signal[: last - 1], half)[:, ::-1]
+    c, even, odd = np.empty((signal.size, 3)), fit[half + 1 :, ::2].copy(), fit[half + 1 :, 1].copy()
+    for rows in _blocks(last - half, half, _CACHED_CELLS):
+        middle = signal[half:last][rows, None]
+        ahead, behind = after[rows] - middle, before[rows] - middle
+        c[half:last][rows, ::2] = (ahead + behind) @ even
+        c[half:last][rows, 1] = (ahead - behind) @ odd
     ends = (signal[: tau.size], slice(0, half)), (signal[-tau.size :], slice(last, None))
     for window, away in ends:
         d0, d1, d2 = ((window - signal[away, None]) @ fit).T  # seen away from the middle of the window
         at = tau[:half] if away.start == 0 else tau[half + 1 :]
         c[away] = np.stack([d0 + at * (d1 + at * d2), d1 + 2 * at * d2, d2], axis=1)
     return c
+
+
+@lru_cache(maxsize=64)
+def _quadratic(half: int) -> tuple[Floats, Floats]:
+    """Return the steps of a window from its middle, and (width, 3) weights of the quadratic through it."""
+    tau = np.arange(-half, half + 1.0)
+    fit = np.linalg.pinv(np.column_stack([np.ones_like(tau), tau, tau**2]))
+    return tau, np.asarray(fit.T, dtype=float)
 
 
 def _characteristic_period(time: Floats, signal: Floats) -> float:

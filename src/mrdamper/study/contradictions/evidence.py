@@ -10,14 +10,15 @@ leaving out a run or changing it costs one factorisation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
 from mrdamper.data import Floats, current_levels
-from mrdamper.statistics.linear import solve_lower_triangle
+from mrdamper.statistics.linear import solve_lower_triangle, solve_with_determinant
 from mrdamper.study.contradictions.tracks import Track
 
 _YIELDS = (0.015, 0.06, 0.2, 0.6)  # yield displacements of the stop operators, relative to the median amplitude
@@ -94,7 +95,7 @@ class RowProducts:
     @property
     def constant(self) -> Floats:
         """(E,) or (P,) coefficients of a force of one."""
-        return np.tile(np.eye(_ELEMENTS)[0], len(self.gram) // _ELEMENTS)
+        return _constant(len(self.gram))
 
     def with_force(self, gain: float, offset: float) -> RowProducts:
         """Return the same with another gain and offset of the force."""
@@ -150,7 +151,7 @@ class Posterior:
             if over is not None:
                 size = mean.size // over.size
                 mean = over @ mean.reshape(over.size, size)
-                root = np.tensordot(over, root.reshape(over.size, size, -1), 1)
+                root = (over @ root.reshape(over.size, -1)).reshape(size, -1)
             self.known[key] = mean, root @ root.T
         return self.known[key]
 
@@ -165,7 +166,7 @@ class Posterior:
     def without(self, run: Moments) -> tuple[Floats, Floats]:
         """Mean and covariance of the coefficients at a run's current, without that run."""
         mean, covariance = self.at(run.over)
-        left = np.eye(mean.size) - covariance @ run.gram
+        left = _identity(mean.size) - covariance @ run.gram
         moments: Floats = np.asarray(
             np.linalg.solve(left, np.column_stack([mean - covariance @ run.moment, covariance])), dtype=float
         )
@@ -179,10 +180,19 @@ class Posterior:
 def _log_probability(run: Moments, mean: Floats, covariance: Floats) -> float:
     left = run.gram @ mean
     power = run.power + float(mean @ left) - 2 * float(mean @ run.moment)
-    system = np.eye(mean.size) + run.gram @ covariance
     rest = run.moment - left
-    gained = float(rest @ covariance @ np.linalg.solve(system, rest))
-    return 0.5 * (gained - power - float(np.linalg.slogdet(system)[1]))
+    solved, log_determinant = solve_with_determinant(_identity(mean.size) + run.gram @ covariance, rest)
+    return 0.5 * (float(rest @ covariance @ solved) - power - log_determinant)
+
+
+@cache
+def _identity(size: int) -> Floats:
+    return np.eye(size)
+
+
+@cache
+def _constant(size: int) -> Floats:
+    return np.tile(np.eye(_ELEMENTS)[0], size // _ELEMENTS)
 
 
 class Evidence:
@@ -200,6 +210,7 @@ class Evidence:
         self._velocity = float(np.median([np.max(np.abs(t.velocity)) for t in tracks])) or 1.0
         self._acceleration = float(np.median([np.max(np.abs(t.acceleration)) for t in tracks])) or 1.0
         self.nodes = _nodes(tracks)
+        self._shares: dict[float, Floats] = {}
         self._root = _outer(_root_covariance(self.nodes), np.eye(_ELEMENTS))
 
     @cached_property
@@ -210,14 +221,14 @@ class Evidence:
     def posterior(self, members: Iterable[Moments]) -> Posterior:
         """Coefficients determined by runs."""
         gram, moment = self.total(members)
-        factor = np.linalg.cholesky(self._root.T @ gram @ self._root + np.eye(len(moment)))
+        factor = np.linalg.cholesky(self._root.T @ gram @ self._root + _identity(len(moment)))
         root = solve_lower_triangle(factor, self._root.T).T
         return Posterior(root @ (root.T @ moment), root, self)
 
     def log_evidence(self, members: Sequence[Moments]) -> float:
         """Logarithm of the evidence that runs follow one model."""
         gram, moment = self.total(members)
-        factor = np.linalg.cholesky(self._root.T @ gram @ self._root + np.eye(len(moment)))
+        factor = np.linalg.cholesky(self._root.T @ gram @ self._root + _identity(len(moment)))
         half = solve_lower_triangle(factor, self._root.T @ moment)
         power = sum(member.power for member in members)
         return float(0.5 * (half @ half) - np.sum(np.log(np.diag(factor))) - 0.5 * power)
@@ -227,19 +238,20 @@ class Evidence:
         spread, size = self.spread, run.size
         level = model_error(run) ** 2
         weight = _INDEPENDENT_SAMPLES / (run.rows * spread.misfit**2 * level)
-        one = run.constant
+        one, gram, moment = run.constant, weight * run.gram, weight * run.moment
         mean = float(one @ run.gram @ expected) / run.rows
-        shared = np.column_stack([spread.gain * (expected - mean * one), spread.offset * np.sqrt(max(size, 0.1)) * one])
-        along = weight * run.gram @ shared
-        (a, b), (_, d) = np.eye(2) + shared.T @ along
-        determinant = float(a * d - b * b)
-        inner = np.array([[d, -b], [-b, a]]) / determinant
-        with_force = weight * shared.T @ run.moment
-        normalisation = _INDEPENDENT_SAMPLES * np.log(spread.misfit**2 * level / size**2) + np.log(determinant)
+        shared = np.array([spread.gain * (expected - mean * one), spread.offset * math.sqrt(max(size, 0.1)) * one])
+        along = shared @ gram
+        (a, b), (_, d) = (shared @ along.T).tolist()
+        a, d = 1 + a, 1 + d
+        determinant = a * d - b * b
+        with_force = shared @ moment
+        weighted = np.array([[d, -b], [-b, a]]) @ np.column_stack([along, with_force]) / determinant
+        normalisation = _INDEPENDENT_SAMPLES * math.log(spread.misfit**2 * level / size**2) + math.log(determinant)
         return Moments(
-            weight * run.gram - along @ inner @ along.T,
-            weight * run.moment - along @ inner @ with_force,
-            weight * run.power - float(with_force @ inner @ with_force) + normalisation,
+            gram - along.T @ weighted[:, :-1],
+            moment - along.T @ weighted[:, -1],
+            weight * run.power - float(with_force @ weighted[:, -1]) + normalisation,
             run.over,
         )
 
@@ -266,6 +278,12 @@ class Evidence:
             None if track.current_changes else over[0],
         )  # fmt: skip
 
+    def share(self, current: float) -> Floats:
+        """(K,) shares of the nodes at one current [A]."""
+        if current not in self._shares:
+            self._shares[current] = self.shares(np.array([current]))[0]
+        return self._shares[current]
+
     def shares(self, current: Floats) -> Floats:
         """(N, K) shares of the nodes at currents [A]."""
         return np.column_stack([np.interp(current, self.nodes, hat) for hat in np.eye(self.nodes.size)])
@@ -289,7 +307,7 @@ class Evidence:
 
 def model_error(run: RowProducts) -> float:
     """Return standard deviation of the model error of a run, before the factor of all runs."""
-    return run.misfit * float(np.sqrt((_MISFIT * run.size) ** 2 + _MIN_MISFIT**2 * min(1.0, run.size)))
+    return run.misfit * math.sqrt((_MISFIT * run.size) ** 2 + _MIN_MISFIT**2 * min(1.0, run.size))
 
 
 def _outer(a: Floats, b: Floats) -> Floats:

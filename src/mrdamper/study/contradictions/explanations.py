@@ -125,9 +125,10 @@ class ExplanationCandidate:
         candidates: list[Explanation] = []
         for trial, products in self._trials(others, like):
             if self._is_large(trial, products, others):
-                odds = trial.odds + (_EDGE_ODDS if trial.cause in ("force", "current") and self._is_edge else 0.0)
-                gain = others.log_probability(others.weigh(products)) - odds - least
-                candidates.append(Explanation(replace(trial, odds=odds), gain, products))
+                if trial.cause in ("force", "current") and self._is_edge:
+                    trial = replace(trial, odds=trial.odds + _EDGE_ODDS)
+                gain = others.log_probability(others.weigh(products)) - trial.odds - least
+                candidates.append(Explanation(trial, gain, products))
         return sorted(candidates, key=lambda e: -e.gain)
 
     def alone(self, others: Posterior) -> Explanation:
@@ -142,7 +143,7 @@ class ExplanationCandidate:
     def changed(self, trial: Trial) -> RowProducts:
         """Products of the run as corrected by a trial of force, offset or current."""
         if trial.cause == "current":
-            return replace(self.own, over=self.evidence.shares(np.array([trial.value]))[0])
+            return replace(self.own, over=self.evidence.share(trial.value))
         if trial.cause == "offset":
             return self.own.with_force(1.0, trial.value / self.evidence.force)
         return self.own.with_force(trial.value, 0.0)
@@ -164,7 +165,10 @@ class ExplanationCandidate:
             self._moved = list(zip(trials, self.evidence.products([self._move(t) for t in trials]), strict=True))
         for trial, products in self._moved:
             if not like or any(trial.is_like(one) for one in like):
-                yield trial, replace(products, misfit=self.own.misfit)
+                yield (
+                    trial,
+                    products if products.misfit == self.own.misfit else replace(products, misfit=self.own.misfit),
+                )
 
     def _of_the_force(self, others: Posterior) -> Iterator[Trial]:
         """Yield a factor or an offset of the force."""
