@@ -323,6 +323,15 @@ def test_slopes_by_the_search_axes_are_those_of_the_force(runs, problem, fit):
     assert lagging.force_slopes(start, fit.damper.one_model, motion, picked) is None
 
 
+def test_the_last_digits_do_not_hang_on_the_start(problem, fit):
+    """The gradient vanishes where the search goes on to the last digit, and not where it ends as usual."""
+    starts = [fit.point + shift for shift in (-2e-3, 2e-3)]
+    asked = dict(rows=[0, 3, 5, 7, 8, 11], rounds=1, settled=1e-4)
+    one, other = (problem.fit(start=u, to_the_last_digit=True, **asked).point for u in starts)
+    assert one == pytest.approx(other, abs=1e-8)
+    assert problem.fit(start=starts[0], **asked).point != pytest.approx(one, abs=1e-8)
+
+
 def test_samples_of_some_runs_are_those_they_have_among_all(problem, fit):
     whole, rows = problem.linearised(fit).table, [2, 5]
     some = whole.only(rows)

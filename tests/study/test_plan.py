@@ -228,7 +228,8 @@ def test_the_number_of_sessions_is_the_best_of_those_the_hours_hold():
 def test_a_record_counts_by_samples_spread_evenly_over_a_steady_cycle(damper):
     condition = FEW[1]
     names = damper.uncertainty.names
-    table = _slopes(damper, damper.uncertainty, names, condition)[0]
+    table, *drawn = _slopes(damper, damper.uncertainty, names, condition)
+    assert [np.allclose(one, table, rtol=1e-3) for one in drawn] == [False] * 2  # at the estimate and beside it
     assert table.shape == (24, len(names) + 2)
     steady = damper.predict(condition).force
     force, half = table[:, -2] / table[:, -1], np.ptp(steady) / 2
