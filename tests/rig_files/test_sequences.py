@@ -77,3 +77,21 @@ def test_a_sampling_rate_that_contradicts_the_frequency_of_the_name_is_refused(t
     assert [refusal.error.code for refusal in import_files([tmp_path]).refusals] == ["E_MOTION_CONTRADICTS"]
     (tmp_path / "1Hz_0.5A.csv").write_text("Sampling rate: 250 Hz\nSample;Stroke [mm];Load [N]\n" + rows)
     assert not import_files([tmp_path]).refusals
+
+
+def test_a_log_with_starts_and_ends_cuts_a_session_and_says_its_currents(tmp_path):
+    parts = [loop(1.0, 10.0, 300.0, 6.5), loop(2.0, 5.0, 900.0, 5.5)]
+    parts[1][:, 0] += parts[0][-1, 0] + 1 / RATE_HZ
+    parts[0][-20:, 2] += 3000.0  # the current of the second test is switched on in the rest of the first
+    samples = np.concatenate(parts)
+    rows = "".join(f"{t:.4f},{x:.5f},{f:.3f}\n" for t, x, f in samples)
+    (tmp_path / "record.csv").write_text("time_s,displacement_mm,force_N\n" + rows)
+    log = "run,from [s],to [s],I [mA]\n{},6.7,11.8,900\n{},0.1,6.3,300\n"
+    (tmp_path / "log.csv").write_text(log.format(2, 1))
+    records = import_files([tmp_path]).records
+    assert [float(np.mean(record.current)) for record in records] == pytest.approx([0.3, 0.9])
+    assert [(record.time[0], record.time[-1]) for record in records] == [
+        pytest.approx((0.1, 6.3), abs=0.005),
+        pytest.approx((6.7, 11.8), abs=0.005),
+    ]
+    assert records[0].force.max() < 1000.0

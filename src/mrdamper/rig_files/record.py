@@ -6,8 +6,9 @@ Nothing is filled in or moved: missing samples stay NaN here and are left out of
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from typing import overload
 
 import numpy as np
@@ -70,6 +71,13 @@ class LineNumbers:
         inner = [i for i, at in enumerate(self.starts) if start < at < stop]
         starts = (0, *(self.starts[i] - start for i in inner))
         return LineNumbers(stop - start, starts, (self[start], *(self.lines[i] for i in inner)))
+
+    @classmethod
+    def concatenated(cls, parts: Sequence[LineNumbers]) -> LineNumbers:
+        """Return the lines of samples behind each other."""
+        begins = accumulate((part.size for part in parts), initial=0)
+        starts = tuple(begin + start for begin, part in zip(begins, parts, strict=False) for start in part.starts)
+        return cls(sum(part.size for part in parts), starts, tuple(line for part in parts for line in part.lines))
 
     def __array__(self, dtype=None, copy=None):
         return np.asarray(self[:], dtype=dtype)
@@ -160,6 +168,14 @@ class Record:
     def noticed(self, *findings: Finding) -> Record:
         """Return the same record with further findings."""
         return replace(self, findings=(*self.findings, *findings))
+
+
+def part_of_record(record: Record, rows: slice, name: str = "") -> Record:
+    """Return the samples of some rows of a record, under its name or another."""
+    channels = {channel: values[rows] for channel, values in record.channels.items()}
+    further = {channel: values[rows] for channel, values in record.further.items()}
+    lines = None if record.lines is None else record.lines.part(rows.start, rows.stop)
+    return replace(record, id=name or record.id, lines=lines, further=further, **channels)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.mapping.session import OFF_S, OFF_STEPS, stretches_of_session
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import OPTIONAL, Finding, Record
+from mrdamper.rig_files.record import OPTIONAL, Finding, LineNumbers, Record, part_of_record
 
 _HZ = re.compile(r"(?<![\w.,])([0-9]{1,4}(?:[.,][0-9]{1,4})?) ?Hz(?![A-Za-z])")
 _NUMBERED = re.compile(
@@ -89,14 +89,10 @@ def _tests_of(records: Sequence[Record]) -> list[Record]:
     if len(stretches) == 1:
         return [record]
     text = f"cut at rests or steps of the current into {len(stretches)} tests"
-    return [_part(record, s, f"{record.id}_{n}").noticed(Finding("W_CUT", text)) for n, s in enumerate(stretches, 1)]
-
-
-def _part(record: Record, rows: slice, name: str) -> Record:
-    channels = {channel: values[rows] for channel, values in record.channels.items()}
-    further = {channel: values[rows] for channel, values in record.further.items()}
-    lines = None if record.lines is None else record.lines[rows]
-    return replace(record, id=name, lines=lines, further=further, **channels)  # type: ignore[arg-type]
+    return [
+        part_of_record(record, s, f"{record.id}_{n}").noticed(Finding("W_CUT", text))
+        for n, s in enumerate(stretches, 1)
+    ]
 
 
 def _concatenated(records: Sequence[Record]) -> Record:
@@ -104,9 +100,8 @@ def _concatenated(records: Sequence[Record]) -> Record:
     names = [n for n in ("time", "displacement", "force", *OPTIONAL) if all(getattr(r, n) is not None for r in records)]
     channels: dict[str, Floats | None] = dict.fromkeys(OPTIONAL)
     channels |= {name: np.concatenate([getattr(record, name) for record in records]) for name in names}
-    lines = None
-    if all(record.lines is not None for record in records):
-        lines = np.concatenate([np.asarray(record.lines) for record in records])
+    numbers = [record.lines for record in records if record.lines is not None]
+    lines = LineNumbers.concatenated(numbers) if len(numbers) == len(records) else None
     if channels["current"] is None and "current_from" in records[0].provenance:  # a page's heading states it once
         stated = {float(r.current[0]) for r in records if r.current is not None}
         channels["current"] = constant(stated.pop(), channels["time"]) if len(stated) == 1 else None  # type: ignore[arg-type]

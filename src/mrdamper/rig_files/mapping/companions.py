@@ -24,7 +24,7 @@ from mrdamper.rig_files.profile import Channel, Profile
 from mrdamper.rig_files.readers import raw_tables
 from mrdamper.rig_files.readers.arrays import array_table
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import Finding, Record
+from mrdamper.rig_files.record import Finding, Record, part_of_record
 from mrdamper.rig_files.rig_record import records_of
 from mrdamper.rig_files.text.short import short_lines
 from mrdamper.rig_files.text.spool import rescale
@@ -160,11 +160,14 @@ def results_of(path: Path) -> Results | None:
 
 def with_results_of(pending: Sequence[tuple[Path, Record]], results: Results, path: Path) -> list[Record] | None:
     """Return the records with the currents that a table of results states; None unless it names every one of them."""
-    currents = results.by_test(_called(pending))
+    records = [record for _, record in pending]
+    timed = results.rows_in_time([record.time for record in records])
+    currents = {i: results.current[row] for i, (row, _) in timed.items()} or results.by_test(_called(pending))
     if len(currents) < len(pending):
         return None
+    records = [part_of_record(record, timed[i][1]) if timed else record for i, record in enumerate(records)]
     whence = f"{path.name}, {results.title}"
-    return [with_stated_current(record, currents[i], whence, file.name) for i, (file, record) in enumerate(pending)]
+    return [with_stated_current(r, currents[i], whence, pending[i][0].name) for i, r in enumerate(records)]
 
 
 def _called(tests: Sequence[tuple[Path, Record]]) -> list[tuple[str, ...]]:

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import names_condition, split_name
+from mrdamper.data import Floats
+from mrdamper.rig_files.column_names import names_condition, split_name, words_of
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of
 from mrdamper.rig_files.units import is_unit, parse_unit
@@ -19,6 +20,8 @@ _QUANTITY = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s*(m?A)")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
+_STARTS = frozenset(("start", "begin", "from", "von", "beginn", "anfang", "début", "debut", "inicio", "inizio", "开始"))
+_ENDS = frozenset(("end", "stop", "to", "bis", "ende", "fin", "fine", "until", "结束"))
 _SPECIMEN = re.compile(
     r"(?i)^(?:specimen|probe|prüfkörper|test|versuch|run|sample|essai|éprouvette|ensayo|no|nr)\b[\s.:#]*"
 )
@@ -49,6 +52,31 @@ class Results:
             if currents:
                 return currents[0] if all(other == currents[0] for other in currents) else {}
         return {}
+
+    def rows_in_time(self, times: Sequence[Floats]) -> dict[int, tuple[int, slice]]:
+        """Return the row of each test by its number, and the samples between the start and the end that it states.
+
+        Empty unless each test has one row, of which it covers more than half, and no row two tests.
+        """
+        bounds = [self._seconds(words) for words in (_STARTS, _ENDS)]
+        rows: dict[int, tuple[int, slice]] = {}
+        for test, time in enumerate(times if all(bounds) else ()):
+            inside = [slice(*np.searchsorted(time, window)) for window in zip(*bounds, strict=True)]
+            spans = [b - a for a, b in zip(*bounds, strict=True)]
+            covered = [time[s][-1] - time[s][0] if s.stop > s.start else 0.0 for s in inside]
+            own = [row for row, span in enumerate(spans) if span > 0 and covered[row] > 0.5 * span]
+            if len(own) == 1:
+                rows[test] = own[0], inside[own[0]]
+        return rows if len({row for row, _ in rows.values()}) == len(times) else {}
+
+    def _seconds(self, words: frozenset[str]) -> list[float]:
+        """Return the times [s] of the one column of such a name; empty if there is none."""
+        headers = [split_name(key) for key in self.keys]
+        columns = [i for i, header in enumerate(headers) if words & {w.casefold() for w in words_of(header.name)}]
+        columns = [i for i in columns if headers[i].dimension == "time"]
+        cells = [row[columns[0]].replace(",", ".") for row in self.cells] if len(columns) == 1 else []
+        unit = headers[columns[0]].known if cells else None
+        return [unit.factor * float(cell) for cell in cells] if unit and all(map(_NUMBER.fullmatch, cells)) else []
 
     def column_of_tests(self, table: RawTable) -> str | None:
         """Return the column of a record that numbers its tests as a column of this table, of the same name, does."""
