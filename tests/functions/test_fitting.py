@@ -123,7 +123,7 @@ def test_searched_rates_are_charged_to_the_error_at_left_out_conditions():
 def test_errors_of_left_out_groups_are_those_of_refits_and_charged_for_rates(form, rates):
     """A fold of every kind is refitted without its values, at the rates of all; weights count in every error."""
     errors = np.where(np.arange(CURRENT.size) % 3 == 0, 60.0, 20.0)
-    found = fitting._fitted(form, CONDITIONS, VALUES, False, errors)
+    found = fitting._fitted(form, CONDITIONS, VALUES, False, fitting._weights(errors, len(CONDITIONS)))
     w, y, N = 20.0 / errors, VALUES, VALUES.size
     first = CURRENT if not rates else np.exp(-found.fit.function.rates[0] * CURRENT)
     columns = np.column_stack([first, np.ones(N)])
@@ -307,8 +307,8 @@ def test_r2_of_small_values_and_errors_known_to_be_none():
     assert small.r2 < 0.999
     # Where a quarter is without error nothing says what the others' are worth beside it.
     none = np.where(np.arange(CURRENT.size) % 3, 5.0, 0.0)
-    assert fitting._weights(none, VALUES).tolist() == [1.0] * CURRENT.size
-    assert fitting._weights(np.full(3, np.nan), VALUES[:3]).tolist() == [1.0] * 3
+    assert fitting._weights(none, CURRENT.size).tolist() == [1.0] * CURRENT.size
+    assert fitting._weights(np.full(3, np.nan), 3).tolist() == [1.0] * 3
 
 
 def test_a_choice_hands_on_logarithm_and_uncertainty():

@@ -340,7 +340,10 @@ class JointResiduals:
         moved = replace(
             self.problem.without_linear(point), **{i.name: getattr(model, i.name) for i in self.problem.linear}
         )
-        return (moved.force(*self._followed(moved, point)) - self.target) * self.unit
+        motion = self.concatenated.with_field_current(self.problem.coil_at(point))
+        values = force_tangents(moved, motion, (), self.picked)
+        force = moved.force(*self._followed(moved, point)) if values is None else values[0]
+        return (force - self.target) * self.unit
 
     def linearise(self, point: Floats, model: Model) -> tuple[Floats, Floats]:
         """Weighted residual of a model, and its derivatives by search axes and linear parameters."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -66,10 +67,16 @@ def distance_from(
     """
     levels = np.array(sorted({*(swept_A or current_levels([abs(c.current_A) for c in tested]))}))
     between, beyond = _current_distances(np.abs(current[:: max(1, current.size // _MAX_SAMPLES)]), levels)
-    frequency, amplitude = MotionHull.of(tested).nearest(at.frequency_Hz, at.amplitude_m)
+    frequency, amplitude = _nearest(MotionHull.of(tested), at.frequency_Hz, at.amplitude_m)
     motion = np.hypot(np.log(at.frequency_Hz / frequency), np.log(at.amplitude_m / amplitude))
     gaps = 0.0 if swept_A else float(np.sqrt(np.mean(between**2)))
     return Distance(gaps, float(np.sqrt(np.mean(beyond**2))), float(motion))
+
+
+@lru_cache(maxsize=4096)
+def _nearest(hull: MotionHull, frequency: float, amplitude: float) -> tuple[float, float]:
+    """Nearest motion of a hull: dampers of many models are made from the same tests, and score the same runs."""
+    return hull.nearest(frequency, amplitude)
 
 
 def _current_distances(current: Floats, levels: Floats) -> tuple[Floats, Floats]:

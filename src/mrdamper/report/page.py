@@ -14,6 +14,8 @@ from markupsafe import Markup
 
 from mrdamper.data import Dataset
 
+PAPERS = ("a4", "letter")  # sizes of the pages of a PDF
+
 
 def render_page(template: str, title: str, footer: str, **facts: object) -> str:
     """Render a template of `templates/`; the footer states how the page was made."""

@@ -21,6 +21,7 @@ from fpdf.enums import Align, TableBordersLayout, TextEmphasis
 
 from mrdamper.errors import UnknownNameError
 from mrdamper.report.fonts import Fallback, fallback_fonts
+from mrdamper.report.page import PAPERS
 
 _MARGIN = 18.0  # mm
 _INK, _FAINT, _RULE = (27, 31, 36), (91, 101, 112), (217, 222, 227)
@@ -33,7 +34,6 @@ _LOGO = (50.0, 14.0)  # mm, the room of a logo
 _KEEP = 42.0  # mm a heading wants below itself, so that it never ends a page
 _VOID = frozenset({"br", "img", "meta", "link", "hr", "input"})
 _INLINE = frozenset({"b", "strong", "code", "a", "span", "br", "em", "i", "sup", "sub"})
-PAPERS = ("a4", "letter")
 
 
 @dataclass

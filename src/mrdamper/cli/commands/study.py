@@ -113,7 +113,7 @@ def _require_switched_current(dataset: Dataset) -> None:
 
 def _paper_size(name: str) -> str:
     from mrdamper.errors import UnknownNameError
-    from mrdamper.report.pdf import PAPERS
+    from mrdamper.report.page import PAPERS
 
     if name.lower() not in PAPERS:
         raise UnknownNameError.of("paper size", name, PAPERS)

@@ -91,12 +91,10 @@ def fit_function(
         If the conditions cannot tell the form's terms apart: too few currents, frequencies or
         amplitudes.
     """
-    return _fitted(form, conditions, values, log, uncertainty).fit
+    return _fitted(form, conditions, values, log, _weights(uncertainty, len(conditions))).fit
 
 
-def _fitted(
-    form: str | Form, conditions: Sequence[Condition], values: ArrayLike, log: bool, uncertainty: ArrayLike | None
-) -> _Fitted:
+def _fitted(form: str | Form, conditions: Sequence[Condition], values: ArrayLike, log: bool, weight: Floats) -> _Fitted:
     chosen = form_named(form) if isinstance(form, str) else form
     I, f, A = features(conditions)
     target = np.asarray(values, dtype=float)
@@ -104,7 +102,6 @@ def _fitted(
         target = np.log(target)
     if target.size < len(chosen.terms) + len(chosen.rate_bounds):
         raise _undetermined(chosen, f"{target.size} conditions", I, f, A)
-    weight = _weights(uncertainty, target)
     rates = _best_rates(chosen, I, f, A, target, weight)
     columns = chosen.columns(I, f, A, rates) if rates else _fixed_columns(chosen, tuple(conditions))
     if columns is None or (rates and not _determined(columns)):
@@ -147,12 +144,13 @@ def choose_function(
     refusal: IdentificationError | None = None
     refused: dict[str, str] = {}
     ordered = sorted((form_named(name) for name in forms), key=lambda f: len(f.terms) + len(f.rate_bounds))
+    weight = _weights(uncertainty, len(conditions))
     for form in ordered:
         if best is not None and not supported(form, conditions):
             refused[form.name] = "too many parameters for the tested currents and motions"
             continue
         try:
-            tried = _fitted(form, conditions, values, log, uncertainty)
+            tried = _fitted(form, conditions, values, log, weight)
         except IdentificationError as error:
             refusal = error
             refused[form.name] = str(error)
@@ -282,12 +280,12 @@ def _fold_errors(
     return errors[order] * (target.size / (target.size - rates))
 
 
-def _weights(uncertainty: ArrayLike | None, target: Floats) -> Floats:
-    errors = np.full(target.size, np.inf) if uncertainty is None else np.asarray(uncertainty, dtype=float)
+def _weights(uncertainty: ArrayLike | None, count: int) -> Floats:
+    errors = np.full(count, np.inf) if uncertainty is None else np.asarray(uncertainty, dtype=float)
     finite = errors[np.isfinite(errors)]
     floor = float(np.quantile(finite, 0.25)) if finite.size else 0.0
     if not floor:
-        return np.ones(target.size)
+        return np.ones(count)
     return floor / np.maximum(np.where(np.isfinite(errors), errors, finite.max()), floor)
 
 
