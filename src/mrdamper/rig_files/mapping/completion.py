@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -80,7 +80,7 @@ _FEWEST_PATHS = 3  # that have a beginning in common
 def completed(table: RawTable) -> RawTable:
     """Add the names, units and scales that the file states above, below or beside its row of names."""
     if not any(table.names):
-        table = _with_indexed_names(_with_listed_names(table))
+        table = _with_listed_names(table)
     if not any(table.names):
         return table
     table = _with_numbered_channels(_without_shared_path(table))
@@ -142,49 +142,64 @@ def _with_stated_signs(table: RawTable) -> RawTable:
     return table
 
 
+def _keyed_cells(table: RawTable, longest: int = _LONGEST_LINE) -> Iterator[tuple[str, list[str]]]:
+    """Yield the first cell of every line beside the columns and the cells behind it, by every separator."""
+    for line in table.remarks:
+        for separator in _SEPARATORS:
+            key, *cells = [cell.strip('"') for cell in cells_of(line[:longest], separator)]
+            yield key, cells
+
+
 def _with_row_of_currents(table: RawTable) -> RawTable:
     """Titles with the currents of a line above the names: current (A), 0, , 0.5, , one for a column or a group."""
     width = len(table.names)
-    for line in table.remarks if width > 2 else ():
-        for separator in _SEPARATORS:
-            key, *cells = cells_of(line[:_LONGEST_CONDITIONS], separator)
-            header = split_name(key.strip('"'))
-            stated = [cell for cell in cells if cell]
-            if header.dimension != "current" or not names_condition(header.name, "current") or len(stated) < 2:
-                continue
-            if not width - 2 <= len(cells) <= width or not all(map(_PLAIN.fullmatch, stated)):
-                continue
-            titles, last = [""], ""
-            for cell in cells[: width - 1]:
-                last = f"{cell.replace(',', '.')} {header.unit}" if cell else last
-                titles.append(last)
-            titles += [last] * (width - len(titles))
-            over = table.over or ("",) * width
-            return replace(table, over=tuple(f"{a} {b}".strip() for a, b in zip(over, titles, strict=True)))
+    for key, cells in _keyed_cells(table, _LONGEST_CONDITIONS) if width > 2 else ():
+        header, stated = split_name(key), [cell for cell in cells if cell]
+        if header.dimension != "current" or not names_condition(header.name, "current") or len(stated) < 2:
+            continue
+        if not width - 2 <= len(cells) <= width or not all(map(_PLAIN.fullmatch, stated)):
+            continue
+        titles, last = [""], ""
+        for cell in [*cells, ""][: width - 1]:
+            last = f"{cell.replace(',', '.')} {header.unit}" if cell else last
+            titles.append(last)
+        over = table.over or ("",) * width
+        return replace(table, over=tuple(f"{a} {b}".strip() for a, b in zip(over, titles, strict=True)))
     return table
 
 
 def _with_keyed_units(table: RawTable) -> RawTable:
     """Units of a line with a key before them, one a column: Vertical Units, V, V, V."""
-    if any(table.units):
-        return table
-    for line in table.remarks:
-        for separator in _SEPARATORS:
-            key, *cells = [cell.strip().strip('"') for cell in line[:_LONGEST_LINE].split(separator)]
-            units = [cell if is_unit(cell) else "" for cell in cells[: len(table.names) - 1]]
-            if _UNITS_KEY.fullmatch(key) and len(units) == len(table.names) - 1 and all(units):
-                return replace(table, units=("", *units))
+    for key, cells in () if any(table.units) else _keyed_cells(table):
+        units = [cell for cell in cells[: len(table.names) - 1] if is_unit(cell)]
+        if _UNITS_KEY.fullmatch(key) and len(units) == len(table.names) - 1:
+            return replace(table, units=("", *units))
     return table
 
 
 def _with_listed_names(table: RawTable) -> RawTable:
-    """Names and units of columns without any, where numbered lines above state them: 1=Time;min."""
-    matches = [match for line in table.remarks if (match := LISTED.match(line[:_LONGEST_LINE]))]
-    listed = {int(match["number"]): match for match in matches if is_unit(match["unit"].strip())}
-    if len(listed) < len(matches) or set(listed) != set(range(1, len(table.names) + 1)):
+    """Names, units and scales of columns without any that numbered lines state: 1=Time;min, or UNITS.CHAN_1=mm."""
+    listed = [match for line in table.remarks if (match := LISTED.match(line[:_LONGEST_LINE]))]
+    texts: dict[str, dict[int, str]] = {"name": {}, "unit": {}, "scal": {}}
+    for match in listed if all(is_unit(match["unit"].strip()) for match in listed) else ():
+        texts["name"][int(match["number"])] = match["name"].strip()
+        texts["unit"][int(match["number"])] = match["unit"].strip()
+    width = range(1, len(table.names) + 1)
+    if {*texts["name"]} != {*width}:
+        texts = {"name": {}, "unit": {}, "scal": {}}
+        for match in filter(None, (_INDEXED.match(line[:_LONGEST_LINE]) for line in table.remarks)):
+            what = match["what"].casefold()[:4].replace("desc", "name").replace("labe", "name")
+            texts[what][int(match["number"])] = match["value"]
+    if any(i not in texts["name"] or not is_unit(texts["unit"].get(i, "")) for i in width):
         return table
-    names, units = (tuple(listed[i][key].strip() for i in sorted(listed)) for key in ("name", "unit"))
-    return replace(table, names=names, units=units)
+    steps = [line.partition("=")[2] for line in table.remarks if line.startswith("DELTA_T=")]  # of the format RPC, in s
+    table = replace(table, remarks=(*table.remarks, *(f"DELTA_T: {step.strip()} s" for step in steps)))
+    table = table.named({i - 1: (texts["name"][i], texts["unit"][i]) for i in width})
+    for i, scale in texts["scal"].items():
+        if i in width and _FLOAT.fullmatch(scale.strip()) and float(scale) not in (0.0, 1.0):
+            text = f"column {table.names[i - 1]!r} is scaled by {float(scale):g} as the file states"
+            table = _scaled(table, i - 1, table.names[i - 1], table.units[i - 1], float(scale), text)
+    return table
 
 
 def _with_numbered_channels(table: RawTable) -> RawTable:
@@ -199,30 +214,6 @@ def _with_numbered_channels(table: RawTable) -> RawTable:
         return table
     names = tuple(next(iter(what), name) for name, what in zip(table.names, meant, strict=True))
     return replace(table, names=names)
-
-
-def _with_indexed_names(table: RawTable) -> RawTable:
-    """Names, units and scales of columns without any that numbered keys state: DESC.CHAN_1=..., UNITS.CHAN_1=mm."""
-    matches = [match for line in table.remarks if (match := _INDEXED.match(line[:_LONGEST_LINE]))]
-    texts: dict[str, dict[int, str]] = {"desc": {}, "unit": {}, "scal": {}}
-    for match in matches:
-        texts[match["what"].casefold()[:4].replace("name", "desc").replace("labe", "desc")][int(match["number"])] = (
-            match["value"]
-        )
-    width = range(1, len(table.names) + 1)
-    if any(i not in texts["desc"] or not is_unit(texts["unit"].get(i, "")) for i in width):
-        return table
-    steps = [
-        line.partition("=")[2] for line in table.remarks if line.startswith("DELTA_T=")
-    ]  # of the format RPC, in seconds
-    remarks = (*table.remarks, *(f"DELTA_T: {step.strip()} s" for step in steps))
-    names, units = tuple(texts["desc"][i] for i in width), tuple(texts["unit"][i] for i in width)
-    table = replace(table, names=names, units=units, remarks=remarks)
-    for i, scale in texts["scal"].items():
-        if i in width and _FLOAT.fullmatch(scale.strip()) and float(scale) not in (0.0, 1.0):
-            text = f"column {names[i - 1]!r} is scaled by {float(scale):g} as the file states"
-            table = _scaled(table, i - 1, names[i - 1], units[i - 1], float(scale), text)
-    return table
 
 
 def _with_keyed_axis(table: RawTable) -> RawTable:
@@ -286,7 +277,7 @@ def _with_listed_units(table: RawTable) -> RawTable:
     if written and all(len(units) == 1 for units in written.values()):
         own = [next(iter(written.get(i, ())), unit) for i, unit in enumerate(table.units)]
         return replace(table, units=tuple(own))
-    for separator in _SEPARATORS:
+    for separator in _SEPARATORS:  # a line a channel, its name and its unit among the cells
         units_of: dict[int, list[str]] = {}
         for line in table.remarks:
             cells = [cell.strip().strip('"') for cell in line[:_LONGEST_LINE].lstrip("#%/ ").split(separator)]

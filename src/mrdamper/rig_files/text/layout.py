@@ -10,7 +10,7 @@ import csv
 import re
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from typing import Literal
@@ -481,36 +481,35 @@ def _header_lines(
             if index is not None and not 0 <= index < len(lines):
                 raise source.refuse("E_PROFILE", f"there is no line {index + 1}", "correct [file] of the profile")
         return header, units
-    plain = [] if _lists_columns(lines[:first], width) else _plain(lines[:first])
-    keyed = _keyed_lines(lines, plain, separator, width)
+    cells = {i: own for i, t in enumerate(lines[:first]) if len(own := _cells(t, separator, width)) == width}
+    roles = {i: len(_roles(own)) for i, own in cells.items()}
+    filled = [i for i, line in enumerate(lines[:first]) if line.strip()]
+    marked = [i for i in filled if is_comment(lines[i])]
+    plain = [] if _lists_columns(lines[:first], width) else [i for i in filled if i not in marked]
+    keyed = _keyed_lines({i: cells[i] for i in plain if i in cells}, roles)
     if keyed:
         return keyed
-    marked = [i for i, line in enumerate(lines[:first]) if is_comment(line)]
     for candidates in (plain, marked):
-        fitting = [i for i in candidates if len(_fields(lines[i], separator, width)) == width]
-        if width == 1:
-            fitting = fitting[-2:]
+        fitting = [i for i in candidates if i in cells][-2 if width == 1 else 0 :]
         if not fitting:
             continue
-        last = fitting[-1]
+        last, telling = fitting[-1], [i for i in fitting if roles[i] >= _TELLING]
         if candidates is plain and last != plain[-1] and _names_columns(lines[plain[-1]], separator):
             break
-        stated = [i for i in reversed(fitting) if _is_units(_cells(lines[i], separator, width))]
-        units = next((i for i in stated if not _is_times(_cells(lines[i], separator, width))), (*stated, None)[0])
-        if units is not None and units != fitting[-1]:  # keys with one cell a column: TraceName, VUnit, HUnit
-            named = [i for i in fitting if len(_roles(_cells(lines[i], separator, width))) >= _TELLING and i < units]
-            if named and all(_is_keyed(_cells(lines[i], separator, width)) for i in fitting if i > named[-1]):
-                return named[-1], units
+        stated = [i for i in reversed(fitting) if _is_units(cells[i])]
+        units = next((i for i in stated if not _is_times(cells[i])), (*stated, None)[0])
         naming = [i for i in fitting if i != units and (units is None or i < units)]
-        if units is not None and len(fitting) > 1 and units == fitting[-2] and not naming:  # above the names
-            return last, units
-        if units is not None and (units == last or not _roles(_cells(lines[last], separator, width))):
+        if units is not None and units != last:  # keys with one cell a column: TraceName, VUnit, HUnit
+            named = [i for i in telling if i < units]
+            if named and all(_is_keyed(cells[i]) for i in fitting if i > named[-1]):
+                return named[-1], units
+            if units == fitting[-2] and not naming:  # above the names
+                return last, units
+        if units is not None and (units == last or not roles[last]):
             return (naming[-1] if naming else None), units
-        telling = [i for i in fitting if len(_roles(_cells(lines[i], separator, width))) >= _TELLING]
-        if telling and not _roles(_cells(lines[last], separator, width)):  # names of sensors or types below the names
-            last = telling[-1]
-        below = [i for i in marked if i > last and _is_units(_cells(lines[i], separator, width))]  # #, deg, mm, N
-        below = [i for i in below if candidates is plain and len(_fields(lines[i], separator, width)) == width]
+        last = telling[-1] if telling and not roles[last] else last  # names of sensors or types below the names
+        below = [i for i in marked if i > last and i in cells and _is_units(cells[i])]  # #, deg, mm, N
+        below = below if candidates is plain else []
         return last, (form.units_line - 1 if form.units_line else (*below, None)[0])
     naming = [i for i in plain if _names_columns(lines[i], separator)]
     if naming and not form.names:
@@ -518,17 +517,11 @@ def _header_lines(
     return None, (form.units_line - 1 if form.units_line else None)
 
 
-def _keyed_lines(lines: Sequence[str], plain: list[int], separator: str, width: int) -> tuple[int, int] | None:
+def _keyed_lines(cells: Mapping[int, Sequence[str]], roles: Mapping[int, int]) -> tuple[int, int] | None:
     """Return the lines of names and of units, where lines begin with what they hold: descriptor, path, unit."""
-    cells = {i: _cells(lines[i], separator, width) for i in plain if len(_fields(lines[i], separator, width)) == width}
-    units = [i for i, row in cells.items() if width > 1 and row[0].casefold() in _UNIT_KEYS and _is_units(row[1:])]
-    named = {i: (row[0].casefold() == "name", len(_roles(row)), i) for i, row in cells.items() if i not in units}
+    units = [i for i, row in cells.items() if row[0].casefold() in _UNIT_KEYS and _is_units(row[1:])]
+    named = {i: (row[0].casefold() == "name", roles[i], i) for i, row in cells.items() if i not in units}
     return (max(named, key=lambda i: named[i]), units[-1]) if units and named else None
-
-
-def _plain(lines: Sequence[str]) -> list[int]:
-    """Return indices of the lines that are neither empty nor remarks."""
-    return [i for i, line in enumerate(lines) if line.strip() and not is_comment(line)]
 
 
 def _lists_columns(lines: Sequence[str], width: int) -> bool:
