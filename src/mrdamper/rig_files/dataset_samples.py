@@ -77,7 +77,7 @@ def _of_parquet(table: RawTable, path: Path) -> dict[str, Channels]:
         except RigFileError as error:
             if error.code not in ("E_NUMBER", "E_UNSAFE"):
                 raise
-            _refuse_text(name, path)
+            refuse_text(name, path)
         _refuse_bomb(8 * ids.codes.size * (len(channels) + 1), path)
     return _by_run(ids.codes, ids.labels, channels)
 
@@ -98,7 +98,7 @@ def _of_text(source: Source, path: Path) -> dict[str, Channels]:
     channels = {
         name: table[name].cast(pl.Float64).fill_null(float("nan")).to_numpy()
         for name in _in_order(table.columns)
-        if table.schema[name].is_numeric() or _refuse_text(name, path)
+        if table.schema[name].is_numeric() or refuse_text(name, path)
     }
     return _by_run(ids.codes, ids.labels, channels)
 
@@ -121,7 +121,7 @@ def _in_order(names: Iterable[str]) -> list[str]:
     return channels + [name for name in names if name not in (*channels, "run_id")]
 
 
-def _refuse_text(name: str, path: Path) -> bool:
+def refuse_text(name: str, path: Path) -> bool:
     """Further columns may hold text, and are left out."""
     if name in (*REQUIRED, *OPTIONAL):
         raise ColumnError(

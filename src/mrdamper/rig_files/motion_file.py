@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mrdamper.data import Floats, Run
-from mrdamper.errors import ColumnError, DatasetError, RunError, UnitError
-from mrdamper.rig_files.dataset_samples import first_line
+from mrdamper.errors import ColumnError, DatasetError, RunError
+from mrdamper.rig_files.dataset_samples import first_line, missing_column, refuse_text
 from mrdamper.rig_files.readers.archive import opened
 from mrdamper.rig_files.readers.base import RigFileError
 
@@ -68,16 +68,10 @@ def read_table(path: Path, remedy: str) -> pl.DataFrame:
 def _numbers(table: pl.DataFrame, name: str, path: Path) -> Floats:
     """Return a column as doubles, none missing."""
     if name not in table.columns:
-        near = [column for column in table.columns if column.lower().startswith(name.split("_")[0])]
-        if near:
-            reason, remedy = f"column {near[0]!r} where {name!r} is expected", "convert it to SI and rename it"
-            raise UnitError(reason, where=str(path), remedy=remedy)
-        reason = f"column {name} is missing (found {', '.join(table.columns)})"
-        raise ColumnError(reason, where=str(path), remedy="add it")
+        raise missing_column(name, table.columns, path)
     values = table[name]
     if not values.dtype.is_numeric():
-        remedy = "write plain numbers with a decimal point"
-        raise ColumnError(f"column {name} holds text", where=str(path), remedy=remedy)
+        refuse_text(name, path)
     if values.null_count():
         reason = f"column {name} has {values.null_count()} empty cells"
         raise ColumnError(reason, where=str(path), remedy="remove those rows")

@@ -225,17 +225,13 @@ def profile_text(profile: Profile) -> str:
     """Return the profile as TOML that reads back equal."""
     lines = [f"{key} = {_toml(getattr(profile, key))}" for key in ("rig", "excitation", "split")]
     sections = {"file": profile.file.model_dump(exclude_none=True, exclude_defaults=True)}
-    plain = Channel().model_dump(exclude_none=True)
     for name, channel in profile.channels.items():
-        says = channel.model_dump(exclude_none=True)
-        sections[f"channels.{name}"] = {k: v for k, v in says.items() if v != plain.get(k) or k == "sign"}
+        says = channel.model_dump(exclude_none=True, exclude_defaults=True)
+        sections[f"channels.{name}"] = {**says, "sign": channel.sign}
     for name in ("current", "correction"):
         table = getattr(profile, name)
-        sections[name] = {} if table is None else table.model_dump(exclude_none=True)
-    if profile.current is not None:
-        sections["current.values"] = sections["current"].pop("values")
-        if sections["current.values"] and "unit" not in profile.current.model_fields_set:
-            del sections["current"]["unit"]
+        sections[name] = {} if table is None else table.model_dump(exclude_none=True, exclude_unset=True)
+    sections["current.values"] = sections["current"].pop("values", {})
     for name, section in sections.items():
         if section or name.startswith("channels."):
             lines += ["", f"[{name}]", *(f"{_key(key)} = {_toml(value)}" for key, value in section.items())]
