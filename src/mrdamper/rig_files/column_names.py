@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
@@ -61,7 +61,7 @@ _COMPOUNDS = MappingProxyType(
     }
 )  # fmt: skip
 # What says that a column is made from a channel rather than being it.
-_MADE = frozenset(
+COMPUTED = frozenset(
     ("rms", "peak", "pk", "filtered", "filter", "filt", "lowpass", "smoothed", "smooth", "average", "averaged", "avg",
      "mean", "std", "sd", "abs", "amplitude", "ampl", "envelope", "spitze", "spitzenwert", "effektiv", "gefiltert",
      "geglättet", "mittelwert", "mittel", "filtré", "filtrée", "moyenne", "filtrado", "filtrada", "filtrato", "delta",
@@ -87,10 +87,10 @@ _ELSEWHERE = frozenset(
      "motor", "pump", "pumpe", "heater", "drive", "servo", "servovalve", "leakage", "mains")
 )  # fmt: skip
 # Forces that a laboratory shows as weights.
-_WEIGHT = frozenset(
+WEIGHT = frozenset(
     ("load", "loadcell", "last", "charge", "carga", "carico", "weight", "gewicht", "poids", "peso", "荷重", "载荷")
 )
-_COIL = frozenset(
+COIL = frozenset(
     ("coil", "spule", "spulenstrom", "bobine", "bobina", "solenoid", "magnet", "线圈电流", "damper", "icoil", "ispule")
 )
 _FACTOR = re.compile(r"[\s_][x×*·]\s?10+(?![0-9])|\bp-p\b")  # Force x10, Force p-p
@@ -178,7 +178,7 @@ def role_of(name: str) -> str | None:
     name = _RATE_GROUP.sub("", name)
     words = words_of(name)
     lower = [w.casefold().rstrip("0123456789") or w for w in words]
-    if any(word in _NOT_MEASURED or word in _MADE or word in _ELSEWHERE for word in lower) or _FACTOR.search(name):
+    if any(word in _NOT_MEASURED or word in COMPUTED or word in _ELSEWHERE for word in lower) or _FACTOR.search(name):
         return None
     if _COMMANDED.search(name) or _CONDITION.search(name):
         return None
@@ -186,7 +186,7 @@ def role_of(name: str) -> str | None:
         return _SYMBOLS[words[0]]
     if len(words) == 1 and words[0].rstrip("0123456789") in _SYMBOLS:  # t1, x1, F1
         return _SYMBOLS[words[0].rstrip("0123456789")]
-    if len(words) == 2 and _SYMBOLS.get(words[0]) == "current" and lower[1] in _COIL:  # I_coil
+    if len(words) == 2 and _SYMBOLS.get(words[0]) == "current" and lower[1] in COIL:  # I_coil
         return "current"
     roles = [role for role in map(_role_of_word, lower) if role is not None]
     # "load displacement" is a displacement: the last word is the noun in the languages at hand.
@@ -205,19 +205,14 @@ def _role_of_word(word: str) -> str | None:
     return next((role for end, role in _COMPOUNDS.items() if word.endswith(end) and word != end), None)
 
 
-def names_coil(name: str) -> bool:
-    """Tell if a name states that a current is the coil's."""
-    return any(word.casefold() in _COIL for word in words_of(name))
+def holds(name: str, words: Collection[str]) -> bool:
+    """Tell if a name holds one of some words: of `COIL`, `COMPUTED`, `WEIGHT`, in any case, numbered or not."""
+    return any(word.casefold() in words or word.casefold().rstrip("0123456789") in words for word in words_of(name))
 
 
 def names_compression(name: str) -> bool:
     """Tell if a name contains compression, which rigs that use the word mostly count positive."""
     return any(word.casefold().startswith(_COMPRESSION) for word in words_of(name))
-
-
-def names_computed(name: str) -> bool:
-    """Tell if a name states a filtered, averaged or computed quantity."""
-    return any(word.casefold() in _MADE for word in words_of(name))
 
 
 def names_condition(key: str, role: str) -> bool:
@@ -226,21 +221,15 @@ def names_condition(key: str, role: str) -> bool:
     return bool(kept) and role_of(" ".join(kept)) == role
 
 
-def names_weight(name: str) -> bool:
-    """Tell if a name is that of a load displayed as a weight."""
-    return any(word.casefold().rstrip("0123456789") in _WEIGHT for word in words_of(name))
-
-
 def names_command(name: str) -> bool:
     """Tell if a name states the command to a machine, or its error, rather than what was measured."""
-    words = {word.casefold().rstrip("0123456789") for word in words_of(name)}
-    return bool(words & (_NOT_MEASURED | _SET)) or _COMMANDED.search(name) is not None
+    return holds(name, _NOT_MEASURED | _SET) or _COMMANDED.search(name) is not None
 
 
 def says_nothing(name: str) -> bool:
     """Tell if a name holds no word of a channel, of a command or of another place."""
     words = [w.casefold().rstrip("0123456789") for w in re.split(r"[^\w]+|_", name) if w]
-    meaningful = {w for words_of in WORDS.values() for w in words_of} | _NOT_MEASURED | _MADE | _ELSEWHERE | _SET
+    meaningful = {w for words_of in WORDS.values() for w in words_of} | _NOT_MEASURED | COMPUTED | _ELSEWHERE | _SET
     return not any(word in meaningful for word in words)
 
 

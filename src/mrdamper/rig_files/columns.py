@@ -13,9 +13,10 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, printable
 from mrdamper.rig_files.column_names import (
+    COIL,
     WORDS,
     Header,
-    names_coil,
+    holds,
     names_command,
     names_compression,
     says_nothing,
@@ -189,7 +190,7 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
         exact = [i for i, name in zip(candidates, names, strict=True) if name in WORDS[role]]
         if len({headers[i].name.casefold() for i in exact}) == 1 or (exact and role == "time"):
             return exact[0]
-        coils = [i for i in candidates if role == "current" and names_coil(headers[i].name)]
+        coils = [i for i in candidates if role == "current" and holds(headers[i].name, COIL)]
         if len(coils) == 1:
             return coils[0]
         if role == "time" and fitting:  # total and running time: refused if they run otherwise

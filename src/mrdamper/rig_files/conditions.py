@@ -16,7 +16,7 @@ import numpy as np
 
 from mrdamper.data.arrays import Floats
 from mrdamper.data.runs import held_current
-from mrdamper.rig_files.column_names import names_coil, names_condition, split_name
+from mrdamper.rig_files.column_names import COIL, holds, names_condition, split_name
 from mrdamper.rig_files.units import Unit, parse_unit
 
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
@@ -115,7 +115,7 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
     lines, currents, rated = list(lines), [], []
     for line in lines:
         for key, value, unit in _quantities(line, decimal):
-            coil = names_condition(key, "current") or (names_coil(key) and not _RATING.search(key))
+            coil = names_condition(key, "current") or (holds(key, COIL) and not _RATING.search(key))
             if unit.dimension != "current" or _OTHER_TIME.search(key):
                 continue
             if re.search("rated", key, re.IGNORECASE):

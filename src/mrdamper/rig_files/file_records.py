@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mrdamper.errors import ColumnError, CombinedError, InputError, printable
 from mrdamper.rig_files.coil_current import as_data, with_value_of_name
-from mrdamper.rig_files.column_names import names_computed
+from mrdamper.rig_files.column_names import COMPUTED, holds
 from mrdamper.rig_files.columns import assign, partly_assigned
 from mrdamper.rig_files.mapping.clocks import with_time_stated
 from mrdamper.rig_files.mapping.completion import completed
@@ -133,7 +133,7 @@ def _resembles_a_test(table: RawTable, tests: list[RawTable], profile: Profile) 
     """Return whether a table beside tests has as many columns, as many rows and two of their channels."""
     columns = [entry.column for role, entry in partly_assigned(table, profile).items() if role in REQUIRED]
     alike = next((test for test in tests if len(test.names) == len(table.names)), None)
-    if alike is None or names_computed(table.label) or len(columns) < len(REQUIRED) - 1:
+    if alike is None or holds(table.label, COMPUTED) or len(columns) < len(REQUIRED) - 1:
         return False
     return _rows(table, columns[0]) >= _ROWS_OF_A_TEST * _rows(alike, assign(alike, profile)["force"].column)
 
@@ -155,7 +155,7 @@ def _incomplete(table: RawTable, error: InputError) -> InputError:
 
 def _without_computed(tables: list[RawTable]) -> tuple[list[RawTable], list[str]]:
     """Leave out tables whose names say filtered or computed, beside one that was measured; and return their names."""
-    measured = [table for table in tables if not names_computed(table.label)]
+    measured = [table for table in tables if not holds(table.label, COMPUTED)]
     if not measured or len(measured) == len(tables):
         return tables, []
-    return measured, [table.label for table in tables if names_computed(table.label)]
+    return measured, [table.label for table in tables if holds(table.label, COMPUTED)]

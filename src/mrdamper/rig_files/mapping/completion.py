@@ -10,8 +10,9 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.rig_files.column_names import (
+    WEIGHT,
+    holds,
     names_condition,
-    names_weight,
     role_of,
     says_nothing,
     split_name,
@@ -23,6 +24,7 @@ from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.layout import LISTED, cells_of
 from mrdamper.rig_files.text.spool import rescale
+from mrdamper.rig_files.text.tokens import looks_numeric
 from mrdamper.rig_files.units import DIMENSION, is_unit, parse_unit
 
 _SEPARATORS = ("\t", ";", ",", "|")
@@ -44,6 +46,8 @@ _PER_COUNT = re.compile(
     re.IGNORECASE,
 )
 _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.IGNORECASE)
+_LABELS = frozenset(("label", "name", "channel", "channel name", "signal", "trace", "titel", "bezeichnung", "nom"))
+_LABVIEW = ("Delta_X", "X_Dimension")
 _MONITOR = frozenset(("mon", "monitor", "imon", "iout", "i", "current", "curr", "strom", "amp", "amplifier", "shunt"))
 _LONGEST_CONDITIONS = 4000
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
@@ -79,12 +83,13 @@ _FEWEST_PATHS = 3  # that have a beginning in common
 
 def completed(table: RawTable) -> RawTable:
     """Add the names, units and scales that the file states above, below or beside its row of names."""
+    table = _with_values_for_all(table)
     if not any(table.names):
         table = _with_listed_names(table)
     if not any(table.names):
         return table
     table = _with_numbered_channels(_without_shared_path(table))
-    table = _with_titles(_with_keyed_units(_with_row_of_currents(table)))
+    table = _with_titles(_with_keyed_units(_with_row_of_currents(_with_labels(table))))
     table = _with_stated_time_unit(_with_listed_units(_with_keyed_axis(table)))
     table = _with_stated_signs(_with_clocks_and_weights(table))
     return _with_sense(_with_scales(_with_counts(table)))
@@ -145,9 +150,41 @@ def _with_stated_signs(table: RawTable) -> RawTable:
 def _keyed_cells(table: RawTable, longest: int = _LONGEST_LINE) -> Iterator[tuple[str, list[str]]]:
     """Yield the first cell of every line beside the columns and the cells behind it, by every separator."""
     for line in table.remarks:
-        for separator in _SEPARATORS:
+        for separator in filter(line.__contains__, _SEPARATORS):
             key, *cells = [cell.strip('"') for cell in cells_of(line[:longest], separator)]
             yield key, cells
+
+
+def _with_values_for_all(table: RawTable) -> RawTable:
+    """Lines of a key with one value for all columns, whose unit another states: HResolution, 5E-3, 5E-3; HUnit, s, s.
+
+    The steps of LabVIEW and of the format RPC are in seconds.
+    """
+    width, keyed = len(table.names), dict[str, str]()
+    for key, cells in _keyed_cells(table):
+        stated = {cell for cell in cells if cell}
+        if key and len(stated) == 1 and (len(cells) == width - 1 > 1 or key in _LABVIEW):
+            keyed[key] = stated.pop()
+    units = {key[:-4]: unit for key, unit in keyed.items() if key.casefold().endswith("unit") and is_unit(unit)}
+    units |= {"Delta_X": "s"} if keyed.get("X_Dimension") == "Time" else {}
+    lines = [f"{key}: {number}" for key, number in keyed.items() if split_name(key).unit and looks_numeric(number)]
+    lines += [
+        f"{key}: {number} {unit}"
+        for start, unit in units.items()
+        for key, number in keyed.items()
+        if start and key.startswith(start) and looks_numeric(number)
+    ]
+    lines += [f"DELTA_T: {line[8:].strip()} s" for line in table.remarks if line.startswith("DELTA_T=")]
+    return replace(table, remarks=(*table.remarks, *lines)) if lines else table
+
+
+def _with_labels(table: RawTable) -> RawTable:
+    """Titles of a line that begins with what it holds: Label, Displacement 10 mm/V, Force 1 kN/V."""
+    for key, cells in _keyed_cells(table):
+        named = key.casefold().rstrip("s") in _LABELS and len(cells) + 1 == len(table.names) > 2
+        if named and len({split_name(cell).role for cell in cells} - {None}) > 1:
+            return replace(table, over=("", *cells))
+    return table
 
 
 def _with_row_of_currents(table: RawTable) -> RawTable:
@@ -192,8 +229,6 @@ def _with_listed_names(table: RawTable) -> RawTable:
             texts[what][int(match["number"])] = match["value"]
     if any(i not in texts["name"] or not is_unit(texts["unit"].get(i, "")) for i in width):
         return table
-    steps = [line.partition("=")[2] for line in table.remarks if line.startswith("DELTA_T=")]  # of the format RPC, in s
-    table = replace(table, remarks=(*table.remarks, *(f"DELTA_T: {step.strip()} s" for step in steps)))
     table = table.named({i - 1: (texts["name"][i], texts["unit"][i]) for i in width})
     for i, scale in texts["scal"].items():
         if i in width and _FLOAT.fullmatch(scale.strip()) and float(scale) not in (0.0, 1.0):
@@ -314,7 +349,7 @@ def _with_clocks_and_weights(table: RawTable) -> RawTable:
         key = re.sub(r"[\s_()]+", " ", header.name.strip().casefold()).strip()
         if not header.unit and key in _CLOCKS:
             headings[i] = "time", _CLOCKS[key]
-        elif header.role == "force" and header.unit in _WEIGHTS and names_weight(header.name):
+        elif header.role == "force" and header.unit in _WEIGHTS and holds(header.name, WEIGHT):
             headings[i] = header.name, _WEIGHTS[header.unit]
             notes.append(Finding("W_UNITS", f"{header.name!r} in {header.unit} is the force of that weight"))
     return table.named(headings).noted(*notes)

@@ -15,7 +15,7 @@ from mrdamper.rig_files.record import Finding, LineNumbers
 from mrdamper.rig_files.text.blocks import Block, find_blocks
 from mrdamper.rig_files.text.bulk import read_bulk
 from mrdamper.rig_files.text.cells import RowFormat, field_count, read_cells, split_rows
-from mrdamper.rig_files.text.labview import is_labview, named, stated_form, with_step
+from mrdamper.rig_files.text.labview import is_labview, named, stated_form
 from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
 from mrdamper.rig_files.text.spool import Spool
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, line_feeds, open_text, too_long
@@ -73,7 +73,7 @@ class DelimitedText(Reader):
             f"block {index + 1}" if count > 1 else "",
             _form(stream, layout),
             odd=layout.odd,
-            remarks=with_step(block.remarks or layout.remarks),
+            remarks=block.remarks or layout.remarks,
             over=layout.over,
             words=lambda column: _words(stream, layout, block, column),
         )

@@ -50,16 +50,6 @@ def named(layout: Layout, lines: Sequence[str]) -> Layout:
     )
 
 
-def with_step(remarks: Sequence[str]) -> tuple[str, ...]:
-    """Lines above a section with the one step of time [s] that its header states for all channels."""
-    for line in remarks:
-        key, *cells = [cell.strip() for cell in line.split("\t")]
-        stated = {cell.replace(",", ".") for cell in cells if cell}
-        if key == "Delta_X" and len(stated) == 1 and any(other.startswith("X_Dimension\tTime") for other in remarks):
-            return (*remarks, f"Delta_X: {stated.pop()} s")
-    return tuple(remarks)
-
-
 def _entries(lines: Sequence[str]) -> dict[str, str]:
     """Return the entries of the first header by key, with any separator."""
     entries = {}

@@ -33,7 +33,6 @@ _FEWEST_LINES = 20  # of a text: fewer, with words among the numbers, are notes
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
 _UNIT_KEYS = frozenset(("unit", "units", "einheit", "einheiten", "unité", "unidad", "unità", "jednostka", "enhet"))
-_LABELS = frozenset(("label", "name", "channel", "channel name", "signal", "trace", "titel", "bezeichnung", "nom"))
 _MOST_LEVELS = 4  # lines of headings
 _TELLING = 2  # columns whose names tell what they are
 _WORD = re.compile(r"(?:[^\W\d_]-)?[^\W\d_]{3,}")  # also x-axis
@@ -139,7 +138,6 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         tuple(next(filter(None, c), "") if k == "text" else "" for c, k in zip(columns, kinds, strict=True)),
         (
             *(line for line in (*above, *below) if line.strip()),
-            *_stated_for_all(lines[:first], separator, width),
             *_notes_beside(rows),
         ),
         titles or _titles(above, separator, width),
@@ -206,23 +204,6 @@ def _with_levels(names: tuple[str, ...], levels: list[tuple[str, ...]]) -> tuple
     filled = tuple(name or cell for name, cell in zip(names, telling[0], strict=True))
     others = [cells for cells in levels if cells is not telling[0]]
     return filled, others[0] if others else ()
-
-
-def _stated_for_all(above: Sequence[str], separator: str, width: int) -> list[str]:
-    """Lines of a key with one number for every column, with their unit: HResolution, 5E-3, 5E-3 and HUnit, s, s."""
-    keyed: dict[str, str] = {}
-    for line in above:
-        key, *cells = _fields(line, separator, width) if width > 2 and line.strip() else [""]
-        if key and len(cells) == width - 1 and len(set(cells)) == 1 and cells[0]:
-            keyed[key.strip('"')] = cells[0].strip('"')
-    units = {key[:-4]: unit for key, unit in keyed.items() if key.casefold().endswith("unit") and is_unit(unit)}
-    own = [f"{key}: {number}" for key, number in keyed.items() if split_name(key).unit and looks_numeric(number)]
-    return own + [
-        f"{key}: {number} {unit}"
-        for start, unit in units.items()
-        for key, number in keyed.items()
-        if start and key.startswith(start) and looks_numeric(number)
-    ]
 
 
 def _without_units(lines: Sequence[str]) -> Sequence[str]:
@@ -305,10 +286,6 @@ def _titles(above: Sequence[str], separator: str, width: int) -> tuple[str, ...]
     """Titles of groups of columns, one a column: each stands over its group's first column."""
     if not above or separator == SPACES or is_comment(above[-1]):
         return ()
-    for line in above[-_MOST_LEVELS:]:  # Label, Displacement 10 mm/V, Force 1 kN/V
-        labels = [cell.strip('"') for cell in cells_of(line, separator)]
-        if len(labels) == width > _TELLING and labels[0].casefold().rstrip("s") in _LABELS and len(_roles(labels)) > 1:
-            return ("", *labels[1:])
     cells = cells_of(above[-1], separator)[:width]
     if sum(map(bool, cells)) < 2 or not cells[0] or len(cells) < width // 2:
         return ()
