@@ -42,14 +42,8 @@ from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests
 _PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")
 _TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
 _MAY_BE_PARTS = (
-    "E_COLUMN",
-    "E_UNITS_MISSING",
-    "E_UNITS_DIMENSION",
-    "E_AMBIGUOUS",
-    "E_NO_DATA",
-    "E_NUMBER",
-    "E_FIELD_COUNT",
-)
+    "E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER", "E_FIELD_COUNT",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,20 +191,14 @@ class _Intake:
         if run:
             self._shares[path] = run, profile
             return
-        try:
-            with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused
-                records, problems = records_of_file(path, profile)
-        except InputError as error:
-            refusals = [Refusal(str(path), one) for one in getattr(error, "errors", (error,))]
-            self.met.append((path, ""))
-            if not given and [type(refusal.error) for refusal in refusals] == [NoTableError]:
-                self.notes += refusals
-            else:
-                self.refusals += refusals
-            return
-        self.refusals += [Refusal(str(path), problem) for problem in problems]
+        records, refusals = _unchecked(path, profile)
+        self.met += [] if records else [(path, "")]
+        if not records and not given and [type(refusal.error) for refusal in refusals] == [NoTableError]:
+            self.notes += refusals
+        else:
+            self.refusals += refusals
         split = profile.file.blocks == "split" or (self._table and self._table.of_file(path))
-        if problems or split or not goes_on(records):
+        if refusals or split or not goes_on(records):
             self._take_parts()
             self._take_all(path, records)
             return
@@ -360,6 +348,16 @@ class _Intake:
         self._found = [entry for i, entry in enumerate(problems_by_place) if i not in errors]
 
 
+def _unchecked(path: Path, profile: Profile) -> tuple[list[Record], list[Refusal]]:
+    """Return the tests of a file before they are checked, and why others of it, or the whole file, cannot be read."""
+    try:
+        with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused as such
+            records, problems = records_of_file(path, profile)
+    except InputError as error:
+        records, problems = [], getattr(error, "errors", (error,))
+    return records, [Refusal(str(path), problem) for problem in problems]
+
+
 def found_tests(
     paths: Iterable[str | Path], profile: Profile | str | Path | None = None
 ) -> tuple[tuple[Record, ...], tuple[Refusal, ...]]:
@@ -368,14 +366,9 @@ def found_tests(
     refusals: list[Refusal] = []
     with unpacked(paths) as given:
         for path in files_in(given)[0]:
-            try:
-                of_file, problems = records_of_file(path, profile_of(profile))
-                records += [(path, record) for record in of_file]
-                refusals += [Refusal(str(path), problem) for problem in problems]
-            except NoTableError as error:
-                refusals += [Refusal(str(path), error)] if path in given else []
-            except InputError as error:
-                refusals.append(Refusal(str(path), error))
+            of_file, problems = _unchecked(path, profile_of(profile))
+            records += [(path, record) for record in of_file]
+            refusals += [p for p in problems if path in given or not isinstance(p.error, NoTableError)]
     return tuple(_with_folders(records)), tuple(refusals)
 
 

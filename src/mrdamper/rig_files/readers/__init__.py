@@ -20,27 +20,13 @@ if TYPE_CHECKING:
 
 _FOREIGN = MappingProxyType(
     {
-        b"%PDF": "PDF",
-        b"\x89PNG": "PNG image",
-        b"\xff\xd8\xff": "JPEG image",
-        b"GIF8": "GIF image",
-        b"\xd0\xcf\x11\xe0": "old Excel or Word",
-        b"BZh": "bzip2",
-        b"\xfd7zXZ": "xz",
-        b"7z\xbc\xaf": "7-Zip",
-        b"Rar!": "RAR",
-        b"\x28\xb5\x2f\xfd": "Zstandard",
-        b"\x7fELF": "program",
-        b"SQLite format 3": "SQLite",
-        b"{\\rtf": "RTF",
-        b"<!DOCTYPE": "HTML",
-        b"<!doctype": "HTML",
-        b"<html": "HTML",
-        b"<HTML": "HTML",
-        b"<?xml": "XML",
-        b"RIFF": "RIFF",
+        b"%PDF": "PDF", b"\x89PNG": "PNG image", b"\xff\xd8\xff": "JPEG image", b"GIF8": "GIF image",
+        b"\xd0\xcf\x11\xe0": "old Excel or Word", b"BZh": "bzip2", b"\xfd7zXZ": "xz", b"7z\xbc\xaf": "7-Zip",
+        b"Rar!": "RAR", b"\x28\xb5\x2f\xfd": "Zstandard", b"\x7fELF": "program", b"SQLite format 3": "SQLite",
+        b"{\\rtf": "RTF", b"<!DOCTYPE": "HTML", b"<!doctype": "HTML", b"<html": "HTML", b"<HTML": "HTML",
+        b"<?xml": "XML", b"RIFF": "RIFF",
     }
-)
+)  # fmt: skip
 _PICTURES = ("PNG image", "JPEG image", "GIF image")
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")  # no text has them
 _PICKLE = tuple(bytes((0x80, protocol)) for protocol in range(2, 6))

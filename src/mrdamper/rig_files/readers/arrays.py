@@ -35,6 +35,7 @@ _PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value")
 _FORMULA = re.compile(
     r"(?:raw|counts?|adc|digits?|data)\s*[*·×]\s*(gain|scale|factor|slope)(?:\s*\+\s*(offset|bias))?", re.IGNORECASE
 )
+_LARGEST_TEXT = 200 * 10**6  # bytes
 _TELLING = 2  # words that name channels make a list of names
 _NO_NUMBERS = {"b": "truth values", "c": "complex numbers", "V": "bytes"}
 _EARLY_END = (
@@ -242,6 +243,14 @@ def check_unpacked(source: Source, size: int) -> None:
     if size > RATIO_MATTERS_FROM and (size > MOST_RATIO * source.size or size > 10 * MOST_UNPACKED):
         problem = f"{size / 1e6:.0f} MB of numbers in a file of {source.size / 1e6:.3g} MB"
         raise source.refuse("E_ARCHIVE_RATIO", problem, "export only the channels and the time needed")
+
+
+def whole(source: Source, title: str) -> bytes:
+    """Return a text of numbers as a whole; E_FORMAT beyond 200 MB."""
+    if source.size > _LARGEST_TEXT:
+        raise source.refuse("E_FORMAT", f"{title} of over {_LARGEST_TEXT // 10**6} MB", "export it as CSV or Parquet")
+    source.file.seek(0)
+    return source.file.read()
 
 
 def load(library: str, title: str) -> ModuleType:

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import damaged, twice
+from mrdamper.rig_files.readers.arrays import damaged, twice, whole
 from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, RigFileError, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 from mrdamper.rig_files.text.tokens import stamp
 
-_LARGEST = 200 * 10**6  # bytes: a text of numbers, read as a whole
 _SAVED_MODEL = "mrdamper-model"
 _FEWEST = 8  # samples of a test
 
@@ -34,10 +33,7 @@ class Json(Reader):
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a node that holds lists of numbers."""
-        if source.size > _LARGEST:
-            raise source.refuse("E_FORMAT", f"JSON of over {_LARGEST // 10**6} MB", "export it as CSV or Parquet")
-        source.file.seek(0)
-        tree = _tree(_parsed(source, source.file.read()))
+        tree = _tree(_parsed(source, whole(source, self.title)))
         if isinstance(tree, Mapping) and _SAVED_MODEL in map(str, tree.values()):
             remedy = "give it to mrdamper predict, validate or export; tests are what import reads"
             raise NoTableError("E_FORMAT", "a saved model", file=source.name, remedy=remedy)

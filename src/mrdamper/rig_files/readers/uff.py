@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import damaged, refusing_damage
+from mrdamper.rig_files.readers.arrays import damaged, refusing_damage, whole
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 
 _DELIMITER = "-1"
-_LARGEST = 200 * 10**6  # bytes: a text of numbers, read as a whole
 # Kinds of data of the format, for axes without a label.
 _KINDS = {8: "displacement", 11: "velocity", 12: "acceleration", 13: "force", 9: "force", 17: "time", 15: "pressure"}
 _HEADER = 11  # lines of a data set above its values
@@ -40,10 +39,7 @@ class Uff(Reader):
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table of the functions that share a clock."""
-        if source.size > _LARGEST:
-            raise source.refuse("E_FORMAT", f"over {_LARGEST // 10**6} MB", "export it as CSV or HDF5")
-        source.file.seek(0)
-        lines = source.file.read().decode("latin-1").splitlines()
+        lines = whole(source, self.title).decode("latin-1").splitlines()
         marks = [i for i, line in enumerate(lines) if line.strip() == _DELIMITER]
         if len(marks) % 2:
             raise damaged(source, self.title, "truncated: a data set is not closed")
