@@ -13,21 +13,19 @@ import numpy as np
 
 from mrdamper.data import Dataset
 from mrdamper.errors import ColumnError, CombinedError, InputError
-from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data
+from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, with_stated_current
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.folder import files_in, unpacked
 from mrdamper.rig_files.long_records import check_long_record
 from mrdamper.rig_files.mapping.agreement import contradictions
 from mrdamper.rig_files.mapping.companions import (
-    contradictions_with,
+    currents_beside,
     is_list,
     joined_files,
     number_of,
     part_of,
     results_of,
     tests_by,
-    with_legend_of,
-    with_results_of,
 )
 from mrdamper.rig_files.mapping.description import is_description
 from mrdamper.rig_files.mapping.integration import is_integrated
@@ -166,10 +164,10 @@ class _Intake:
 
     def __init__(self, profile: Profile, table: TestsTable | None):
         self._profile, self._table = profile, table
-        self._order: dict[str, int] = {}
+        self._order: dict[Path, int] = {}
         self._parts: list[tuple[Path, list[Record]]] = []  # the last file and those that it continues, with their tests
         self._pending: list[tuple[Path, Record]] = []
-        self._found: list[tuple[int, Record]] = []
+        self._found: list[tuple[Path, Record]] = []
         self.refusals: list[Refusal] = []
         self.notes: list[Refusal] = []  # texts of a folder that hold no table
         self.met: list[tuple[Path, str]] = []
@@ -185,7 +183,7 @@ class _Intake:
 
     def read(self, path: Path, *, given: bool) -> None:
         """Read a file, and check the tests in it whose current is known."""
-        self._order[str(path)] = len(self._order)
+        self._order[path] = len(self._order)
         self._given |= {path} if given else set()
         run, profile = self._profile.of_file(path.name)
         if run:
@@ -246,7 +244,7 @@ class _Intake:
         where = f"{path}, {record.id}" if several else str(path)
         self.refusals += [Refusal(where, problem, record.id) for problem in problems]
         if not problems:
-            self._found.append((self._order[str(path)], checked))
+            self._found.append((path, checked))
 
     def join(self) -> None:
         """Join tests with what other files state of them, check what was waiting, and compare tests with each other."""
@@ -259,16 +257,25 @@ class _Intake:
             self._check(path, record, [], several=files.count(path) > 1)
         self._refuse_names_without_point()
         for path in [path for path in others if path not in used and self._found]:
-            results = self._results(path)
-            refused = contradictions_with(self.tests(), results, path) if results else None
-            if refused is not None:
-                self._refuse(refused)
+            stated = currents_beside(path, self._results(path), self.tests())
+            if stated:
+                self._refuse(self._contradicted_by(stated))
             elif path not in self._given and (is_list(path) or is_description(path)):
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
             else:
                 continue
             self._drop_refusals({path})
         self._refuse(contradictions([record for _, record in self.tests()]))
+
+    def _contradicted_by(self, stated: Sequence[tuple[float, str]]) -> dict[int, InputError]:
+        """Return the refusals of accepted tests whose current another file contradicts, by their place."""
+        refused: dict[int, InputError] = {}
+        for i, ((file, record), (current, whence)) in enumerate(zip(self.tests(), stated, strict=True)):
+            try:
+                with_stated_current(record, current, whence, file.name)
+            except InputError as error:
+                refused[i] = error
+        return refused
 
     def _join_channels(self, others: list[Path]) -> set[Path]:
         """Join channels of several files, and currents that other files state; the files that were used."""
@@ -287,8 +294,7 @@ class _Intake:
             used |= paths
             self._drop_refusals(paths)
             self._pending = [(path, record) for path, record in self._pending if path not in paths]
-            places = {self._order[str(path)] for path in paths}
-            self._found = [(place, record) for place, record in self._found if place not in places]
+            self._found = [(path, record) for path, record in self._found if path not in paths]
             if isinstance(records, InputError):
                 self.refusals.append(Refusal(str(group[0].path), records))
             else:
@@ -303,10 +309,10 @@ class _Intake:
         for path in [path for path in (*others, *notes) if pending and path not in used]:
             results = self._results(path)
             tests = self._numbered(results) if results else pending
-            stated = with_results_of(tests, results, path) if results else None
-            stated = stated or with_legend_of(tests, path)
+            stated = currents_beside(path, results, tests)
             if stated:
-                self._pending = [(file, record) for (file, _), record in zip(tests, stated, strict=True)]
+                both = zip(tests, stated, strict=True)
+                self._pending = [(f, with_stated_current(record, *s, f.name)) for (f, record), s in both]
                 self.notes = [note for note in self.notes if Path(note.file) != path]
                 self._drop_refusals({path})
                 return used | {path}
@@ -326,7 +332,7 @@ class _Intake:
 
     def _refuse_names_without_point(self) -> None:
         """Refuse currents of two digits in names, where another name of the set begins such a number with a zero."""
-        if not any(_PADDED.search(Path(name).name) for name in self._order):
+        if not any(_PADDED.search(path.name) for path in self._order):
             return
         error = ColumnError(
             "a current of two digits, beside names such as 05A: is the decimal point left out?",
@@ -337,15 +343,13 @@ class _Intake:
 
     def tests(self) -> list[tuple[Path, Record]]:
         """The accepted tests with their files, in the order of these."""
-        names = {number: Path(name) for name, number in self._order.items()}
-        return [(names[number], record) for number, record in sorted(self._found, key=lambda entry: entry[0])]
+        return sorted(self._found, key=lambda entry: self._order[entry[0]])
 
     def _refuse(self, errors: Mapping[int, InputError]) -> None:
         """Refuse accepted tests, each by its place among them."""
-        problems_by_place = sorted(self._found, key=lambda entry: entry[0])
-        files = self.tests()
-        self.refusals += [Refusal(str(files[i][0]), error, files[i][1].id) for i, error in errors.items()]
-        self._found = [entry for i, entry in enumerate(problems_by_place) if i not in errors]
+        tests = self.tests()
+        self.refusals += [Refusal(str(tests[i][0]), error, tests[i][1].id) for i, error in errors.items()]
+        self._found = [test for i, test in enumerate(tests) if i not in errors]
 
 
 def _unchecked(path: Path, profile: Profile) -> tuple[list[Record], list[Refusal]]:

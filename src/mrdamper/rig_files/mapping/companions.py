@@ -12,7 +12,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import InputError
-from mrdamper.rig_files.coil_current import as_data, current_of, with_stated_current, with_value_of_name
+from mrdamper.rig_files.coil_current import as_data, current_of, with_value_of_name
 from mrdamper.rig_files.column_names import role_of, split_name, words_of
 from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.conditions import amperes
@@ -104,9 +104,8 @@ def joined_files(parts: Sequence[Part], profile: Profile) -> Iterator[tuple[list
     for group in groups.values():
         group.sort(key=lambda part: "force" not in part.table.names)
         names = [part.path.name for part in group]
-        files = {"file": group[0].test.name, "files": ", ".join(names)}
-        files |= {"columns": ", ".join(part.columns for part in group)}
-        files = {key: as_data(text) for key, text in files.items()} | {"sha256": digest_of(group[0].path)}
+        columns = ", ".join(part.columns for part in group)
+        files = {"file": group[0].test.name, "files": ", ".join(names), "columns": columns}
         try:
             table = _together(group)
             records = [] if table is None else records_of(table, own, group[0].test)
@@ -115,7 +114,8 @@ def joined_files(parts: Sequence[Part], profile: Profile) -> Iterator[tuple[list
             yield group, error
             continue
         if records:
-            yield group, [replace(record, provenance={**record.provenance, **files}) for record in records]
+            remarks = {key: as_data(text) for key, text in files.items()} | {"sha256": digest_of(group[0].path)}
+            yield group, [replace(record, provenance={**record.provenance, **remarks}) for record in records]
 
 
 def _together(parts: Sequence[Part]) -> RawTable | None:
@@ -158,16 +158,34 @@ def results_of(path: Path) -> Results | None:
         return None
 
 
-def with_results_of(pending: Sequence[tuple[Path, Record]], results: Results, path: Path) -> list[Record] | None:
-    """Return the records with the currents that a table of results states; None unless it names every one of them."""
-    records = [record for _, record in pending]
-    timed = results.rows_in_time([record.time for record in records])
-    currents = {i: results.current[row] for i, (row, _) in timed.items()} or results.by_test(_called(pending))
-    if len(currents) < len(pending):
+def currents_beside(
+    path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]
+) -> list[tuple[float, str]] | None:
+    """Return the current [A] of every test and where it stands, by a table of results or a legend: I1 = 0.3 A.
+
+    None unless one of them names every test; a legend's codes stand in the names of files, between separators.
+    """
+    timed = results.rows_in_time([record.time for _, record in tests]) if results else {}
+    by_test = {i: results.current[row] for i, (row, _) in timed.items()} if results else {}
+    by_test = by_test or (results.by_test(_called(tests)) if results else {})
+    if results and len(by_test) == len(tests):
+        return [(by_test[i], f"{path.name}, {results.title}") for i in range(len(tests))]
+    lines = short_lines(path) if path.suffix.lower() in _TEXTS else []
+    matches = [match for line in lines if (match := _CODE.match(line))]
+    codes = {match[1].casefold(): amperes(match[2], match[3]) for match in matches}
+    if len(codes) < 2 or len(codes) < len(matches):
         return None
-    records = [part_of_record(record, timed[i][1]) if timed else record for i, record in enumerate(records)]
-    whence = f"{path.name}, {results.title}"
-    return [with_stated_current(r, currents[i], whence, pending[i][0].name) for i, r in enumerate(records)]
+    words = [re.split(r"[^0-9A-Za-z]+", file.stem.casefold()) for file, _ in tests]
+    stated = [[code for code in codes if code in parts] for parts in words]
+    if any(len(own) != 1 for own in stated):
+        return None
+    return [(codes[code], f"{path.name}, {code.upper()}") for (code,) in stated]
+
+
+def within_times(tests: Sequence[tuple[Path, Record]], results: Results | None) -> list[tuple[Path, Record]]:
+    """Return the tests between the starts and the ends that a table of results states, if it states them."""
+    timed = results.rows_in_time([record.time for _, record in tests]) if results else {}
+    return [(file, part_of_record(record, timed[i][1]) if timed else record) for i, (file, record) in enumerate(tests)]
 
 
 def _called(tests: Sequence[tuple[Path, Record]]) -> list[tuple[str, ...]]:
@@ -190,42 +208,6 @@ def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:
         return records_of_file(path, profile.model_copy(update={"file": form}))[0]
     except InputError:
         return []
-
-
-def with_legend_of(pending: Sequence[tuple[Path, Record]], path: Path) -> list[Record] | None:
-    """Return the records with the currents that the codes in their names stand for, by a legend: I1 = 0.3 A.
-
-    None unless the name of every file holds one of the codes, between separators.
-    """
-    lines = short_lines(path) if path.suffix.lower() in _TEXTS else []
-    matches = [match for line in lines if (match := _CODE.match(line))]
-    codes = {match[1].casefold(): amperes(match[2], match[3]) for match in matches}
-    if len(codes) < 2 or len(codes) < len(matches):
-        return None
-    words = [re.split(r"[^0-9A-Za-z]+", file.stem.casefold()) for file, _ in pending]
-    stated = [[code for code in codes if code in parts] for parts in words]
-    if any(len(own) != 1 for own in stated):
-        return None
-    return [
-        with_stated_current(record, codes[own[0]], f"{path.name}, {own[0].upper()}", file.name)
-        for (file, record), own in zip(pending, stated, strict=True)
-    ]
-
-
-def contradictions_with(
-    tests: Sequence[tuple[Path, Record]], results: Results, path: Path
-) -> dict[int, InputError] | None:
-    """Refusals of tests whose current a table of results contradicts, by number; None unless it names every test."""
-    currents = results.by_test(_called(tests))
-    if len(currents) < len(tests):
-        return None
-    refused: dict[int, InputError] = {}
-    for i, (file, record) in enumerate(tests):
-        try:
-            with_stated_current(record, currents[i], path.name, file.name)
-        except InputError as error:
-            refused[i] = error
-    return refused
 
 
 def is_list(path: Path) -> bool:

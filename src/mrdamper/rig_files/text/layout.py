@@ -70,9 +70,7 @@ class Layout:
     odd: tuple[str, ...] = ()  # a sampled cell of a column of kind "text", else empty
     remarks: tuple[str, ...] = ()  # the lines above the names of columns
     over: tuple[str, ...] = ()  # where the line above the names holds titles of groups of columns
-    writes: tuple[
-        tuple[str, str], ...
-    ] = ()  # signs used throughout and what they stand for: D for E, a typographic minus
+    writes: tuple[tuple[str, str], ...] = ()  # signs used throughout and their meaning: D for E, a typographic minus
     behind: tuple[str, ...] = ()  # where its numbers have a unit behind them: 12.3 mm
 
     @property
