@@ -34,6 +34,7 @@ _LINE = re.compile(
     r"^[\s#%/\"]*(?P<key>[^:=;\t]{1,60}?)[\s\"]*(?:[:=;\t]|(?<![0-9]),|,(?![0-9]+(?![0-9.])))[\s:=;,\t\"]*(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)"
     r"[\s;,\t\"]*[\[(]?(?P<unit>(?:1/)?[A-Za-zµ/]{0,9}(?:-1)?)[\])]?[\s;,\t\"]*$"
 )
+CELL = re.compile(r"\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*([A-Za-z°]{0,8})\s*")  # a number, and a unit behind it
 _LONGEST_LINE, _MOST_PARTS = 300, 20
 _OTHER_TIMES = r"previous|vorher|\blast\b|\bnext\b|before|after|\bnach\b|instead|statt"
 _OTHER_TIME = re.compile(_OTHER_TIMES, re.IGNORECASE)
@@ -154,6 +155,15 @@ class Quantity(NamedTuple):
     key: str
     value: float  # in SI
     unit: Unit
+
+
+def quantity_in_cell(cell: str, unit: str) -> tuple[float, Unit] | None:
+    """Return the number of a cell in SI and its unit, which stands behind it or is that of the column; else None."""
+    match = CELL.fullmatch(cell)
+    unit_of = parse_unit((match[2] if match else "") or unit)
+    if match is None or unit_of is None:
+        return None
+    return unit_of.factor * float(match[1].replace(",", ".")) + unit_of.offset, unit_of
 
 
 def stated_quantities(

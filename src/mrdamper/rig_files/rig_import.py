@@ -26,6 +26,7 @@ from mrdamper.rig_files.mapping.companions import (
     part_of,
     results_of,
     tests_by,
+    within_times,
 )
 from mrdamper.rig_files.mapping.description import is_description
 from mrdamper.rig_files.mapping.integration import is_integrated
@@ -311,7 +312,7 @@ class _Intake:
             tests = self._numbered(results) if results else pending
             stated = currents_beside(path, results, tests)
             if stated:
-                both = zip(tests, stated, strict=True)
+                both = zip(within_times(tests, results), stated, strict=True)
                 self._pending = [(f, with_stated_current(record, *s, f.name)) for (f, record), s in both]
                 self.notes = [note for note in self.notes if Path(note.file) != path]
                 self._drop_refusals({path})

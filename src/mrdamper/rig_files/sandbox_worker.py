@@ -44,15 +44,10 @@ def serve() -> None:
                     continue
                 send(replies, {"missing": error.found, "remedy": error.remedy})
             except (RigFileError, CombinedError) as error:
-                send(
-                    replies,
-                    {
-                        "wrong": [
-                            {name: getattr(one, name) for name in _TOLD} | {"no_table": isinstance(one, NoTableError)}
-                            for one in getattr(error, "errors", (error,))
-                        ]
-                    },
-                )
+                errors = getattr(error, "errors", (error,))
+                wrong = [{name: getattr(one, name) for name in _TOLD} for one in errors]
+                kinds = [{"no_table": isinstance(one, NoTableError)} for one in errors]
+                send(replies, {"wrong": [one | kind for one, kind in zip(wrong, kinds, strict=True)]})
             except MemoryError:
                 os._exit(3)
 

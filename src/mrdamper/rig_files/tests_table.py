@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
@@ -14,10 +13,9 @@ from mrdamper.data.strict_text import open_regular
 from mrdamper.errors import CombinedError, InputError
 from mrdamper.rig_files.coil_current import with_stated_current
 from mrdamper.rig_files.column_names import split_name
-from mrdamper.rig_files.conditions import LARGEST_STATED
+from mrdamper.rig_files.conditions import CELL, LARGEST_STATED, quantity_in_cell
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.text.short import decoded
-from mrdamper.rig_files.units import parse_unit
 
 NAME = "tests.csv"
 COLUMNS = ("file", "run", "current_A", "temperature_C", "split", "session", "specimen", "notes")
@@ -26,7 +24,6 @@ _MOST_ROWS = 10_000  # tests of one import
 _FILE = frozenset(("file", "filename", "file name", "datei", "dateiname", "fichier", "archivo"))
 _RUN = frozenset(("run", "run_id", "test", "versuch", "essai"))
 _Wrong = Callable[[int, str, str], None]
-_NUMBER = re.compile(r"\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*([A-Za-z°]{0,8})\s*")
 
 
 class TestsTableError(InputError):
@@ -239,16 +236,14 @@ def _row(line: int, cells: list[str], names: list[str], keys: list[str], wrong: 
 
 
 def _quantity(line: int, key: str, name: str, cell: str, wrong: _Wrong) -> float | None:
-    match = _NUMBER.fullmatch(cell)
-    unit_of = parse_unit((match[2] if match else "") or split_name(name).unit)
-    if match is None:
+    value, unit = quantity_in_cell(cell, split_name(name).unit) or (0.0, None)
+    if CELL.fullmatch(cell) is None:
         wrong(line, f"{name} is {cell!r}", "write a number")
-    elif unit_of is None or unit_of.dimension != key:
+    elif unit is None or unit.dimension != key:
         example = "current_A or current_mA" if key == "current" else "temperature_C"
         wrong(line, f"{name} {cell} has no unit of {key}", f"name the column {example}")
+    elif key != "current" or abs(value) <= LARGEST_STATED:
+        return value
     else:
-        value = unit_of.factor * float(match[1].replace(",", ".")) + unit_of.offset
-        if key != "current" or abs(value) <= LARGEST_STATED:
-            return value
         wrong(line, f"{name} is {value:g} A", "no damper's coil takes that: mA?")
     return None

@@ -10,9 +10,10 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.rig_files.column_names import names_condition, split_name, words_of
+from mrdamper.rig_files.conditions import quantity_in_cell
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of
-from mrdamper.rig_files.units import is_unit, parse_unit
+from mrdamper.rig_files.units import is_unit
 
 _SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
 _NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
@@ -214,12 +215,8 @@ def _is_units_row(cells: Sequence[str], width: int) -> bool:
 
 
 def _amperes(cell: str, unit: str) -> float | None:
-    match = _QUANTITY.fullmatch(cell)
-    number, unit_of = (match[1], parse_unit(match[2])) if match else (cell, parse_unit(unit))
-    if not _NUMBER.fullmatch(number) or unit_of is None or unit_of.dimension != "current":
-        return None
-    value = unit_of.factor * float(number.replace(",", "."))
-    return value if np.isfinite(value) and abs(value) <= 100 else None
+    value, unit_of = quantity_in_cell(cell, unit) or (0.0, None)
+    return value if unit_of is not None and unit_of.dimension == "current" and abs(value) <= 100 else None
 
 
 def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:
