@@ -158,7 +158,8 @@ def _counts(cells: Iterable[str]) -> bool:
 
 def _with_name_of_numbers(above: Sequence[str], separator: str, width: int) -> list[str]:
     """Lines above the rows, an empty name before the names if these are one too few: R names no row numbers."""
-    named = [i for i in _plain(above) if len(_roles(cells_of(above[i], separator))) >= _TELLING]
+    plain = [i for i, line in enumerate(above) if line.strip() and not is_comment(line)]
+    named = [i for i in plain if len(_roles(cells_of(above[i], separator))) >= _TELLING]
     if len(named) != 1 or len(cells_of(above[named[0]], separator)) != width - 1:
         return list(above)
     return [f'""{separator}{line}' if i == named[0] else line for i, line in enumerate(above)]
