@@ -140,8 +140,8 @@ def _require_fit(name: str, value: object, kind: object) -> None:
 
 
 def _fits(value: Any, kind: Any) -> bool:
-    origin, inner = get_origin(kind), get_args(kind)
-    if _is_array(kind):
+    origin, inner, of_numbers = _parts(kind)
+    if of_numbers:
         return is_series(value)
     if origin in (Union, UnionType):
         return any(_fits(value, one) for one in inner)
@@ -169,9 +169,11 @@ def _fits(value: Any, kind: Any) -> bool:
 
 
 @cache
-def _is_array(kind: Any) -> bool:
-    """Tell if an annotation is one of NumPy's: ArrayLike, NDArray. Its text is long, and asked for once."""
-    return "numpy._typing" in str(kind) or getattr(get_origin(kind), "__module__", "") == "numpy"
+def _parts(kind: Any) -> tuple[Any, tuple[Any, ...], bool]:
+    """Origin and arguments of an annotation, and if it is one of NumPy's: ArrayLike, NDArray; asked for once."""
+    origin = get_origin(kind)
+    of_numbers = "numpy._typing" in str(kind) or getattr(origin, "__module__", "") == "numpy"
+    return origin, get_args(kind), of_numbers
 
 
 def is_series(value: object) -> bool:

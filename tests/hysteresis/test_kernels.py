@@ -16,6 +16,7 @@ from mrdamper.models.spencer import Spencer
 from mrdamper.physics.hysteresis import Shape, follow
 from mrdamper.physics.hysteresis.batch import batch_cost, follow_alike, follow_quickly, follow_with_slope
 from mrdamper.physics.motion import Path, sine
+from mrdamper.statistics import linear
 from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.statistics.linear import FixedColumns
 from mrdamper.statistics.scalar_least_squares import least_squares_in_one
@@ -104,6 +105,21 @@ def test_fixed_columns_say_when_they_explain_each_other():
     assert fixed.independent
     np.testing.assert_allclose(fixed.inverse @ fixed.along, [3.0, 2.0])
     assert fixed.rest_squared < 1e-20
+
+
+def test_a_long_table_is_factored_block_by_block_as_at_once(monkeypatch):
+    rng = np.random.default_rng(4)
+    table = rng.standard_normal((1001, 4)) * [1.0, 1e6, 1e-4, 10.0]
+    table[:, 3] = 10 * table[:, 0] + 1e-3 * table[:, 3]
+    right = rng.standard_normal(1001)
+    whole = FixedColumns.of(table, right)
+    monkeypatch.setattr(linear, "_ROWS_PER_BLOCK", 100)
+    blocks = FixedColumns.of(table, right)
+    np.testing.assert_allclose(blocks.basis.T @ blocks.basis, np.eye(4), atol=1e-14)
+    np.testing.assert_allclose(blocks.basis @ blocks.triangle, table / blocks.scale, atol=1e-14)
+    np.testing.assert_allclose(blocks.rest, whole.rest, atol=1e-12)
+    np.testing.assert_allclose(blocks.inverse @ blocks.along, whole.inverse @ whole.along, rtol=1e-10)
+    assert not FixedColumns.of(table[:, [0, 1, 1]], right).independent
 
 
 def test_a_bound_sends_the_search_the_general_way():

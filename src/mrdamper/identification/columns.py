@@ -37,11 +37,11 @@ def linear_table(
     """
     base = bare.force(motion, state) if base is None else base
     units = [1.0 if info.bounds[0] <= 1.0 <= info.bounds[1] else info.bounds[1] for info in linear]
-    columns = [
-        (replace(bare, **{info.name: unit}).force(motion, state) - base) / unit
-        for info, unit in zip(linear, units, strict=True)
-    ]
-    return base, np.array(columns).reshape(len(columns), base.size).T
+    columns = np.empty((len(units), base.size))
+    for column, info, unit in zip(columns, linear, units, strict=True):
+        np.subtract(replace(bare, **{info.name: unit}).force(motion, state), base, out=column)
+        column /= unit
+    return base, columns.T
 
 
 def bounds_of(linear: Sequence[ParameterInfo]) -> tuple[Floats, Floats]:

@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import ParameterInfo
@@ -32,25 +33,30 @@ class Elimination:
     """A problem whose state fills one column: what stays the same however the search moves."""
 
     problem: Problem
-    columns: Floats  # (N, L) columns that stay, at the scored samples
-    right: Floats  # (N,) measured force less the force without linear parameters [N]
     kind: LinearStructure
 
     @classmethod
     def of(cls, problem: Problem, axes: Sequence[SearchAxis]) -> Self | None:
-        """Evaluate the columns that stay; None where the model or the search is of another kind."""
+        """Return None where the model or the search is of another kind."""
         if any(axis.name == DELAY for axis in axes):
             return None
         kind = linear_structure(problem.model_type, problem.free, tuple(sorted(problem.fixed.items())))
         if kind is None or kind.coordinates != tuple(axis.name for axis in axes):
             return None
-        base, columns = linear_table(kind.bare, kind.others, problem.seen, np.zeros(len(problem.seen)))
-        return cls(problem, columns, problem.force - base, kind)
+        return cls(problem, kind)
+
+    def fixed_columns(self, rows: slice | NDArray[np.intp] = slice(None)) -> FixedColumns:
+        """Columns that stay, and measured force less the force without linear parameters [N], at scored samples."""
+        motion = self.problem.seen.part(rows)
+        base, columns = linear_table(self.kind.bare, self.kind.others, motion, np.zeros(len(motion)))
+        right = self.problem.force[rows] - base
+        del base  # of a long record worth its memory
+        return FixedColumns.of(columns, right)
 
     @cached_property
     def projector(self) -> FixedColumnSolver | None:
         """The columns factored; None where they depend on each other."""
-        fixed = FixedColumns.of(self.columns, self.right)
+        fixed = self.fixed_columns()
         if not fixed.independent:
             return None
         return FixedColumnSolver(fixed, *bounds_of(self.kind.others), self.kind.state.bounds)
@@ -182,7 +188,8 @@ class FixedColumnSolver:
             return None
         size, beside, _ = fit
         basis, rest = self.fixed.basis, self.fixed.rest
-        moved = change - basis @ (change @ basis)
+        moved = basis @ (change @ basis)
+        np.subtract(change, moved, out=moved)
         growth = (float(moved @ rest) - 2 * size * float(moved @ beside)) / float(beside @ beside)
         return size * beside - rest, size * moved + growth * beside
 
@@ -194,7 +201,8 @@ class FixedColumnSolver:
     def _fit(self, state: Floats) -> tuple[float, Floats, Floats] | None:
         fixed = self.fixed
         along = state @ fixed.basis
-        beside = state - fixed.basis @ along
+        beside = fixed.basis @ along
+        np.subtract(state, beside, out=beside)
         square = float(beside @ beside)
         if not square > _MIN_UNEXPLAINED_SHARE * float(state @ state):
             return None

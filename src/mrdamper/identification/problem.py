@@ -109,7 +109,7 @@ class Problem:
     @cached_property
     def force(self) -> Floats:
         """Measured force in the steady window [N]."""
-        return self.run.force[self.run.in_window]
+        return self.run.steady().force
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]  # as in `data`, which this room does without
 _WELL_APART = 1e-4  # smallest pivot of equilibrated columns at which the normal equations keep their digits
 _MIN_RELATIVE_PIVOT = 1e-5  # pivot over the largest below which a column is explained by the others
 
+_ROWS_PER_BLOCK = 50_000  # rows of a table that are factored at a time
+
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -137,9 +139,9 @@ class FixedColumns:
     @classmethod
     def of(cls, columns: Floats, right: Floats) -> Self:
         """Factor (N, L) columns beside an (N,) right side."""
-        scale = np.sqrt(np.mean(columns**2, axis=0))
+        scale = np.sqrt(np.einsum("ij,ij->j", columns, columns) / len(columns))
         scale[scale == 0] = 1.0
-        basis, triangle = np.linalg.qr(columns / scale)
+        basis, triangle = _factored(columns, scale)
         along = basis.T @ right
         return cls(basis, triangle, scale, along, right - basis @ along)
 
@@ -158,6 +160,30 @@ class FixedColumns:
     def inverse(self) -> Floats:
         """(L, L) matrix that takes what lies along the basis to coefficients of the columns."""
         return np.linalg.inv(self.triangle) / self.scale[:, None]
+
+
+def _factored(columns: Floats, scale: Floats) -> tuple[Floats, Floats]:
+    """Orthonormal basis and triangle of (N, L) columns over their scale; of many rows block by block, twice.
+
+    A long table is factored without the four copies of it that one factorisation makes.
+    """
+    size, count = columns.shape
+    if size <= _ROWS_PER_BLOCK:
+        return np.linalg.qr(columns / scale)
+    basis, triangle = np.empty((count, size)).T, np.eye(count)
+    blocks = [slice(begin, begin + _ROWS_PER_BLOCK) for begin in range(0, size, _ROWS_PER_BLOCK)]
+    source, over = columns, np.diag(1 / scale)
+    for _ in range(2):  # the second time for the rounding that the first leaves between the columns of a basis
+        part = np.empty((0, count))
+        for rows in blocks:
+            part = np.linalg.qr(np.vstack([part, source[rows] @ over]), mode="r")
+        if not np.all(np.diag(part)):
+            return np.linalg.qr(columns / scale)
+        over = over @ np.linalg.inv(part)
+        for rows in blocks:
+            basis[rows] = source[rows] @ over
+        triangle, source, over = part @ triangle, basis, np.eye(count)
+    return basis, triangle
 
 
 def nonnegative_least_squares(table: Floats, right: Floats) -> tuple[Floats, float]:

@@ -26,7 +26,7 @@ from mrdamper.physics.hysteresis import Shape
 from mrdamper.physics.hysteresis.batch import batch_cost
 from mrdamper.physics.motion import Path
 from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares
-from mrdamper.statistics.linear import FixedColumns, on_one_blas_thread, solve_bounded
+from mrdamper.statistics.linear import on_one_blas_thread, solve_bounded
 from mrdamper.statistics.scalar_least_squares import least_squares_in_one
 from mrdamper.statistics.stop_reason import StopReason
 
@@ -160,7 +160,7 @@ def _best_of_grid(
 def _batched_costs(elimination: Elimination, points: list[dict[str, float]]) -> Floats:
     """Costs of the grid on a few cycles, all shapes of one n at once."""
     path, rows = _few_cycles(elimination.problem)
-    fixed = FixedColumns.of(elimination.columns[rows], elimination.right[rows])
+    fixed = elimination.fixed_columns(rows)
     shapes = np.array([elimination.kind.shape(point) for point in points], dtype=float)
     costs = np.empty(len(points))
     for n in set(shapes[:, 2].tolist()):

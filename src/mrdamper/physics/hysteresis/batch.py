@@ -20,6 +20,7 @@ from mrdamper.physics.hysteresis.shape import Shape
 from mrdamper.physics.motion.path import Path
 from mrdamper.statistics.linear import FixedColumns
 
+_BLOCK = 20_000  # samples whose states are computed at a time
 _MAX_STATES = 2**17  # states held at a time
 
 
@@ -97,15 +98,20 @@ def follow_with_slope(kappa: float, rho: float, n: float, path: Path, part: slic
             w = -end
         starts.append(w)
         shifts.append(slope / _rate(w, rho, n) if slope else 0.0)
-    stroke, phi = path.stroke[part], kappa * path.distance[part]
-    states = state_at(curve, rho, np.array(starts), stroke, phi)
-    size = np.abs(states)
-    rate = 1.0 - (size if n == 1 else size * size if n == 2 else size**n)
-    if rho != 1.0:
-        before = np.flatnonzero(states < 0)
-        rate[before] = (1.0 - rho) + rho * rate[before]
-    direction = path.direction[part]
-    return direction * states, direction * (rate * (phi + np.array(shifts)[stroke]))
+    strokes, distances, directions = path.stroke[part], path.distance[part], path.direction[part]
+    first, later = np.array(starts), np.array(shifts)
+    states, slopes = np.empty((2, distances.size))
+    for begin in range(0, distances.size, _BLOCK):  # of which all arrays stay in the processor's cache
+        rows = slice(begin, begin + _BLOCK)
+        stroke, phi, direction = strokes[rows], kappa * distances[rows], directions[rows]
+        state = state_at(curve, rho, first, stroke, phi)
+        size = np.abs(state)
+        rate = 1.0 - (size if n == 1 else size * size if n == 2 else size**n)
+        if rho != 1.0:
+            before = np.flatnonzero(state < 0)
+            rate[before] = (1.0 - rho) + rho * rate[before]
+        states[rows], slopes[rows] = direction * state, direction * (rate * (phi + later[stroke]))
+    return states, slopes
 
 
 def _rate(w: float, rho: float, n: float) -> float:

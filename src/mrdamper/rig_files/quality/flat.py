@@ -65,6 +65,8 @@ def flat_tops(view: View, name: str) -> dict[float, np.ndarray]:
     """Flat tops of a channel by their level: at least five equal samples at an end of its range."""
     channel = _channels(view)[name]
     tops = {}
+    if not len(channel.equal):
+        return tops
     for level in (channel.high, channel.low):
         at = channel.equal[(channel.values[channel.equal[:, 0]] == level) & ~channel.leaps(channel.equal)]
         if len(at) and channel.piled_up(level):
@@ -79,6 +81,8 @@ def flat_tops(view: View, name: str) -> dict[float, np.ndarray]:
 def frozen_stretches(view: View, name: str) -> np.ndarray:
     """Find stretches in which a channel repeats one sample inside its range while the other channel moves."""
     channel, other, time = _channels(view)[name], view.channels[_OTHER[name]], view.record.time
+    if not len(channel.equal):
+        return channel.equal
     at_end = np.isin(channel.values[channel.equal[:, 0]], (channel.low, channel.high))
     stretches = channel.equal[~at_end | channel.leaps(channel.equal)]
     bounds = stretches.reshape(-1)
@@ -132,6 +136,8 @@ class _Channel:
 
     def odd(self, stretches: np.ndarray, sure: np.ndarray | bool = False) -> np.ndarray:
         """(K,) mask of the stretches that are sure, or that neither motion nor noise makes."""
+        if not len(stretches):
+            return np.zeros(0, dtype=bool)
         fine = self.level < _COARSE * self.span
         frozen_ones = sure | (self._kink(stretches) if self.smooth or fine else np.zeros(len(stretches), dtype=bool))
         if fine or not self.smooth:
