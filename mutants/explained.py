@@ -45,6 +45,10 @@ EXPLAINED = (
         _ORDER,
     ),
     Explained("paper.options", "for name, (low, high) in", "items 0 and 1", _ORDER),
+    Explained(
+        "systems.inverse", "if not 0 < width.max()", "0 → 1", "the force of a damper changes by far more than 1 N"
+    ),
+    Explained("systems.inverse", "sample = (x, v, -(omega**2) * x)", "USub", "inertia is the same at every current"),
     Explained("systems.inverse", "status, outputs, memory = 1", "1 → 2", "any status but 0 is a refusal"),
     Explained("study.recipe", "in ([],", "items", _ORDER),
     Explained("paper.assumptions", "[-longest, longest]", "", "the gas is compressed at one end alone"),

@@ -63,7 +63,7 @@ ROOMS = (
     _room(
         "systems.controllers.hooks systems.controllers.add systems.controllers.clipped_optimal systems.inverse",
         "systems/test_laws_by_hand.py systems/test_control.py",
-        "preview skyhook never_in_reach",
+        "preview lets_energy_into never_in_reach",
     ),
     _room("systems.measures", "systems/test_measures.py"),
     _room("systems.monte_carlo", "systems/test_uncertainty.py"),

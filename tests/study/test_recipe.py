@@ -9,6 +9,7 @@ import pytest
 from support.dampers import joint_damper
 from support.synthetic import synthetic_run
 
+from mrdamper.dampers.calibration import PredictedRun
 from mrdamper.dampers.distance import AT_TESTS
 from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition, Run
@@ -206,6 +207,7 @@ def test_a_stretch_has_a_dozen_cycles_and_a_lead_in_of_one_and_a_half(seconds, c
         slow = Condition(1.0, 0.5, 0.01)
         patch.setattr(cross_validation, "equivalent_sine", lambda run: SimpleNamespace(condition=slow, is_sine=False))
         assert len(stretches(run)) == max(1, count // 2)
+        assert all(p.window[0] - p.time[0] == pytest.approx(3.0) for p in stretches(run)[1:])
         assert len(stretches(replace(run, window=(10.0, seconds - 0.01)))) == max(1, int((seconds - 10) / 24))
         # A sine whose current changes is cut too, a sine at one current stays whole.
         patch.setattr(
@@ -360,6 +362,16 @@ def test_stretches_are_scored_as_the_record_they_were_cut_from():
     (alone,) = cross_validation._whole_again(Validation("x", scores[:1]), pieces).runs
     assert (alone.run_id, astuple(alone.scores)) == ("long", pytest.approx(astuple(scores[0].scores)))
     assert cross_validation._joined("long 1", [scores[0]]) is scores[0]
+    forces = [np.arange(8.0), 10 + np.arange(6.0)]
+    predictions = [PredictedRun(f"long {n}", "day", f, -f, f[:1], f[1:2]) for n, f in enumerate(forces)]
+    assert joined.predicted is None
+    (beside,) = cross_validation._whole_again(
+        Validation("x", tuple(replace(s, predicted=p) for s, p in zip(scores[:2], predictions, strict=True))), pieces
+    ).runs
+    assert (beside.predicted.run_id, beside.predicted.session) == ("long", "day")
+    assert beside.predicted.predicted.tolist() == [0, 2, 4, 6, 10, 12, 14]  # every second of each of two
+    assert beside.predicted.measured.tolist() == [0, -2, -4, -6, -10, -12, -14]
+    assert (beside.predicted.peak.tolist(), beside.predicted.energy.tolist()) == ([0, 10], [1, 11])
 
 
 def test_a_recipe_says_its_model_and_an_unknown_fault_is_not_hidden():
