@@ -70,8 +70,8 @@ COMPUTED = frozenset(
      "simuliert", "calculé", "calculée", "pp", "ptp")
 )  # fmt: skip
 _SET = frozenset(
-    ("set", "setpoint", "command", "cmd", "commanded", "soll", "sollwert", "target", "demand", "desired", "nominal",
-     "consigne", "consigna", "reference", "ref", "mean", "average", "avg", "mittel", "mittelwert")
+    ("set", "setpoint", "point", "command", "cmd", "commanded", "soll", "sollwert", "target", "demand", "desired",
+     "nominal", "consigne", "consigna", "reference", "ref", "mean", "average", "avg", "mittel", "mittelwert")
 )  # fmt: skip
 _NOT_MEASURED = frozenset(
     ("command", "cmd", "commanded", "setpoint", "set", "target", "soll", "reference", "ref", "demand", "desired",

@@ -13,7 +13,7 @@ from mrdamper.rig_files.column_names import COMPUTED, holds
 from mrdamper.rig_files.columns import assign, partly_assigned
 from mrdamper.rig_files.mapping.clocks import with_time_stated
 from mrdamper.rig_files.mapping.completion import completed
-from mrdamper.rig_files.mapping.description import with_description, with_notes
+from mrdamper.rig_files.mapping.description import with_description, with_notes, with_notes_of_sheets
 from mrdamper.rig_files.mapping.integration import with_integrated_velocity
 from mrdamper.rig_files.mapping.long_table import with_channels_as_columns
 from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_unit_of_time
@@ -41,7 +41,7 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
     with raw_tables(path, profile.file) as every:
         if len(every) == 1:
             every = [with_description(every[0], path)]
-        every = [with_notes(table, path) for table in every]
+        every = [with_notes(table, path) for table in with_notes_of_sheets(every)]
         tables, problems = tables_of_tests(test_tables(every, profile), profile)
         tables, computed = _without_computed(tables)
         records: list[Record] = []

@@ -19,6 +19,7 @@ from mrdamper.rig_files.folder import files_in, unpacked
 from mrdamper.rig_files.long_records import check_long_record
 from mrdamper.rig_files.mapping.agreement import contradictions
 from mrdamper.rig_files.mapping.companions import (
+    TEXTS,
     currents_beside,
     is_list,
     joined_files,
@@ -36,7 +37,7 @@ from mrdamper.rig_files.readers.base import NoTableError, RigFileError
 from mrdamper.rig_files.record import Record, Refusal
 from mrdamper.rig_files.sequences import follows, goes_on, tests_of_files
 from mrdamper.rig_files.tests_table import NAME as TESTS
-from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests
+from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, names_tests
 
 _PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")
 _TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
@@ -137,17 +138,23 @@ def import_files(
     profile = profile_of(profile)
     with unpacked(paths) as given:
         beside = [path / TESTS for path in given if (path / TESTS).is_file()]
+        lists = [path for path in beside if not names_tests(path)]  # a laboratory's own, under the same name
+        beside = [path for path in beside if path not in lists]
         if tests is None and beside:
             tests = beside[0]
         table = tests if tests is None or isinstance(tests, TestsTable) else load_tests(tests)
         files, left_out = files_in(given)
+        texts = [*lists, *(path for path in left_out if path.suffix.lower() in TEXTS)]
+        texts = [path for path in texts if not profile.leaves_out(path.name)]
+        left_out += lists
         left_out += [path for path in files if profile.leaves_out(path.name)]
         files = [path for path in files if not profile.leaves_out(path.name)]
         intake = _Intake(profile, table)
         for number, path in enumerate(files):
             progress(path.name, number / len(files))
             intake.read(path, given=path in given)
-        intake.join()
+        used = intake.join(texts)
+        left_out = [path for path in left_out if path not in used]
         if table is not None:
             table.require_found(intake.met)
         _require_matches(profile, [*intake.met, *((path, "") for path in files)])
@@ -247,26 +254,27 @@ class _Intake:
         if not problems:
             self._found.append((path, checked))
 
-    def join(self) -> None:
-        """Join tests with what other files state of them, check what was waiting, and compare tests with each other."""
+    def join(self, texts: Sequence[Path]) -> set[Path]:
+        """Join tests with what other files and texts state, check and compare them; return the files that were used."""
         self._take_parts()
         others = [Path(refusal.file) for refusal in self.refusals if refusal.error.code in _MAY_BE_PARTS]
         others = [path for path in dict.fromkeys(others) if path.is_file()]
-        used = self._join_channels(others)
+        used = self._join_channels(others, texts)
         files = [path for path, _ in self._pending]
         for path, record in self._pending:
             self._check(path, record, [], several=files.count(path) > 1)
         self._refuse_names_without_point()
-        for path in [path for path in others if path not in used and self._found]:
+        for path in [path for path in (*others, *texts) if path not in used and self._found]:
             stated = currents_beside(path, self._results(path), self.tests())
             if stated:
                 self._refuse(self._contradicted_by(stated))
-            elif path not in self._given and (is_list(path) or is_description(path)):
+            elif path in others and path not in self._given and (is_list(path) or is_description(path)):
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
             else:
                 continue
             self._drop_refusals({path})
         self._refuse(contradictions([record for _, record in self.tests()]))
+        return used
 
     def _contradicted_by(self, stated: Sequence[tuple[float, str]]) -> dict[int, InputError]:
         """Return the refusals of accepted tests whose current another file contradicts, by their place."""
@@ -278,7 +286,7 @@ class _Intake:
                 refused[i] = error
         return refused
 
-    def _join_channels(self, others: list[Path]) -> set[Path]:
+    def _join_channels(self, others: list[Path], texts: Sequence[Path]) -> set[Path]:
         """Join channels of several files, and currents that other files state; the files that were used."""
         parts = [part_of(path, self._profile.of_file(path.name)[1]) for path in others]
         parts += [part_of(path, own, run) for path, (run, own) in self._shares.items()]
@@ -307,7 +315,7 @@ class _Intake:
             self.refusals.append(Refusal(str(path), error))
         pending = self._pending
         notes = [Path(note.file) for note in self.notes]
-        for path in [path for path in (*others, *notes) if pending and path not in used]:
+        for path in [path for path in (*others, *notes, *texts) if pending and path not in used]:
             results = self._results(path)
             tests = self._numbered(results) if results else pending
             stated = currents_beside(path, results, tests)

@@ -12,7 +12,7 @@ from mrdamper.data import held_current
 from mrdamper.data.strict_text import open_regular
 from mrdamper.errors import CombinedError, InputError
 from mrdamper.rig_files.coil_current import with_stated_current
-from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.conditions import CELL, LARGEST_STATED, quantity_in_cell
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.text.short import decoded
@@ -101,6 +101,15 @@ def _is_file(name: str, path: Path) -> bool:
     parts = PurePath(name.replace("\\", "/").casefold()).parts  # as file systems of Windows tell them apart
     normalised = PurePath(str(path).casefold())
     return normalised.parts[-len(parts) :] == parts or (len(parts) == 1 and normalised.stem == parts[0])
+
+
+def names_tests(path: Path) -> bool:
+    """Tell if a table has a column of files or of runs, or cannot be read; a laboratory's own list may have neither."""
+    try:
+        keys = {_key(name.strip()) for name in _cells(path)[0][1]}
+    except TestsTableError:
+        return True
+    return len(keys) < 2 or bool(keys & {"file", "run"}) or not any(names_condition(key, "current") for key in keys)
 
 
 def load_tests(path: str | Path) -> TestsTable:

@@ -30,7 +30,7 @@ from mrdamper.rig_files.text.short import short_lines
 from mrdamper.rig_files.text.spool import rescale
 
 _FEWEST_ROWS = 50  # of a record
-_TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log")
+TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")  # short ones
 _CODE = re.compile(r"\s*([A-Za-z]{1,6}[0-9]{1,3})\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")
 _SI = {"time": "s", "displacement": "m", "force": "N", "velocity": "m/s", "acceleration": "m/s2", "current": "A",
        "voltage": "V", "temperature": "°C", "pressure": "Pa"}  # fmt: skip
@@ -148,7 +148,7 @@ def _arrays(table: RawTable) -> list[Floats]:
 
 def results_of(path: Path) -> Results | None:
     """Return the table of results that a file holds; None if it holds none."""
-    if path.suffix.lower() in _TEXTS:
+    if path.suffix.lower() in TEXTS:
         return results_in(short_lines(path))
     try:
         with raw_tables(path) as tables:
@@ -170,7 +170,7 @@ def currents_beside(
     by_test = by_test or (results.by_test(_called(tests)) if results else {})
     if results and len(by_test) == len(tests):
         return [(by_test[i], f"{path.name}, {results.title}") for i in range(len(tests))]
-    lines = short_lines(path) if path.suffix.lower() in _TEXTS else []
+    lines = short_lines(path) if path.suffix.lower() in TEXTS else []
     matches = [match for line in lines if (match := _CODE.match(line))]
     codes = {match[1].casefold(): amperes(match[2], match[3]) for match in matches}
     if len(codes) < 2 or len(codes) < len(matches):

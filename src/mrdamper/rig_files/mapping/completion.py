@@ -50,13 +50,14 @@ _LABELS = frozenset(("label", "name", "channel", "channel name", "signal", "trac
 _LABVIEW = ("Delta_X", "X_Dimension")
 _MONITOR = frozenset(("mon", "monitor", "imon", "iout", "i", "current", "curr", "strom", "amp", "amplifier", "shunt"))
 _LONGEST_CONDITIONS = 4000
+_COLON = re.compile(r"^([^:]+):\s+([^\s:]{1,12})$")  # force: N
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
 _INDEXED = re.compile(
     r"^\s*(?P<what>desc|name|label|units?|scale)[A-Za-z]*[._ ]*(?:chan(?:nel)?|ch)[._ ]*(?P<number>[0-9]{1,3})"
     r"\s*[=:]\s*(?P<value>.+?)\s*$",
     re.IGNORECASE,
 )
-_NUMBERED = re.compile(r"(?i)(?:ch(?:annel)?|kanal|canal|voie|canale)?[ ._]?([0-9]{1,3})")
+NUMBERED = re.compile(r"(?i)(?:(?:ch(?:annel)?|kanal|canal|voie|canale)?[ ._]?|[a-z]\w*\[)([0-9]{1,3})\]?")
 _CHANNEL_IS = re.compile(
     r"(?i)(?<!\w)(?:ch(?:annel)?|kanal|canal|voie|canale)[ ._]?(?P<number>[0-9]{1,3})\s*[:=]\s*(?P<what>[^;|\t]{2,60})"
 )
@@ -239,7 +240,7 @@ def _with_listed_names(table: RawTable) -> RawTable:
 
 def _with_numbered_channels(table: RawTable) -> RawTable:
     """Names of columns that are called by their numbers, where a line says what each channel is: channel 2: LVDT."""
-    numbers = [match[1] if (match := _NUMBERED.fullmatch(name.strip())) else "" for name in table.names]
+    numbers = [match[1] if (match := NUMBERED.fullmatch(name.strip())) else "" for name in table.names]
     says: dict[str, set[str]] = {}
     for line in table.remarks if any(numbers) else ():
         for match in _CHANNEL_IS.finditer(line[:_LONGEST_LINE]):
@@ -306,6 +307,7 @@ def _with_listed_units(table: RawTable) -> RawTable:
     written: dict[int, set[str]] = {}
     for line in table.remarks:  # Weg in mm, Kraft in N
         for cell in re.split(r"[,;|\t]\s*", line[:_LONGEST_LINE].lstrip("#%/ ")):
+            cell = _COLON.sub(r"\1 [\2]", cell)
             header, i = split_name(cell), wanted.get(split_name(cell).name.strip().casefold())
             if i is not None and header.dimension and header.dimension == DIMENSION.get(header.role or ""):
                 written.setdefault(i, set()).add(header.unit)

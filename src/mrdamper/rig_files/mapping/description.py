@@ -9,37 +9,71 @@ from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
 
+from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_by_lines
-from mrdamper.rig_files.mapping.completion import scaled_columns, states_scale
+from mrdamper.rig_files.mapping.completion import NUMBERED, scaled_columns, states_scale
 from mrdamper.rig_files.readers.base import RawTable
+from mrdamper.rig_files.record import REQUIRED
 from mrdamper.rig_files.text.short import short_lines
-from mrdamper.rig_files.units import is_unit
+from mrdamper.rig_files.units import is_unit, parse_unit
 
 _LARGEST = 2**16  # bytes
 _PLACES = ("column", "number", "index", "no", "position", "channel")
 _MOST = 200  # elements
 _FEWEST_ROWS = 50  # of a record
+_STRUCTURES = (".json", ".yaml", ".yml")
+_READ = ("", ".txt", ".md", ".rst", ".csv", ".tsv", *_STRUCTURES)
+_LARGEST_LIST = 4096  # bytes of a list of channels
 _TEXTS = (".csv", ".txt", ".tsv", ".ini", ".cfg", ".par", ".set")
 _README = re.compile(
     r"(?i)(?:read[_ ]?me|lies_?mich|lisez[-_ ]?moi|l[eé]eme|leggimi|leia[-_ ]?me|notes?|info|说明|説明|설명)\b.*"
 )
 
 
+def with_notes_of_sheets(tables: list[RawTable]) -> list[RawTable]:
+    """Tables of a file, its only record with the quantities that lists of keys, values and units beside it state."""
+    records = [table for table in tables if {"displacement", "force"} <= {header.channel for header in table.headers}]
+    lists = [table for table in tables if not any(header.role or header.unit for header in table.headers)]
+    lines = [line for table in lists for line in table.remarks if stated_by_lines([line], table.decimal)]
+    if len(records) != 1 or not lines:
+        return tables
+    whole = replace(records[0], remarks=(*records[0].remarks, *lines))
+    return [whole if table is records[0] else table for table in tables]
+
+
 def with_notes(table: RawTable, path: Path) -> RawTable:
-    """Add the scales that a text beside the file states for readers, where the table has columns that need one."""
-    if not scaled_columns(table):
+    """Add the names, units and scales that short texts beside the file state, where the table lacks them."""
+    if not scaled_columns(table) and not _lacks_names_or_units(table):
         return table
-    texts = sorted(p for p in path.parent.iterdir() if _README.fullmatch(p.name) and p.is_file() and p != path)
-    texts = [text for text in texts if text.suffix.lower() in ("", ".txt", ".md", ".rst")]
-    lines = [line for text in texts for line in short_lines(text) if states_scale(line)]
-    return replace(table, remarks=(*table.remarks, *lines))
+    readme = [p for p in path.parent.iterdir() if _README.fullmatch(p.name) or p.suffix.lower() in _STRUCTURES]
+    listing = [p for p in path.parent.iterdir() if p.suffix.lower() in _TEXTS and p.stat().st_size <= _LARGEST_LIST]
+    texts = sorted(p for p in {*readme, *listing} if p.is_file() and p != path and p.suffix.lower() in _READ)
+    lines = [line for text in texts if len(own := short_lines(text)) <= _MOST for line in own]
+    return replace(table, remarks=(*table.remarks, *filter(None, map(_of_channels, lines))))
+
+
+def _lacks_names_or_units(table: RawTable) -> bool:
+    """Tell if a column that may be needed has no unit, or a number for a name."""
+    bare = [i for i, header in enumerate(table.headers) if not header.unit]
+    return any(table.headers[i].role in REQUIRED or NUMBERED.fullmatch(table.names[i].strip()) for i in bare)
+
+
+def _of_channels(line: str) -> str:
+    """Return what a line states of channels: a scale, a unit, or as "channel 2: load N" what a number stands for."""
+    cells = [cell.strip().strip('"') for cell in re.split(r"[,;\t|]", line.strip(" |"))]
+    if len(cells) > 2 and cells[0].isascii() and cells[0].isdigit() and parse_unit(cells[-1]):
+        return f"channel {cells[0]}: {' '.join(cells[1:])}"
+    units = [split_name(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]
+    return line if states_scale(line) or (any(map(is_unit, units)) and not stated_by_lines([line], ".")) else ""
 
 
 def with_description(table: RawTable, path: Path) -> RawTable:
-    """Return the table with what the XML file of its name, or the only other file of its folder, states."""
+    """Return the table with what the text or XML file of its name, or the only other file of its folder, states."""
     other = _only_other(path)
-    if other is not None and is_description(other):
-        return replace(table, remarks=(*table.remarks, *short_lines(other)))
+    named = [p for suffix in _STRUCTURES if (p := path.with_suffix(suffix)) != path and p.is_file()]
+    if named or (other is not None and is_description(other)):
+        lines = short_lines(named[0] if named else other)  # type: ignore[arg-type]
+        return replace(table, remarks=(*table.remarks, *lines))
     elements = _elements(path, other)
     if not elements:
         return table
@@ -64,9 +98,12 @@ def _unit(attributes: dict[str, str]) -> str:
 
 
 def is_description(path: Path) -> bool:
-    """Tell if a file is a short text that states quantities, and no record: Coil_Current, 0.5, A."""
+    """Tell if a file is a short text that states quantities or lists channels, and no record: Coil_Current, 0.5, A."""
     lines = short_lines(path) if path.suffix.lower() in _TEXTS and path.is_file() else []
-    return sum(bool(line.strip()) for line in lines) < _FEWEST_ROWS and bool(stated_by_lines(lines, "."))
+    if sum(bool(line.strip()) for line in lines) >= _FEWEST_ROWS:
+        return False
+    listed = [line for line in lines if _of_channels(line).startswith("channel ")]
+    return len(listed) > 1 or bool(stated_by_lines(lines, "."))
 
 
 def _only_other(path: Path) -> Path | None:

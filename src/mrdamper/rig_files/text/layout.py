@@ -12,7 +12,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice, pairwise
+from itertools import islice
 from typing import Literal
 
 from mrdamper.rig_files.column_names import split_name
@@ -264,11 +264,16 @@ def _roles(cells: Sequence[str]) -> set[str | None]:
 
 
 def _notes_beside(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    """Names with a number behind them that stand beside the first rows, as lines."""
+    """Names with a number and its unit behind them that stand beside the first rows, as lines."""
     filled = Counter(i for row in rows for i, cell in enumerate(row) if cell)
     columns = {i for i, count in filled.items() if 2 * count > len(rows) > _SAMPLE}  # channels and labels, no notes
-    pairs = [(a, b) for row in rows[:_SAMPLE] for i, (a, b) in enumerate(pairwise(row)) if a and b and i not in columns]
-    return tuple(f"{a}: {b}" for a, b in pairs if not looks_numeric(a) and looks_numeric(b))[:_SAMPLE]
+    stated = [
+        (key, number, unit if is_unit(unit) else "")
+        for row in rows[:_SAMPLE]
+        for i, (key, number, unit) in enumerate(zip(row, row[1:], [*row[2:], ""], strict=False))
+        if key and number and i not in columns and not looks_numeric(key) and looks_numeric(number)
+    ]
+    return tuple(f"{key}: {number} {unit}".rstrip() for key, number, unit in stated)[:_SAMPLE]
 
 
 def is_footer(line: str, layout: Layout) -> bool:

@@ -1,10 +1,18 @@
-"""Short texts beside records: legends, lists of tests, descriptions, notes."""
+"""Short texts beside records, as lines: legends, lists of tests, descriptions, also in Markdown, JSON and YAML."""
 
 from __future__ import annotations
 
+import json
+import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 _LARGEST = 2**18  # bytes
+_RULE = re.compile(r"[\s|:+=-]*")  # below the names of columns of a table in Markdown
+_PAIR = re.compile(r"""\s*["']?(?P<key>[^:"'{}\[\]#,]{1,60}?)["']?\s*:\s+["']?(?P<value>[^"'{},#]*?)["']?\s*""")
+_ITEM = re.compile(r"\s*-\s+(?=\S)")
+_DEEPEST, _FEWEST_TESTS = 6, 2
 
 
 def decoded(content: bytes) -> str:
@@ -18,10 +26,76 @@ def decoded(content: bytes) -> str:
 
 
 def short_lines(path: Path) -> list[str]:
-    """Return the lines of a short text; none of a file that is long, or cannot be read."""
+    """Return the lines of a short text; none of a file that is long, or cannot be read.
+
+    Of a structure, every quantity and every channel is a line, and a list of objects of one form a table.
+    """
     try:
         with path.open("rb") as file:
             content = file.read(_LARGEST + 1)
     except OSError:
         return []
-    return decoded(content).splitlines() if len(content) <= _LARGEST else []
+    text = decoded(content) if len(content) <= _LARGEST else ""
+    suffix = path.suffix.lower()
+    if suffix == ".json":
+        try:
+            return list(_stated(json.loads(text), ""))
+        except (ValueError, RecursionError):
+            return []
+    if suffix in (".yaml", ".yml"):
+        return list(_stated(_mapping(text.splitlines()), ""))
+    return [line for line in text.splitlines() if "|" not in line or not _RULE.fullmatch(line)]
+
+
+def _mapping(lines: list[str]) -> dict[str, Any]:
+    """Return pairs, pairs in braces, and lists of objects of a YAML text; all other structure is left out."""
+    tree: dict[str, Any] = {}
+    items: list[dict[str, Any]] = []
+    for line in (text.split(" #")[0].rstrip() for text in lines):
+        head, brace, inner = line.partition("{")
+        if brace:
+            pairs = [match for part in inner.rstrip("}").split(",") if (match := _PAIR.fullmatch(part))]
+            tree[head.strip(" :-")] = {match["key"]: _scalar(match["value"]) for match in pairs}
+            continue
+        item, match = _ITEM.match(line), _PAIR.fullmatch(_ITEM.sub("", line) + " ")
+        if item and match:
+            items.append({})
+        if match and match["value"]:
+            own = items[-1] if items and line[:1] in (" ", "-") else tree
+            own[match["key"].strip()] = _scalar(match["value"])
+    return {**tree, "tests": items}
+
+
+def _scalar(text: str) -> Any:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: int = 0) -> Iterator[str]:
+    """Yield what a node states as lines: "current: 400 mA", "x; displacement; mm", "time: s", rows of a table."""
+    units = units or {}
+    if isinstance(node, list) and len(node) >= _FEWEST_TESTS and all(isinstance(item, dict) for item in node):
+        plain = [name for name in node[0] if all(isinstance(item.get(name), (str, int, float)) for item in node)]
+        yield "\t".join(f"{name} [{units[name]}]" if isinstance(units.get(name), str) else name for name in plain)
+        for item in node:
+            yield "\t".join(f"{v:g}" if isinstance(v := item[name], (int, float)) else v for name in plain)
+    if not isinstance(node, dict) or depth > _DEEPEST:
+        return
+    lower = {str(name).casefold(): value for name, value in node.items()}
+    unit = next((lower[name] for name in ("unit", "units") if isinstance(lower.get(name), str)), "")
+    if unit and isinstance(lower.get("value"), (int, float)):
+        yield f"{key}: {lower['value']:g} {unit}"
+    elif unit:
+        words = [key, *(str(value) for value in lower.values() if isinstance(value, (str, int, float)))]
+        yield "; ".join(dict.fromkeys(words))
+    own = next((lower[name] for name in ("units", "unit") if isinstance(lower.get(name), dict)), units)
+    for name, value in node.items():
+        if isinstance(value, (dict, list)):
+            yield from _stated(value, str(name), own, depth + 1)
+        elif not unit:
+            stated = own.get(name) if isinstance(own.get(name), str) and own is not node else None
+            yield (
+                f"{name}: {value:g} {stated or ''}".rstrip() if isinstance(value, (int, float)) else f"{name}: {value}"
+            )
