@@ -44,6 +44,9 @@ EXPORTS = {
     + lines(lambda i, t, x, f: f"{t:.3f},{x:.6f},{f:.4f}"),
     "numbers of rows without a name": "t.s,stroke.mm,load.N\n"
     + lines(lambda i, t, x, f: f'"{i + 1}",{t:.3f},{x:.6f},{f:.4f}'),
+    "a step for all channels, and a separator behind every line": '"Name","stroke","load",\n"VUnit","mm","N",\n'
+    + '"HResolution",0.005,0.005,\n"HUnit","s","s",\n\n'
+    + lines(lambda i, t, x, f: f",{x:.6f},{f:.4f},"),
     "paths of a model": "time,Rig model/plant/Ref/x_ref,Rig model/plant/Sensor/stroke,Rig model/plant/Sensor/load\n"
     + "s,mm,mm,N\n"
     + lines(lambda i, t, x, f: f"{t:.3f},{x:.4f},{x:.6f},{f:.4f}"),

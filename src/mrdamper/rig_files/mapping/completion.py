@@ -164,6 +164,7 @@ def _with_values_for_all(table: RawTable) -> RawTable:
     width, keyed = len(table.names), dict[str, str]()
     for key, cells in _keyed_cells(table):
         stated = {cell for cell in cells if cell}
+        cells = cells[:-1] if len(cells) == width and not cells[-1] else cells  # a separator ends the line
         if key and len(stated) == 1 and (len(cells) == width - 1 > 1 or key in _LABVIEW):
             keyed[key] = stated.pop()
     units = {key[:-4]: unit for key, unit in keyed.items() if key.casefold().endswith("unit") and is_unit(unit)}
