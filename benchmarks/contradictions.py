@@ -1,8 +1,9 @@
 """Which contradicting runs are named with their cause: `python -m benchmarks.contradictions [--sound N] [--seed S]`.
 
 Every kind of contradicting folder with each synthetic damper, and sound folders of which none may be accused. With
-`--models` a model is fitted to the runs that are left of every folder, and its peak forces are compared with those of
-the model fitted to the same runs as they ought to be.
+`--models` a model is fitted to the runs that are left of every folder, and its peak forces at every condition of the
+folder are compared with those of two models: of the folder's right runs alone, which shows what the comparison of runs
+did wrong, and of all runs as they ought to be, which shows also what the runs set aside would have added.
 """
 
 from __future__ import annotations
@@ -44,19 +45,28 @@ class Models:
     """Models of runs, and how far those of contradicting folders are from those of sound ones."""
 
     def __init__(self) -> None:
-        self._sound: dict[tuple[int, ...], JointDamper] = {}
+        self._models: dict[tuple[int, ...], tuple[Sequence[Run], JointDamper]] = {}  # the runs keep their identity
 
-    def difference(self, left: Sequence[Run], sound: Sequence[Run]) -> float:
-        """Median difference of the peak forces of the models of two sets of runs, at the motions of the second."""
-        key = tuple(id(run) for run in sound)
-        if key not in self._sound:
-            self._sound[key] = JointProblem(sound, _MODEL).fit().damper
+    def differences(self, left: Sequence[Run], folder: Folder) -> tuple[float, float]:
+        """Median differences of the peak forces of the model of the runs left.
+
+        From the model of the folder's right runs, and from that of all its runs as they ought to be.
+        """
+        right = [run for run in folder.sound if run.id not in folder.wrong]
         try:
-            damper = JointProblem(left, _MODEL).fit().damper
+            own = self._peaks_of(left, folder.sound)
         except InputError:
-            return 0.0  # no model is made
-        own, sound_peaks = (_peaks(each, sound) for each in (damper, self._sound[key]))
-        return float(np.median(np.abs(own / sound_peaks - 1)))
+            return 0.0, 0.0  # no model is made
+        first, second = (
+            float(np.median(np.abs(own / self._peaks_of(runs, folder.sound) - 1))) for runs in (right, folder.sound)
+        )
+        return first, second
+
+    def _peaks_of(self, runs: Sequence[Run], sound: Sequence[Run]) -> Floats:
+        key = tuple(id(run) for run in runs)
+        if key not in self._models:
+            self._models[key] = runs, JointProblem(runs, _MODEL).fit().damper
+        return _peaks(self._models[key][1], sound)
 
 
 def _peaks(damper: JointDamper, runs: Sequence[Run]) -> Floats:
@@ -72,7 +82,7 @@ def main() -> None:
     arguments.add_argument("--only", default="", help="kinds of folders whose name holds this")
     arguments.add_argument("--models", action="store_true", help="also how far models of these folders are off")
     given = arguments.parse_args()
-    differences, tried, models, begin = [], [], Models(), time.process_time()
+    differences, tried, models, begin = list[tuple[float, float]](), list[bool](), Models(), time.process_time()
     for damper, make in [*((d, folders) for d in DAMPERS), *((d, second_folders) for d in SECOND)]:
         for folder in make(damper):
             if given.only in folder.name:
@@ -80,8 +90,8 @@ def main() -> None:
                 tried.append(good)
                 text = ""
                 if given.models and left:
-                    differences.append(models.difference(left, folder.sound))
-                    text = f" | model {100 * differences[-1]:.1f} %"
+                    differences.append(models.differences(left, folder))
+                    text = " | model {:.1f} % {:.1f} %".format(*(100 * one for one in differences[-1]))
                 print(
                     f"{'named' if good else 'not'} | {damper.kind} | {folder.name} | {found or 'nothing'}{text}",
                     flush=True,
@@ -93,11 +103,11 @@ def main() -> None:
         if found:
             print(f"accused | {number} | {'; '.join(map(str, found))}", flush=True)
     print(f"{sum(tried)} of {len(tried)} contradicting folders named, {accused} of {given.sound} sound folders accused")
-    if differences:
-        worse = np.array(differences) > WORSE
+    for what, column in zip(("right runs", "runs as they ought to be"), zip(*differences, strict=True), strict=False):
         print(
-            f"peak forces of the model differ by more than {100 * WORSE:.0f} % in {worse.sum()} of {worse.size} "
-            f"folders; median {100 * np.median(differences):.2f} %, worst {100 * max(differences):.1f} %"
+            f"peak forces of the model differ by more than {100 * WORSE:.0f} % from the model of the {what} in "
+            f"{sum(one > WORSE for one in column)} of {len(column)} folders; "
+            f"median {100 * np.median(column):.2f} %, worst {100 * max(column):.1f} %"
         )
     print(f"{(time.process_time() - begin) / max(len(tried) + given.sound, 1):.2f} s of processor time per folder")
 

@@ -1,6 +1,7 @@
 """Limitations are sentences in a fixed order, whatever the reason for which the search stopped."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -80,3 +81,28 @@ def test_the_worst_run_tells_its_kind_of_motion_apart_from_its_range():
     fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 9, 0.1)
     text = next(s.text for s in limitations(replace(scored(fit), validation=runs), ()) if "Largest error" in s.text)
     assert "5.3 Hz, 1.7 mm, not a sine; amplitude outside the tested range)" in text
+
+
+@pytest.mark.parametrize(
+    ("conditions", "said"),
+    [
+        ([(0.5, 1, 0.01), (0.5, 2, 0.01), (0.5, 2, 0.02), (0.5, 1, 0.02)], "One current was tested (0.5 A)"),
+        ([(0.0, 1, 0.01), (0.5, 1, 0.01), (1.0, 1, 0.01), (1.5, 1, 0.01)], "One motion was tested (1 Hz, 10 mm)"),
+        ([(0.0, 1, 0.01), (0.5, 2, 0.01), (1.0, 1, 0.02)], "Only 3 identification runs"),
+        ([(0.0, 1, 0.01), (0.5, 1, 0.01), (0.5, 2, 0.01), (0.0, 2, 0.01)], None),
+    ],
+)
+def test_what_the_design_of_the_tests_cannot_show_is_stated_first(conditions, said):
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 9, 0.1)
+    tests = {f"t{k}": Condition(*condition) for k, condition in enumerate(conditions)}
+    runs = tuple(RunScore(name, "rig", at, Scores(0.02, *5 * (0.0,)), None, ()) for name, at in tests.items())
+    loops = [
+        SimpleNamespace(run_id=name, condition=at, motion=SimpleNamespace(is_sine=True, drift=0.0))
+        for name, at in tests.items()
+    ]
+    entries = limitations(replace(scored(fit), train=Validation("train", runs)), loops)
+    design = ("One current", "One motion", "Only")
+    assert [one.text.startswith(said) for one in entries if one.text.startswith(design)] == ([True] if said else [])
+    assert said is None or entries[0].text.startswith(said)
+    others = limitations(replace(scored(fit), train=Validation("train", runs)), loops[1:])
+    assert not any(one.text.startswith(design[:2]) for one in others)  # a record of other motion varies the rest

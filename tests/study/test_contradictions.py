@@ -1,5 +1,6 @@
 """Runs that contradict the others are found with their cause; sound runs, sessions and reversed coils are not."""
 
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
 from mrdamper.study.contradictions.evidence import AssumedScatter, Evidence
+from mrdamper.study.contradictions.gains import gain_differences
 from mrdamper.study.contradictions.tracks import tracks_of
 
 sys.path.insert(0, str(Path(__file__).parent.parent.parent))
@@ -133,6 +135,45 @@ def test_a_gain_of_a_run_multiplies_the_expected_force(sound):
         run = evidence.products(tracks)[4]
         means.append(float(np.sqrt(expected.at(run.over)[0] @ run.gram @ expected.at(run.over)[0])))
     assert means[0] == pytest.approx(means[1], rel=0.02)
+
+
+@pytest.mark.parametrize("factors", [{}, {4: 0.6, 8: 0.45, 9: 0.7}, {1: 1.6}])
+def test_runs_with_gains_of_their_own_are_found_and_gains_of_sessions_are_not(sound, factors):
+    """A wide gain of a run costs evidence where sessions explain the differences."""
+    tracks = tracks_of([replace(run, force=factors.get(k, 1.0) * run.force) for k, run in enumerate(sound)])
+    evidence = Evidence(tracks)
+    differences = gain_differences(evidence, evidence.products(tracks))
+    assert differences.members == set(factors)
+    assert (differences.odds > 15) == bool(factors)
+    assert factors or differences.everywhere < 0
+
+
+@pytest.mark.parametrize("kind", [0, 3])
+def test_two_dampers_half_the_runs_each_are_refused_with_both_groups(kind):
+    """A single model of many coefficients describes both dampers together with an error of a few per cent."""
+    folder = next(f for f in folders(DAMPERS[kind]) if f.name == "two dampers, half the runs each")
+    with pytest.raises(ContradictionError, match=r"times what the others show\) against t") as refusal:
+        find_contradictions(folder.runs)
+    groups = re.findall(r"((?:t\d\d(?:, )?)+) \(", str(refusal.value))
+    smaller = min((group.split(", ") for group in groups), key=len)
+    find_contradictions(folder.runs, keep=smaller)
+
+
+def test_motions_that_complete_the_matrix_of_tests_are_those_of_another_stroke(sound):
+    """Three strokes counted from peak to peak leave three cells of the matrix of tests empty."""
+    folder = next(f for f in second_folders(SECOND[1]) if f.name == "stroke for amplitude in three runs")
+    found = find_contradictions(folder.runs)
+    assert [(one.run_id, one.cause, one.value) for one in found] == [
+        (name, "displacement", 0.5) for name in sorted(folder.wrong)
+    ]
+    runs = {run.id: run for run in sound}
+    tested = [run for run in sound if run.id not in ("t05", "t08")]
+    assert find_contradictions(tested) == []  # two missing tests are no fault
+    damper = DAMPERS[0]
+    further = make_run(
+        damper, "t12", damper.currents[1], 2.0, 0.8 * damper.amplitude, np.random.default_rng(5)
+    )  # a further test at the doubled stroke, whose cell of the matrix is tested as well
+    assert find_contradictions([*runs.values(), further]) == []
 
 
 @pytest.mark.parametrize("name", [

@@ -13,8 +13,10 @@ from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.prediction import NOT_A_SINE
 from mrdamper.dampers.uncertainty import uncertainty_warnings
+from mrdamper.data import Floats
 from mrdamper.identification import Identification
 from mrdamper.identification.loop_analysis import LoopAnalysis
+from mrdamper.study.contradictions import MIN_RUNS
 from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import Validation
 
@@ -27,6 +29,8 @@ _MAX_ENERGY_ERROR = 0.15  # relative error of the dissipated energy [-]
 _MAX_DRIFT_M_S = 1e-4  # drift of the mean position [m/s]
 _MAX_CORRELATION = 0.85  # correlation coefficient of tested frequencies and amplitudes [-]
 _MIN_LEVELS = 4  # number of tested currents
+_SAME_CURRENT_A = 0.01  # difference of currents that are one level [A]
+_SAME_MOTION = 0.05  # relative difference of frequencies or amplitudes that are one
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,10 @@ class Limitation:
 def limitations(scored: RecipeResult, loops: Sequence[LoopAnalysis]) -> list[Limitation]:
     """List the limitations of a model and of the tests it was identified from, the most harmful first."""
     entries = {
-        PREDICTION: _prediction(scored.cross_validated, scored.validation),
+        PREDICTION: [
+            *_design(loops, [run.run_id for run in scored.train.runs]),
+            *_prediction(scored.cross_validated, scored.validation),
+        ],
         TESTS: _tests(loops),
         MODEL: [
             *(_joint(scored.fit) if isinstance(scored.fit, JointFit) else ()),
@@ -87,6 +94,33 @@ def _explained(entries: Sequence[Limitation], damper: Damper) -> list[Limitation
     return explained
 
 
+def _design(loops: Sequence[LoopAnalysis], identified: Sequence[str]) -> list[str]:
+    """List what the design of the tests cannot show."""
+    sentences = []
+    if 0 < len(identified) < MIN_RUNS:
+        sentences.append(
+            f"Only {len(identified)} identification runs: they were not compared with each other, "
+            f"which shows wrong units, currents and signs from {MIN_RUNS} runs on."
+        )
+    sines = [loop.condition for loop in loops if loop.run_id in identified]
+    if len(sines) < len(identified) or len(sines) < 2:
+        return sentences
+    currents, frequencies, amplitudes = (
+        np.array([getattr(condition, name) for condition in sines])
+        for name in ("current_A", "frequency_Hz", "amplitude_m")
+    )
+    if np.ptp(np.abs(currents)) <= _SAME_CURRENT_A:
+        sentences.append(
+            f"One current was tested ({abs(currents[0]):.3g} A): the dependence on the current is not identifiable."
+        )
+    if not _varied(frequencies) and not _varied(amplitudes):
+        sentences.append(
+            f"One motion was tested ({np.median(frequencies):.3g} Hz, {1e3 * np.median(amplitudes):.3g} mm): "
+            "the dependence on frequency and amplitude is not identifiable."
+        )
+    return sentences
+
+
 def _prediction(cross_validated: Validation, validation: Validation) -> list[str]:
     sentences = []
     for scores, name in ((validation, "validation run"), (cross_validated, "cross-validated run")):
@@ -131,7 +165,7 @@ def _functions(fit: ModifiedFit) -> list[str]:
     if fit.at_bounds:
         sentences.append(f"Parameter functions at a bound of the search: {', '.join(fit.at_bounds)}.")
     levels = len({round(c.current_A, 3) for c in fit.conditions})
-    if levels < _MIN_LEVELS:
+    if 1 < levels < _MIN_LEVELS:
         sentences.append(f"Only {levels} currents were tested: the form between them is an assumption.")
     return sentences
 
@@ -174,7 +208,7 @@ def _tests(loops: Sequence[LoopAnalysis]) -> list[str]:
     sentences = []
     amplitudes = np.array([loop.condition.amplitude_m for loop in loops])
     frequencies = np.array([loop.condition.frequency_Hz for loop in loops])
-    if len(loops) > 3:
+    if len(loops) > 3 and _varied(amplitudes) and _varied(frequencies):
         tied = float(np.corrcoef(np.log(amplitudes), np.log(frequencies))[0, 1])
         if abs(tied) > _MAX_CORRELATION:
             sentences.append(
@@ -195,6 +229,10 @@ def _tests(loops: Sequence[LoopAnalysis]) -> list[str]:
             f"Drift of the mean position in {len(drifting)} runs, up to {1e3 * fastest:.2f} mm/s: {_some(drifting)}."
         )
     return sentences
+
+
+def _varied(values: Floats) -> bool:
+    return float(np.ptp(values)) > _SAME_MOTION * float(np.max(values))
 
 
 def _some(names: Sequence[str], most: int = 4) -> str:

@@ -5,6 +5,6 @@ The runs of a damper are compared with each other before any model is chosen. Wh
 """
 
 from mrdamper.study.contradictions.findings import Contradiction
-from mrdamper.study.contradictions.rig import ContradictionError, find_contradictions
+from mrdamper.study.contradictions.rig import MIN_RUNS, ContradictionError, find_contradictions
 
-__all__ = ["Contradiction", "ContradictionError", "find_contradictions"]
+__all__ = ["MIN_RUNS", "Contradiction", "ContradictionError", "find_contradictions"]

@@ -233,14 +233,23 @@ class Evidence:
         power = sum(member.power for member in members)
         return float(0.5 * (half @ half) - np.sum(np.log(np.diag(factor))) - 0.5 * power)
 
-    def weigh(self, run: RowProducts, expected: Floats) -> Moments:
-        """Weighted products of a run; its gain multiplies the force of the coefficients expected of it."""
+    def weigh(self, run: RowProducts, expected: Floats, gain: float | None = None) -> Moments:
+        """Weighted products of a run; its gain multiplies the force of the coefficients expected of it.
+
+        Parameters
+        ----------
+        run : RowProducts
+        expected : (E,) or (P,) array
+        gain : float, optional
+            Standard deviation of the run's gain, if not that of sessions.
+        """
         spread, size = self.spread, run.size
         level = model_error(run) ** 2
         weight = _INDEPENDENT_SAMPLES / (run.rows * spread.misfit**2 * level)
         one, gram, moment = run.constant, weight * run.gram, weight * run.moment
         mean = float(one @ run.gram @ expected) / run.rows
-        shared = np.array([spread.gain * (expected - mean * one), spread.offset * math.sqrt(max(size, 0.1)) * one])
+        varied = (spread.gain if gain is None else gain) * (expected - mean * one)
+        shared = np.array([varied, spread.offset * math.sqrt(max(size, 0.1)) * one])
         along = shared @ gram
         (a, b), (_, d) = (shared @ along.T).tolist()
         a, d = 1 + a, 1 + d

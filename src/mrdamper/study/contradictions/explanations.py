@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -11,7 +11,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.study.contradictions.evidence import Evidence, Posterior, RowProducts
-from mrdamper.study.contradictions.tracks import Track
+from mrdamper.study.contradictions.tracks import Track, irregularity
 
 Cause = Literal["force", "offset", "current", "displacement", "time", "sign", "damper", "shifted"]
 
@@ -27,6 +27,8 @@ _TRIED_CURRENTS = 31  # currents that are tried
 # Logarithms of prior odds against an explanation: one that names a unit, a tested level or a tested motion is simpler.
 _UNIT_ODDS, _LEVEL_ODDS, _FREE_ODDS, _SIGN_ODDS, _ODD_MOTION_ODDS, _ALONE_ODDS = 4.0, 4.0, 7.0, 4.0, 12.0, 10.0
 _TESTED_MOTION_ODDS = 5.0  # what a motion of other runs lowers them by, and losing such a motion raises them by
+EMPTY_CELL_ODDS = 6.0  # what an empty cell of the matrix of tests that is filled lowers them by, down to its inverse
+MAX_IRREGULARITY = 0.5  # repeated and missing tests of a matrix that is nearly complete, over its tests
 _EDGE_ODDS = 14.0  # what the only run at the lowest or highest current raises those of a factor or another current by
 _USUAL_STEP = 3.0  # the same of the time between two samples
 _SAME_STEP = 0.01  # relative difference of times between samples that are one
@@ -107,9 +109,13 @@ class ExplanationCandidate:
     """
 
     def __init__(self, index: int, tracks: Sequence[Track], evidence: Evidence, products: RowProducts) -> None:
-        self.track, self.evidence, self.own = tracks[index], evidence, products
-        self._others = [t for k, t in enumerate(tracks) if k != index]
-        self._moved: list[tuple[Trial, RowProducts]] = []
+        self.track, self.evidence, self.own, self._index = tracks[index], evidence, products, index
+        self.set_tracks(tracks)
+
+    def set_tracks(self, tracks: Sequence[Track]) -> None:
+        """Compare with these runs, of which some have other motions than before."""
+        self._others = [t for k, t in enumerate(tracks) if k != self._index]
+        self._motions: list[tuple[Trial, RowProducts]] = []
 
     def explanations(self, others: Posterior, like: Sequence[Trial] = ()) -> list[Explanation]:
         """Explanations that are more than differences between sessions, the most probable first.
@@ -160,10 +166,10 @@ class ExplanationCandidate:
         for trial in (*self._of_the_force(others), *self._of_the_current()):
             if not like or any(trial.is_like(one) for one in like):
                 yield trial, self.changed(trial)
-        if not self._moved:
+        if not self._motions:
             trials = list(self._of_the_motion())
-            self._moved = list(zip(trials, self.evidence.products([self._move(t) for t in trials]), strict=True))
-        for trial, products in self._moved:
+            self._motions = list(zip(trials, self.evidence.products([self.moved(t) for t in trials]), strict=True))
+        for trial, products in self._motions:
             if not like or any(trial.is_like(one) for one in like):
                 yield (
                     trial,
@@ -210,8 +216,11 @@ class ExplanationCandidate:
                 if any(abs(np.log(factor / f)) < _SAME_FACTOR for f, *_ in factors[:k]):
                     continue
                 trial = Trial(cause, factor, unit, odds)
-                odds -= _TESTED_MOTION_ODDS * self._tested(trial)
-                yield replace(trial, odds=odds - _USUAL_STEP * (cause == "time") * self._is_usual(factor))
+                tested = self._tested(trial)
+                odds -= _TESTED_MOTION_ODDS * tested + _USUAL_STEP * (cause == "time") * self._is_usual(factor)
+                if tested > 0:
+                    odds = completed_matrix_odds(odds, [*self._others, self.track], {-1: self.moved(trial)})
+                yield replace(trial, odds=odds)
 
     def _ratios(self, cause: Cause) -> list[float]:
         """Factors that bring the motion to one that other runs have."""
@@ -226,7 +235,7 @@ class ExplanationCandidate:
         """1 if the change brings the motion to one that more of the other runs have, −1 if to one that fewer have."""
         if not self.track.frequency:
             return 0
-        moved = self._move(trial)
+        moved = self.moved(trial)
         return int(np.sign(sum(moved.is_at_motion(t) - self.track.is_at_motion(t) for t in self._others)))
 
     def _is_usual(self, factor: float) -> int:
@@ -235,7 +244,8 @@ class ExplanationCandidate:
         after, before = (abs(self.track.step * f / usual - 1) < _SAME_STEP for f in (factor, 1.0))
         return int(after) - int(before)
 
-    def _move(self, trial: Trial) -> Track:
+    def moved(self, trial: Trial) -> Track:
+        """Return the run with its motion as corrected by a trial."""
         if trial.cause == "sign":
             moved = self.track.scaled(-1.0)
             return replace(moved, force=-self.track.force)
@@ -256,6 +266,31 @@ class ExplanationCandidate:
         """Tell whether a factor brings the stroke nearer to the usual one, as the right unit does."""
         stroke = float(np.ptp(self.track.displacement)) / 2 / self.evidence.amplitude
         return abs(np.log(stroke * factor)) < abs(np.log(stroke))
+
+
+def completed_matrix_odds(odds: float, tracks: Sequence[Track], moved: Mapping[int, Track]) -> float:
+    """Return prior odds against other motions of some runs, lower where these fill empty cells of the matrix of tests.
+
+    Parameters
+    ----------
+    odds : float
+        Where no cell is filled.
+    tracks : sequence of Track
+        All runs.
+    moved : mapping of int to Track
+        Runs with other motions, by position.
+    """
+    before = list(tracks)
+    after = list(tracks)
+    for k, track in moved.items():
+        after[k] = track
+    kept = [k for k, track in enumerate(before) if not track.current_changes]
+    currents = [float(before[k].current[0]) for k in kept]
+    missing = irregularity([after[k] for k in kept], currents)
+    filled = irregularity([before[k] for k in kept], currents) - missing
+    if filled <= 0 or missing > MAX_IRREGULARITY * len(kept):
+        return odds
+    return min(odds, max(odds - EMPTY_CELL_ODDS * filled, -EMPTY_CELL_ODDS))
 
 
 def _rms(products: RowProducts, coefficients: Floats) -> float:

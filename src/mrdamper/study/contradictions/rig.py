@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -21,6 +21,8 @@ _MAX_SHARE = 0.34  # share of the runs that may contradict the others; beyond, n
 _REFUSED_SHARE = 0.2  # share of the runs from which they are refused if the others do not agree either
 _MAX_MISFIT_FACTOR = 4.0  # factor of the usual model error at which runs do not agree
 _INVERSE_TOLERANCE = 0.1  # logarithm of the product of two factors up to which one is the inverse of the other
+_MIN_GAIN = 1e-3  # gain of a run at least, for its logarithm
+_CLUSTERS_REMEDY = "tests of two dampers need a column specimen in tests.csv; --keep RUN keeps a run as it is"
 _MILLIAMPERE_RATIO = 50.0  # ratio of a current to the usual one from which it is in milliamperes
 
 
@@ -72,8 +74,12 @@ def _among(train: Sequence[Track], keep: Collection[str]) -> dict[str, Contradic
         train[i].run.id: describe(train[i].run, e, len(train) - 1) for i, e in sorted(search.found.items())
     }
     contradictions = {name: one for name, one in contradictions.items() if name not in keep}
-    incoherent = (
-        len(contradictions) > _REFUSED_SHARE * len(train) and search.evidence.spread.misfit >= _MAX_MISFIT_FACTOR
+    groups = _parted(train, search.differing)
+    if groups and not any(set(keep) >= set(group) for group in groups):
+        raise _differing(train, groups)
+    causes = {one.cause for one in contradictions.values()}
+    incoherent = len(contradictions) > _REFUSED_SHARE * len(train) and (
+        search.evidence.spread.misfit >= _MAX_MISFIT_FACTOR or ("damper" in causes and len(causes) > 1)
     )
     if len(contradictions) > _MAX_SHARE * len(train) or incoherent or _opposed(list(contradictions.values())):
         raise _disagreement(train, contradictions)
@@ -115,6 +121,33 @@ def _split(runs: Sequence[Run], name: str) -> str:
     return next(run.split for run in runs if run.id == name)
 
 
+def _parted(train: Sequence[Track], gains: Mapping[int, float]) -> list[dict[str, float]]:
+    """Part runs where their gains differ most."""
+    if not gains:
+        return []
+    ranked = sorted(gains, key=gains.__getitem__)
+    steps = np.diff(np.log([max(gains[k], _MIN_GAIN) for k in ranked]))
+    cut = 1 + int(np.argmax(steps))
+    return [{train[k].run.id: gains[k] for k in part} for part in (ranked[:cut], ranked[cut:])]
+
+
+def _differing(train: Sequence[Track], groups: Sequence[Mapping[str, float]]) -> ContradictionError:
+    """Return the refusal of runs whose gains differ too much, with both groups."""
+    low, high = (
+        f"{', '.join(sorted(group))} ({min(group.values()):.2g} to {max(group.values()):.2g} times" for group in groups
+    )
+    return ContradictionError(
+        f"the forces of {sum(map(len, groups))} of {len(train)} runs differ by factors that neither currents, motions "
+        f"nor sessions explain: {low} what the others show) against {high})",
+        where=_rig(train),
+        remedy=_CLUSTERS_REMEDY,
+    )
+
+
+def _rig(train: Sequence[Track]) -> str:
+    return f"rig {train[0].run.rig}" if train[0].run.rig else "the dataset"
+
+
 def _disagreement(train: Sequence[Track], contradictions: dict[str, Contradiction]) -> ContradictionError:
     """Return the refusal, with both groups of runs."""
     rest = [track.run.id for track in train if track.run.id not in contradictions]
@@ -124,6 +157,6 @@ def _disagreement(train: Sequence[Track], contradictions: dict[str, Contradictio
         f"{len(contradictions)} of {len(train)} runs contradict the other {len(rest)} ({', '.join(causes)}): "
         f"{', '.join(sorted(contradictions))} against {', '.join(rest)}; "
         f"the first, {first.run_id}, {first.explanation}",
-        where=f"rig {train[0].run.rig}" if train[0].run.rig else "the dataset",
-        remedy="tests of two dampers need a column specimen in tests.csv; --keep RUN keeps a run as it is",
+        where=_rig(train),
+        remedy=_CLUSTERS_REMEDY,
     )

@@ -19,13 +19,17 @@ from mrdamper.study.contradictions.evidence import (
     model_error,
 )
 from mrdamper.study.contradictions.explanations import (
+    EMPTY_CELL_ODDS,
+    MAX_IRREGULARITY,
     MAX_SESSION_GAIN,
     Cause,
     Explanation,
     ExplanationCandidate,
     Trial,
+    completed_matrix_odds,
 )
-from mrdamper.study.contradictions.tracks import Track
+from mrdamper.study.contradictions.gains import gain_differences
+from mrdamper.study.contradictions.tracks import Track, irregularity
 
 _ODDS, _FEW_ODDS = 12.0, 36.0  # logarithm of the odds from which an explanation is far better: always, over the runs
 _ALONE_ODDS = 10.0  # more of them for a run that nothing explains
@@ -37,8 +41,6 @@ _KEEP_ODDS = 3.0  # logarithm of the odds from which an accepted explanation sta
 _SHIFT_ODDS = 12.0  # logarithm of the prior odds against shifted rows
 _EXCHANGE_ODDS = 6.0  # the same against two exchanged rows
 _SPARSE_ODDS = 20.0  # the same where the tests are no matrix of currents and motions
-_EMPTY_CELL_ODDS = 6.0  # what an empty cell of the matrix of tests that is filled lowers them by
-_MAX_IRREGULARITY = 0.5  # repeated and missing tests of a matrix that is nearly complete, over its tests
 _MIN_SHIFT_ODDS = 0.0  # prior odds of shifted rows at least
 _MEMBER_ODDS = 4.0  # the same against a further run with the same cause
 _MAJORITY_ODDS = 6.0  # the same against another current of most runs at a current
@@ -53,7 +55,8 @@ _MIN_MISFIT = 0.5  # factor of the usual model error for groups at least
 _ERROR_FACTORS = (1.0, 0.7, 0.45, 0.3)  # factors of the model error that explained runs leave
 _REFINED_EXPLANATIONS = 4  # single explanations whose model error is adapted
 _GROUP_GAIN_DIFFERENCE = 0.3  # difference of the logarithms of the gains of two groups of runs at one current
-_MIN_AT_MOTION = 3  # other runs at a motion that say how well the model describes it
+_MIN_AT_MOTION = 3  # other runs at a motion that show how well the model describes it
+_MAX_AT_MOTION = 3.0  # factor of the usual model error at a motion at most; beyond, runs there do not agree
 _ROUNDS = 4  # assignments of runs to two groups
 
 
@@ -76,11 +79,19 @@ class Search:
     Parameters
     ----------
     tracks : sequence of Track
+
+    Attributes
+    ----------
+    found : dict of int to Explanation
+        Runs that contradict the others, by position.
+    differing : dict of int to float
+        Gains of the runs left, if so many differ that none can be called wrong.
     """
 
     def __init__(self, tracks: Sequence[Track]) -> None:
-        self.tracks = tracks
+        self.tracks = list(tracks)
         self.found: dict[int, Explanation] = {}
+        self.differing: dict[int, float] = {}
         self.evidence = Evidence(tracks)
         self._products = self.evidence.products(tracks)
         self._candidates = [ExplanationCandidate(i, tracks, self.evidence, p) for i, p in enumerate(self._products)]
@@ -93,7 +104,10 @@ class Search:
             best = max(self._proposals(), key=lambda proposal: proposal.gain, default=_NO_PROPOSAL)
             if not best.explanations or best.gain < self._threshold(best.explanations.values()):
                 best = self._further()
-            if not best.explanations:
+                best = best if best.explanations else self._of_gains(-np.inf)
+            elif not self._is_shared(best.explanations.values()):
+                self._of_gains(best.gain)
+            if not best.explanations or self.differing:
                 break
             self._accept(best.explanations)
         self._review()
@@ -112,8 +126,19 @@ class Search:
 
     def _threshold(self, explanations: Iterable[Explanation]) -> float:
         """Logarithm of the odds from which explanations are far better than none."""
+        explanations = list(explanations)
+        if self._is_shared(explanations):
+            return _TIE_ODDS
         alone = any(e.cause == "damper" for e in explanations)
         return _ODDS + _FEW_ODDS / len(self.tracks) + (_ALONE_ODDS if alone else 0.0)
+
+    def _is_shared(self, explanations: Iterable[Explanation]) -> bool:
+        """Tell whether explanations have causes that were found in other runs."""
+        return all(any(e.trial.is_like(one) for one in self._shared_trials()) for e in explanations)
+
+    def _shared_trials(self) -> list[Trial]:
+        """Return the causes found that further runs may have as well."""
+        return [e.trial for e in self.found.values() if e.cause in _SHARED_CAUSES]
 
     def _agreeing(self, but: Iterable[int] = ()) -> list[int]:
         aside = {k for k, explanation in self.found.items() if explanation.cause == "damper"} | set(but)
@@ -123,6 +148,10 @@ class Search:
         self.found |= explanations
         for i, explanation in explanations.items():
             self._products[i] = explanation.products
+            if explanation.cause in ("displacement", "time"):
+                self.tracks[i] = self._candidates[i].moved(explanation.trial)
+                for candidate in self._candidates:
+                    candidate.set_tracks(self.tracks)
         self._adapt()
 
     def _adapt(self) -> None:
@@ -147,30 +176,31 @@ class Search:
             scores[AssumedScatter(best.misfit, gain, offset)] = score(AssumedScatter(best.misfit, gain, offset))
         self.evidence.spread = max(scores, key=scores.__getitem__)
         expected = self.evidence.posterior([expected.weigh(self._products[k]) for k in agreeing])
+        self._products = [replace(products, misfit=1.0) for products in self._products]
         self._members = [expected.weigh(products) for products in self._products]
-        self._adapt_to_motions()
+        self._products = self._widened()
         self._members = [expected.weigh(products) for products in self._products]
+        for candidate, products in zip(self._candidates, self._products, strict=True):
+            candidate.own = replace(candidate.own, misfit=products.misfit)
 
-    def _adapt_to_motions(self) -> None:
-        """Widen the model error of runs at a motion that the linear model describes worse than the others.
+    def _widened(self) -> list[RowProducts]:
+        """Return the runs with a wider model error at the motions that the linear model describes worse than others.
 
         It fails there in every run alike: the others at a motion say how much, and not the run itself.
         """
-        agreeing, posterior = self._agreeing(), self.posterior()
+        posterior = self.posterior()
         ratios: dict[int, float] = {}
-        for k in agreeing:
-            products = self._products[k] = replace(self._products[k], misfit=1.0)
-            error = products.unexplained(posterior.without(self._members[k])[0], MAX_SESSION_GAIN)
-            ratios[k] = error / (self.evidence.spread.misfit * model_error(products))
-        for i, track in enumerate(self.tracks):
+        for k in self._agreeing():
+            error = self._products[k].unexplained(posterior.without(self._members[k])[0], MAX_SESSION_GAIN)
+            ratios[k] = error / (self.evidence.spread.misfit * model_error(self._products[k]))
+        widened: list[RowProducts] = []
+        for i, (track, products) in enumerate(zip(self.tracks, self._products, strict=True)):
             beside = [ratio for k, ratio in ratios.items() if k != i and self.tracks[k].is_at_motion(track)]
             misfit = 1.0
             if len(beside) >= _MIN_AT_MOTION:
-                most = max(_MISFITS) / self.evidence.spread.misfit  # beyond, runs do not agree at all
-                misfit = float(np.clip(np.quantile(beside, 0.75), 1.0, most))
-            self._products[i] = replace(self._products[i], misfit=misfit)
-            candidate = self._candidates[i]
-            candidate.own = replace(candidate.own, misfit=misfit)
+                misfit = float(np.clip(np.quantile(beside, 0.75), 1.0, _MAX_AT_MOTION))
+            widened.append(replace(products, misfit=misfit))
+        return widened
 
     def _proposals(self) -> Iterator[JointExplanation]:
         posterior, prior = self.posterior(), self.evidence.prior
@@ -198,7 +228,7 @@ class Search:
 
     def _further(self) -> JointExplanation:
         """Return the run that best has the cause found in others, as a further one of their group."""
-        shared = [e.trial for e in self.found.values() if e.cause in _SHARED_CAUSES]
+        shared = self._shared_trials()
         options = [
             (e.gain + e.trial.odds - _MEMBER_ODDS, i, e)
             for i, of in self._options.items()
@@ -209,6 +239,22 @@ class Search:
         if best is None or gain < _TIE_ODDS:
             return _NO_PROPOSAL
         return JointExplanation({i: replace(best, gain=gain)}, gain)
+
+    def _of_gains(self, gain: float) -> JointExplanation:
+        """Return the few runs that have gains of their own; note the gains where too many do.
+
+        Too many do where this is more probable than the best explanation of some runs, whose gain is given.
+        """
+        left, least = self._agreeing(), _ODDS + _FEW_ODDS / len(self.tracks)
+        differences = gain_differences(self.evidence, [self._products[k] for k in left])
+        if differences.everywhere >= max(least, gain):
+            posterior = self.posterior()
+            self.differing = {k: self._gain(k, posterior) for k in left}
+        elif differences.odds >= _ODDS:
+            trial, odds = Trial("damper", 1.0, "", 0.0), differences.odds
+            alone = {left[k]: Explanation(trial, odds, self._products[left[k]]) for k in differences.members}
+            return JointExplanation(alone, odds)
+        return _NO_PROPOSAL
 
     def _of_one(self, i: int) -> JointExplanation:
         """Return the best explanation of a run."""
@@ -296,9 +342,10 @@ class Search:
                 break
             for explanation in self._options[i][:_SHARED_EXPLANATIONS]:
                 trial = explanation.trial
-                sets.append(
-                    [k for k, of in self._options.items() if any(e.gain > 0 and e.trial.is_like(trial) for e in of)]
-                )
+                alike = {k: [e for e in of if e.trial.is_like(trial)] for k, of in self._options.items()}
+                sets.append([k for k, of in alike.items() if any(e.gain > 0 for e in of)])
+                if trial.cause in ("displacement", "time"):  # together they may complete the matrix of tests
+                    sets.append([k for k, of in alike.items() if any(e.gain + e.trial.odds > 0 for e in of)])
         return [tuple(sorted(s)) for s in sets if 2 <= len(s) <= len(self.tracks) // 2]
 
     def _gain(self, k: int, posterior: Posterior) -> float:
@@ -351,6 +398,9 @@ class Search:
             members = {k: e for k, e in zip(group, alike, strict=True) if e is not None}
             if len(members) == len(group):
                 odds = max(e.trial.odds for e in members.values())
+                if explanation.cause in ("displacement", "time"):
+                    moved = {k: self._candidates[k].moved(e.trial) for k, e in members.items()}
+                    odds = completed_matrix_odds(odds, self.tracks, moved)
                 if explanation.cause == "current" and self._outnumbers(group):
                     odds += _MAJORITY_ODDS
                 moments = [others.weigh(e.products) for e in members.values()]
@@ -399,18 +449,19 @@ class Search:
         order = [k for k, track in enumerate(self.tracks) if not track.current_changes]
         written = [float(self.tracks[k].current[0]) for k in order]
         rows, last = list(range(len(order))), len(order) - 1
-        empty = self._irregular(written)
+        rigid = [self.tracks[k] for k in order]
+        empty = irregularity(rigid, written)
         for i, j in combinations(rows, 2):
             if (order[i] in suspects or order[j] in suspects) and abs(written[i] - written[j]) > _SAME_CURRENT:
-                odds = _EXCHANGE_ODDS if empty <= _MAX_IRREGULARITY * len(rows) else _SPARSE_ODDS
+                odds = _EXCHANGE_ODDS if empty <= MAX_IRREGULARITY * len(rows) else _SPARSE_ODDS
                 yield self._of_currents({order[i]: written[j], order[j]: written[i]}, "current", odds)
         for step in (-1, 1):
             for first in range(last):
                 moved = [written[k if k < first else min(max(k + step, first), last)] for k in rows]
                 changed = {order[k]: moved[k] for k in rows if abs(moved[k] - written[k]) > _SAME_CURRENT}
                 if len(changed) >= _MIN_SHIFTED_RUNS:
-                    filled = empty - self._irregular(moved) if set(moved) == set(written) else 0
-                    odds = _SHIFT_ODDS - _EMPTY_CELL_ODDS * filled * (empty <= _MAX_IRREGULARITY * len(rows))
+                    filled = empty - irregularity(rigid, moved) if set(moved) == set(written) else 0
+                    odds = _SHIFT_ODDS - EMPTY_CELL_ODDS * filled * (empty <= MAX_IRREGULARITY * len(rows))
                     yield self._of_currents(changed, "shifted", max(odds, _MIN_SHIFT_ODDS))
 
     def _of_currents(self, currents: dict[int, float], cause: Cause, odds: float) -> JointExplanation:
@@ -427,13 +478,6 @@ class Search:
         products = [moved[k].products if k in moved else p for k, p in enumerate(self._products)]
         gain = self._adapted(products, posterior) - self._base - next(iter(moved.values())).trial.odds
         return JointExplanation({k: replace(e, gain=gain) for k, e in moved.items()}, gain)
-
-    def _irregular(self, currents: Sequence[float]) -> int:
-        """Repeated tests, and empty cells of the matrix of currents and motions."""
-        sines = [track for track in self.tracks if not track.current_changes]
-        motions = [next(j for j, t in enumerate(sines) if t is track or t.is_at_motion(track)) for track in sines]
-        cells = set(zip(currents, motions, strict=True))
-        return len(sines) - len(cells) + len(set(currents)) * len(set(motions)) - len(cells)
 
     def _review(self) -> None:
         """Compare each explanation with all the other runs as they ended; drop those no longer needed."""

@@ -90,6 +90,21 @@ def tracks_of(runs: Sequence[Run]) -> list[Track]:
     return tracks
 
 
+def irregularity(tracks: Sequence[Track], currents: Sequence[float]) -> int:
+    """Repeated tests, and empty cells of the matrix of currents and motions.
+
+    Parameters
+    ----------
+    tracks : sequence of Track
+        Of constant current.
+    currents : sequence of float
+        Of each test [A].
+    """
+    motions = [next(j for j, t in enumerate(tracks) if t is track or t.is_at_motion(track)) for track in tracks]
+    cells = set(zip(currents, motions, strict=True))
+    return len(tracks) - len(cells) + len(set(currents)) * len(set(motions)) - len(cells)
+
+
 def _track(run: Run) -> Track:
     sine = equivalent_sine(run)
     motion = measured_motion(run)
