@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from math import lgamma
+from math import inf, lgamma
 
 from mrdamper.study.contradictions.evidence import Evidence, Moments, RowProducts
 
@@ -57,14 +57,14 @@ def gain_differences(evidence: Evidence, products: Sequence[RowProducts]) -> Gai
                 best = odds, misfit, variant
     assert best is not None
     evidence.spread = replace(scatter, misfit=best[1])
-    found = _grown(evidence, best[2])
+    differences = _grown(evidence, best[2])
     evidence.spread = scatter
-    return found
+    return differences
 
 
 def _grown(evidence: Evidence, products: Sequence[RowProducts]) -> GainDifferences:
     """Add and remove runs one by one while the odds rise."""
-    group, size = frozenset[int](), len(products)
+    group, size, now = frozenset[int](), len(products), -inf
     every = range(size)
     for _ in range(_ROUNDS):
         usual = _weighed(evidence, products, group)

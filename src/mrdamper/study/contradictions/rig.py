@@ -49,7 +49,8 @@ def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list
     Raises
     ------
     ContradictionError
-        If more than a third of the identification runs contradict the others.
+        If more than a third of the identification runs contradict the others, or their forces differ by
+        factors that currents, motions and sessions do not explain.
     """
     copies = [describe_copy(copy, _split(runs, copy.run_id) == "validate") for copy in find_copies(runs)]
     contradictions = {one.run_id: one for one in copies if one.run_id not in keep}

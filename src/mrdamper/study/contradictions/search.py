@@ -101,7 +101,7 @@ class Search:
     def run(self, most: int) -> None:
         """Explain runs until the others agree, or more than `most` are explained."""
         while len(self.found) <= most:
-            best = max(self._proposals(), key=lambda proposal: proposal.gain, default=_NO_PROPOSAL)
+            best = max(self._proposals(), key=self._rank, default=_NO_PROPOSAL)
             if not best.explanations or best.gain < self._threshold(best.explanations.values()):
                 best = self._further()
                 best = best if best.explanations else self._of_gains(-np.inf)
@@ -132,9 +132,16 @@ class Search:
         alone = any(e.cause == "damper" for e in explanations)
         return _ODDS + _FEW_ODDS / len(self.tracks) + (_ALONE_ODDS if alone else 0.0)
 
+    def _rank(self, proposal: JointExplanation) -> float:
+        """Logarithm of the odds of a proposal, where a cause found in other runs is as probable as in a group."""
+        if not self._is_shared(proposal.explanations.values()):
+            return proposal.gain
+        return proposal.gain + max(0.0, *(e.trial.odds - _MEMBER_ODDS for e in proposal.explanations.values()))
+
     def _is_shared(self, explanations: Iterable[Explanation]) -> bool:
         """Tell whether explanations have causes that were found in other runs."""
-        return all(any(e.trial.is_like(one) for one in self._shared_trials()) for e in explanations)
+        shared = self._shared_trials()
+        return bool(shared) and all(any(e.trial.is_like(one) for one in shared) for e in explanations)
 
     def _shared_trials(self) -> list[Trial]:
         """Return the causes found that further runs may have as well."""
