@@ -42,7 +42,9 @@ KNOWN = Uncertainty(
 
 def damper(known=KNOWN):
     model = Bingham(c=2000.0, fy=100.0, f0=25.0)
-    envelope = SimpleNamespace(distance=lambda condition, current: AWAY)
+    envelope = SimpleNamespace(
+        distance=lambda condition, current: AWAY, nearest=lambda condition: condition, flags=lambda condition: ()
+    )
     return JointDamper("rig", model, ("c", "fy"), envelope, uncertainty=known)  # type: ignore[arg-type]
 
 
@@ -56,12 +58,14 @@ def _slopes(monkeypatch):
         return SLOPES
 
     monkeypatch.setattr(bands, "force_slopes", slopes)
+    monkeypatch.setattr(bands, "_by_parameters", lambda damper, loop: np.full(3, np.inf))
 
 
-def reach(level, *parts):
+def reach(level, *parts, at=slice(None)):
     """Half a band: Student's t with degrees of freedom by Welch and Satterthwaite."""
-    whole = sum(parts)
-    dof = whole**2 / sum(part**2 / d for part, d in zip(parts, (5.0, 3.0, 8.0), strict=True))
+    whole, shares = sum(parts), np.mean(SLOPES[at] ** 2, axis=0) * np.diag(COVARIANCE)
+    of_parameters = shares.sum() / (shares[0] / 12.0 + shares[1] / 5.0)
+    dof = whole**2 / sum(part**2 / d for part, d in zip(parts, (of_parameters, 3.0, 8.0), strict=True))
     return students_t.ppf((1 + level) / 2, dof) * np.sqrt(whole)
 
 
@@ -79,21 +83,37 @@ def test_a_band_adds_numbers_sessions_and_form(level, shown):
     quantiles = students_t.ppf((1 + level) / 2, GROWN_DOF)
     away = {quantity: np.sqrt(quantiles**2 @ grown) for quantity, grown in GROWN.items()}
     whole = own + session + form
-    t = reach(level, own.mean(), session.mean(), form.mean()) / np.sqrt(whole.mean())
+    t = reach(level, own.mean(), session.mean(), form.mean(), at=at) / np.sqrt(whole.mean())
     assert found.high - force == pytest.approx(np.hypot(t * np.sqrt(whole), away["force"] * half))
     assert force - found.low == pytest.approx(found.high - force)
     swing = (slopes[force.argmax()] - slopes[force.argmin()]) / 2
     parts = swing @ COVARIANCE @ swing, (0.03 * half) ** 2, (0.012**2 + 0.015**2) * half**2
-    at_tests = reach(level, *parts), reach(level, parts[0], 0.0, parts[2])
+    at_tests = reach(level, *parts, at=at) * np.sqrt([1.0, 1 - parts[1] / sum(parts)])  # the session is known
     unseen, seen = (np.hypot(each, away["peak"] * half) for each in at_tests)
     assert found.peak == pytest.approx((half - unseen, half + unseen))
     assert found.known_session == pytest.approx((half - seen, half + seen))
     time, v = MOTION.time[at], MOTION.velocity[at]
     power, *turned = (np.trapezoid(f * v, time) for f in (force, slopes[:, 0], slopes[:, 1]))
     share = np.array(turned) / power
-    loss = reach(level, share @ COVARIANCE @ share, 0.03**2, 0.012**2 + 0.05**2)
+    loss = reach(level, share @ COVARIANCE @ share, 0.03**2, 0.012**2 + 0.05**2, at=at)
     loss = np.hypot(loss, away["energy"])
     assert found.energy == pytest.approx((-loss, loss))
+
+
+def test_beyond_the_tested_motions_parameters_count_as_at_the_nearest(monkeypatch):
+    """Growth holds the error of folds, that of their parameters with it; without growth nothing is limited."""
+    plain, still = band(damper(), PREDICTION), band(damper(replace(KNOWN, growth=Growth())), PREDICTION)
+    monkeypatch.setattr(bands, "_by_parameters", lambda damper, loop: np.zeros(3))
+    limited = band(damper(), PREDICTION)
+    assert not limited.parameter.any()
+    for name in ("peak", "energy"):
+        assert getattr(limited, name)[1] < getattr(plain, name)[1]
+    assert np.all(limited.high < plain.high)
+    unlimited = band(damper(replace(KNOWN, growth=Growth())), PREDICTION)
+    assert unlimited.high == pytest.approx(still.high)
+    monkeypatch.setattr(bands, "_by_parameters", lambda damper, loop: np.full(3, 1e-4))
+    half = np.ptp(FORCE) / 2
+    assert np.mean(band(damper(), PREDICTION).parameter ** 2) == pytest.approx(1e-4 * half**2)
 
 
 def test_a_calibrated_band_is_its_factor_times_the_band_at_the_tests():

@@ -7,10 +7,11 @@ import pytest
 
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.calibration import Calibration, PredictedRun, StandardizedErrors, model_error
+from mrdamper.dampers.concatenated_runs import JointResiduals
 from mrdamper.dampers.covariance import _determined, _within, estimate_uncertainty
 from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.envelope import UNTESTED
-from mrdamper.dampers.joint import JointDamper
+from mrdamper.dampers.joint import JointDamper, JointProblem
 from mrdamper.dampers.random_effects import GainsAndOffsets
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.data import Condition, Run
@@ -25,7 +26,6 @@ def bingham(c, fy, f0):
 
 TRUTH = bingham(2000.0, 150.0, 20.0)
 CONDITIONS = [Condition(0.5, f, a) for f in (0.5, 1.0, 2.0) for a in (0.005, 0.01, 0.02)]
-ROWS, CYCLES = 400, 4
 
 
 def runs_of(gain=0.03, session=0.0, noise=0.02, seed=0, sessions=0, conditions=CONDITIONS, size=1.0):
@@ -50,7 +50,7 @@ def fitted(runs, size=1.0):
         columns = [np.column_stack([m.velocity, np.sign(m.velocity), np.ones(len(m))])[p.picked] for p in parts
                    for m in [p.prediction.motion]]  # fmt: skip
         normal = normal_matrix(columns, parts)
-        right = sum(c.T @ p.measured * p.weight**2 for c, p in zip(columns, parts, strict=True))
+        right = sum(p.weighted(c).T @ (p.measured * p.weight) for c, p in zip(columns, parts, strict=True))
         c, fy, f0 = np.linalg.solve(normal, right)
         damper = bingham(c, fy, f0)
     return damper
@@ -72,27 +72,38 @@ def test_columns_that_no_run_shows_are_unseen_and_the_unit_of_a_parameter_change
     assert (len(keep), unseen, [sorted(group) for group in alike]) == (2, [], [[0, 1]])
 
 
-def test_what_enters_of_a_run_is_its_last_cycles_thinned():
+def test_what_enters_of_a_run_is_what_entered_its_fit():
     (run,) = runs_of(conditions=CONDITIONS[:1])
-    part = RunResiduals.of(TRUTH, run)
-    motion = part.prediction.motion
-    assert motion.time[part.picked[-1]] == pytest.approx(run.time[-1], abs=4 * (run.time[1] - run.time[0]))
-    assert motion.time[part.picked[0]] == pytest.approx(run.time[-1] - CYCLES / 0.5, abs=0.03)
-    assert ROWS <= part.picked.size < 2 * ROWS
-    assert part.scale == pytest.approx(np.ptp(run.force[run.time >= run.time[-1] - CYCLES / 0.5]), rel=0.02)
-    at = np.searchsorted(run.time, motion.time[part.picked])
+    part, joint = RunResiduals.of(TRUTH, run), JointProblem([run], "bingham")
+    table = JointResiduals(joint, joint.parts)
+    time = part.prediction.motion.time[part.picked]
+    at = np.searchsorted(run.time, time)
+    assert part.measured == pytest.approx(table.target)
     assert part.measured == pytest.approx(run.force[at])
     assert part.residual == pytest.approx(part.predicted - run.force[at])
-    error = np.sqrt(np.mean(part.residual**2)) / part.scale
-    assert part.weight == pytest.approx(1 / (part.scale * np.sqrt(part.picked.size) * np.sqrt(error)))
-    assert part.frequency == pytest.approx(0.5, rel=1e-3)
+    assert np.sum(part.weight**2) * part.error == pytest.approx(1 / np.ptp(run.force) ** 2)
+    assert part.weight * np.sqrt(part.error) == pytest.approx(table.unit)
+    assert part.error == pytest.approx(np.sqrt(np.sum((part.residual * table.unit) ** 2)))
     assert part.session is None
-    begin = motion.time[0]
-    assert begin == pytest.approx(motion.time[part.picked[0]] - 1.5 / 0.5, abs=0.03)
-    window = replace(run, window=(0.0, 6.0), notes={"session": "a"})
+    # Ramps and rests enter with a tenth of the weight, the steady window as its last four cycles.
+    window = replace(run, window=(4.0, 10.0), notes={"session": "a"})
     inside = RunResiduals.of(TRUTH, window)
-    assert inside.prediction.motion.time[inside.picked].max() <= 6.0
+    time = inside.prediction.motion.time[inside.picked]
+    outside = (time < 4.0) | (time > 10.0)
+    assert np.sum(inside.weight[outside] ** 2) == pytest.approx(0.1 / 1.1 * np.sum(inside.weight**2))
     assert inside.session == "a"
+    steady, before, after = inside.stretches
+    assert (steady.frequency, before.frequency, after.frequency) == (pytest.approx(0.5, rel=1e-3), None, None)
+    assert (steady.time[0], steady.time[-1]) == (pytest.approx(4.0, abs=0.02), pytest.approx(10.0, abs=0.02))
+    assert before.time[-1] < 4.0 < 10.0 < after.time[0]
+    for stretch in inside.stretches:
+        assert np.ptp(np.diff(stretch.time)) < 1e-9
+        measured = np.interp(stretch.time, run.time, run.force)
+        assert stretch.residual == pytest.approx(stretch.predicted - measured)
+    parts = [stretch.weight**2 * stretch.time.size for stretch in inside.stretches]
+    assert sum(parts) == pytest.approx(np.sum(inside.weight**2))
+    forces = inside.evenly(inside.predicted[:, None], steady)[:, 0]
+    assert np.median(np.abs(forces - steady.predicted)) < 0.01 * np.ptp(forces)
 
 
 @pytest.mark.parametrize("sessions", [0, 3])
@@ -135,15 +146,11 @@ def test_without_gains_the_intervals_are_those_of_the_noise():
     runs = runs_of(gain=0.0, noise=0.01)
     damper = fitted(runs)
     known = estimate_uncertainty(damper, runs).uncertainty
-    parts = [RunResiduals.of(damper, run) for run in runs]
-    columns = [np.column_stack([p.prediction.motion.velocity, np.sign(p.prediction.motion.velocity)])[p.picked]
-               for p in parts]  # fmt: skip
-    columns = [np.column_stack([c, np.ones(len(c))]) for c in columns]
-    inverse = np.linalg.inv(normal_matrix(columns, parts))
-    square = sum(
-        (c * p.weight**2).T @ (c * p.weight**2) * np.var(p.residual) for c, p in zip(columns, parts, strict=True)
-    )
-    assert np.sqrt(np.diag(known.covariance)) == pytest.approx(np.sqrt(np.diag(inverse @ square @ inverse)), rel=0.6)
+    fits = [fitted(runs_of(gain=0.0, noise=0.01, seed=seed)).one_model.values() for seed in range(1, 31)]
+    scatter = np.std([[fit[name] for name in known.names] for fit in fits], axis=0)
+    c, fy, f0 = np.sqrt(np.diag(known.covariance)) / scatter
+    assert (c, f0) == pytest.approx((1.0, 1.0), rel=0.3)
+    assert 0.8 < fy < 2.5  # samples at a reversal have the other sign of a velocity, in every cycle and every fit
     few = estimate_uncertainty(damper, runs[:3]).uncertainty
     assert np.all(np.diag(few.covariance) > np.diag(known.covariance))
 
@@ -164,12 +171,10 @@ def test_information_and_effective_samples_are_those_of_weighted_least_squares()
     damper = fitted(runs)
     known = estimate_uncertainty(damper, runs).uncertainty
     parts, columns, inverse = linear_parts(damper, runs)
-    squares = np.array(
-        [p.weight**2 * np.diag(inverse @ c.T @ c @ inverse) for c, p in zip(columns, parts, strict=True)]
-    )
+    squares = np.array([np.sum((p.weighted(c) @ inverse) ** 2, axis=0) for c, p in zip(columns, parts, strict=True)])
     shares = (squares / squares.sum(axis=0)).mean(axis=1)
     assert list(known.information.values()) == pytest.approx(shares.tolist(), rel=1e-5)
-    left = sum(np.sum(p.residual**2) * p.weight**2 for p in parts)
+    left = sum(np.sum((p.residual * p.weight) ** 2) for p in parts)
     samples = left * np.diag(inverse) / np.diag(known.covariance)
     most = sum(p.picked.size for p in parts)
     assert list(known.effective.values()) == pytest.approx(np.minimum(samples, most).tolist(), rel=1e-5)
@@ -187,10 +192,11 @@ def test_noise_counts_by_its_square_however_large_beside_the_force():
     alone = runs_of(conditions=CONDITIONS[:1])
     parts, (columns,), inverse = linear_parts(fitted(alone), alone)
     (part,) = parts
-    table = np.column_stack([part.predicted, np.ones(part.predicted.size)])
-    rest = part.residual - table @ np.linalg.lstsq(table, part.residual)[0]
-    time = part.prediction.motion.time[part.picked]
-    dof = score_covariance(columns, rest, time, part.frequency, inverse * part.weight**2)[1]
+    (stretch,) = part.stretches
+    table = np.column_stack([stretch.predicted, np.ones(stretch.predicted.size)])
+    rest = stretch.residual - table @ np.linalg.lstsq(table, stretch.residual)[0]
+    own = inverse * stretch.weight**2
+    dof = score_covariance(part.evenly(columns, stretch), rest, stretch.time, stretch.frequency, own)[1]
     assert _within(parts, [columns], inverse)[1] == pytest.approx(2 / dof)  # of a variance with its degrees of freedom
 
 
@@ -200,11 +206,11 @@ def test_without_cross_validation_the_residuals_of_the_fit_stand_in():
     known = estimate_uncertainty(damper, runs).uncertainty
     inside = []
     for part in linear_parts(damper, runs)[0]:
-        motion = part.prediction.motion
-        time, v = motion.time[part.picked], motion.velocity[part.picked]
-        energy = np.trapezoid(part.measured * v, time) / np.trapezoid(part.predicted * v, time)
-        peak = np.ptp(part.measured) / np.ptp(part.predicted)
-        inside.append(PredictedRun(part.run.id, None, part.predicted, part.measured, peak, energy))
+        (steady,) = part.stretches
+        measured = steady.predicted - steady.residual
+        powers = [np.trapezoid(force * steady.velocity, steady.time) for force in (measured, steady.predicted)]
+        peak = np.ptp(measured) / np.ptp(steady.predicted)
+        inside.append(PredictedRun(part.run.id, None, steady.predicted, measured, peak, powers[0] / powers[1]))
     error = model_error(inside)
     assert (known.force, known.peak, known.energy) == pytest.approx((error.force, error.peak, error.energy), rel=1e-6)
     assert error.peak != pytest.approx(error.energy, rel=0.1)
@@ -219,35 +225,26 @@ def test_a_parameter_rests_on_one_run_of_three_or_more_only():
     assert "determined mainly" not in " ".join(estimate_uncertainty(fitted(runs[:2]), runs[:2]).uncertainty.words)
 
 
-def test_degrees_of_freedom_are_those_of_the_parts_of_a_variance():
-    """Of n sessions a variance between sessions has at most n - 1 degrees of freedom."""
-    for count in (3, 9):
-        runs = runs_of(gain=0.0, session=0.2, noise=1e-4, sessions=count, conditions=CONDITIONS)
-        known = estimate_uncertainty(fitted(runs), runs).uncertainty
-        assert known.session_dof <= count - 1
-        at = known.names.index("c")
-        assert known.dof[at] == pytest.approx(max(known.session_dof, 1.0), rel=0.25)
+def test_student_s_interval_holds_its_share_of_errors_drawn_as_the_tests_scatter():
+    """A common gain of nine sessions has about their degrees of freedom, noise alone the many of its samples."""
+    runs = runs_of(gain=0.0, session=0.2, noise=1e-4, sessions=9, conditions=CONDITIONS * 3)
+    known = estimate_uncertainty(fitted(runs), runs).uncertainty
+    assert known.session_dof <= 8
+    at = known.names.index("c")
+    assert 0.5 * known.session_dof < known.dof[at] < 4 * known.session_dof
+    # Noise alone has the many degrees of freedom of its samples.
+    still = estimate_uncertainty(fitted(runs_of(gain=0.0)), runs_of(gain=0.0)).uncertainty
+    assert np.min(still.dof) > 20
 
 
-@pytest.mark.parametrize(("gain", "session", "noise"), [(0.03, 0.03, 0.02), (0.0, 0.0, 0.05)])
-def test_degrees_of_freedom_are_by_welch_and_satterthwaite(gain, session, noise):
-    runs = runs_of(gain=gain, session=session, noise=noise, sessions=3)
-    damper = fitted(runs)
-    known = estimate_uncertainty(damper, runs).uncertainty
-    parts, columns, inverse = linear_parts(damper, runs)
-    influence = [inverse @ (c * p.weight**2).T for c, p in zip(columns, parts, strict=True)]
-    scatter = GainsAndOffsets(parts, columns, influence)
-    effects = scatter.effects()
-    between, by_session, by_run = scatter.covariance(effects)
-    within, doubt = _within(parts, columns, inverse)
-    whole = np.diag(between + within)
-    kinds = [
-        (np.diag(between) * by_session, max(effects.session_dof, 1.0)),
-        (np.diag(between) * by_run, max(effects.run_dof, 1.0)),
-        (np.diag(within), 2 / doubt),
-    ]
-    expected = whole**2 / sum(variance**2 / dof for variance, dof in kinds)
-    assert known.dof == pytest.approx(np.maximum(expected, 1.0), rel=1e-4)
+def test_what_gains_of_other_runs_moved_is_no_error_within_a_run():
+    """Parameters that large gains have moved leave the shape of their force in every run's residual."""
+    runs = runs_of(gain=0.3, noise=0.002, seed=3)
+    parts, columns, inverse = linear_parts(fitted(runs), runs)
+    influence = [inverse @ p.weighted(p.weighted(c)).T for c, p in zip(columns, parts, strict=True)]
+    moved = GainsAndOffsets(parts, columns, influence).by_gains()
+    counted, free = (_within(parts, columns, inverse, by)[0][0, 0] for by in (0.0, moved))
+    assert free < 0.5 * counted
 
 
 def test_other_sessions_show_the_scatter_of_sessions_and_far_runs_the_growth():
@@ -270,14 +267,15 @@ def test_other_sessions_show_the_scatter_of_sessions_and_far_runs_the_growth():
     assert known.growth.force[1] > plain.growth.force[1]
 
 
-def test_the_first_sample_of_a_record_that_is_no_sine_enters():
+def test_a_record_that_is_no_sine_enters_from_where_it_has_moved_by_its_amplitude():
     time = np.linspace(0.0, 8.0, 801)
     path = 0.01 * np.sin(2 * np.pi * (0.3 * time + 0.1 * time**2))
     run = Run("sweep", time, path, 2000 * np.gradient(path, time), 0.5)
     part = RunResiduals.of(TRUTH, run)
-    assert part.frequency is None
-    assert (part.picked[0], part.picked[-1]) == (0, 800)
-    assert part.measured == pytest.approx(run.force[part.picked])
+    (stretch,) = part.stretches
+    assert stretch.frequency is None
+    assert stretch.time[[0, -1]] == pytest.approx([0.65, 8.0], abs=0.02)  # before, it has not moved by its amplitude
+    assert part.measured == pytest.approx(np.interp(part.prediction.motion.time[part.picked], time, run.force))
 
 
 def test_the_model_error_of_cross_validation_takes_the_place_of_the_residuals():
@@ -347,12 +345,12 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
     shares, scores = [], []
     for run in runs:
         part = RunResiduals.of(damper, run)
-        velocity = part.prediction.motion.velocity[part.picked]
-        slopes = np.column_stack([velocity, np.sign(velocity), np.ones(velocity.size)])
-        time = part.prediction.motion.time[part.picked]
-        power, *lost = (np.trapezoid(f * velocity, time) for f in (part.predicted, *slopes.T))
-        swing = (slopes[part.predicted.argmax()] - slopes[part.predicted.argmin()]) / np.ptp(part.predicted)
-        share = np.mean(np.sum(slopes @ known.covariance * slopes, axis=1)) / (np.ptp(part.predicted) / 2) ** 2
+        every, velocity = part.prediction.motion.velocity[part.picked], part.stretches[0].velocity
+        table = np.column_stack([every, np.sign(every), np.ones(every.size)])
+        slopes, predicted = part.evenly(table, part.stretches[0]), part.stretches[0].predicted
+        power, *lost = (np.trapezoid(f * velocity, part.stretches[0].time) for f in (predicted, *slopes.T))
+        swing = (slopes[predicted.argmax()] - slopes[predicted.argmin()]) / np.ptp(predicted)
+        share = np.mean(np.sum(slopes @ known.covariance * slopes, axis=1)) / (np.ptp(predicted) / 2) ** 2
         shares.append([share, *(d @ known.covariance @ d for d in (swing, np.array(lost) / power))])
     shares[6] = np.median(shares, axis=0)
     for own, prediction in zip(shares, seen, strict=True):

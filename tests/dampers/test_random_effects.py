@@ -11,10 +11,32 @@ PHASE = np.linspace(0.0, 2 * np.pi, 120, endpoint=False)
 FORCE = 100 * np.sin(PHASE)
 
 
+class Residuals(SimpleNamespace):
+    """Residuals of a run of evenly spaced samples, which counts by its error."""
+
+    information = 1.0
+
+    @property
+    def error(self):
+        return max(np.sqrt(np.mean(self.residual**2)) / self.scale, 1e-3)
+
+    @property
+    def weight(self):
+        return np.full(self.picked.size, 1 / self.scale / np.sqrt(self.picked.size * self.error))
+
+    def weighted(self, table):
+        return table * self.weight[:, None]
+
+
+def covariance_of(scatter, effects):
+    moved = scatter.draws(effects).moved
+    return moved.T @ moved / len(moved)
+
+
 def runs_of(gains, offsets, sessions, noise=0.0, seed=0):
     rng = np.random.default_rng(seed)
     return [
-        SimpleNamespace(
+        Residuals(
             session=s, predicted=FORCE, picked=np.arange(PHASE.size), scale=200.0,
             residual=-(g * FORCE + o) + noise * rng.standard_normal(PHASE.size),
         )
@@ -100,10 +122,10 @@ def test_what_the_fit_has_absorbed_is_not_divided_by():
     (gains, _), names = drawn(6, 3, seed=5)
     runs, slope = runs_of(gains, np.zeros(18), names), FORCE[:, None]
     own = slope.T / (slope.T @ slope)
-    lost = [SimpleNamespace(**{**vars(run), "residual": 1e-13 * run.residual}) for run in runs[:1]]
+    lost = [Residuals(**{**vars(run), "residual": 1e-13 * run.residual}) for run in runs[:1]]
     assert effects_of(lost, slope, own).effects() == Effects()
     mean = float(np.mean(gains))
-    left = [SimpleNamespace(**{**vars(r), "residual": r.residual + mean * FORCE}) for r in runs]
+    left = [Residuals(**{**vars(r), "residual": r.residual + mean * FORCE}) for r in runs]
     found = effects_of(left, slope, own / 18).effects()
     table = (gains - mean).reshape(6, 3)
     within = np.sum((table - table.mean(axis=1, keepdims=True)) ** 2) / 12
@@ -142,28 +164,42 @@ def test_one_parameter_scatters_as_the_mean_of_gains():
     runs = runs_of(np.zeros(20), np.zeros(20), names, noise=60.0)  # beside which gains change no weight
     scatter = effects_of(runs, slope, slope.T / (slope.T @ slope) / 20)
     effects = Effects(gain=0.05, session_dof=4.0, run_gain=0.08, run_dof=19.0)
-    covariance, by_session, by_run = scatter.covariance(effects)
-    expected = 0.05**2 / 5, 0.08**2 / 20
-    assert covariance[0, 0] == pytest.approx(sum(expected), rel=0.2)  # 600 draws know a variance to 6 %
-    assert (by_session[0], by_run[0]) == pytest.approx((expected[0] / sum(expected), expected[1] / sum(expected)))
-    assert not scatter.covariance(Effects())[0].any()
+    expected = 0.05**2 / 5 + 0.08**2 / 20
+    assert covariance_of(scatter, effects)[0, 0] == pytest.approx(expected, rel=0.2)  # 600 draws show it to 6 %
+    assert not covariance_of(scatter, Effects()).any()
     # An offset moves a parameter of the gain nowhere.
-    assert scatter.covariance(Effects(offset=5.0, run_offset=5.0))[0][0, 0] == pytest.approx(0.0, abs=1e-20)
+    assert covariance_of(scatter, Effects(offset=5.0, run_offset=5.0))[0, 0] == pytest.approx(0.0, abs=1e-20)
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e3])
-def test_shares_of_sessions_and_runs_are_those_of_their_gains_and_offsets(unit):
-    """One parameter that gains and offsets both move; the unit of the force drops out."""
-    force, slope = unit * FORCE, unit * (FORCE + 60.0)[:, None]
-    runs = runs_of(np.zeros(20), np.zeros(20), [f"day {i // 4}" for i in range(20)], noise=60.0)
+def test_draws_show_a_variance_with_the_degrees_of_freedom_of_their_groups(unit):
+    """One parameter that gains move and offsets do not; the unit of the force drops out."""
+    force, slope = unit * FORCE, unit * FORCE[:, None]
+    runs = runs_of(np.zeros(40), np.zeros(40), [f"day {i // 4}" for i in range(40)], noise=60.0)
     for run in runs:
         run.predicted, run.residual, run.scale = force, unit * run.residual, unit * run.scale
-    influence = slope.T / (slope.T @ slope) / 20
-    effects = Effects(gain=0.05, session_dof=4.0, run_offset=3.0 * unit, run_dof=19.0)
-    _, by_session, by_run = effects_of(runs, slope, influence).covariance(effects)
-    session = 5 * (0.05 * 4 * float(influence[0] @ force)) ** 2
-    run = 20 * (3.0 * unit * float(influence[0].sum())) ** 2
-    assert (by_session[0], by_run[0]) == pytest.approx((session / (session + run), run / (session + run)))
+    scatter = effects_of(runs, slope, slope.T / (slope.T @ slope) / 40)
+    for effects, dof in (
+        (Effects(gain=0.05, offset=8.0 * unit, session_dof=9.0), 9.0),
+        (Effects(run_gain=0.05, run_offset=8.0 * unit, run_dof=39.0), 39.0),
+    ):
+        shown = scatter.draws(effects).shown[:, 0]
+        assert np.mean(shown) == pytest.approx(1.0, abs=0.12)
+        assert 2 / np.var(shown) == pytest.approx(dof, rel=0.35)
+
+
+def test_gains_that_the_residuals_show_are_taken_out_with_what_they_moved():
+    """Of two parameters that gains of the runs have moved, nothing is left of the residuals but their noise."""
+    rng = np.random.default_rng(8)
+    gains, slope = rng.standard_normal(12) * 0.05, np.column_stack([FORCE, np.abs(FORCE) + 20.0])
+    influence = np.linalg.solve(12 * slope.T @ slope, slope.T)
+    moved = influence @ np.outer(FORCE, gains).sum(axis=1)
+    runs = runs_of(gains, np.zeros(12), [None] * 12)
+    for run in runs:
+        run.residual = run.residual + slope @ moved
+    scatter = effects_of(runs, slope, influence)
+    for rest in scatter.rests():
+        assert rest == pytest.approx(0.0, abs=1e-9)
 
 
 def test_runs_far_off_pull_less_than_their_gain_would_say():
@@ -171,7 +207,7 @@ def test_runs_far_off_pull_less_than_their_gain_would_say():
     names = [f"day {i}" for i in range(40)]
     runs, slope = runs_of(np.zeros(40), np.zeros(40), names), FORCE[:, None]
     scatter = effects_of(runs, slope, slope.T / (slope.T @ slope) / 40)
-    variance = scatter.covariance(Effects(run_gain=0.05, run_dof=39.0))[0][0, 0]
+    variance = covariance_of(scatter, Effects(run_gain=0.05, run_dof=39.0))[0, 0]
     assert 1.2 < variance / (0.05**2 / 40) < 1.8  # of a median: π / 2
 
 
@@ -182,7 +218,7 @@ def test_a_run_counts_the_less_the_noisier_it_is():
     for seed, noise in enumerate(noises):
         runs += runs_of([0.0], [0.0], [None], noise=noise, seed=seed)
     scatter = effects_of(runs, slope, slope.T / (slope.T @ slope) / 20)
-    variance = scatter.covariance(Effects(run_gain=0.02, run_dof=19.0))[0][0, 0]
+    variance = covariance_of(scatter, Effects(run_gain=0.02, run_dof=19.0))[0, 0]
     share = (1 / noises) / np.sum(1 / noises)
     assert variance == pytest.approx(0.02**2 * np.sum(share**2), rel=0.2)  # were they alike: a quarter less
 
@@ -198,5 +234,5 @@ def test_a_run_counts_by_its_relative_error_whatever_its_force():
         run.predicted, run.residual, run.scale = size * run.predicted, size * run.residual, size * run.scale
         slopes.append(run.predicted[:, None])
     scatter = GainsAndOffsets(runs, slopes, [s.T / (s.T @ s) / 20 for s in slopes])
-    variance = scatter.covariance(Effects(run_gain=0.08, run_dof=19.0))[0][0, 0]
+    variance = covariance_of(scatter, Effects(run_gain=0.08, run_dof=19.0))[0, 0]
     assert variance == pytest.approx(0.08**2 / 20, rel=0.2)

@@ -92,7 +92,11 @@ def band(
     session = (uncertainty.gain * force) ** 2 + uncertainty.offset**2
     model = (uncertainty.run_gain * force) ** 2 + uncertainty.run_offset**2 + (uncertainty.force * half) ** 2
     own = relative_variances(slopes, uncertainty.covariance, force, motion.velocity, motion.time)
-    dofs = _degrees_of_freedom(uncertainty, level)
+    if distance.motion > 0 and uncertainty.growth.force[2] > 0:
+        # Beyond the tested motions growth holds the whole error that folds showed, that of their parameters with it.
+        nearest = np.minimum(own, _by_parameters(damper, damper.predict(damper.envelope.nearest(prediction.condition))))
+        parameter, own = parameter * nearest[0] / (own[0] or 1.0), nearest
+    dofs = _degrees_of_freedom(uncertainty, slopes, level)
     of_run, of_session = uncertainty.run_gain**2, uncertainty.gain**2
 
     def reach(quantity: Quantity, parts: Sequence[float]) -> float:
@@ -111,10 +115,11 @@ def band(
     t = reach("force", [float(np.mean(v)) for v in (parameter, session, model)])
     t /= float(np.sqrt(np.mean(variance))) or 1.0
     width = half * with_growth(t * np.sqrt(variance) / (half or 1.0), "force")
-    future, known_session = (
-        half * with_growth(reach("peak", [own[1], between, of_run + uncertainty.peak**2]), "peak")
-        for between in (of_session, 0.0)
-    )
+    of_peak = own[1] + of_run + uncertainty.peak**2
+    at_tests = reach("peak", [own[1], of_session, of_run + uncertainty.peak**2])
+    # A known session leaves its part of the variance out, at the same quantile.
+    own_session = at_tests * float(np.sqrt(of_peak / ((of_peak + of_session) or 1.0)))
+    future, known_session = (half * with_growth(each, "peak") for each in (at_tests, own_session))
     loss = float(with_growth(reach("energy", [own[2], of_session, of_run + uncertainty.energy**2]), "energy"))
     model = model + uncertainty.growth.variance("force", distance) * half**2
     return Band(
@@ -123,12 +128,24 @@ def band(
     )  # fmt: skip
 
 
-def _degrees_of_freedom(uncertainty: Uncertainty, level: float) -> tuple[float, float, float]:
-    """Behind the variances of parameters, sessions and the rest, which calibration counts itself within its reach."""
-    worst = float(np.min(uncertainty.dof)) if uncertainty.names else 1.0
+def _by_parameters(damper: Damper, loop: Prediction) -> Floats:
+    """(3,) relative variances of the force, the peak and the energy of a loop by the parameters."""
+    uncertainty: Uncertainty = damper.uncertainty
+    slopes, motion = force_slopes(damper, loop, uncertainty.names), loop.motion
+    return relative_variances(slopes, uncertainty.covariance, loop.force, motion.velocity, motion.time)
+
+
+def _degrees_of_freedom(uncertainty: Uncertainty, slopes: Floats, level: float) -> tuple[float, float, float]:
+    """Behind the variances of parameters, sessions and the rest, which calibration counts itself within its reach.
+
+    Those of the parameters are their harmonic mean, each by its variance of the force.
+    """
+    shares = np.mean(slopes**2, axis=0) * np.diag(uncertainty.covariance)
+    doubt = float(np.sum(shares / uncertainty.dof))
+    parameters = max(float(np.sum(shares)) / doubt, 1.0) if doubt > 0 else 1.0
     calibration = uncertainty.calibration
     runs = np.inf if calibration and level <= calibration.reachable else max(uncertainty.run_dof, 1.0)
-    return worst, max(uncertainty.session_dof, 1.0), float(runs)
+    return parameters, max(uncertainty.session_dof, 1.0), float(runs)
 
 
 def scope(damper: Damper, level: float) -> str:

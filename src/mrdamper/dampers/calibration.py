@@ -10,7 +10,7 @@ set [Barber, Candès, Ramdas and Tibshirani 2021, Ann. Stat. 49, 486: the jackkn
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 from typing import ClassVar, Literal
@@ -41,6 +41,7 @@ _MAX_GROWTH = 10.0  # relative error per unit of distance; one beyond is no long
 _TYPICAL_GROWTH, _TYPICAL_DOF = (0.065, 0.031, 0.026), 1.0
 _NORMAL_DOF = 1e9  # of a normal distribution
 _SHOWN = (0.01, 0.05, 0.1)  # distances of a fold from its tests from which it shows growth
+_NONE: Mapping[str, Floats] = {}  # relative variances of runs by the parameters, where none are known
 _NORMAL_MEDIAN = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 
 
@@ -225,7 +226,9 @@ class Growth:
         return float(np.square(getattr(self, quantity)) @ distance.squares)
 
     @classmethod
-    def of(cls, runs: Sequence[PredictedRun], at_tests: ModelError) -> Growth:
+    def of(
+        cls, runs: Sequence[PredictedRun], at_tests: ModelError, by_parameters: Mapping[str, Floats] = _NONE
+    ) -> Growth:
         """Least squares of the squared errors in excess of those at the tests, by the squared distances.
 
         The fastest motions, or the highest current, are one fold, and a lucky one would leave no growth. The variance
@@ -237,6 +240,9 @@ class Growth:
         runs : sequence of PredictedRun
             Predicted by models identified without a condition, a current, or the fastest motions.
         at_tests : ModelError
+        by_parameters : mapping of str to (3,) array
+            Relative variances of the force, the peak and the energy of a run by the parameters, which an interval
+            counts beside growth.
         """
         away = [run for run in runs if run.distance.squares.any()]
         if not away:
@@ -246,7 +252,9 @@ class Growth:
         size = np.sqrt(np.mean(table**2, axis=0))
         size[size == 0] = 1.0
         shown = table.max(axis=0) > np.square(_SHOWN)
-        excess = np.array([_squared_errors(run) - _expected(run, at_tests) for run in away])
+        excess = np.array(
+            [_squared_errors(r) - _expected(r, at_tests) - by_parameters.get(r.run_id, np.zeros(3)) for r in away]
+        )
         fits = [nonnegative_least_squares(table / size, column)[0] for column in excess.T]
         slopes = np.array(fits) / size
         typical = np.square(_TYPICAL_GROWTH)

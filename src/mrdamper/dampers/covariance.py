@@ -17,17 +17,20 @@ from mrdamper.dampers.calibration import (
     model_error,
     scatter_between_sessions,
 )
-from mrdamper.dampers.random_effects import Effects, GainsAndOffsets
+from mrdamper.dampers.random_effects import Draws, Effects, GainsAndOffsets
+from mrdamper.dampers.refits import refitted
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Floats, Run
 from mrdamper.identification.covariance import alike_groups, score_covariance
-from mrdamper.identification.intervals import interval_about, relative_width, weaknesses
+from mrdamper.identification.intervals import dof_of_quantile, interval_about, relative_width, weaknesses
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 
 _MAX_RUN_SHARE = 0.6  # share of the information on a parameter from which one run mainly determines it
 _MIN_EIGENVALUE = 1e-10  # of the largest of the scaled normal matrix, below which a direction is not determined
+_REFITS = 16  # draws of gains and offsets that are fitted without linearisation
+_SEED = 20261124  # of errors within the runs that are drawn beside those of sessions
 _LEVEL = 0.95  # of the intervals by which a parameter is identifiable or not
 
 
@@ -91,14 +94,15 @@ def estimate_uncertainty(
     # A parameter at its bound of zero has no size that its interval could be compared with.
     sized = {name for name in names if bounded or numbers[name].value}
     spread, wide = _identifiable(names, sized, numbers, parts, [s[:, kept] for s in slopes], inverse)
-    effects = spread.effects
+    spread = spread.curved(damper, parts)
+    effects, samples = spread.effects, sum(part.picked.size for part in parts)
     uncertainty = Uncertainty(
         spread.names, tuple(numbers[n].log for n in spread.names), spread.covariance, spread.dof, at_bound,
         tuple(name for name in free if name in unknown | wide),
         effects.gain, effects.offset, effects.session_dof, effects.run_gain, effects.run_offset, effects.run_dof,
         words=(*words, *_rest_on_one_run(spread.names, parts, spread.information)),
         information=dict(zip([p.run.id for p in parts], _shares(spread.information), strict=True)),
-        effective=dict(zip(spread.names, spread.effective.tolist(), strict=True)),
+        effective=spread.effective(samples),
     )  # fmt: skip
     uncertainty = _with_model_error(uncertainty, parts, spread.slopes, cross_validated, away, other_sessions)
     return replace(damper, uncertainty=uncertainty)
@@ -106,42 +110,75 @@ def estimate_uncertainty(
 
 @dataclass(frozen=True, eq=False)
 class _Spread:
-    """Covariance of some parameters, what it was made of, and the share (R, P) each run has in it."""
+    """Covariance of some parameters by its causes, and the share (R, P) each run has in their information.
+
+    `within` is that by noise and model error, of relative variance `doubt`; `draws` are of gains and offsets.
+    """
 
     names: tuple[str, ...]
     slopes: Sequence[Floats]
-    covariance: Floats
-    dof: Floats
-    effective: Floats
+    within: Floats
+    doubt: Floats
+    draws: Draws
     effects: Effects
+    rests: Sequence[Floats]
+    textbook: Floats
     information: Floats
 
     @classmethod
     def of(
         cls, names: Sequence[str], parts: Sequence[RunResiduals], slopes: Sequence[Floats], inverse: Floats
     ) -> _Spread:
-        influence = [inverse @ (slope * part.weight**2).T for slope, part in zip(slopes, parts, strict=True)]
-        within, doubt = _within(parts, slopes, inverse)
+        weighted = [part.weighted(slope) for slope, part in zip(slopes, parts, strict=True)]
+        influence = [inverse @ part.weighted(table).T for table, part in zip(weighted, parts, strict=True)]
         scatter = GainsAndOffsets(parts, slopes, influence)
         effects = scatter.effects()
-        between, by_session, by_run = scatter.covariance(effects)
-        covariance = within + between
-        variance = np.maximum(np.diag(covariance), np.finfo(float).tiny)
-        share = np.diag(between) / variance
-        left = sum(float(part.residual @ part.residual) * part.weight**2 for part in parts)
-        samples = sum(part.picked.size for part in parts)
-        dof = 1 / np.maximum(
-            (share * by_session) ** 2 / max(effects.session_dof, 1.0)
-            + (share * by_run) ** 2 / max(effects.run_dof, 1.0)
-            + (1 - share) ** 2 * doubt / 2,
-            1e-9,
-        )
-        squares = np.array([np.sum((s @ inverse * p.weight) ** 2, axis=0) for s, p in zip(slopes, parts, strict=True)])
+        within, doubt = _within(parts, slopes, inverse, scatter.by_gains())
+        left = sum(float(np.sum((part.residual * part.weight) ** 2)) for part in parts)
+        squares = np.array([np.sum((table @ inverse) ** 2, axis=0) for table in weighted])
         return cls(
-            tuple(names), slopes, covariance, np.maximum(dof, 1.0),
-            np.minimum(left * np.diag(inverse) / variance, samples), effects,
-            squares / np.maximum(squares.sum(axis=0), np.finfo(float).tiny),
+            tuple(names), slopes, within, doubt, scatter.draws(effects), effects, scatter.rests(),
+            left * np.diag(inverse), squares / np.maximum(squares.sum(axis=0), np.finfo(float).tiny),
         )  # fmt: skip
+
+    def curved(self, damper: Damper, parts: Sequence[RunResiduals]) -> _Spread:
+        """Scale the draws to those that are fitted without linearisation, where one model describes the damper.
+
+        Few are fitted, and their search ends early: a scatter below that of linearised fits is not counted.
+        """
+        linear, size = self.draws.moved[:_REFITS], np.sqrt(np.mean(self.draws.moved[:_REFITS] ** 2, axis=0))
+        if damper.one_model is None or not size.all():
+            return self
+        shifts = np.concatenate([np.zeros((1, len(parts), 2)), self.draws.shifts[:_REFITS]])
+        starts = np.concatenate([np.zeros((1, len(self.names))), linear])
+        fits = refitted(damper, parts, self.rests, self.names, shifts, starts)
+        factors = np.maximum(np.sqrt(np.mean((fits[1:] - fits[0]) ** 2, axis=0)) / size, 1.0)
+        return replace(self, draws=replace(self.draws, moved=self.draws.moved * factors))
+
+    @property
+    def covariance(self) -> Floats:
+        """(P, P) of the parameters, or of their logarithms."""
+        return self.within + self.draws.moved.T @ self.draws.moved / len(self.draws.moved)
+
+    @property
+    def dof(self) -> Floats:
+        """(P,) degrees of freedom at which Student's interval holds its share of the draws.
+
+        The scatter of sessions that the residuals of a draw show depends on the gains that move its parameters: the
+        ratio of an error to its standard error is not distributed as Student's [bootstrap-t: Hall 1988, Ann. Stat. 16,
+        927].
+        """
+        rng, moved, within = np.random.default_rng(_SEED), self.draws.moved, np.diag(self.within)
+        free = 2 / np.maximum(self.doubt, 1e-9)
+        error = moved + np.sqrt(within) * rng.standard_normal(moved.shape)
+        variance = within * rng.chisquare(free, moved.shape) / free + self.draws.shown * np.mean(moved**2, axis=0)
+        ratio = np.abs(error) / np.sqrt(np.maximum(variance, np.finfo(float).tiny))
+        return np.array([dof_of_quantile(float(q), _LEVEL) for q in np.quantile(ratio, _LEVEL, axis=0)])
+
+    def effective(self, samples: int) -> dict[str, float]:
+        """Return independent samples behind each parameter, of those that there are."""
+        variance = np.maximum(np.diag(self.covariance), np.finfo(float).tiny)
+        return dict(zip(self.names, np.minimum(self.textbook / variance, samples).tolist(), strict=True))
 
 
 def _identifiable(
@@ -210,34 +247,43 @@ def _rest_on_one_run(names: Sequence[str], parts: Sequence[RunResiduals], inform
     ]
 
 
-def _within(parts: Sequence[RunResiduals], slopes: Sequence[Floats], inverse: Floats) -> tuple[Floats, Floats]:
-    """Covariance by noise and model error within the runs, and its relative variance by parameter."""
+def _within(
+    parts: Sequence[RunResiduals], slopes: Sequence[Floats], inverse: Floats, by_gains: Floats | float = 0.0
+) -> tuple[Floats, Floats]:
+    """Covariance by noise and model error within the runs, and its relative variance by parameter.
+
+    What gains and offsets of other runs have moved the parameters by is no error of the model.
+    """
     total, doubt = np.zeros_like(inverse), np.zeros(len(inverse))
     for part, slope in zip(parts, slopes, strict=True):
-        table = np.column_stack([part.predicted - part.predicted.mean(), np.ones(part.picked.size)])
-        rest = part.residual - table @ np.linalg.lstsq(table, part.residual, rcond=None)[0]
-        time = part.prediction.motion.time[part.picked]
-        own = inverse * part.weight**2  # what this run takes part in
-        score, dof, _ = score_covariance(slope, rest, time, part.frequency, own)
-        covariance = inverse @ score @ inverse * part.weight**4
-        total += covariance
-        doubt += np.diag(covariance) ** 2 * 2 / dof
+        for stretch in part.stretches:
+            table = np.column_stack([stretch.predicted - stretch.predicted.mean(), np.ones(stretch.time.size)])
+            even = part.evenly(slope, stretch)
+            rest: Floats = stretch.residual - np.sum(even * by_gains, axis=1)
+            rest -= table @ np.linalg.lstsq(table, rest, rcond=None)[0]
+            own = inverse * stretch.weight**2  # what this stretch takes part in
+            score, dof, _ = score_covariance(even, rest, stretch.time, stretch.frequency, own)
+            covariance = inverse @ score @ inverse * stretch.weight**4
+            total += covariance
+            doubt += np.diag(covariance) ** 2 * 2 / dof
     return total, doubt / np.maximum(np.diag(total), np.finfo(float).tiny) ** 2
 
 
 def _inside(part: RunResiduals) -> PredictedRun:
     """Return a run beside the force of the fit that saw it."""
-    at, motion = part.picked, part.prediction.motion
-    powers = [dissipated_power(f, motion.velocity[at], motion.time[at]) for f in (part.measured, part.predicted)]
-    peak = np.array([peak_force(part.measured) / max(peak_force(part.predicted), 1e-300)])
+    steady = part.stretches[0]
+    measured = steady.predicted - steady.residual
+    powers = [dissipated_power(f, steady.velocity, steady.time) for f in (measured, steady.predicted)]
+    peak = np.array([peak_force(measured) / max(peak_force(steady.predicted), 1e-300)])
     energy = np.array([powers[0] / powers[1] if powers[1] else np.inf])
-    return PredictedRun(part.run.id, part.session, part.predicted, part.measured, peak, energy)
+    return PredictedRun(part.run.id, part.session, steady.predicted, measured, peak, energy)
 
 
 def _by_parameters(part: RunResiduals, slopes: Floats, covariance: Floats) -> Floats:
     """(3,) relative variances of a run's force, peak and energy by the parameters."""
-    velocity, time = (getattr(part.prediction.motion, name)[part.picked] for name in ("velocity", "time"))
-    return relative_variances(slopes, covariance, part.predicted, velocity, time)
+    steady = part.stretches[0]
+    even = part.evenly(slopes, steady)
+    return relative_variances(even, covariance, steady.predicted, steady.velocity, steady.time)
 
 
 def _with_model_error(
@@ -270,7 +316,7 @@ def _with_model_error(
         run_gain=float(np.sqrt(max(error.gain**2 - of_sessions["gain"], 0.0))),
         run_offset=float(np.sqrt(max(error.offset**2 - of_sessions["offset"], 0.0))),
         run_dof=max(len(cross_validated) - 1.0, 1.0),
-        growth=Growth.of([*cross_validated, *away], error),
+        growth=Growth.of([*cross_validated, *away], error, own),
     )
     usual = np.median(list(own.values()), axis=0)
     gain, offset = (getattr(uncertainty, f"run_{name}") ** 2 + of_sessions[name] for name in ("gain", "offset"))

@@ -13,6 +13,7 @@ from mrdamper.dampers.distance import Distance, distance_from
 from mrdamper.data.conditions import Condition, same_condition
 from mrdamper.data.runs import Floats
 from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.statistics.functions.motion_hull import MotionHull
 from mrdamper.statistics.linear import nonnegative_least_squares
 
 SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
@@ -123,6 +124,11 @@ class Envelope:
         larger = max(0.0, np.log(condition.amplitude_m / self.amplitude_m[1]))
         faster = max(0.0, np.log(condition.peak_velocity / self.peak_velocity_m_s[1]))
         return replace(nearest, motion=min(nearest.motion, float(np.hypot(larger, faster))))
+
+    def nearest(self, condition: Condition) -> Condition:
+        """Return the motion of the hull of the tested ones that is nearest to a condition, at its current."""
+        frequency, amplitude = MotionHull.of(self._tested).nearest(condition.frequency_Hz, condition.amplitude_m)
+        return Condition(condition.current_A, float(frequency), float(amplitude))
 
     def _combined(self, condition: Condition) -> bool:
         """Tell if a condition lies in the convex hull of the tested ones, in I, log f and log A (and log f·A)."""

@@ -83,7 +83,7 @@ class Likelihood:
         slopes = [force_slopes(damper, p.prediction, names)[p.picked] for p in parts]
         normal = normal_matrix(slopes, parts)
         root = np.linalg.cholesky(positive(normal @ uncertainty.covariance @ normal))
-        rows = np.concatenate([s * p.weight**2 for s, p in zip(slopes, parts, strict=True)])
+        rows = np.concatenate([p.weighted(p.weighted(s)) for s, p in zip(slopes, parts, strict=True)])
         instruments: Floats = np.asarray(np.linalg.solve(root, rows.T), dtype=float)
         measured = np.concatenate([p.predicted - p.residual for p in parts])
         # What robust weights left of the score belongs to the estimate; what a bound holds back does not.

@@ -47,6 +47,25 @@ class Effects:
 
 
 @dataclass(frozen=True, eq=False)
+class Draws:
+    """Draws of gains and offsets, and fits to them.
+
+    Attributes
+    ----------
+    shifts : (D, R, 2) array
+        Gains and offsets of the runs [-, N].
+    moved : (D, P) array
+        Change of the parameters.
+    shown : (D, P) array
+        Variance of the parameters that the residuals of a draw would show, over that of the draws.
+    """
+
+    shifts: Floats
+    moved: Floats
+    shown: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class _Component:
     """Variance of gains (0) or offsets (1) shared by groups of runs.
 
@@ -91,12 +110,12 @@ class GainsAndOffsets:
         self._shown = np.zeros((2 * count, 2 * count))  # what each gain and offset shows as in every run
         self._read, self._noise = np.zeros(2 * count), np.zeros(2 * count)
         for k, (run, slope, table) in enumerate(zip(runs, slopes, tables, strict=True)):
-            own, solve = slice(2 * k, 2 * k + 2), np.linalg.pinv(table)
+            own, solve = slice(2 * k, 2 * k + 2), np.linalg.pinv(run.weighted(table)) * run.weight
             self._read[own] = solve @ run.residual
             self._shown[own] = solve @ slope @ self.effect
             self._shown[own, own] += solve @ table
             rest = run.residual - table @ self._read[own]
-            self._noise[own] = np.sum(solve**2, axis=1) * float(np.mean(rest**2))
+            self._noise[own] = np.sum(solve**2, axis=1) * float(np.average(rest**2, weights=run.weight**2))
         names = sorted({run.session for run in runs if run.session is not None})
         members = [[k for k, run in enumerate(runs) if run.session == name] for name in names]
         self.sessions = members if len(names) >= SESSIONS_NEEDED else []
@@ -113,30 +132,62 @@ class GainsAndOffsets:
             within = []  # sessions of one run each: all scatter is counted as that between sessions
         return self._solved(between, within)
 
-    def covariance(self, effects: Effects) -> tuple[Floats, Floats, Floats]:
-        """(P, P) covariance of the parameters by gains and offsets, and each parameter's share (P,) of the two kinds.
+    def by_gains(self) -> Floats:
+        """(P,) change of the parameters by the gains and offsets that the residuals show."""
+        return self.effect @ np.linalg.lstsq(self._shown, self._read, rcond=_MIN_RETAINED)[0]
 
-        The fit counts a run less the worse it is described, so a run far off moves the parameters
-        less than its gain would say. Each draw of gains and offsets is therefore fitted as the runs
-        were: linearised, weights and parameters in turn.
+    def rests(self) -> list[Floats]:
+        """Return what is left of the residuals of each run after all gains and offsets, and what they moved."""
+        rests, by_gains = list[Floats](), self.by_gains()
+        for run, slope in zip(self.runs, self.slopes, strict=True):
+            rest, table = run.residual - slope @ by_gains, np.column_stack([run.predicted, np.ones(run.picked.size)])
+            own = run.weighted(table)
+            rests.append(rest - table @ np.linalg.lstsq(own, rest * run.weight, rcond=None)[0])
+        return rests
+
+    def draws(self, effects: Effects) -> Draws:
+        """Draw gains and offsets, and fit each draw as the runs were: linearised, weights and parameters in turn.
+
+        The fit counts a run less the worse it is described, so a run far off moves the parameters less than its gain
+        would say.
         """
         rng, count = np.random.default_rng(_SEED), len(self.runs)
         drawn = rng.standard_normal((_DRAWS, count, 2)) * [effects.run_gain, effects.run_offset]
         shared = rng.standard_normal((_DRAWS, len(self.sessions), 2)) * [effects.gain, effects.offset]
         for k, members in enumerate(self.sessions):
             drawn[:, members] += shared[:, k : k + 1]
-        whole = self._refitted(drawn)
-        kinds: list[Floats] = []
-        for members, (gain, offset) in (
-            (self.sessions, (effects.gain, effects.offset)),
-            ([[k] for k in range(count)], (effects.run_gain, effects.run_offset)),
+        moved, read = self._refitted(drawn)
+        by_run = self.effect.reshape(len(self.effect), count, 2)
+        shares: list[Floats] = []
+        for members, spreads in (
+            (self.sessions, (effects.gain, effects.offset / self.unit)),
+            ([[k] for k in range(count)], (effects.run_gain, effects.run_offset / self.unit)),
         ):
-            scale = np.array([gain, offset / self.unit])
-            by_run = self.effect.reshape(len(self.effect), count, 2)
-            moved = [by_run[:, group].sum(axis=1) * scale for group in members]
-            kinds.append(np.sum(np.square(moved), axis=(0, 2)) if moved else np.zeros(len(self.effect)))
-        total = np.maximum(kinds[0] + kinds[1], np.finfo(float).tiny)
-        return whole, kinds[0] / total, kinds[1] / total
+            for which, spread in enumerate(spreads):
+                sums = [by_run[:, group, which].sum(axis=1) * spread for group in members]
+                shares.append(np.sum(np.square(sums), axis=0) if sums else np.zeros(len(self.effect)))
+        total = np.maximum(np.sum(shares, axis=0), np.finfo(float).tiny)
+        return Draws(drawn, moved, self._variances_over(read, effects) @ (np.array(shares) / total))
+
+    def _variances_over(self, read: Floats, effects: Effects) -> Floats:
+        """(D, 4) variances that draws of readings (D, R, 2) would show, over those they were drawn with."""
+        drawn_with = (effects.gain, effects.offset / self.unit, effects.run_gain, effects.run_offset / self.unit)
+        between, within = self._pair(self.sessions), self._pair([[k] for k in range(len(self.runs))])
+        used = [
+            (i, c) for i, c in enumerate([*(between or [None] * 2), *within]) if c is not None and drawn_with[i] > 0
+        ]
+        shown = np.ones((len(read), 4))
+        if not used:
+            return shown
+        own = np.array([self._moment(c, c) for _, c in used])
+        squares = [np.sum(c.sums(read[:, :, c.which].T) ** 2 / c.sizes, axis=0) for _, c in used]
+        right = np.column_stack(squares) / own
+        table = self._equations([c for _, c in used])
+        solved = np.linalg.solve(table, right.T).T
+        for row in np.flatnonzero((solved < 0).any(axis=1)):
+            solved[row] = nonnegative_least_squares(table, right[row])[0]
+        shown[:, [i for i, _ in used]] = solved / np.square([drawn_with[i] for i, _ in used])
+        return shown
 
     def _pair(self, groups: Sequence[Sequence[int]]) -> list[_Component]:
         """Gain and offset shared by groups of runs; empty unless the residuals still show the gain."""
@@ -196,25 +247,29 @@ class GainsAndOffsets:
             run_gain, run_offset * self.unit, self._dof(within[0], len(self.runs)) if within else 0.0,
         )  # fmt: skip
 
-    def _refitted(self, shift: Floats) -> Floats:
-        """(P, P) mean square of the parameters over draws (D, R, 2) of gains and offsets [-, N]."""
+    def _refitted(self, shift: Floats) -> tuple[Floats, Floats]:
+        """(D, P) parameters, and the gains and offsets (D, R, 2) that residuals show, by draws (D, R, 2) of them."""
         size, count = self.slopes[0].shape[1], len(self.runs)
         grams, rest = np.empty((count, size + 2, size + 2)), np.empty(count)
         for i, (run, slope) in enumerate(zip(self.runs, self.slopes, strict=True)):
             table = np.column_stack([slope, run.predicted, np.ones(run.picked.size)])
+            each = run.weight * np.sqrt(run.error) / run.information  # whose squares add up to the error's
+            table: Floats = table * each[:, None]
+            residual: Floats = run.residual * each
             grams[i] = table.T @ table
             own = table[:, size:]
-            rest[i] = np.sum((run.residual - own @ np.linalg.lstsq(own, run.residual, rcond=None)[0]) ** 2)
+            rest[i] = np.sum((residual - own @ np.linalg.lstsq(own, residual, rcond=None)[0]) ** 2)
         pulls = np.einsum("rpk,drk->drp", grams[:, :size, size:], shift)
-        scale = np.array([run.scale * np.sqrt(run.picked.size) for run in self.runs])
+        information = np.array([run.information**2 for run in self.runs])
         moved, weight = np.zeros((len(shift), size)), np.ones((len(shift), count))
         for _ in range(_ROUNDS):
-            pull = weight / scale**2
+            pull = weight * information
             normal: Floats = np.einsum("dr,rpq->dpq", pull, grams[:, :size, :size])
             unit: Floats = np.sqrt(np.einsum("dpp->dp", normal))
             right: Floats = np.einsum("dr,drp->dp", pull, pulls) / unit
             moved = np.linalg.solve(normal / unit[:, :, None] / unit[:, None, :], right[:, :, None])[:, :, 0] / unit
             left = np.concatenate([np.broadcast_to(moved[:, None, :], (len(shift), count, size)), -shift], axis=2)
             squares = np.einsum("drp,rpq,drq->dr", left, grams, left, optimize=True) + rest
-            weight = 1 / np.maximum(np.sqrt(np.maximum(squares, 0)) / scale, _MIN_ERROR_PP)
-        return moved.T @ moved / len(shift)
+            weight = 1 / np.maximum(np.sqrt(np.maximum(squares, 0)), _MIN_ERROR_PP)
+        own = np.linalg.solve(grams[:, size:, size:], grams[:, size:, :size])
+        return moved, (np.einsum("rkp,dp->drk", own, moved) - shift) / [1.0, self.unit]

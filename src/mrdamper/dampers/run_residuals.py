@@ -1,4 +1,4 @@
-"""Residuals of the runs a damper was identified from, with the weight each had in the fit."""
+"""Residuals of the runs a damper was identified from, with the weight each sample had in the fit."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.concatenated_runs import RunRows
 from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Floats, Run, index_at, session_of
 
@@ -15,11 +17,41 @@ _MAX_SAMPLES = 400  # samples of a run that enter
 _CYCLES = 4  # of a sine that enter, as in the joint fit
 _WARM_UP = 1.5  # cycles before them in which the model forgets its start
 _MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
+_MIN_STRETCH = 10  # samples in which the spectrum of a residual is looked for
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Evenly spaced samples of a run: their residuals have a spectrum.
+
+    Attributes
+    ----------
+    time, velocity, predicted, residual : (M,) arrays
+        [s], [m/s], [N], and predicted minus measured force [N].
+    weight : float
+        Of each residual in the fit [1/N].
+    frequency : float or None
+        Of a steady sine [Hz].
+    """
+
+    time: Floats
+    velocity: Floats
+    predicted: Floats
+    residual: Floats
+    weight: float
+    frequency: float | None
+
+    @classmethod
+    def of(cls, whole: Prediction, run: Run, samples: slice, square: float, frequency: float | None = None) -> Stretch:
+        """Of a prediction along a whole run, with the sum of its squared weights."""
+        motion, predicted = whole.motion.part(samples), whole.force[samples]
+        weight = float(np.sqrt(square / predicted.size))
+        return cls(motion.time, motion.velocity, predicted, predicted - run.force[samples], weight, frequency)
 
 
 @dataclass(frozen=True, eq=False)
 class RunResiduals:
-    """Samples of a run that enter, what the fit left of them, and their weight.
+    """Samples of a run that enter, what the fit left of them, and their weights.
 
     Attributes
     ----------
@@ -27,47 +59,73 @@ class RunResiduals:
     session : str or None
         None where it is not known.
     prediction : Prediction
+        Along the samples that are simulated.
     picked : (N,) array of int
-        Samples of the prediction.
+        Samples of the prediction: those of the joint fit, ramps and rests among them, where one model describes the
+        damper, else evenly spaced ones of the steady window.
     residual : (N,) array
         Predicted minus measured force [N].
     scale : float
         Peak-to-peak measured force [N].
-    weight : float
+    error : float
+        nrmse_pp, by the time that samples represent; at least that from which a run gains no more weight.
+    information : float
+        Weight of the run by its length, as in the joint fit.
+    weight : (N,) array
         Of each residual in the fit [1/N].
-    frequency : float or None
-        Of a sine [Hz].
+    stretches : sequence of Stretch
+        The steady window, then what lies before and after it.
     """
 
     run: Run
     session: str | None
     prediction: Prediction
-    picked: np.ndarray
+    picked: NDArray[np.intp]
     residual: Floats
     scale: float
-    weight: float
-    frequency: float | None
+    error: float
+    information: float
+    weight: Floats
+    stretches: Sequence[Stretch]
 
     @classmethod
     def of(cls, damper: Damper, run: Run) -> RunResiduals:
         """Residuals of a run against a damper; raises E_CLOCK as `session_of`."""
-        prediction = damper.predict_run(run)
-        first, last = (int(i) for i in np.flatnonzero(run.in_window)[[0, -1]])
-        begin = 0
-        if prediction.is_sine:
-            period = 1 / prediction.condition.frequency_Hz
-            first = max(first, index_at(run.time, run.time[last] - _CYCLES * period))
-            begin = index_at(run.time, run.time[first] - _WARM_UP * period)
-            short = replace(prediction, motion=prediction.motion.part(slice(begin, last + 1)))
-            prediction = replace(short, force=damper.force_for(short))
-        measured = run.force[first : last + 1 : max(1, (last + 1 - first) // _MAX_SAMPLES)]
-        picked = np.arange(first, last + 1, max(1, (last + 1 - first) // _MAX_SAMPLES)) - begin
-        residual = prediction.force[picked] - measured
-        scale = float(np.ptp(run.force[first : last + 1])) or 1.0
-        error = float(np.sqrt(np.mean(residual**2))) / scale
-        weight = 1 / (scale * np.sqrt(picked.size) * np.sqrt(max(error, _MIN_ERROR_PP)))
-        frequency = prediction.condition.frequency_Hz if prediction.is_sine else None
-        return cls(run, session_of(run), prediction, picked, residual, scale, weight, frequency)
+        whole = damper.predict_run(run)
+        frequency = whole.condition.frequency_Hz if whole.is_sine else None
+        window = np.flatnonzero(run.in_window)
+        first, last = int(window[0]), int(window[-1])
+        if whole.is_sine:
+            first = max(first, index_at(run.time, run.time[last] - _CYCLES / whole.condition.frequency_Hz))
+        if damper.one_model is None:
+            begin = index_at(run.time, run.time[first] - _WARM_UP / frequency) if frequency else 0
+            motion, information = whole.motion.part(slice(begin, last + 1)), 1.0
+            picked = np.arange(first - begin, last + 1 - begin, max(1, (last + 1 - first) // _MAX_SAMPLES))
+            target, share = run.force[picked + begin], np.full(picked.size, 1 / picked.size)
+            scale = float(np.ptp(run.force[first : last + 1])) or 1.0
+        else:
+            rows = RunRows.of(run)
+            motion, picked, target, share = rows.motion, rows.picked, rows.target, rows.share
+            scale, information = rows.scale, rows.information
+        prediction = replace(whole, motion=motion)
+        prediction = replace(prediction, force=damper.force_for(prediction))
+        residual = prediction.force[picked] - target
+        error = max(float(np.sqrt(share @ residual**2)) / scale, _MIN_ERROR_PP)
+        weight = information * np.sqrt(share / error) / scale
+        time, stretches = motion.time[picked], list[Stretch]()
+        for inside in (
+            (time >= run.time[first]) & (time <= run.time[last]), time < run.time[first], time > run.time[last]
+        ):  # fmt: skip
+            if np.count_nonzero(inside) < min(_MIN_STRETCH, picked.size):
+                continue
+            begin, end = (index_at(run.time, float(t)) for t in time[inside][[0, -1]])
+            every = max(1, (end + 1 - begin) // _MAX_SAMPLES)
+            square = float(np.sum(weight[inside] ** 2))
+            of_window = frequency if not stretches else None
+            stretches.append(Stretch.of(whole, run, slice(begin, end + 1, every), square, of_window))
+        return cls(
+            run, session_of(run), prediction, picked, residual, scale, error, information, weight, tuple(stretches)
+        )
 
     @property
     def predicted(self) -> Floats:
@@ -79,7 +137,20 @@ class RunResiduals:
         """Measured force at the picked samples [N]."""
         return self.predicted - self.residual
 
+    def weighted(self, table: Floats) -> Floats:
+        """Return a table of the picked samples (N, ·) by their weights."""
+        return table * self.weight[:, None]
+
+    def evenly(self, table: Floats, stretch: Stretch) -> Floats:
+        """Return a table of the picked samples (N, ·) at those of a stretch."""
+        time = self.prediction.motion.time[self.picked]
+        even: Floats = np.zeros((stretch.time.size, table.shape[1]))
+        for i, column in enumerate(table.T):
+            even[:, i] = np.interp(stretch.time, time, column)
+        return even
+
 
 def normal_matrix(slopes: Sequence[Floats], runs: Sequence[RunResiduals]) -> Floats:
     """(P, P) weighted normal matrix of some runs."""
-    return np.sum([(s.T @ s) * run.weight**2 for s, run in zip(slopes, runs, strict=True)], axis=0)
+    weighted = [run.weighted(slope) for slope, run in zip(slopes, runs, strict=True)]
+    return np.sum([table.T @ table for table in weighted], axis=0)

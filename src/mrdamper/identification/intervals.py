@@ -18,6 +18,7 @@ _SAME_MOTION = 0.03  # frequencies and amplitudes this close are one
 _MAX_RATIO = 1e3  # of an interval's half width to its estimate, or of its ends: beyond, it is not identifiable
 NOT_IDENTIFIABLE = "not identifiable from these runs"
 _SERIES_DEGREES_OF_FREEDOM = 1000.0  # degrees of freedom from which the series of the quantile is exact to rounding
+_MOST_DEGREES_OF_FREEDOM, _HALVINGS = 1e6, 30  # that a quantile is looked for in, and steps of bisection
 _NODES = 80  # of Gauss and Legendre's rule
 _MAX_NEWTON_STEPS = 200  # of Newton's method
 _LOPSIDED = 0.1  # of an interval's half width: shifted by less, it is written with ±
@@ -56,6 +57,15 @@ def _student(level: float, dof: float) -> float:
         if step <= 1e-15:
             break
     return math.sqrt(dof) * math.tan(angle)
+
+
+def dof_of_quantile(quantile: float, level: float) -> float:
+    """Degrees of freedom at which Student's t has a two-sided quantile: at least one, and many for a normal one."""
+    few, many = 0.0, math.log(_MOST_DEGREES_OF_FREEDOM)
+    for _ in range(_HALVINGS):
+        middle = (few + many) / 2
+        few, many = (middle, many) if student(level, math.exp(middle)) > quantile else (few, middle)
+    return math.exp(many)
 
 
 def interval_about(value: float, error: float, dof: float, level: float, log: bool) -> tuple[float, float] | None:
