@@ -1,15 +1,13 @@
 """The check says nothing of a sound FMU, and finds what is planted: nothing takes the caller down."""
 
 import re
-import subprocess
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support.fmu_files import COMPILERS, DAMPERS, FEW, fmu_bytes, unpacked
 
 from mrdamper.errors import MissingExtraError
-from mrdamper.export import fmu_check, fmu_probe
+from mrdamper.export import fmu_check
 from mrdamper.export.fmu import token_of, zipped
 from mrdamper.export.fmu_check import check_fmu
 from mrdamper.export.toolchain import build_library, here
@@ -20,20 +18,7 @@ pytestmark = pytest.mark.skipif(not COMPILERS or not here(), reason="no C compil
 
 
 @pytest.fixture
-def check(check_apart, monkeypatch):
-    """As `check_apart`, for binaries that leave this process alive: it is probed here, without starting another."""
-
-    def here_instead(command, **_):
-        fmu_probe.main(*command[command.index(fmu_probe.__file__) + 1 :])
-        return SimpleNamespace(returncode=0)
-
-    stand_in = SimpleNamespace(run=here_instead, TimeoutExpired=subprocess.TimeoutExpired)
-    monkeypatch.setattr(fmu_check, "subprocess", stand_in)
-    return check_apart
-
-
-@pytest.fixture
-def check_apart(tmp_path):
+def check(tmp_path):
     """Codes of the errors found in changed files of an FMU, and the texts."""
 
     def run(files):
@@ -117,32 +102,32 @@ def test_a_missing_symbol_is_caught(check, fmi, symbol):
 
 
 @pytest.mark.parametrize("garbage", [b"", b"MZ" + bytes(4000)])
-def test_a_garbage_binary_is_caught(check_apart, garbage):
+def test_a_garbage_binary_is_caught(check, garbage):
     files = unpacked(fmu_bytes("joint", 3))
-    codes, text = check_apart({**files, binary_of(files): garbage})
+    codes, text = check({**files, binary_of(files): garbage})
     assert codes == {"E_FMU_BINARY"}
     assert "cannot be loaded" in text
 
 
-def test_a_binary_cut_short_is_caught(check_apart):
+def test_a_binary_cut_short_is_caught(check):
     files = unpacked(fmu_bytes("joint", 3))
     whole = files[binary_of(files)]
-    codes, _ = check_apart({**files, binary_of(files): whole[: len(whole) // 2]})
+    codes, _ = check({**files, binary_of(files): whole[: len(whole) // 2]})
     assert codes == {"E_FMU_BINARY"}
 
 
 @pytest.mark.parametrize(("fmi", "function"), [(2, "DoStep"), (3, "FreeInstance")])
-def test_a_binary_that_crashes_takes_nobody_along(check_apart, fmi, function):
+def test_a_binary_that_crashes_takes_nobody_along(check, fmi, function):
     crash = in_function(f"fmi{fmi}{function}".encode(), b"    *(volatile int *)0 = 1;\n")
-    codes, text = check_apart(rebuilt(unpacked(fmu_bytes("joint", fmi)), crash))
+    codes, text = check(rebuilt(unpacked(fmu_bytes("joint", fmi)), crash))
     assert codes == {"E_FMU_BINARY"}
     assert "crashed (signal 11)" in text
 
 
-def test_a_binary_that_hangs_is_given_up(check_apart, monkeypatch):
+def test_a_binary_that_hangs_is_given_up(check, monkeypatch):
     monkeypatch.setattr(fmu_check, "_CHECK_TIMEOUT_S", 1)
     hang = in_function(b"fmi3DoStep", b"    for (;;) { if (time < -1.0) { break; } }\n")
-    codes, text = check_apart(rebuilt(unpacked(fmu_bytes("joint", 3)), hang))
+    codes, text = check(rebuilt(unpacked(fmu_bytes("joint", 3)), hang))
     assert codes == {"E_FMU_BINARY"}
     assert "did not answer within 1 s" in text
 
