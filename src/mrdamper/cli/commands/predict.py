@@ -152,6 +152,7 @@ def _said(prediction: Prediction, interval: Band, level: float, where: str) -> s
     parts = ", ".join(
         f"{name} {float((part**2).mean() ** 0.5):.3g} N"
         for name, part in (("parameters", interval.parameter), ("session", interval.session), ("model", interval.model))
+        if part.any()  # without three known sessions nothing is known of the variation between sessions
     )
     motion, c = prediction.motion, prediction.condition
     power = dissipated_power(prediction.force, motion.velocity, motion.time)
@@ -159,12 +160,14 @@ def _said(prediction: Prediction, interval: Band, level: float, where: str) -> s
     # Of the linear damper that takes as much out of the same sine: C = E/(π ω X²).
     damping = 2 * power / c.peak_velocity**2 if c.peak_velocity > 0 else math.nan
     low, high = (1 + share for share in interval.energy)
+    known = ""
+    if interval.session.any():
+        least, most = interval.known_session
+        known = f"; with gain and offset of the session corrected {least:.4g} to {most:.4g} N"
     return "\n".join(
         (
             f"peak force {peak_force(prediction.force):.4g} N, {100 * level:g} % prediction interval "
-            f"{interval.peak[0]:.4g} to {interval.peak[1]:.4g} N {where}; "
-            "with gain and offset of the session corrected "
-            f"{interval.known_session[0]:.4g} to {interval.known_session[1]:.4g} N",
+            f"{interval.peak[0]:.4g} to {interval.peak[1]:.4g} N {where}{known}",
             f"dissipated energy {energy:.4g} J per cycle ({energy * low:.4g} to {energy * high:.4g})",
             f"equivalent damping {damping:.4g} N s/m ({damping * low:.4g} to {damping * high:.4g})",
             f"standard deviation of the force: {parts}",
