@@ -235,6 +235,14 @@ def test_several_sheets_are_several_runs(tmp_path):
     np.testing.assert_allclose(named.time, np.arange(600) / RATE, rtol=0, atol=1e-12)
 
 
+def test_a_sheet_that_lists_quantities_states_them_for_the_record_beside_it(tmp_path):
+    info = [["Damper", "A7", ""], ["Coil current", 0.4, "A"], ["Frequency", 2.0, "Hz"]]
+    peaks = [["Cycle", "Fmax [N]"], [1, 600.0], [2, 601.0]]
+    record = read_run(write(tmp_path, "a.xlsx", xlsx_bytes(SHEET, {"Info": info, "Peaks": peaks})))
+    assert float(np.mean(record.current)) == 0.4
+    assert "Coil current" in record.provenance["current_from"]
+
+
 def test_hdf5_does_not_follow_links_out_of_the_file(tmp_path):
     import h5py
 

@@ -13,7 +13,7 @@ from mrdamper.rig_files.column_names import COMPUTED, holds
 from mrdamper.rig_files.columns import assign, partly_assigned
 from mrdamper.rig_files.mapping.clocks import with_time_stated
 from mrdamper.rig_files.mapping.completion import completed
-from mrdamper.rig_files.mapping.description import with_description, with_notes, with_notes_of_sheets
+from mrdamper.rig_files.mapping.description import with_description, with_notes
 from mrdamper.rig_files.mapping.integration import with_integrated_velocity
 from mrdamper.rig_files.mapping.long_table import with_channels_as_columns
 from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_unit_of_time
@@ -33,15 +33,12 @@ _ROWS_OF_A_TEST = 0.25  # share of the rows of another test of the file that a t
 def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[InputError]]:
     """Read the tests of a file, and why others of its tests cannot be used.
 
-    Raises
-    ------
-    InputError
-        If no test of the file can be used.
+    Raises `InputError` if no test of the file can be used.
     """
     with raw_tables(path, profile.file) as every:
         if len(every) == 1:
             every = [with_description(every[0], path)]
-        every = [with_notes(table, path) for table in with_notes_of_sheets(every)]
+        every = [with_notes(table, path) for table in every]
         tables, problems = tables_of_tests(test_tables(every, profile), profile)
         tables, computed = _without_computed(tables)
         records: list[Record] = []
@@ -104,10 +101,7 @@ def _stated_columns(profile: Profile) -> dict[str, str | int]:
 def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawTable], list[InputError]]:
     """Select the tables that hold a whole test; refuse those that hold one without a channel it needs.
 
-    Raises
-    ------
-    InputError
-        If no table holds a test.
+    Raises `InputError` if no table holds a test.
     """
     if len(tables) == 1:
         return tables, []

@@ -30,17 +30,6 @@ _README = re.compile(
 )
 
 
-def with_notes_of_sheets(tables: list[RawTable]) -> list[RawTable]:
-    """Tables of a file, its only record with the quantities that lists of keys, values and units beside it state."""
-    records = [table for table in tables if {"displacement", "force"} <= {header.channel for header in table.headers}]
-    lists = [table for table in tables if not any(header.role or header.unit for header in table.headers)]
-    lines = [line for table in lists for line in table.remarks if stated_by_lines([line], table.decimal)]
-    if len(records) != 1 or not lines:
-        return tables
-    whole = replace(records[0], remarks=(*records[0].remarks, *lines))
-    return [whole if table is records[0] else table for table in tables]
-
-
 def with_notes(table: RawTable, path: Path) -> RawTable:
     """Add the names, units and scales that short texts beside the file state, where the table lacks them."""
     if not scaled_columns(table) and not _lacks_names_or_units(table):

@@ -52,6 +52,7 @@ class Workbook(Reader):
             sheets = _sheets(source, form)
         form = form.model_copy(update={"separator": "\t", "encoding": "utf-8"})
         all_tables: list[RawTable] = []
+        lists: list[RawTable] = []
         beside: list[str] = []
         first: InputError | None = None
         for name, sheet in sheets:
@@ -60,13 +61,22 @@ class Workbook(Reader):
             except InputError as error:
                 first = first or error
                 tables = []
-            tables = [table for table in tables if len(table.names) >= _FEWEST]
-            all_tables += [replace(table, label=table.label or name, form={"sheet": name}) for table in tables]
-            beside += () if tables else sheet.head(_NOTES).decode("utf-8", "replace").splitlines()
+            tables = [
+                replace(t, label=t.label or name, form={"sheet": name}) for t in tables if len(t.names) >= _FEWEST
+            ]
+            noted = sheet.size <= _NOTES and all(map(_is_list, tables))
+            beside += sheet.head(_NOTES).decode("utf-8", "replace").splitlines() if noted or not tables else ()
+            (lists if noted else all_tables).extend(tables)
+        all_tables = all_tables or lists
         if not all_tables:
             raise first or source.refuse("E_NO_DATA", "no sheet holds data", "export the file again")
         all_tables = [replace(table, remarks=(*table.remarks, *beside)) for table in all_tables]
         return all_tables if len(all_tables) > 1 else [replace(all_tables[0], label="")]
+
+
+def _is_list(table: RawTable) -> bool:
+    """Tell if a table is a list of quantities, one a line, and names no channel."""
+    return any(table.odd[:1]) and not any(header.channel for header in table.headers)
 
 
 def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
