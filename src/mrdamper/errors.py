@@ -380,11 +380,7 @@ _RESOURCES = {
     errno.ENOSPC: ("E_DISK_FULL", "the disk is full", "make room, or choose another disk"),
     errno.EDQUOT: ("E_DISK_FULL", "the disk quota is used up", "make room, or choose another disk"),
     errno.EFBIG: ("E_FILE_SIZE", "the file grows beyond the limit for files", "raise the limit (ulimit -f)"),
-    errno.ENOMEM: (
-        "E_MEMORY",
-        "the memory does not suffice",
-        "close other programs, or take less data",
-    ),
+    errno.ENOMEM: ("E_MEMORY", "the memory does not suffice", "close other programs, or take less data"),
     errno.EMFILE: ("E_OPEN_FILES", "too many files are open", "raise the limit (ulimit -n)"),
     errno.ENFILE: ("E_OPEN_FILES", "too many files are open", "close other programs"),
     errno.EAGAIN: ("E_PROCESSES", "no further process can be started", "close other programs, or raise the limit"),

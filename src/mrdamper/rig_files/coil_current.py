@@ -36,11 +36,8 @@ def current_of(
 
     Of a table of several tests one after the other, this one has the given rows.
 
-    Raises
-    ------
-    InputError
-        E_AMBIGUOUS if two statements contradict each other, E_CURRENT_CONTRADICTS if one
-        contradicts the channel, E_RANGE if one is no coil current.
+    Raises `InputError`: E_AMBIGUOUS if two statements contradict each other, E_CURRENT_CONTRADICTS if one contradicts
+    the channel, E_RANGE if one is no coil current.
     """
     where, source = printable(table.source.name), profile.current
     statements = _statements(table, path)
@@ -79,10 +76,8 @@ def current_of(
 def with_value_of_name(record: Record, path: Path, profile: Profile) -> Record:
     """Return the record with the current that the profile's table of values gives a file or test of its name.
 
-    Raises
-    ------
-    ColumnError
-        E_AMBIGUOUS if two patterns give it different currents, E_CURRENT_CONTRADICTS if the file states another.
+    Raises `ColumnError`: E_AMBIGUOUS if two patterns give it different currents, E_CURRENT_CONTRADICTS if the file
+    states another.
     """
     patterns = profile.current.fitting(path, record.id) if profile.current is not None else []
     if profile.current is None or not patterns:
@@ -101,10 +96,7 @@ def with_value_of_name(record: Record, path: Path, profile: Profile) -> Record:
 def with_stated_current(record: Record, current: float, whence: str, where: str) -> Record:
     """Return the record with the current [A] that a profile or a table of tests states; a channel that agrees stays.
 
-    Raises
-    ------
-    ColumnError
-        E_CURRENT_CONTRADICTS if the channel, name or heading of the file states another.
+    Raises `ColumnError`: E_CURRENT_CONTRADICTS if the channel, name or heading of the file states another.
     """
     own = record.provenance.get("current_from", "")
     mean = None if record.current is None else contradicted(record.current, current)

@@ -4,98 +4,23 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
 from mrdamper.rig_files.units import Unit, is_unit, parse_unit
+from mrdamper.rig_files.vocabulary import TABLES, meanings, words
 
-# Words of channel names in the languages rigs are operated in; the last that fits wins.
-WORDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "time": ("time", "zeit", "temps", "tiempo", "tempo", "czas", "tijd", "tid", "timestamp", "timestamps",
-                 "zeitstempel", "elapsed", "время", "时间", "時間", "시간", "čas", "aika", "zaman", "idő", "timp",
-                 "χρόνοσ", "час", "godzina", "hora", "heure", "時刻", "时刻"),
-        "displacement": ("displacement", "disp", "displ", "position", "pos", "stroke", "travel", "weg", "hub",
-                         "verschiebung", "auslenkung", "läge", "förskjutning", "déplacement", "deplacement", "course",
-                         "desplazamiento", "posicion", "posición", "spostamento", "corsa", "deslocamento", "lvdt",
-                         "extension",
-                         "compression", "jounce", "einfederung", "einfederweg",
-                         "przemieszczenie", "перемещение", "位移", "変位", "변위", "ストローク", "dráha", "droga",
-                         "verplaatsing", "siirtymä", "deplasman", "elmozdulás", "deplasare", "μετατόπιση",
-                         "переміщення", "forskyvning", "forskydning", "pomak"),
-        "force": ("force", "load", "kraft", "fuerza", "forza", "força", "forca", "charge", "carga", "carico", "siła",
-                  "loadcell", "last", "kracht", "effort", "сила", "усилие", "力", "荷重", "载荷", "하중", "síla",
-                  "voima", "kuvvet", "erő", "forță", "forţă", "δύναμη", "sila"),
-        "velocity": ("velocity", "vel", "speed", "geschwindigkeit", "vitesse", "velocidad", "velocità",
-                     "velocidade", "скорость", "速度", "속도"),
-        "acceleration": ("acceleration", "accel", "acc", "beschleunigung", "accélération", "aceleracion",
-                         "aceleración", "accelerazione", "加速度", "가속도"),
-        "current": ("current", "curr", "cur", "strom", "stromstärke", "courant", "corriente", "corrente",
-                    "amperage", "ток", "电流", "電流", "電流値", "전류", "intensité", "intensidad", "intensità",
-                    "intensidade", "stroom", "ström", "proud", "prąd", "virta", "akım", "strøm", "áram",
-                    "curent", "ρεύμα", "струм", "prúd", "struja", "icoil", "ispule"),
-        "voltage": ("voltage", "spannung", "tension électrique", "voltaje", "tensione", "напряжение", "电压", "電圧",
-                    "전압"),
-        "pressure": ("pressure", "druck", "pression", "presión", "pressione", "gasdruck", "давление", "压力", "圧力",
-                     "압력"),
-        "temperature": ("temperature", "temp", "temperatur", "température", "temperatura", "температура", "温度",
-                        "온도", "teplota"),
-    }
-)  # fmt: skip
-_SYMBOLS = MappingProxyType(
-    {
-        "t": "time", "x": "displacement", "z": "displacement", "d": "displacement", "s": "displacement",
-        "u": "displacement", "F": "force", "f": "force", "v": "velocity", "a": "acceleration", "I": "current",
-        "i": "current", "U": "voltage", "T": "temperature",
-    }
-)  # fmt: skip
-# Ends of compounds: Spulenstrom, Dämpferkraft, Kolbenweg.
-_COMPOUNDS = MappingProxyType(
-    {
-        "strom": "current", "ström": "current", "strøm": "current", "stroom": "current", "kraft": "force",
-        "weg": "displacement", "hub": "displacement", "zeit": "time",
-        "geschwindigkeit": "velocity", "beschleunigung": "acceleration", "spannung": "voltage",
-        "temperatur": "temperature", "druck": "pressure",
-    }
-)  # fmt: skip
-# What says that a column is made from a channel rather than being it.
-COMPUTED = frozenset(
-    ("rms", "peak", "pk", "filtered", "filter", "filt", "lowpass", "smoothed", "smooth", "average", "averaged", "avg",
-     "mean", "std", "sd", "abs", "amplitude", "ampl", "envelope", "spitze", "spitzenwert", "effektiv", "gefiltert",
-     "geglättet", "mittelwert", "mittel", "filtré", "filtrée", "moyenne", "filtrado", "filtrada", "filtrato", "delta",
-     "simulated", "sim", "model", "calc", "calculated", "theoretical", "ideal", "nominal", "lp", "hp", "uncertainty",
-     "sigma", "estimated", "est", "predicted", "pred", "normalized", "normalised", "difference", "diff", "berechnet",
-     "simuliert", "calculé", "calculée", "pp", "ptp")
-)  # fmt: skip
-_SET = frozenset(
-    ("set", "setpoint", "point", "command", "cmd", "commanded", "soll", "sollwert", "target", "demand", "desired",
-     "nominal", "consigne", "consigna", "reference", "ref", "mean", "average", "avg", "mittel", "mittelwert")
-)  # fmt: skip
-_NOT_MEASURED = frozenset(
-    ("command", "cmd", "commanded", "setpoint", "set", "target", "soll", "reference", "ref", "demand", "desired",
-     "error", "count", "counts", "cycle", "cycles", "segment", "segments", "index", "offset", "limit", "max", "min",
-     "consigne", "consigna", "sollwert", "rate", "id", "status", "state", "flag", "commande", "comando", "vorgabe",
-     "demanded", "objetivo", "obiettivo", "riferimento", "referencia", "référence", "zadana", "zadane", "задание",
-     "уставка", "hedef", "börvärde", "požadovaná", "err", "abweichung", "regelabweichung")
-)  # fmt: skip
-_COMMANDED = re.compile("指令|目标|目標|设定|設定|给定|給定|목표|지령")  # in words written without spaces
-# What says that a column is of another place than the damper's axis or coil.
-_ELSEWHERE = frozenset(
-    ("lateral", "side", "transverse", "transversal", "radial", "bending", "shear", "quer", "querkraft", "seitenkraft",
-     "motor", "pump", "pumpe", "heater", "drive", "servo", "servovalve", "leakage", "mains")
-)  # fmt: skip
-# Forces that a laboratory shows as weights.
-WEIGHT = frozenset(
-    ("load", "loadcell", "last", "charge", "carga", "carico", "weight", "gewicht", "poids", "peso", "荷重", "载荷")
-)
-COIL = frozenset(
-    ("coil", "spule", "spulenstrom", "bobine", "bobina", "solenoid", "magnet", "线圈电流", "damper", "icoil", "ispule")
-)
+WORDS = {role: frozenset(names) for role, names in TABLES["channels"].items()}
+_ROLES, _SYMBOLS, _COMPOUNDS = meanings("channels"), meanings("symbols"), meanings("compounds")
+COIL, COMPUTED, WEIGHT = words("coil"), words("computed"), words("weight")
+_SET, _NOT_MEASURED, _ELSEWHERE = words("set"), words("not_measured"), words("elsewhere")
+_MEANINGFUL = frozenset().union(_ROLES, _NOT_MEASURED, COMPUTED, _ELSEWHERE, _SET)
+_COMMANDED = re.compile("|".join(words("commanded")))
+_COMPRESSION = tuple(words("compression"))
 _FACTOR = re.compile(r"[\s_][x×*·]\s?10+(?![0-9])|\bp-p\b")  # Force x10, Force p-p
 _CONDITION = re.compile(r"=\s*[+-]?[0-9]")  # stroke = 40
-_COMPRESSION = ("compress", "jounce", "bump", "druckkraft", "druckweg", "einfeder", "compresi", "druckstufe")
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,40})[\])}>]\s*$", re.DOTALL)
 _INNER = re.compile(r"^(?P<name>[^\[({<]+?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,20})[\])}>]\s*[-–:,;@|/].*$", re.DOTALL)
 _SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+in\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
@@ -194,11 +119,10 @@ def role_of(name: str) -> str | None:
 
 
 def _role_of_word(word: str) -> str | None:
-    exact = next((role for role, words in WORDS.items() if word in words), None)
-    if exact is not None:
-        return exact
+    if word in _ROLES:
+        return _ROLES[word]
     if _EAST_ASIAN.search(word):  # written without spaces: 线圈电流, 阻尼力; the longest ending, as 压力 is no 力
-        ends = [(len(w), role) for role, words in WORDS.items() for w in words if not w.isascii() and word.endswith(w)]
+        ends = [(len(w), role) for w, role in _ROLES.items() if not w.isascii() and word.endswith(w)]
         return max(ends)[1] if ends else None
     if len(word) < 5:
         return None
@@ -228,9 +152,7 @@ def names_command(name: str) -> bool:
 
 def says_nothing(name: str) -> bool:
     """Tell if a name holds no word of a channel, of a command or of another place."""
-    words = [w.casefold().rstrip("0123456789") for w in re.split(r"[^\w]+|_", name) if w]
-    meaningful = {w for words_of in WORDS.values() for w in words_of} | _NOT_MEASURED | COMPUTED | _ELSEWHERE | _SET
-    return not any(word in meaningful for word in words)
+    return not any(w.casefold().rstrip("0123456789") in _MEANINGFUL for w in re.split(r"[^\w]+|_", name) if w)
 
 
 def unknown_unit(header: str) -> str:

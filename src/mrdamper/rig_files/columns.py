@@ -27,6 +27,7 @@ from mrdamper.rig_files.conditions import rate_in_name, stated_rate
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 from mrdamper.rig_files.units import DIMENSION, Unit, parse_unit
+from mrdamper.rig_files.vocabulary import words
 
 if TYPE_CHECKING:
     from mrdamper.rig_files.profile import Channel, Profile
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 ROLES = (*REQUIRED, *OPTIONAL)
 _MOST_RESTARTS = 0.05  # of the samples of a clock that counts within steps
 _TOTAL = re.compile(r"total|absolut|gesamt|cumulat|kumul", re.IGNORECASE)
-_INDEX = frozenset(("sample", "samples", "sample no", "sample number", "index", "scan", "point", "n", "no", "nr"))
+_INDEX = words("sample")
 
 
 @dataclass(frozen=True, slots=True)

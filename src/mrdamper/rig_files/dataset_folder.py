@@ -197,12 +197,8 @@ def _holds_rig_files(folder: Path) -> bool:
 def run_of(row: Mapping[str, str | None], samples: Channels, path: Path) -> Run:
     """Make a run from a row of a table and its channels.
 
-    Raises
-    ------
-    ColumnError
-        If a cell is no number, or nothing tells the current; `path` is where.
-    RunError, TimeOrderError, NonFiniteError
-        If the channels do not fit together.
+    Raises `ColumnError` if a cell is no number, or nothing tells the current; `path` is where; `RunError` or
+    `TimeOrderError` or `NonFiniteError` if the channels do not fit together.
     """
     where = f"{path}, run {row['run_id']}"
 
@@ -257,10 +253,7 @@ def _driven(channels: Channels, number: Callable[[str], float | None], where: st
         raise ColumnError("voltage_V without a gain", where=where, remedy=remedy, code="E_DRIVER")
     time, limit = channels["time_s"], number("limit_A")
     driver = Driver(
-        gain,
-        number("resistance_ohm") or 0.0,
-        number("inductance_H") or 0.0,
-        math.inf if limit is None else limit,
+        gain, number("resistance_ohm") or 0.0, number("inductance_H") or 0.0, math.inf if limit is None else limit
     )
     return driver.current(time, np.broadcast_to(volts, time.shape))
 

@@ -24,17 +24,7 @@ class LimitsError(InputError):
 
 
 def require_known_keys(table: Mapping[str, Any], refuse: type[InputError], where: str) -> None:
-    """Refuse a limits file with a key of no part.
-
-    Parameters
-    ----------
-    table : mapping of str to object
-        The content of the file.
-    refuse : type of InputError
-        Raised for the first unknown key, with code E_LIMITS or E_ABOUT as its class has it.
-    where : str
-        Name of the file.
-    """
+    """Refuse the content of a limits file called `where` with a key of no part, by an error of the class `refuse`."""
     for name in table:
         if name not in _KEYS:
             same = [key for key in RIG_LIMITS if key.split("_")[0] == name.split("_")[0]]

@@ -18,16 +18,13 @@ from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import LineNumbers
 from mrdamper.rig_files.units import DIMENSION
+from mrdamper.rig_files.vocabulary import words
 
 MOST_RUNS = 2000
 _FEWEST_ROWS = 5  # of a test, on average
 _MOST_LEVELS = 200  # currents of a column of texts that are looked at
 _SMALL = 32 * 2**20  # bytes of a file whose columns are kept together
-_RUN_WORDS = frozenset(
-    ("run", "test", "specimen", "experiment", "trial", "versuch", "prüfung", "prüflauf", "lauf", "messung", "essai",
-     "éprouvette", "ensayo", "prova", "teste", "тест", "试验", "試験", "measurement", "recording", "record")
-)  # fmt: skip
-_NUMBER_WORDS = frozenset(("no", "nr", "num", "number", "nummer", "id", "name", "index", "n", "label", "the", "of"))
+_RUN_WORDS, _NUMBER_WORDS = words("run"), words("run_number")
 
 
 def tests_of(table: RawTable, form: FileForm) -> list[RawTable]:

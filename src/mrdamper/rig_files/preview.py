@@ -63,10 +63,7 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
 
     Reading with it gives the same record. What the file does not say is left out of it.
 
-    Raises
-    ------
-    InputError
-        If the form of the file cannot be found.
+    Raises `InputError` if the form of the file cannot be found.
     """
     profile = profile_of(profile)
     with raw_tables(path, profile.file) as tables:
@@ -92,10 +89,7 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
 def preview(path: str | Path, profile: Profile | str | Path | None = None) -> Preview:
     """Return the beginning of a file, to choose its columns from.
 
-    Raises
-    ------
-    InputError
-        If the form of the file cannot be found.
+    Raises `InputError` if the form of the file cannot be found.
     """
     profile = profile_of(profile)
     with raw_tables(path, profile.file) as tables:

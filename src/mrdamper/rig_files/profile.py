@@ -201,10 +201,7 @@ class Profile(Table):
 def load_profile(path: str | Path) -> Profile:
     """Read a rig profile.
 
-    Raises
-    ------
-    ProfileError
-        If it is no TOML, or a key or value is not known.
+    Raises `ProfileError` if it is no TOML, or a key or value is not known.
     """
     return load_toml(Path(path), Profile, ProfileError, _HELP)
 
@@ -253,11 +250,8 @@ def current_in_name(name: str, profile: Profile) -> float | None:
     profile : Profile
         Its pattern is the only way where it has one.
 
-    Raises
-    ------
-    ProfileError
-        E_AMBIGUOUS if the number that the pattern finds has another unit behind it, or none
-        while the profile states none.
+    Raises `ProfileError`: E_AMBIGUOUS if the number that the pattern finds has another unit behind it, or none while
+    the profile states none.
     """
     source = profile.current
     if source is None or source.pattern is None:

@@ -23,18 +23,10 @@ FURTHER = {"acceleration": "m_s2", "voltage": "V", "temperature": "C", "pressure
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something noticed in a record that does not stop its use.
+    """Something noticed in a record that does not stop its use."""
 
-    Attributes
-    ----------
-    code : str
-        Stable: W_MISSING, W_CLIPPED, ...
-    text : str
-        One sentence with the figures behind it.
-    """
-
-    code: str
-    text: str
+    code: str  # stable: W_MISSING, W_CLIPPED, ...
+    text: str  # one sentence with the figures behind it
 
     def __str__(self) -> str:
         return f"{self.text} [{self.code}]"
@@ -85,70 +77,36 @@ class LineNumbers:
 
 @dataclass(frozen=True, slots=True)
 class SteadyPart:
-    """The steady motion of a record.
+    """The steady motion of a record."""
 
-    Attributes
-    ----------
-    window : (float, float) or None
-        Start and end of its last whole cycles [s]; None for a motion without a period.
-    repeatability : float or None
-        Cycle-to-cycle scatter of the force over its peak-to-peak value; None under two cycles.
-    """
-
-    window: tuple[float, float] | None
-    repeatability: float | None
+    window: tuple[float, float] | None  # start and end of its last whole cycles [s]; None for a motion without a period
+    repeatability: float | None  # scatter of the force over its peak-to-peak value; None under two cycles
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """One test as a rig's file holds it.
+    """One test as a rig's file holds it."""
 
-    Attributes
-    ----------
-    id : str
-        Name of the run to be.
-    time, displacement, force : (N,) arrays
-        [s], [m], [N], NaN where a sample is missing; positive in extension.
-    velocity, acceleration, current, voltage, temperature, pressure : (N,) arrays or None
-        [m/s], [m/s²], [A], [V], [°C], [Pa], where the file or the profile has them.
-    further : mapping of str to (N,) array
-        Other columns in a known unit, by name and SI unit: second sensors of a kind, the raw force.
-    findings : tuple of Finding
-        In the order they were noticed.
-    provenance : mapping of str to str
-        File name, hash, profile and remarks.
-    rig, excitation, split : str
-        As for `Run`.
-    segments : tuple of (int, int)
-        Half-open sample ranges without a gap in time; empty before the checks looked.
-    lines : LineNumbers, optional
-        Line of every sample, where the file is text.
-    window : (float, float), optional
-        Steady window of a stored run [s]; of a new record it is found.
-    steady : SteadyPart, optional
-        As the checks found it; of a long record, which is judged part by part, it is found later.
-    """
-
-    id: str
-    time: Floats
-    displacement: Floats
-    force: Floats
-    velocity: Floats | None = None
-    acceleration: Floats | None = None
-    current: Floats | None = None
-    voltage: Floats | None = None
-    temperature: Floats | None = None
-    pressure: Floats | None = None
-    further: Mapping[str, Floats] = field(default_factory=dict)
-    findings: tuple[Finding, ...] = ()
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    rig: str = ""
+    id: str  # name of the run to be
+    time: Floats  # (N,) [s]; NaN where a sample is missing, as in all channels
+    displacement: Floats  # [m], positive in extension
+    force: Floats  # [N], positive in extension
+    velocity: Floats | None = None  # [m/s]; this and the others where the file or the profile has them
+    acceleration: Floats | None = None  # [m/s²]
+    current: Floats | None = None  # [A]
+    voltage: Floats | None = None  # [V]
+    temperature: Floats | None = None  # [°C]
+    pressure: Floats | None = None  # [Pa]
+    further: Mapping[str, Floats] = field(default_factory=dict)  # by name and SI unit: second sensors, the raw force
+    findings: tuple[Finding, ...] = ()  # in the order they were noticed
+    provenance: Mapping[str, str] = field(default_factory=dict)  # file name, hash, profile and remarks
+    rig: str = ""  # this and the next two as for `Run`
     excitation: str = "sine"
     split: str = "train"
-    segments: tuple[tuple[int, int], ...] = ()
-    lines: LineNumbers | None = None
-    window: tuple[float, float] | None = None
-    steady: SteadyPart | None = None
+    segments: tuple[tuple[int, int], ...] = ()  # sample ranges without a gap in time; empty before the checks looked
+    lines: LineNumbers | None = None  # of every sample, where the file is text
+    window: tuple[float, float] | None = None  # steady window of a stored run [s]; of a new record it is found
+    steady: SteadyPart | None = None  # as the checks found it; of a long record, judged part by part, found later
 
     @property
     def channels(self) -> dict[str, Floats]:

@@ -412,10 +412,7 @@ def _with_folders(tests: Sequence[tuple[Path, Record]]) -> list[Record]:
 def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
     """Return the runs of judged records, with their provenance as notes.
 
-    Raises
-    ------
-    InputError
-        If a record has no current, or there is no record.
+    Raises `InputError` if a record has no current, or there is no record.
     """
     from mrdamper.rig_files.to_run import to_run
 

@@ -21,12 +21,13 @@ from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.profile import Correction, Profile
 from mrdamper.rig_files.readers import suffixes
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import OPTIONAL, Finding, Record
+from mrdamper.rig_files.record import FURTHER, OPTIONAL, Finding, Record
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.units import Unit
+from mrdamper.rig_files.vocabulary import words
 
-_KEPT = {"temperature": "C", "pressure": "Pa", "voltage": "V", "acceleration": "m_s2", "length": "m", "force": "N"}
-_SCALES = frozenset(("scale", "scaling", "gain", "factor", "sensitivity", "slope", "calibration", "lsb", "faktor"))
+_KEPT = {**FURTHER, "length": "m", "force": "N"}
+_SCALES = words("scale")
 _SAMPLE = 10_000  # samples looked at
 _LEAST_CURRENT = 0.02  # [A] largest of a record: less is no current of a coil
 _MOST_FURTHER = 12  # channels
@@ -36,11 +37,8 @@ _LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged c
 def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     """Return the records a table of one test holds, not yet judged: several where its time starts again and again.
 
-    Raises
-    ------
-    InputError
-        If a channel is missing, has no unit, or holds something else than numbers, or if two
-        places contradict each other about the current.
+    Raises `InputError` if a channel is missing, has no unit, or holds something else than numbers, or if two places
+    contradict each other about the current.
     """
     assigned = assign(table, profile)
     raw, findings, lines = _read(table, assigned)

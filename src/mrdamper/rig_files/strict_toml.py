@@ -16,18 +16,9 @@ T = TypeVar("T", bound=BaseModel)
 
 
 def load_toml(path: Path, kind: type[T], refuse: type[InputError], help: str, largest: int = 2**16) -> T:
-    """Read a TOML file by its schema.
+    """Read a TOML file of at most so many bytes by its schema; `help` is where its keys are shown.
 
-    Parameters
-    ----------
-    path : Path
-    kind : type of BaseModel
-    refuse : type of InputError
-        Raised if it cannot be read, is no TOML, or holds a key or value that is not known.
-    help : str
-        Where its keys are shown.
-    largest : int
-        Bytes; a profile is a page.
+    Raises `refuse` if it cannot be read, is no TOML, or holds a key or value that is not known.
     """
     try:
         with open_regular(path) as file:

@@ -16,13 +16,13 @@ from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.conditions import CELL, LARGEST_STATED, quantity_in_cell
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.text.short import decoded
+from mrdamper.rig_files.vocabulary import words
 
 NAME = "tests.csv"
 COLUMNS = ("file", "run", "current_A", "temperature_C", "split", "session", "specimen", "notes")
 _LARGEST = 4 * 2**20  # bytes
 _MOST_ROWS = 10_000  # tests of one import
-_FILE = frozenset(("file", "filename", "file name", "datei", "dateiname", "fichier", "archivo"))
-_RUN = frozenset(("run", "run_id", "test", "versuch", "essai"))
+_FILE, _RUN = words("table_file"), words("table_run")
 _Wrong = Callable[[int, str, str], None]
 
 
@@ -67,10 +67,7 @@ class TestsTable:
     def require_found(self, tests: Iterable[tuple[Path, str]]) -> None:
         """Refuse rows of files or runs that are not there, and rows of one name that several files have.
 
-        Raises
-        ------
-        TestsTableError
-            Naming every one of them.
+        Raises `TestsTableError`, naming every one of them.
         """
         tests = list(tests)
         for row in self.rows:
@@ -118,10 +115,7 @@ def load_tests(path: str | Path) -> TestsTable:
     Columns: file or run, or both; current and temperature with their unit in the name or the
     cell; split (train, validate), session, specimen, rig; further columns become notes.
 
-    Raises
-    ------
-    TestsTableError
-        E_TESTS, with everything that is wrong.
+    Raises `TestsTableError`: E_TESTS, with everything that is wrong.
     """
     path = Path(path)
     rows = _cells(path)

@@ -28,14 +28,8 @@ def to_run(record: Record) -> Run:
     record : Record
         Judged; a record that was not is judged first.
 
-    Raises
-    ------
-    QualityError
-        If the record cannot be used.
-    ColumnError
-        If it has no current.
-    RunError
-        If under three samples are left.
+    Raises `QualityError` if the record cannot be used; `ColumnError` if it has no current; `RunError` if under three
+    samples are left.
     """
     if not record.segments:
         record = check_record(record)

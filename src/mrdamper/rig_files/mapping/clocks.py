@@ -14,11 +14,10 @@ from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.tokens import stamp
 from mrdamper.rig_files.units import is_unit, parse_unit
+from mrdamper.rig_files.vocabulary import words
 
 _FRACTIONS = {"millisekunden": "ms"}
-_DATES = frozenset(
-    ("date", "datum", "data", "fecha", "dato", "дата", "日期", "日付", "날짜", "tarih", "dátum", "päivä")
-)
+_DATES = words("date")
 _DAY_S = 86_400.0
 _SAME_RATE, _SAME_FREQUENCY = 0.2, 0.1  # relative differences of what is stated from what is measured
 _SAMPLES = 100_000  # looked at

@@ -28,12 +28,11 @@ from mrdamper.rig_files.record import Finding, Record, part_of_record
 from mrdamper.rig_files.rig_record import records_of
 from mrdamper.rig_files.text.short import short_lines
 from mrdamper.rig_files.text.spool import rescale
+from mrdamper.rig_files.units import SI
 
 _FEWEST_ROWS = 50  # of a record
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")  # short ones
 _CODE = re.compile(r"\s*([A-Za-z]{1,6}[0-9]{1,3})\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")
-_SI = {"time": "s", "displacement": "m", "force": "N", "velocity": "m/s", "acceleration": "m/s2", "current": "A",
-       "voltage": "V", "temperature": "°C", "pressure": "Pa"}  # fmt: skip
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
 
 
@@ -77,7 +76,7 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
         path.parent / "_".join(words) if alone and words else path.parent if alone else path.with_name(run or path.name)
     )
     remarks = [] if current is None else [f"current: {current!r} A"]
-    units = [_SI[role] for role in channels]
+    units = [SI[role] for role in channels]
     columns = ", ".join(f"{role} = {e.name} in {e.unit}" for role, e in assigned.items())
     values = array_table(table.source, list(channels), units, list(channels.values()).__getitem__, remarks=remarks)
     key = ("column", str(test)) if alone else (run,) if run else number_of(path)
@@ -126,7 +125,7 @@ def _together(parts: Sequence[Part]) -> RawTable | None:
         whole = {"displacement", "force"} <= set(columns) and len(columns) == len(tables)
         if not whole or len({values.size for values in columns.values()}) > 1:
             return None
-        units = [_SI[role] for role in columns]
+        units = [SI[role] for role in columns]
         return array_table(tables[0].source, list(columns), units, list(columns.values()).__getitem__)
     clocks = [_arrays(table)[table.names.index("time")] for table in tables]
     moving = [time for time, table in zip(clocks, tables, strict=True) if {"displacement", "force"} & {*table.names}]

@@ -26,12 +26,10 @@ from mrdamper.rig_files.text.layout import LISTED, cells_of
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.text.tokens import looks_numeric
 from mrdamper.rig_files.units import DIMENSION, is_unit, parse_unit
+from mrdamper.rig_files.vocabulary import meanings, words
 
 _SEPARATORS = ("\t", ";", ",", "|")
-_CLOCKS = {"micros": "us", "millis": "ms", "microseconds": "us", "milliseconds": "ms", "nanoseconds": "ns",
-           "seconds": "s", "secs": "s", "sec": "s", "nanos": "ns", "usec": "us", "msec": "ms", "elapsed seconds": "s",
-           "time since start": "", "epoch ms": "ms", "timestamp ms": "ms"}  # fmt: skip
-_WEIGHTS = {"g": "gf", "kg": "kgf", "t": "tf", "gram": "gf", "grams": "gf", "G": "gf", "Kg": "kgf", "KG": "kgf"}
+_CLOCKS, _WEIGHTS = meanings("clocks") | {"time since start": ""}, meanings("weights")
 _SCALE = re.compile(
     r"(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{1,4}|%)"
     r"(?:\s*(?:PWM|duty(?: cycle)?|drive|output))?\s*(?:/|=|per|pro|entspricht|->)\s*"
@@ -46,9 +44,8 @@ _PER_COUNT = re.compile(
     re.IGNORECASE,
 )
 _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.IGNORECASE)
-_LABELS = frozenset(("label", "name", "channel", "channel name", "signal", "trace", "titel", "bezeichnung", "nom"))
+_LABELS, _MONITOR = words("label"), words("monitor")
 _LABVIEW = ("Delta_X", "X_Dimension")
-_MONITOR = frozenset(("mon", "monitor", "imon", "iout", "i", "current", "curr", "strom", "amp", "amplifier", "shunt"))
 _LONGEST_CONDITIONS = 4000
 _COLON = re.compile(r"^([^:]+):\s+([^\s:]{1,12})$")  # force: N
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
@@ -65,11 +62,8 @@ _FLOAT = re.compile(r"[+-]?[0-9]+(?:[.][0-9]*)?(?:[eE][+-]?[0-9]+)?")
 _AXIS_UNIT = re.compile(
     r"(?i)^[\s\"]*(?P<axis>[xyz])[ _-]?axis[ _-]?unit\"?\s*[;,:=\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s;,\"]*$"
 )
-_SENSE_NAMES = frozenset(("sense", "direction", "dir", "sign", "richtung", "vorzeichen", "sens", "sentido", "verso"))
-_SENSES = {
-    1: ("tensi", "exten", "pull", "zug", "traction", "tracc", "rebound"),
-    -1: ("compress", "push", "druck", "compres"),
-}
+_SENSE_NAMES = words("sense")
+_SENSES = {1: tuple(words("tension_stems")), -1: tuple(words("compression_stems"))}
 _COUNTED = (  # force positive in compression; Force (compression positive)
     re.compile(
         r"(?i)(?P<what>[^\W\d_]+(?: [^\W\d_]+)?):? (?:is |are )?posit?iv[eo]? (?:in|for|on|bei|für|en) "

@@ -11,25 +11,17 @@ import numpy as np
 from mrdamper.data import held_current
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.readers.base import Content, RawTable, Words
+from mrdamper.rig_files.vocabulary import words
 
-_VALUE = frozenset(
-    ("value", "values", "wert", "messwert", "valeur", "valor", "valore", "reading", "значение", "数值", "值", "値")
-)
-_CHANNEL = frozenset(
-    ("channel", "kanal", "signal", "variable", "sensor", "quantity", "parameter", "field", "canal", "grandeur", "name",
-     "tag", "messgröße", "magnitud", "канал", "通道", "チャンネル")
-)  # fmt: skip
-_UNIT = frozenset(("unit", "units", "einheit", "unité", "unidad", "unità", "единица", "单位", "単位"))
+_VALUE, _CHANNEL, _UNIT = words("value"), words("channel"), words("unit")
 _MOST_CHANNELS = 60
 
 
 def with_channels_as_columns(table: RawTable) -> RawTable:
     """Return a long table with a column for each of its channels; any other table as it is.
 
-    Raises
-    ------
-    RigFileError
-        E_RASTER, when the table is read, if the channels have other times or other tests than the force.
+    Raises `RigFileError`: E_RASTER, when the table is read, if the channels have other times or other tests than the
+    force.
     """
     names = [name.strip(" _").casefold() for name in table.names]
     value = [i for i, name in enumerate(names) if name in _VALUE]

@@ -22,10 +22,7 @@ _TWO_STARTS = 1.0  # [s] between two clocks of all channels: more is a clock wit
 def with_one_clock(table: RawTable) -> RawTable:
     """Return the table with every channel on the force's clock, where groups of columns have times of their own.
 
-    Raises
-    ------
-    RigFileError
-        E_RASTER, when the table is read, if a channel covers less than half of the force's time.
+    Raises `RigFileError`: E_RASTER, when the table is read, if a channel covers less than half of the force's time.
     """
     groups = _clocks(table)
     if len(groups) < 2:
@@ -216,10 +213,7 @@ def _covered(target: Floats, time: Floats) -> np.ndarray:
 def resampled(table: RawTable, name: str, target: Floats, time: Floats, values: Floats) -> Floats:
     """Return a channel on another clock [s], by linear interpolation; its ends are held for one of its own steps.
 
-    Raises
-    ------
-    RigFileError
-        E_RASTER if the clock runs backwards or covers less than half of the other.
+    Raises `RigFileError`: E_RASTER if the clock runs backwards or covers less than half of the other.
     """
     if np.any(np.diff(time) <= 0):
         raise table.source.refuse("E_TIME_ORDER", f"the clock of {name!r} stands or runs backwards", "export it again")

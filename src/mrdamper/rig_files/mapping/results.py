@@ -14,6 +14,7 @@ from mrdamper.rig_files.conditions import quantity_in_cell
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of
 from mrdamper.rig_files.units import is_unit
+from mrdamper.rig_files.vocabulary import words
 
 _SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
 _NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
@@ -21,8 +22,7 @@ _QUANTITY = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s*(m?A)")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
-_STARTS = frozenset(("start", "begin", "from", "von", "beginn", "anfang", "début", "debut", "inicio", "inizio", "开始"))
-_ENDS = frozenset(("end", "stop", "to", "bis", "ende", "fin", "fine", "until", "结束"))
+_STARTS, _ENDS = words("start"), words("end")
 _SPECIMEN = re.compile(
     r"(?i)^(?:specimen|probe|prüfkörper|test|versuch|run|sample|essai|éprouvette|ensayo|no|nr)\b[\s.:#]*"
 )

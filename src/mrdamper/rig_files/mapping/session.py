@@ -33,10 +33,7 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     pause within a test, the dwell of a trapezoidal motion, and a slow stretch of a random one at one
     current do not separate tests. Time in which nothing was recorded is a rest.
 
-    Raises
-    ------
-    ColumnError
-        E_BLOCKS if there are more than 500 tests.
+    Raises `ColumnError`: E_BLOCKS if there are more than 500 tests.
     """
     whole = [slice(0, time.size)]
     if not 400 <= time.size <= _LONGEST:  # a longer record lies in a file and is not read as a whole

@@ -105,13 +105,9 @@ def check_record(record: Record, without: Collection[Check] = ()) -> Record:
         With the findings of the checks and its segments (sample ranges without a gap in
         time). The channels are not changed.
 
-    Raises
-    ------
-    QualityError
-        If the record cannot be used; the code says why: E_NO_DATA, E_NONFINITE, E_SENTINEL,
-        E_MISSING, E_TIME_ORDER, E_TIME_DUPLICATE, E_RANGE, E_NO_EXCITATION,
-        E_SPIKE, E_LEAP, E_NOISE, E_UNRESOLVED, E_DISSIPATION_SIGN, E_RECTIFIED, E_NO_ENERGY,
-        E_UNRELATED, E_CHANNEL_LAG, E_DISTURBED, E_SAMPLES_LOST, E_COPIED.
+    Raises `QualityError` if the record cannot be used; the code says why: E_NO_DATA, E_NONFINITE, E_SENTINEL,
+    E_MISSING, E_TIME_ORDER, E_TIME_DUPLICATE, E_RANGE, E_NO_EXCITATION, E_SPIKE, E_LEAP, E_NOISE, E_UNRESOLVED,
+    E_DISSIPATION_SIGN, E_RECTIFIED, E_NO_ENERGY, E_UNRELATED, E_CHANNEL_LAG, E_DISTURBED, E_SAMPLES_LOST, E_COPIED.
     """
     return checked(View(record), without)
 

@@ -16,27 +16,15 @@ _EARLY = 0.02  # of the period: a cycle may begin before the window by so much
 
 @dataclass(frozen=True, eq=False)
 class CycleChannel:
-    """One channel of K steady cycles.
+    """One channel of K steady cycles: each is offset + (1 + gain) (loop − its mean), `late` of a period."""
 
-    Attributes
-    ----------
-    values : (K, P) array
-        At P equal phases of every cycle.
-    loop, slope : (P,) arrays
-        Mean over the cycles, and its derivative by the phase [per cycle].
-    offset, gain, late : (K,) arrays
-        Cycle = offset + (1 + gain) (loop − its mean), `late` of a period; by least squares.
-    rest : (K, P) array
-        What these three do not explain.
-    """
-
-    values: Floats
-    loop: Floats
-    slope: Floats
-    offset: Floats
-    gain: Floats
-    late: Floats
-    rest: Floats
+    values: Floats  # (K, P), at P equal phases of every cycle
+    loop: Floats  # (P,), mean over the cycles
+    slope: Floats  # (P,), its derivative by the phase [per cycle]
+    offset: Floats  # (K,), as gain and late by least squares
+    gain: Floats  # (K,)
+    late: Floats  # (K,)
+    rest: Floats  # (K, P), what these three do not explain
 
     @property
     def span(self) -> float:

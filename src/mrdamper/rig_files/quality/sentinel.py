@@ -8,8 +8,9 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.rig_files.quality.presence import USED
-from mrdamper.rig_files.quality.view import UNITS, View, runs_of
+from mrdamper.rig_files.quality.view import View, runs_of
 from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.units import SI
 
 # Leading digits of the codes in use: 999, 9999, ..., 999.25, 9.91e37, and the ends of 16-, 24- and 32-bit counts.
 # Only digits are compared: a unit prefix moves the decimal point.
@@ -41,7 +42,7 @@ def missing_value_codes(view: View) -> Iterator[Finding]:
         if code is not None:
             at = np.flatnonzero(values == code)
             text = (
-                f"{name} is {code:g} {UNITS[name]} in {at.size} sample{'s' * (at.size > 1)} among others it does not "
+                f"{name} is {code:g} {SI[name]} in {at.size} sample{'s' * (at.size > 1)} among others it does not "
                 f"fit, first {view.place(int(at[0]))}: it reads like a logger's code for a missing value"
             )
             if name in USED:

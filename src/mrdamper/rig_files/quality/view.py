@@ -199,9 +199,3 @@ def beside(mask: np.ndarray, reach: int) -> np.ndarray:
     count = np.cumsum(np.concatenate([np.zeros(reach + 1, dtype=int), mask, np.zeros(reach, dtype=int)]))
     count[reach + mask.size + 1 :] = count[reach + mask.size]
     return count[2 * reach + 1 :] > count[: mask.size]
-
-
-UNITS = {
-    "time": "s", "displacement": "m", "force": "N", "velocity": "m/s", "acceleration": "m/s²", "current": "A",
-    "voltage": "V", "temperature": "°C", "pressure": "Pa",
-}  # fmt: skip

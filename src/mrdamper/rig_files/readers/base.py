@@ -39,15 +39,7 @@ def scratch(keep: ExitStack) -> IO[bytes]:
 
 
 class RigFileError(InputError):
-    """A rig's file cannot be read, or cannot be read in one way only.
-
-    Attributes
-    ----------
-    file : str
-        Name of the file.
-    line, column : int or None
-        Counted from one, where the format has them.
-    """
+    """A rig's file cannot be read, or cannot be read in one way only; line and column count from one."""
 
     code = "E_FILE"
 
@@ -221,8 +213,5 @@ class Reader(ABC):
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """Return the tables of the file.
 
-        Raises
-        ------
-        RigFileError
-            If it is damaged, or can be read in more than one way.
+        Raises `RigFileError` if it is damaged, or can be read in more than one way.
         """

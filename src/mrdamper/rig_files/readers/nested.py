@@ -21,21 +21,15 @@ from mrdamper.rig_files.conditions import stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, tests_across, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
 from mrdamper.rig_files.units import is_unit, parse_unit
+from mrdamper.rig_files.vocabulary import KEYS
 
 DEEPEST = 8  # levels
 MOST_ITEMS = 2000  # of a list
 _MOST_TEXT = 200  # characters
 _FEWEST_SAMPLES = 50  # of channels beside which as many words are a column
-_NAMES = ("name", "label", "title", "channel", "channelname", "signal", "signalname", "key", "longname", "long_name",
-          "blockname")  # fmt: skip
-_DATA = ("data", "values", "value", "y", "samples", "ydata", "signaldata", "data_array")
-_TIMES = ("time", "t", "x", "xdata", "timestamps", "times", "time_s", "zeit")
-_UNITS = ("unit", "units", "einheit", "yunit", "y_unit", "dataunits", "yunits")
-_TIME_UNITS = ("xunit", "x_unit", "timeunit", "timeunits", "time_unit", "xunits")
 _HEAD = re.compile(r"_?(?:header|info|properties|attributes|meta(?:data)?)$", re.IGNORECASE)
 _BODY = re.compile(r"_?(?:data|values)$", re.IGNORECASE)
 _CLOCK = re.compile(r"(^|[_. ])time[_. ]", re.IGNORECASE)
-_PORTS = frozenset(("out1", "in1", "value", "out", "in", "signal", "outport", "inport", "model root", "y"))
 
 
 @dataclass(frozen=True)
@@ -132,7 +126,7 @@ def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     if not all(isinstance(items, list) and all(isinstance(i, Mapping) for i in items) for items in (axes, channels)):
         return tree
     axes = [{key.casefold(): value for key, value in axis.items()} for axis in axes]
-    units = [_unit_of(axis, _UNITS, "") for axis in axes]
+    units = [_unit_of(axis, KEYS["unit"], "") for axis in axes]
     if any(split_name("", unit).dimension not in (None, "time") for unit in units):
         return tree
     if not axes or not all(isinstance(axis.get("data"), Array) for axis in axes):
@@ -191,7 +185,9 @@ def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _stated_units(tree: Mapping[str, Any]) -> dict[str, str]:
     """Units that a mapping called units gives the columns by their names."""
-    stated = next((value for key, value in tree.items() if key.casefold() in _UNITS and isinstance(value, Mapping)), {})
+    stated = next(
+        (value for key, value in tree.items() if key.casefold() in KEYS["unit"] and isinstance(value, Mapping)), {}
+    )
     return {key: value for key, value in stated.items() if isinstance(value, str) and is_unit(value)}
 
 
@@ -264,25 +260,27 @@ def _records(items: list[Mapping[str, Any]]) -> dict[str, Any]:
 def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
     """Return the columns of a mapping that is one channel: its data, and its own x before it; empty if it is none."""
     lower = {name.casefold(): value for name, value in says.items()}
-    timed = any(name in lower for name in _TIME_UNITS)
-    for name in ("points", *_DATA):  # [time, value] each
+    timed = any(name in lower for name in KEYS["time_unit"])
+    for name in ("points", *KEYS["data"]):  # [time, value] each
         points = lower.get(name)
         if isinstance(points, Array) and points.ndim == 2 and points.shape[1] == 2 and (timed or name == "points"):
             across = np.asarray(points)
             lower |= {name: None, "time": across[:, 0], "data": across[:, 1]}
             break
-    data = next((lower[name] for name in _DATA if isinstance(lower.get(name), Array)), None)
+    data = next((lower[name] for name in KEYS["data"] if isinstance(lower.get(name), Array)), None)
     if data is None or data.size < 2:
         data = next((v["values"] for v in (lower.get("signals"),) if isinstance(v, Mapping) and "values" in v), None)
         if not isinstance(data, Array):
             return []
-    time = next((lower[name] for name in _TIMES if isinstance(lower.get(name), Array)), None)
+    time = next((lower[name] for name in KEYS["time"] if isinstance(lower.get(name), Array)), None)
     arrays = [value for value in lower.values() if isinstance(value, Array) and value.size >= data.size]
     others = [array for array in arrays if array is not data and array is not time]
-    stated = next((lower[name] for name in _NAMES if isinstance(lower.get(name), str) and lower[name].strip()), "")
+    stated = next(
+        (lower[name] for name in KEYS["name"] if isinstance(lower.get(name), str) and lower[name].strip()), ""
+    )
     if others or not (stated or key):
         return []
-    unit = _unit_of(lower, _UNITS, "datainfo")
+    unit = _unit_of(lower, KEYS["unit"], "datainfo")
     if not stated and not unit and time is None:
         return []
     name = _title(stated or key)
@@ -297,7 +295,7 @@ def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
         return [_Column("time", clock, start + step * np.arange(max(data.shape)), None, name), *columns]
     if time is None or time.size != max(data.shape):
         return columns
-    clock = _unit_of(lower, _TIME_UNITS, "timeinfo") or ("s" if "timeinfo" in lower else "")
+    clock = _unit_of(lower, KEYS["time_unit"], "timeinfo") or ("s" if "timeinfo" in lower else "")
     clock = {"seconds": "s", "milliseconds": "ms"}.get(clock, clock)
     return [_Column("time", clock, time, None, name), *columns]
 
@@ -316,7 +314,7 @@ def _title(stated: str) -> str:
     parts = [part.strip().strip('"').strip() for part in parts]
     parts = [part for part in parts if part]
     telling = [part for part in parts if split_name(part).role is not None or split_name(part).unit]
-    plain = [part for part in parts if part.casefold() not in _PORTS]
+    plain = [part for part in parts if part.casefold() not in KEYS["port"]]
     return (telling or plain or parts or [stated])[-1]
 
 

@@ -20,6 +20,7 @@ from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RigFileError, Source
 from mrdamper.rig_files.text.tokens import FORTRAN, MISSING, looks_numeric, stamp
 from mrdamper.rig_files.units import is_unit
+from mrdamper.rig_files.vocabulary import words
 
 Kind = Literal["number", "stamp", "text"]
 SPACES = " "  # stands for any run of spaces
@@ -32,7 +33,7 @@ _MARKS, _DIGITS = frozenset("#%/"), frozenset("0123456789+-.")
 _FEWEST_LINES = 20  # of a text: fewer, with words among the numbers, are notes
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
-_UNIT_KEYS = frozenset(("unit", "units", "einheit", "einheiten", "unité", "unidad", "unità", "jednostka", "enhet"))
+_UNIT_KEYS, _NOTES = words("unit"), words("notes")
 _MOST_LEVELS = 4  # lines of headings
 _TELLING = 2  # columns whose names tell what they are
 _WORD = re.compile(r"(?:[^\W\d_]-)?[^\W\d_]{3,}")  # also x-axis
@@ -45,10 +46,6 @@ LISTED = re.compile(  # a numbered line that names a column and its unit: 1=Time
     r"(?P<name>[^\d\W][^;,\t\[\](){}=]*?)\"?\s*[;,\t\[({]\s*\"?(?P<unit>[^;,\t\[\](){}\"]{1,12})\"?[\])}]?[\s;,\"]*$",
     re.IGNORECASE,
 )
-_NOTES = frozenset(
-    ("comment", "comments", "remark", "remarks", "note", "notes", "bemerkung", "kommentar", "commentaire", "comentario",
-     "commento", "uwagi", "примечание", "备注", "備考", "비고")
-)  # fmt: skip
 _DATE = re.compile(r"[0-9]{1,2}\.[0-9]{1,2}\.[0-9]{2,4}|[0-9]{4}\.[0-9]{1,2}\.[0-9]{1,2}")
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
@@ -134,10 +131,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         trailing,
         "" if header is None else lines[header],
         tuple(next(filter(None, c), "") if k == "text" else "" for c, k in zip(columns, kinds, strict=True)),
-        (
-            *(line for line in (*above, *below) if line.strip()),
-            *_notes_beside(rows),
-        ),
+        (*(line for line in (*above, *below) if line.strip()), *_notes_beside(rows)),
         titles or _titles(above, separator, width),
         _writes(rows),
         behind if any(behind) else (),

@@ -14,6 +14,8 @@ import unicodedata
 from datetime import date
 from functools import lru_cache
 
+from mrdamper.rig_files.vocabulary import TABLES, words
+
 NUMBER = {
     mark: re.compile(rf"[+-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")
     for mark in ".,"
@@ -29,8 +31,7 @@ _GROUPED = {
 _LONGEST = 40  # characters of a number
 _CELLS_APART = re.compile(r"\S\s{2,}\S|[0-9]\s[+-]")  # what another separator would split
 _SIGN_APART = re.compile(r"([+-]) +(?=[0-9.,])")  # - 0.328
-MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "-nan", "+nan", "nan(ind)",
-                     "-nan(ind)", "#nv", "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind"))  # fmt: skip
+MISSING = words("missing")
 _INFINITE = re.compile(r"[+-]?(?:inf(?:inity)?|1\.#inf|∞)", re.IGNORECASE)
 _STAMP = re.compile(
     r"(?:(?:([0-9]{4})([-/])([0-9]{2})\2([0-9]{2})|([0-9]{2})\.([0-9]{2})\.([0-9]{4})"
@@ -39,15 +40,7 @@ _STAMP = re.compile(
     r"(?: ?([AP]M))?(Z|[+-][0-9]{2}:?[0-9]{2})?",
     re.IGNORECASE,
 )
-_MONTHS = {
-    name: i
-    for names in (
-        "jan feb mar apr may jun jul aug sep oct nov dec",
-        "jan feb mär apr mai jun jul aug sep okt nov dez",
-        "ene feb mrz avr maj jun jul ago set out nov dic",
-    )
-    for i, name in enumerate(names.split(), 1)
-}
+_MONTHS = {name: i for names in TABLES["months"]["names"] for i, name in enumerate(names.split(), 1)}
 FORTRAN = re.compile(r"[+-]?[0-9]*[.,]?[0-9]+[dD][+-]?[0-9]{1,3}")  # 1.25D-03; taken where a file writes so throughout
 
 
