@@ -160,14 +160,14 @@ def _said(prediction: Prediction, interval: Band, level: float, where: str) -> s
     # Of the linear damper that takes as much out of the same sine: C = E/(π ω X²).
     damping = 2 * power / c.peak_velocity**2 if c.peak_velocity > 0 else math.nan
     low, high = (1 + share for share in interval.energy)
-    known = ""
+    corrected = ""
     if interval.session.any():
         least, most = interval.known_session
-        known = f"; with gain and offset of the session corrected {least:.4g} to {most:.4g} N"
+        corrected = f"; with gain and offset of the session corrected {least:.4g} to {most:.4g} N"
     return "\n".join(
         (
             f"peak force {peak_force(prediction.force):.4g} N, {100 * level:g} % prediction interval "
-            f"{interval.peak[0]:.4g} to {interval.peak[1]:.4g} N {where}{known}",
+            f"{interval.peak[0]:.4g} to {interval.peak[1]:.4g} N {where}{corrected}",
             f"dissipated energy {energy:.4g} J per cycle ({energy * low:.4g} to {energy * high:.4g})",
             f"equivalent damping {damping:.4g} N s/m ({damping * low:.4g} to {damping * high:.4g})",
             f"standard deviation of the force: {parts}",
