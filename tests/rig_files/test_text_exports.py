@@ -135,3 +135,39 @@ def test_variables_saved_by_octave_as_text_are_read_and_a_cut_one_is_refused(tmp
     (tmp_path / "run.mat").write_text(text[: len(text) * 3 // 4])
     with pytest.raises(InputError, match="E_TRUNCATED"):
         read_run(tmp_path / "run.mat")
+
+
+@pytest.mark.parametrize(("stated", "code"), [("Decimal_Separator\t,\n", ""), ("", "E_AMBIGUOUS")])
+def test_a_line_states_whether_a_comma_is_of_decimals_or_of_thousands(tmp_path, stated, code):
+    body = lines(lambda i, t, x, f: f"{1 + t:.3f}\t{20 + x:.3f}\t{500 + f / 2:.3f}".replace(".", ","))
+    (tmp_path / "a_0.5A.txt").write_text(f"{stated}time (s)\tstroke (mm)\tforce (N)\n{body}", encoding="utf-8")
+    if code:
+        with pytest.raises(InputError) as caught:
+            read_run(tmp_path / "a_0.5A.txt")
+        assert caught.value.code == code
+    else:
+        np.testing.assert_allclose(read_run(tmp_path / "a_0.5A.txt").time, 1 + T, atol=1e-9)
+
+
+SCALED = {
+    "counts of a converter, about a zero": (
+        "# stroke: 0.002 mm/count, zero at 32768\n# force: 0.25 N/count, zero at 32768\n"
+        "time (s),stroke_counts,force_counts\n",
+        lambda x, f: (round(x / 0.002) + 32768, round(f / 0.25) + 32768),
+    ),
+    "per cent of a full scale in sections of the header": (
+        "[Ch1]\nName=Stroke\nFullScale=75\nUnit=mm\n[Ch2]\nName=Force\nFullScale=10\nUnit=kN\n[Data]\n"
+        "time (s),Stroke [%FS],Force [%FS]\n",
+        lambda x, f: (round(100 * x / 75, 4), round(100 * f / 1e4, 4)),
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", SCALED)
+def test_counts_and_shares_of_a_full_scale_are_scaled_as_the_file_states(tmp_path, kind):
+    head, stored = SCALED[kind]
+    body = lines(lambda i, t, x, f: ",".join(map(str, (round(t, 3), *stored(x, f)))))
+    (tmp_path / "a_0.5A.csv").write_text(head + body, encoding="utf-8")
+    record = read_run(tmp_path / "a_0.5A.csv")
+    np.testing.assert_allclose(record.displacement, X / 1e3, atol=1.1e-6)
+    np.testing.assert_allclose(record.force, force(0.5), atol=0.13)

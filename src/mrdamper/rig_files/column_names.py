@@ -52,6 +52,11 @@ class Header(NamedTuple):
         return self.known.dimension if self.known else None
 
     @property
+    def factor(self) -> float:
+        """Of the unit to SI; one, if it is not known."""
+        return self.known.factor if self.known else 1.0
+
+    @property
     def role(self) -> str | None:
         """The channel the name stands for."""
         return role_of(self.name)

@@ -202,12 +202,12 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
     return candidates[0]
 
 
-def column_called(table: RawTable, column: str | int, role: str) -> int:
-    """Return the column that a profile names for a channel; `ColumnError` if there is none."""
+def column_called(table: RawTable, column: str | int, what: str, key: str = "") -> int:
+    """Return the column that a profile names, for a channel or by another key; `ColumnError` if there is none."""
+    remedy = f"correct {key or f'[channels.{what}]'} of the profile"
     if isinstance(column, int):
         if not 1 <= column <= len(table.names):
-            problem = f"no column {column}: there are {len(table.names)}"
-            raise _refusal(ColumnError, table, problem, f"correct [channels.{role}]")
+            raise _refusal(ColumnError, table, f"no column {column}: there are {len(table.names)}", remedy)
         return column - 1
     wanted = column.strip()
     for names in (table.names, [header.name for header in table.headers]):
@@ -215,8 +215,8 @@ def column_called(table: RawTable, column: str | int, role: str) -> int:
         matches = matches or [i for i, name in enumerate(names) if name.casefold() == wanted.casefold()]
         if matches:
             return matches[0]
-    problem = f"no column {column!r} for {role} (found {', '.join(filter(None, table.names))})"
-    raise _refusal(ColumnError, table, problem, f"correct [channels.{role}] of the profile")
+    problem = f"no column {column!r} for {what} (found {', '.join(filter(None, table.names))})"
+    raise _refusal(ColumnError, table, problem, remedy)
 
 
 def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> list[InputError]:
@@ -331,8 +331,7 @@ def _second_clock(table: RawTable, time: Assigned) -> list[InputError]:
         values = table.try_read(time.column, other)
         if values is None:
             continue
-        unit = table.headers[other].known
-        one, two = time.factor * values[time.column], (unit.factor if unit else 1.0) * values[other]
+        one, two = time.factor * values[time.column], table.headers[other].factor * values[other]
         there = np.isfinite(one) & np.isfinite(two)
         if np.count_nonzero(there) < 3:
             continue

@@ -211,7 +211,7 @@ def stated_clock(numbers: Mapping[str, float]) -> tuple[float, float, str] | Non
     clock, start = None, 0.0
     for name, number in numbers.items():
         header = split_name(name)
-        dimension, factor = header.dimension, header.known.factor if header.known else 1.0
+        dimension, factor = header.dimension, header.factor
         unit = "s" if dimension in ("time", "frequency") else ""
         if number > 0 and dimension in (None, "frequency") and _BARE_RATE.fullmatch(header.name):
             clock = 1 / (factor * number), unit

@@ -86,16 +86,9 @@ def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
     tables = with_joined_rasters([with_time_stated(completed(with_channels_as_columns(table))) for table in tables])
     tables = [with_one_clock(table) for table in tables]
     parts = [part for table in tables for part in ([table] if table.fallback else tests_of(table, profile.file))]
-    parts = [
-        with_channels_by_physics(with_integrated_velocity(with_unit_of_time(table)), _stated_columns(profile))
-        for table in with_results(parts)
-    ]
-    return parts
-
-
-def _stated_columns(profile: Profile) -> dict[str, str | int]:
-    """Return the columns that the profile names, by channel."""
-    return {name: channel.column for name, channel in profile.channels.items() if channel.column is not None}
+    stated = {name: channel.column for name, channel in profile.channels.items() if channel.column is not None}
+    timed = [with_integrated_velocity(with_unit_of_time(table)) for table in with_results(parts)]
+    return [with_channels_by_physics(table, stated) for table in timed]
 
 
 def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawTable], list[InputError]]:

@@ -13,6 +13,7 @@ import numpy as np
 from mrdamper.data.arrays import chunks
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import role_of, words_of
+from mrdamper.rig_files.columns import column_called
 from mrdamper.rig_files.conditions import currents_in, currents_in_cells
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable
@@ -51,16 +52,7 @@ def _run_column(table: RawTable, form: FileForm) -> int | None:
             return named[0]
         stated = [(i, table.words(i).labels[:_MOST_LEVELS]) for i, cell in enumerate(table.odd) if currents_in(cell)]
         return next((i for i, labels in stated if all(len(currents_in(label)) == 1 for label in labels)), None)
-    if isinstance(wanted, int):
-        columns = [wanted - 1] if wanted <= len(table.names) else []
-    else:
-        columns = [i for i, name in enumerate(table.names) if name.strip().casefold() == wanted.strip().casefold()]
-    if not columns:
-        shown = ", ".join(name for name in table.names if name)
-        raise table.source.refuse(
-            "E_COLUMN", f"no column {wanted!r} of runs (found {shown})", "correct run_column under [file]"
-        )
-    return columns[0]
+    return column_called(table, wanted, "runs", "run_column under [file]")
 
 
 def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
@@ -158,7 +150,9 @@ def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
     stated = all(currents_in(title) for title in titles.values())
     if not (own_time or stated or form.blocks == "split"):
         return []
-    shared = _shared(table, members)
+    grouped = {i for roles in members.values() for i in roles.values()}
+    alone = [columns[0] for role in ("time", "current") if len(columns := table.columns(role)) == 1]
+    shared = [column for column in alone if column not in grouped]  # belong to every group
     return _beside(table, [(titles[key], roles, [*roles.values(), *shared]) for key, roles in members.items()])
 
 
@@ -216,13 +210,6 @@ def _key(name: str, role: str) -> str:
     rest = [w for w in words if role_of(w) != role or w.rstrip("0123456789") != w]
     rest = [re.sub(r"^[^\W\d]+(?=[0-9]+$)", "", w) if role_of(w) == role else w for w in rest]
     return " ".join(rest).casefold()
-
-
-def _shared(table: RawTable, members: dict[str, dict[str, int]]) -> list[int]:
-    """Return the one time or current that belongs to every group."""
-    grouped = {i for roles in members.values() for i in roles.values()}
-    alone = [columns[0] for role in ("time", "current") if len(columns := table.columns(role)) == 1]
-    return [column for column in alone if column not in grouped]
 
 
 def _filled(table: RawTable, read: Callable[[tuple[int, ...]], Content], roles: dict[str, int], label: str) -> slice:

@@ -10,7 +10,7 @@ from typing import Any
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.coil_current import held_current_of
-from mrdamper.rig_files.column_names import names_compression
+from mrdamper.rig_files.column_names import Header, names_compression
 from mrdamper.rig_files.columns import assign, propose, rate_of
 from mrdamper.rig_files.file_records import tables_of_tests, test_tables
 from mrdamper.rig_files.folder import files_in, unpacked
@@ -23,19 +23,11 @@ _MOST_COLUMNS, _MOST_REMARKS, _MOST_NAMES = 40, 6, 3  # of a tree that is shown
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
-    """A column of a node: its name and its unit."""
-
-    name: str
-    unit: str
-
-
-@dataclass(frozen=True, slots=True)
 class Node:
     """A table within a file."""
 
     path: str  # within the file, empty for its only table
-    columns: tuple[Column, ...]
+    columns: tuple[Header, ...]
     beside: tuple[str, ...]  # numbers and lines beside the columns
 
 
@@ -156,9 +148,8 @@ def _nodes_of(tables: Iterable[RawTable]) -> tuple[Node, ...]:
     for table in tables:
         if table.fallback:
             continue
-        columns = tuple(Column(header.name, header.unit) for header in table.headers)
         beside = [f"{name} = {value:g}" for name, value in table.constants.items()]
-        nodes.append(Node(table.label, columns, (*beside, *table.remarks)))
+        nodes.append(Node(table.label, table.headers, (*beside, *table.remarks)))
     return tuple(nodes)
 
 

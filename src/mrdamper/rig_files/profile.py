@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -188,6 +189,15 @@ class Profile(Table):
         channels = {role: c for role, c in self.channels.items() if role not in stated or matches[role]}
         own = self.model_copy(update={"channels": channels}) if stated else self
         return runs.pop() if len(runs) == 1 else "", own
+
+    def require_matches(self, tests: Sequence[tuple[Path, str]]) -> None:
+        """Refuse patterns of the table of currents that match no file and no test."""
+        source = self.current or CurrentSource(value=0.0)
+        absent = set(source.values).difference(*(source.fitting(path, test) for path, test in tests))
+        if absent:
+            problem = f"no file or test is called {', '.join(repr(pattern) for pattern in sorted(absent))}"
+            remedy = "write names of files or tests, with * for anything"
+            raise ProfileError(problem, where="[current.values]", remedy=remedy)
 
     def leaves_out(self, name: str) -> bool:
         """Tell if files or tables of this name are no tests."""

@@ -6,7 +6,7 @@ Nothing is filled in or moved: missing samples stay NaN here and are left out of
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
 from typing import overload
@@ -134,6 +134,18 @@ def part_of_record(record: Record, rows: slice, name: str = "") -> Record:
     further = {channel: values[rows] for channel, values in record.further.items()}
     lines = None if record.lines is None else record.lines.part(rows.start, rows.stop)
     return replace(record, id=name or record.id, lines=lines, further=further, **channels)  # type: ignore[arg-type]
+
+
+def unique_names(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
+    """Return names told apart by numbers, from those that are taken and from each other."""
+    used, own = set(taken), []
+    for name in names:
+        new, count = name, 2
+        while new in used:
+            new, count = f"{name}_{count}", count + 1
+        used.add(new)
+        own.append(new)
+    return own
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -32,9 +33,9 @@ from mrdamper.rig_files.mapping.companions import (
 from mrdamper.rig_files.mapping.description import is_description
 from mrdamper.rig_files.mapping.integration import is_integrated
 from mrdamper.rig_files.mapping.results import Results
-from mrdamper.rig_files.profile import Profile, ProfileError, profile_of
+from mrdamper.rig_files.profile import Profile, profile_of
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
-from mrdamper.rig_files.record import Record, Refusal
+from mrdamper.rig_files.record import Record, Refusal, unique_names
 from mrdamper.rig_files.sequences import follows, goes_on, tests_of_files
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, names_tests
@@ -56,25 +57,10 @@ class ImportResult:
 
 
 def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> Record:
-    """Read one test from a rig's file and check it.
+    """Read one test from a rig's file and check it: SI channels, NaN where a sample is missing, with findings.
 
-    Parameters
-    ----------
-    path : path
-        Delimited text, workbook, Parquet, MAT, HDF5, TDMS, MDF or NPZ, also packed as gz or zip.
-    profile : Profile or path, optional
-        What the file does not say.
-
-    Returns
-    -------
-    Record
-        SI channels, NaN where a sample is missing, with findings. Its current is None where
-        neither file, name nor profile states one.
-
-    Raises
-    ------
-    InputError
-        With a stable code, the file, the line and column where there is one, and the remedy.
+    Its current is None where neither file, name nor profile states one. Raises `InputError` with a stable code, the
+    file, the line and column where there is one, and the remedy.
     """
     records = read_runs(path, profile)
     if len(records) != 1:
@@ -157,7 +143,7 @@ def import_files(
         left_out = [path for path in left_out if path not in used]
         if table is not None:
             table.require_found(intake.met)
-        _require_matches(profile, [*intake.met, *((path, "") for path in files)])
+        profile.require_matches([*intake.met, *((path, "") for path in files)])
         refusals = intake.refusals
         if intake.tests() or refusals:
             left_out += [Path(note.file) for note in intake.notes]
@@ -181,13 +167,7 @@ class _Intake:
         self.met: list[tuple[Path, str]] = []
         self._given: set[Path] = set()
         self._shares: dict[Path, tuple[str, Profile]] = {}  # files of some channels each, by the profile
-        self._tables_of_results: dict[Path, Results | None] = {}
-
-    def _results(self, path: Path) -> Results | None:
-        """Return the table of results that a file holds, read once."""
-        if path not in self._tables_of_results:
-            self._tables_of_results[path] = results_of(path)
-        return self._tables_of_results[path]
+        self._results = cache(results_of)  # the table of results that a file holds
 
     def read(self, path: Path, *, given: bool) -> None:
         """Read a file, and check the tests in it whose current is known."""
@@ -385,18 +365,6 @@ def found_tests(
     return tuple(_with_folders(records)), tuple(refusals)
 
 
-def _require_matches(profile: Profile, tests: Sequence[tuple[Path, str]]) -> None:
-    """Refuse patterns of the profile's table of currents that match no file and no test."""
-    if profile.current is None or not profile.current.values:
-        return
-    absent = set(profile.current.values).difference(*(profile.current.fitting(path, test) for path, test in tests))
-    if absent:
-        raise ProfileError(
-            f"no file or test is called {', '.join(repr(pattern) for pattern in sorted(absent))}",
-            where="[current.values]", remedy="write names of files or tests, with * for anything",
-        )  # fmt: skip
-
-
 def _with_folders(tests: Sequence[tuple[Path, Record]]) -> list[Record]:
     """Return records whose file is told with its folders, where files of several folders have one name."""
     paths = {path for path, _ in tests}
@@ -437,10 +405,6 @@ def _with_current(record: Record) -> Record:
 
 def with_unique_ids(records: Iterable[Record]) -> tuple[Record, ...]:
     """Return records told apart by their names: files of different folders may share one."""
-    by_id: dict[str, Record] = {}
-    for record in records:
-        name, count = record.id, 2
-        while name in by_id:
-            name, count = f"{record.id}_{count}", count + 1
-        by_id[name] = record if name == record.id else replace(record, id=name)
-    return tuple(by_id.values())
+    records = tuple(records)
+    names = unique_names(record.id for record in records)
+    return tuple(r if r.id == name else replace(r, id=name) for r, name in zip(records, names, strict=True))

@@ -207,6 +207,7 @@ def _joined(old: Dataset, new: Dataset) -> Dataset:
 
     from mrdamper.data import Dataset
     from mrdamper.errors import OutputError
+    from mrdamper.rig_files.record import unique_names
 
     stored = {(run.notes.get("sha256"), run.id) for run in old if run.notes.get("sha256")}
     again = [run.id for run in new if (run.notes.get("sha256"), run.id) in stored]
@@ -215,15 +216,9 @@ def _joined(old: Dataset, new: Dataset) -> Dataset:
             f"{len(again)} of the tests are there already: {', '.join(again[:5])}{' ...' if again[5:] else ''}",
             where=f"dataset {old.name}", remedy="give the new files only",
         )  # fmt: skip
-    taken = {run.id for run in old}
-    runs = list(old.runs)
-    for run in new:
-        name, count = run.id, 2
-        while name in taken:
-            name, count = f"{run.id}_{count}", count + 1
-        taken.add(name)
-        runs.append(run if name == run.id else replace(run, id=name))
-    return Dataset(tuple(runs), old.name)
+    names = unique_names((run.id for run in new), (run.id for run in old))
+    added = (run if name == run.id else replace(run, id=name) for run, name in zip(new, names, strict=True))
+    return Dataset((*old.runs, *added), old.name)
 
 
 def _on_terminal() -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -26,24 +26,23 @@ def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:
 
     Equal conditions whose forces differ several-fold; and the same samples under several currents.
     """
-    points = [_point(record) for record in records]
+    points = {i: point for i, record in enumerate(records) if (point := _point(record)) is not None}
     refused = _copies(records, points)
     groups: dict[tuple[str, int], list[int]] = defaultdict(list)
-    for i, point in enumerate(points):
-        if point is not None:
-            notes = records[i].provenance
-            owner = " ".join((records[i].rig, notes.get("specimen", ""), notes.get("session", "")))
-            groups[owner, round(point[2] / _ALIKE_A / 2)].append(i)
+    for i, point in points.items():
+        notes = records[i].provenance
+        owner = " ".join((records[i].rig, notes.get("specimen", ""), notes.get("session", "")))
+        groups[owner, round(point[2] / _ALIKE_A / 2)].append(i)
     for members in groups.values():
         for i in members:
             for j in members:
                 if i < j and _contradict(points[i], points[j]):
-                    refused.setdefault(i, _refusal(records, points, i, j))
-                    refused.setdefault(j, _refusal(records, points, j, i))
+                    refused.setdefault(i, _refusal(records[i], points[i], records[j], points[j]))
+                    refused.setdefault(j, _refusal(records[j], points[j], records[i], points[i]))
     return refused
 
 
-def _copies(records: Sequence[Record], points: Sequence[_Point | None]) -> dict[int, QualityError]:
+def _copies(records: Sequence[Record], points: Mapping[int, _Point]) -> dict[int, QualityError]:
     """Return the tests that hold the samples of another test and have another current than it."""
     groups: dict[tuple[int, bytes, bytes], list[int]] = defaultdict(list)
     for i, record in enumerate(records):
@@ -52,7 +51,7 @@ def _copies(records: Sequence[Record], points: Sequence[_Point | None]) -> dict[
         groups[record.time.size, force, moved].append(i)
     refused: dict[int, QualityError] = {}
     for members in groups.values():
-        currents = {i: point[2] for i in members if (point := points[i]) is not None}
+        currents = {i: points[i][2] for i in members if i in points}
         for i, current in currents.items():
             others = [records[j].id for j, its in currents.items() if abs(its - current) > _ALIKE_A]
             if not others:
@@ -66,22 +65,19 @@ def _copies(records: Sequence[Record], points: Sequence[_Point | None]) -> dict[
     return refused
 
 
-def _contradict(one: _Point | None, other: _Point | None) -> bool:
-    if one is None or other is None or abs(one[2] - other[2]) > _ALIKE_A:
-        return False
-    near = all(abs(a - b) <= _ALIKE * max(a, b) for a, b in zip(one[:2], other[:2], strict=True))
+def _contradict(one: _Point, other: _Point) -> bool:
+    near = abs(one[2] - other[2]) <= _ALIKE_A and all(
+        abs(a - b) <= _ALIKE * max(a, b) for a, b in zip(one[:2], other[:2], strict=True)
+    )
     return near and max(one[3], other[3]) > _SEVERAL * min(one[3], other[3])
 
 
-def _refusal(records: Sequence[Record], points: Sequence[_Point | None], i: int, j: int) -> QualityError:
-    one, other = points[i], points[j]
-    assert one is not None
-    assert other is not None
-    whence = records[i].provenance.get("current_from", "its channel")
+def _refusal(record: Record, one: _Point, beside: Record, other: _Point) -> QualityError:
+    whence = record.provenance.get("current_from", "its channel")
     return QualityError(
         f"at {one[2]:.3g} A (from {whence}), {one[0]:.3g} Hz and {1e3 * one[1]:.3g} mm its force is {one[3]:.4g} N "
-        f"from peak to peak, that of {records[j].id} at the same condition {other[3]:.4g} N",
-        where=records[i].provenance.get("file", records[i].id),
+        f"from peak to peak, that of {beside.id} at the same condition {other[3]:.4g} N",
+        where=record.provenance.get("file", record.id),
         remedy="one of them has another current or another unit of force: state the current of each in tests.csv "
         "(where a name or heading states a wrong one, correct that), or leave one out",
         code="E_CONDITIONS",

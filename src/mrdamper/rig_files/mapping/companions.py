@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -69,7 +69,9 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
     if not alone and "time" in channels:
         there = np.isfinite(channels["time"])
         channels = {role: values[there] for role, values in channels.items()}
-    if not channels or (not alone and not _is_timed(channels)):
+    time = channels.get("time", np.empty(0))
+    timed = len(channels) > 1 and time.size > 1 and bool(np.all(np.diff(time) > 0))
+    if not channels or not (alone or timed):
         return None
     words = [word for word in words_of(split_name(path.stem).name) if role_of(word) not in assigned]
     test = (
@@ -81,11 +83,6 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
     values = array_table(table.source, list(channels), units, list(channels.values()).__getitem__, remarks=remarks)
     key = ("column", str(test)) if alone else (run,) if run else number_of(path)
     return Part(path, values.noted(*table.findings, *raw.findings), key, test, columns)
-
-
-def _is_timed(channels: Mapping[str, Floats]) -> bool:
-    time = channels.get("time")
-    return len(channels) > 1 and time is not None and time.size > 1 and bool(np.all(np.diff(time) > 0))
 
 
 def number_of(path: Path) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from mrdamper.rig_files.column_names import (
 from mrdamper.rig_files.conditions import currents_in, without_currents
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
-from mrdamper.rig_files.text.layout import LISTED, cells_of
+from mrdamper.rig_files.text.layout import LISTED, X_VALUE, cells_of
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.text.tokens import looks_numeric
 from mrdamper.rig_files.units import DIMENSION, is_unit, parse_unit
@@ -33,7 +33,7 @@ _CLOCKS, _WEIGHTS = meanings("clocks") | {"time since start": ""}, meanings("wei
 _SCALE = re.compile(
     r"(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{1,4}|%)"
     r"(?:\s*(?:PWM|duty(?: cycle)?|drive|output))?\s*(?:/|=|per|pro|entspricht|->)\s*"
-    r"(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{1,4}|%)(?![A-Za-z0-9/])"
+    r"(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{1,6}|%)(?![A-Za-z0-9/])"
 )
 _TIME_UNIT = re.compile(
     r"(?i)^[\s\"#%]*(?:horizontal|x[ -]?|h|time[ _-]?)\s*units?\"?\s*[:=,;\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s,;]*$"
@@ -72,20 +72,25 @@ _COUNTED = (  # force positive in compression; Force (compression positive)
     re.compile(r"(?i)(?P<what>[^\W\d_]+(?: [^\W\d_]+)?)[ ,:(]{1,3}(?P<sense>[^\W\d_]+) (?:is )?posit?iv[eo]?\b"),
 )
 _SIGNALS = ("voltage", "count")  # what a scale leads from
+_ZERO = re.compile(r"(?i)\bzero (?:is )?at ([+-]?[0-9]{1,10})(?![.,]?[0-9])")
+_FULL_SCALE = re.compile(  # sections of a header: Name=Stroke, FullScale=75, Unit=mm
+    r"(?im)^name *= *(?P<name>[^=\n]{1,60})\n(?:[^=\n]*=[^\n]*\n){0,4}?full[ _]?scale *= *(?P<full>[0-9.]{1,12})\n"
+    r"(?:[^=\n]*=[^\n]*\n){0,4}?unit *= *(?P<unit>\S{1,12})$"
+)
 _LONGEST_LINE = 300
 _FEWEST_PATHS = 3  # that have a beginning in common
 
 
 def completed(table: RawTable) -> RawTable:
     """Add the names, units and scales that the file states above, below or beside its row of names."""
-    table = _with_values_for_all(table)
+    table = _with_x_values(_with_values_for_all(table))
     if not any(table.names):
         table = _with_listed_names(table)
     if not any(table.names):
         return table
     table = _with_numbered_channels(_without_shared_path(table))
-    table = _with_titles(_with_keyed_units(_with_row_of_currents(_with_labels(table))))
-    table = _with_stated_time_unit(_with_listed_units(_with_keyed_axis(table)))
+    table = _with_titles(_with_keyed_lines(table))
+    table = _with_listed_units(_with_keyed_axis(table))
     table = _with_stated_signs(_with_clocks_and_weights(table))
     return _with_sense(_with_scales(_with_counts(table)))
 
@@ -170,43 +175,44 @@ def _with_values_for_all(table: RawTable) -> RawTable:
         for key, number in keyed.items()
         if start and key.startswith(start) and looks_numeric(number)
     ]
+    sections = _FULL_SCALE.finditer("\n".join(table.remarks))
+    lines += [f"{m['name']}: 100 % = {m['full']} {m['unit']}" for m in sections]
     lines += [f"DELTA_T: {line[8:].strip()} s" for line in table.remarks if line.startswith("DELTA_T=")]
     return replace(table, remarks=(*table.remarks, *lines)) if lines else table
 
 
-def _with_labels(table: RawTable) -> RawTable:
-    """Titles of a line that begins with what it holds: Label, Displacement 10 mm/V, Force 1 kN/V."""
-    for key, cells in _keyed_cells(table):
-        named = key.casefold().rstrip("s") in _LABELS and len(cells) + 1 == len(table.names) > 2
-        if named and len({split_name(cell).role for cell in cells} - {None}) > 1:
-            return replace(table, over=("", *cells))
-    return table
+def _with_x_values(table: RawTable) -> RawTable:
+    """Clocks and units of measurement files of LabVIEW: X_Value is a time unless X_Dimension says otherwise."""
+    keyed = dict(_keyed_cells(table))
+    units = ["", *(cell.strip() for cell in keyed.get("Y_Unit_Label", ())), *[""] * len(table.names)]
+    if ("Y_Unit_Label" not in keyed and X_VALUE not in table.names) or keyed.get("X_Dimension", ["Time"])[0] != "Time":
+        return table
+    own = enumerate(zip(table.names, table.units, strict=True))
+    return table.named({i: ("Time", "s") if n == X_VALUE else (n, u or units[i]) for i, (n, u) in own})
 
 
-def _with_row_of_currents(table: RawTable) -> RawTable:
-    """Titles with the currents of a line above the names: current (A), 0, , 0.5, , one for a column or a group."""
+def _with_keyed_lines(table: RawTable) -> RawTable:
+    """Titles and units of lines that begin with what they hold, before a cell for each of the other columns.
+
+    Label, LVDT 10 mm/V, Load 1 kN/V; Vertical Units, V, V; current (A), 0, , 0.5, , one for a column or a group.
+    """
     width = len(table.names)
     for key, cells in _keyed_cells(table, _LONGEST_CONDITIONS) if width > 2 else ():
         header, stated = split_name(key), [cell for cell in cells if cell]
-        if header.dimension != "current" or not names_condition(header.name, "current") or len(stated) < 2:
-            continue
-        if not width - 2 <= len(cells) <= width or not all(map(_PLAIN.fullmatch, stated)):
-            continue
-        titles, last = [""], ""
-        for cell in [*cells, ""][: width - 1]:
-            last = f"{cell.replace(',', '.')} {header.unit}" if cell else last
-            titles.append(last)
-        over = table.over or ("",) * width
-        return replace(table, over=tuple(f"{a} {b}".strip() for a, b in zip(over, titles, strict=True)))
-    return table
-
-
-def _with_keyed_units(table: RawTable) -> RawTable:
-    """Units of a line with a key before them, one a column: Vertical Units, V, V, V."""
-    for key, cells in () if any(table.units) else _keyed_cells(table):
-        units = [cell for cell in cells[: len(table.names) - 1] if is_unit(cell)]
-        if _UNITS_KEY.fullmatch(key) and len(units) == len(table.names) - 1:
-            return replace(table, units=("", *units))
+        if key.casefold().rstrip("s") in _LABELS and len(cells) == width - 1:
+            if len({split_name(cell).role for cell in cells} - {None}) > 1:
+                table = replace(table, over=("", *cells))
+        elif _UNITS_KEY.fullmatch(key) and not any(table.units) and all(map(is_unit, cells[: width - 1])):
+            table = replace(table, units=("", *cells[: width - 1])) if len(cells) >= width - 1 else table
+        elif header.dimension == "current" and names_condition(header.name, "current") and len(stated) > 1:
+            if not width - 2 <= len(cells) <= width or not all(map(_PLAIN.fullmatch, stated)):
+                continue
+            titles, last = [""], ""
+            for cell in [*cells, ""][: width - 1]:
+                last = f"{cell.replace(',', '.')} {header.unit}" if cell else last
+                titles.append(last)
+            over = zip(table.over or ("",) * width, titles, strict=True)
+            return replace(table, over=tuple(f"{a} {b}".strip() for a, b in over))
     return table
 
 
@@ -294,49 +300,28 @@ def _with_titles(table: RawTable) -> RawTable:
 
 
 def _with_listed_units(table: RawTable) -> RawTable:
-    """Units of a list of channels above the columns: a line a channel, its name and its unit among the cells."""
+    """Units that lines above the columns state: Weg in mm, Kraft in N; X-Unit: ms; a channel and its unit in cells."""
     bare = [i for i, header in enumerate(table.headers) if header.name and not header.unit]
-    if not bare or not table.remarks:
-        return table
-    wanted = {table.names[i].strip().casefold(): i for i in bare}
-    written: dict[int, set[str]] = {}
-    for line in table.remarks:  # Weg in mm, Kraft in N
-        for cell in re.split(r"[,;|\t]\s*", line[:_LONGEST_LINE].lstrip("#%/ ")):
-            cell = _COLON.sub(r"\1 [\2]", cell)
-            header, i = split_name(cell), wanted.get(split_name(cell).name.strip().casefold())
+    wanted, times = {table.names[i].strip().casefold(): i for i in bare}, table.columns("time")
+    behind: dict[int, set[str]] = {}
+    listed: dict[int, set[str]] = {}
+    for line in table.remarks if bare else ():
+        cells = [cell.strip(' "') for cell in re.split(r"[,;|\t]", line[:_LONGEST_LINE].lstrip("#%/ "))]
+        for header in (split_name(_COLON.sub(r"\1 [\2]", cell)) for cell in cells):
+            i = wanted.get(header.name.strip().casefold())
             if i is not None and header.dimension and header.dimension == DIMENSION.get(header.role or ""):
-                written.setdefault(i, set()).add(header.unit)
-    if written and all(len(units) == 1 for units in written.values()):
-        own = [next(iter(written.get(i, ())), unit) for i, unit in enumerate(table.units)]
-        return replace(table, units=tuple(own))
-    for separator in _SEPARATORS:  # a line a channel, its name and its unit among the cells
-        units_of: dict[int, list[str]] = {}
-        for line in table.remarks:
-            cells = [cell.strip().strip('"') for cell in line[:_LONGEST_LINE].lstrip("#%/ ").split(separator)]
-            named = [wanted[cell.casefold()] for cell in cells if cell.casefold() in wanted]
-            if len(named) == 1 and len(cells) > 1:
-                units_of[named[0]] = [cell.strip("[]()") for cell in cells]
-        if len(units_of) < 2:
-            continue
-        width = min(map(len, units_of.values()))
-        column = next((c for c in range(width) if sum(is_unit(cells[c]) for cells in units_of.values()) >= 2), None)
-        if column is None:
-            continue
-        units = list(table.units)
-        for i, cells in units_of.items():
-            units[i] = cells[column] if is_unit(cells[column]) else units[i]
-        return replace(table, units=tuple(units))
-    return table
-
-
-def _with_stated_time_unit(table: RawTable) -> RawTable:
-    """Return the unit of time that a line states: Horizontal Units,s; X-Unit: ms; HUnit."""
-    times = table.columns("time")
-    if len(times) != 1 or table.headers[times[0]].unit:
-        return table
-    stated = {m["unit"] for line in table.remarks if (m := _TIME_UNIT.match(line[:_LONGEST_LINE]))}
-    units = [unit for unit in stated if is_unit(unit) and split_name("", unit).dimension == "time"]
-    return table.named({times[0]: (table.names[times[0]], units[0])}) if len(units) == 1 else table
+                behind.setdefault(i, set()).add(header.unit)
+        match = _TIME_UNIT.match(line[:_LONGEST_LINE])
+        if match and len(times) == 1 and times[0] in bare and split_name("", match["unit"]).dimension == "time":
+            behind.setdefault(times[0], set()).add(match["unit"])
+        named = [wanted[cell.casefold()] for cell in cells if cell.casefold() in wanted]
+        if len(named) == 1:
+            role = table.headers[named[0]].role
+            units = [bare_cell for cell in cells if is_unit(bare_cell := cell.strip("[]()"))]
+            units = [unit for unit in units if role is None or split_name("", unit).dimension == DIMENSION[role]]
+            listed.setdefault(named[0], set()).update(units[:1])
+    stated = {**(listed if sum(map(bool, listed.values())) > 1 else {}), **behind}
+    return table.named({i: (table.names[i], own.pop()) for i, own in stated.items() if len(own) == 1})
 
 
 def _with_clocks_and_weights(table: RawTable) -> RawTable:
@@ -374,17 +359,17 @@ def _with_scales(table: RawTable) -> RawTable:
         unit, factor, line = other
         header = table.headers[i]
         text = f"column {table.names[i]!r} is scaled as the file states: {line.strip()[:60]!r}"
+        zero = _ZERO.search(line)
         role = next((role for role, dimension in DIMENSION.items() if dimension == parse_unit(unit).dimension), "")  # type: ignore[union-attr]
         name = header.name if header.role == role else f"{role} {header.name}"
         name = name if role_of(name) == role else role
-        table = _scaled(table, i, name, unit, factor * (header.known.factor if header.known else 1.0), text)
+        table = _scaled(table, i, name, unit, factor * header.factor, text, float(zero[1]) if zero else 0.0)
     return table
 
 
 def scaled_columns(table: RawTable) -> list[int]:
-    """Return the columns in volts or per cent, which mean something by a scale alone."""
-    percent = parse_unit("%")
-    return [i for i, h in enumerate(table.headers) if h.dimension == "voltage" or (h.unit and h.known == percent)]
+    """Return the columns in volts, counts or per cent, which mean something by a scale alone."""
+    return [i for i, header in enumerate(table.headers) if header.dimension in _SIGNALS]
 
 
 def states_scale(line: str) -> bool:
@@ -396,7 +381,9 @@ def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[s
     """Return unit, its number per volt and the line of a scale that can only be meant for a column; else None."""
     name = table.headers[column].name
     own = [table.names[column], *table.over[column : column + 1]]
-    for lines in (own, [part for line in table.remarks for part in _parts(line[:_LONGEST_LINE])]):
+    beside = [line[:_LONGEST_LINE] for line in table.remarks]
+    parts = [part for t in beside for part in (re.split(r"[,;|\t]\s*", t) if len(_scales(t)) > 1 else [t])]
+    for lines in (own, parts):
         scales = []
         for line in lines:
             for unit, factor in _scales(line):
@@ -416,11 +403,6 @@ def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[s
     return None
 
 
-def _parts(line: str) -> list[str]:
-    """Return a line, or its cells where it states several scales."""
-    return re.split(r"[,;|\t]\s*", line) if len(_scales(line)) > 1 else [line]
-
-
 def _scales(line: str) -> list[tuple[str, float]]:
     """Return unit and number per volt of every scale that a line states: 0.5 A/V, 100 mV/A, 1 V = 2 A."""
     scales = []
@@ -438,7 +420,9 @@ def _scales(line: str) -> list[tuple[str, float]]:
     return scales
 
 
-def _scaled(table: RawTable, column: int, name: str, unit: str, factor: float, text: str) -> RawTable:
-    """Return the table with a column multiplied by a number, in another unit."""
-    scaled = table.computed(column, (column,), lambda values: rescale(values[column], factor))
+def _scaled(
+    table: RawTable, column: int, name: str, unit: str, factor: float, text: str, zero: float = 0.0
+) -> RawTable:
+    """Return the table with a column multiplied by a number, in another unit; its own zero is at a number."""
+    scaled = table.computed(column, (column,), lambda values: rescale(values[column], factor, -zero * factor))
     return scaled.named({column: (name, unit)}).noted(Finding("W_SCALE", text))

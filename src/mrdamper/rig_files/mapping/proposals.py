@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -25,14 +24,6 @@ _LARGEST = 64 * 2**20  # bytes of a file whose columns are tried
 _MOST_SAMPLES = 20_000
 _MOST_TRIED = 24  # combinations of columns
 _CLEAR, _POOR = 0.5, 0.2  # share of the force that velocity explains: of a damper's, and of another channel
-
-
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """Columns that may be the channels, and how far the force is a damper's."""
-
-    columns: dict[str, int]
-    score: float
 
 
 def with_unit_of_time(table: RawTable) -> RawTable:
@@ -69,38 +60,26 @@ def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -
         return table
     if all(len(columns) == 1 for columns in open_roles.values()) or not all(open_roles.values()):
         return table
-    ranked = ranked_candidates(table, open_roles)
-    good = [candidate for candidate in ranked if candidate.score >= _CLEAR]
-    rest = [candidate for candidate in ranked if _POOR <= candidate.score < _CLEAR]
-    if len(good) != 1 or rest:
+    values = table.try_read(*sorted({column for columns in open_roles.values() for column in columns}))
+    tried = [
+        columns for columns in list(product(*open_roles.values()))[: _MOST_TRIED + 1] if len({*columns}) == len(columns)
+    ]
+    if values is None or len(tried) > _MOST_TRIED:
+        return table
+    scores = {columns: damping_share(*(values[column] for column in columns)) for columns in tried}
+    good = [columns for columns, score in scores.items() if score >= _CLEAR]
+    if len(good) != 1 or any(_POOR <= score < _CLEAR for score in scores.values()):
         return table
     headings, chosen = {}, []
-    for role, columns in open_roles.items():
+    for own, (role, columns) in zip(good[0], open_roles.items(), strict=True):
         if len(columns) < 2:
             continue
-        own = good[0].columns[role]
         chosen.append(f"{table.names[own] or f'column {own + 1}'} as the {role}")
         for column in columns:
             name = role if column == own else f"other {column + 1}"
             headings[column] = f"{name} [{table.headers[column].unit}]", ""
     text = f"{' and '.join(chosen)}: only so the force takes energy in phase with the velocity"
     return table.named(headings).noted(Finding("W_CHOSEN", text))
-
-
-def ranked_candidates(table: RawTable, open_roles: dict[str, list[int]]) -> list[Candidate]:
-    """Return the combinations of columns and how far each is a damper's test, the best first."""
-    wanted = sorted({column for columns in open_roles.values() for column in columns})
-    values = table.try_read(*wanted)
-    if values is None:
-        return []
-    candidates = []
-    for columns in list(product(*open_roles.values()))[: _MOST_TRIED + 1]:
-        if len(set(columns)) < len(columns):
-            continue
-        chosen = dict(zip(open_roles, columns, strict=True))
-        score = damping_share(*(values[chosen[role]] for role in REQUIRED))
-        candidates.append(Candidate(chosen, score))
-    return sorted(candidates, key=lambda candidate: -candidate.score) if len(candidates) <= _MOST_TRIED else []
 
 
 def damping_share(time: Floats, displacement: Floats, force: Floats) -> float:

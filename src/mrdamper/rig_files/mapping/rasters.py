@@ -79,34 +79,21 @@ def _named(table: RawTable) -> RawTable:
 
 
 def _joined(label: str, tables: Sequence[RawTable]) -> RawTable:
-    places = [(table, i) for table in tables for i in _time_first(table)]
-    named = {id(table): _named(table) for table in tables}
+    """Return one table of several, the time of each before its channels."""
+    places = [
+        (_named(t), i)
+        for t in tables
+        for i in sorted(range(len(t.names)), key=lambda i, t=t: t.columns("time")[0] != i)
+    ]
 
     def read(columns: Sequence[int]) -> Content:
-        values = {}
-        for column in columns:
-            table, i = places[column]
-            values[column] = table.read([i]).values[i]
-        return Content(values)
+        return Content({c: table.read([i]).values[i] for c, (table, i) in ((c, places[c]) for c in columns)})
 
-    first = tables[0]
-    return replace(
-        first,
-        names=tuple(named[id(table)].names[i] for table, i in places),
-        units=tuple(table.units[i] for table, i in places),
-        odd=(),
-        over=(),
-        read=read,
-        words=None,
-        label=label,
-        constants={name: value for table in reversed(tables) for name, value in table.constants.items()},
-        remarks=tuple(dict.fromkeys(line for table in tables for line in table.remarks)),
-    )
-
-
-def _time_first(table: RawTable) -> list[int]:
-    times = table.columns("time")[:1]
-    return [*times, *(i for i in range(len(table.names)) if i not in times)]
+    names, units = (tuple(getattr(table, key)[i] for table, i in places) for key in ("names", "units"))
+    constants = {name: value for table in reversed(tables) for name, value in table.constants.items()}
+    remarks = tuple(dict.fromkeys(line for table in tables for line in table.remarks))
+    own = {"names": names, "units": units, "label": label, "constants": constants, "remarks": remarks}
+    return replace(tables[0], odd=(), over=(), read=read, words=None, **own)
 
 
 def _clocks(table: RawTable) -> dict[int, list[int]]:
@@ -126,7 +113,7 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
     read = lru_cache(maxsize=4)(lambda column: table.read([column]).values[column])
 
     def stamps(column: int) -> Floats:
-        return read(column) * _factor(table, column)
+        return read(column) * table.headers[column].factor
 
     @cache
     def common() -> tuple[slice, Floats]:
@@ -158,15 +145,10 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
     return resampled_table if same else resampled_table.noted(Finding("W_RASTER", f"{own}, {text}"))
 
 
-def _factor(table: RawTable, column: int) -> float:
-    unit = table.headers[column].known
-    return unit.factor if unit else 1.0
-
-
 def _apart(table: RawTable, clock: int, others: Iterable[int]) -> float | None:
     """Largest difference of the stamps of a row between a clock and others [s]; None where they have no common rows."""
     try:
-        first, *rest = (_filled(table.read([i]).values[i]) * _factor(table, i) for i in (clock, *others))
+        first, *rest = (_filled(table.read([i]).values[i]) * table.headers[i].factor for i in (clock, *others))
     except InputError:
         return None
     if any(other.size != first.size for other in rest):
@@ -194,27 +176,22 @@ def _filled(values: Floats) -> Floats:
     return values[: there[-1] + 1] if there.size else values
 
 
-def _interpolated(table: RawTable, column: int, target: Floats, time: Floats, values: Floats) -> Floats:
-    size = min(time.size, values.size)
-    there = np.flatnonzero(np.isfinite(time[:size]) & np.isfinite(values[:size]))
-    name = table.headers[column].name
-    if there.size < 2:
-        raise table.source.refuse("E_NO_DATA", f"no samples in the column of {name!r}", "export the channel again")
-    time, values = time[there], values[there]
-    return resampled(table, name, target, time, values)
-
-
 def _covered(target: Floats, time: Floats) -> np.ndarray:
     """(N,) mask of the times that lie within another clock, or within one and a half of its steps of its ends."""
     near = 1.5 * float(np.median(np.diff(time))) if time.size > 1 else 0.0
     return (target >= time[0] - near) & (target <= time[-1] + near) if time.size else np.zeros(target.size, dtype=bool)
 
 
-def resampled(table: RawTable, name: str, target: Floats, time: Floats, values: Floats) -> Floats:
+def _interpolated(table: RawTable, column: int, target: Floats, time: Floats, values: Floats) -> Floats:
     """Return a channel on another clock [s], by linear interpolation; its ends are held for one of its own steps.
 
-    Raises `RigFileError`: E_RASTER if the clock runs backwards or covers less than half of the other.
+    Raises `RigFileError`: E_RASTER or E_TIME_ORDER if the clock covers less than half of the other or runs backwards.
     """
+    size, name = min(time.size, values.size), table.headers[column].name
+    there = np.flatnonzero(np.isfinite(time[:size]) & np.isfinite(values[:size]))
+    if there.size < 2:
+        raise table.source.refuse("E_NO_DATA", f"no samples in the column of {name!r}", "export the channel again")
+    time, values = time[there], values[there]
     if np.any(np.diff(time) <= 0):
         raise table.source.refuse("E_TIME_ORDER", f"the clock of {name!r} stands or runs backwards", "export it again")
     if name and role_of(name) == "current" and time.size < target.size and not held_current(values)[1]:
@@ -227,6 +204,6 @@ def resampled(table: RawTable, name: str, target: Floats, time: Floats, values: 
             f"{name!r} is recorded from {time[0]:.4g} to {time[-1]:.4g} s, the force from {begin:.4g} to {end:.4g} s",
             "export the channels with one clock",
         )
-    resampled_values = np.interp(target, time, values)
-    resampled_values[~inside] = np.nan
-    return resampled_values
+    on_target = np.interp(target, time, values)
+    on_target[~inside] = np.nan
+    return on_target

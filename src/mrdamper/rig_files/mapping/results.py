@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -82,11 +82,8 @@ class Results:
     def column_of_tests(self, table: RawTable) -> str | None:
         """Return the column of a record that numbers its tests as a column of this table, of the same name, does."""
         for i, name in enumerate(table.names if table.words is not None else ()):
-            at = [
-                k
-                for k, key in enumerate(self.keys)
-                if key and _key(split_name(key).name) == _key(split_name(name).name)
-            ]
+            own = _key(split_name(name).name)
+            at = [k for k, key in enumerate(self.keys) if key and _key(split_name(key).name) == own]
             if len(at) != 1 or table.words is None:
                 continue
             numbers = {_key(label) for label in table.words(i).labels} - {""}
@@ -117,31 +114,28 @@ def with_results(tables: list[RawTable]) -> list[RawTable]:
         if len(stated) != 1 or len(tables) < 2:
             return others
         results = stated[0][1]
-        tables = [table for table in tables if table is not stated[0][0] and _names_channels(table)]
+        tables = [t for t in tables if t is not stated[0][0] and (not any(t.names) or _names_channels(t))]
     shared = set(tables[0].remarks).intersection(*(table.remarks for table in tables[1:])) if len(tables) > 1 else set()
     tests = [[table.label, *(_last_lines(table, shared))] for table in tables]
     currents = results.by_test(tests)
     if len(currents) < len(tables) or not tables:
         return others
     note = f"table of results, {results.title}"
-    return [
-        replace(table, constants={**_without_current(table.constants), "current [A]": currents[i]}, stated_in=note)
-        for i, table in enumerate(tables)
-    ]
+    with_current: list[RawTable] = []
+    for i, table in enumerate(tables):
+        rest = {key: v for key, v in table.constants.items() if not names_condition(split_name(key).name, "current")}
+        with_current.append(replace(table, constants={**rest, "current [A]": currents[i]}, stated_in=note))
+    return with_current
 
 
 def _names_channels(table: RawTable) -> bool:
     """Tell if two columns or more of a table name channels: others of a workbook list parameters."""
-    return len({header.role or header.dimension for header in table.headers} - {None}) >= _TELLING or not any(
-        table.names
-    )
+    return len({header.role or header.dimension for header in table.headers} - {None}) >= _TELLING
 
 
 def _may_be_results(table: RawTable) -> bool:
     """Tell if a table names a current, or nothing, and is no record of a test."""
-    return (any(map(_is_current, table.names)) or not any(table.names)) and "time" not in {
-        header.role for header in table.headers
-    }
+    return (any(map(_is_current, table.names)) or not any(table.names)) and not table.columns("time")
 
 
 def lines_of(table: RawTable) -> list[str]:
@@ -149,17 +143,12 @@ def lines_of(table: RawTable) -> list[str]:
     if table.words is None or len(table.names) > _MOST_COLUMNS:
         return []
     columns = [table.words(i) for i in range(len(table.names))]
-    if any(words.codes.size > _MOST_ROWS for words in columns):
-        return []
-    if len({words.codes.size for words in columns}) > 1:  # channels of several rasters
+    sizes = {words.codes.size for words in columns}
+    if len(sizes) > 1 or max(sizes, default=0) > _MOST_ROWS:  # channels of several rasters, or of a record
         return []
     rows = zip(*([words.labels[code] for code in words.codes] for words in columns), strict=True)
     units = (table.units,) if any(table.units) else ()
     return ["\t".join(cells) for cells in (table.names, *units, *rows)]
-
-
-def _without_current(constants: Mapping[str, float]) -> dict[str, float]:
-    return {name: value for name, value in constants.items() if not names_condition(split_name(name).name, "current")}
 
 
 def _last_lines(table: RawTable, shared: set[str]) -> list[str]:

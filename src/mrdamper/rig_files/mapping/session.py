@@ -9,6 +9,7 @@ import numpy as np
 from mrdamper.data import Floats, held_current
 from mrdamper.errors import ColumnError
 from mrdamper.rig_files.quality.strokes import find_strokes
+from mrdamper.rig_files.quality.view import runs_of
 
 MOST_TESTS = 500  # of a record: more is a cut at noise
 _BLOCK_S = 0.1  # [s] in which a motion at rest stays within a share of its range
@@ -48,13 +49,13 @@ def stretches_of_session(time: Floats, displacement: Floats, current: Floats | N
     parts = [piece for part in parts for piece in _pieces(part, time, displacement, current)]
     if len(parts) < 2:
         return whole
-    conditions = []
+    motions: list[_Condition] = []
     for part in parts:
-        conditions.append(_condition(time[part], displacement[part], current[part]))
-        if conditions[-1] is None:
+        condition = _condition(time[part], displacement[part], current[part])
+        if condition is None:
             return whole
-    motions = [condition for condition in conditions if condition is not None]
-    held = max(motions[0][2], *(c[2] for c in motions)) - min(motions[0][2], *(c[2] for c in motions)) <= _ALIKE_A
+        motions.append(condition)
+    held = np.ptp([current_A for *_, current_A, _ in motions]) <= _ALIKE_A
     if all(_same(motions[0], other) for other in motions) or (held and not all(regular for *_, regular in motions)):
         return whole
     if len(parts) > MOST_TESTS:
@@ -95,8 +96,7 @@ def _pieces(part: slice, time: Floats, displacement: Floats, current: Floats) ->
     if t.size < 2 * size:
         return [part]
     ahead = np.abs(i[size:] - i[:-size]) > _ALIKE_A  # two sides of a step are so far apart
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], ahead, [False]]).astype(int)))
-    steps = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    steps = [(int(a), int(b)) for a, b in zip(*runs_of(ahead), strict=True)]
     if not steps or any(not 0.5 * size <= b - a <= 2 * size for a, b in steps):
         return [part]
     # The first sample of which the one `size` ahead differs stands `size` before the step.
@@ -117,8 +117,7 @@ def _boundaries(time: Floats, x: Floats) -> list[int]:
     count = x.size // size
     blocks = x[: count * size].reshape(count, size)
     still = np.ptp(blocks, axis=1) < _REST * np.ptp(x)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
-    rests = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= _FEWEST_BLOCKS]
+    rests = [(a, b) for a, b in zip(*runs_of(still), strict=True) if b - a >= _FEWEST_BLOCKS]
     return sorted({*off.tolist(), *(int((a + b) * size // 2) for a, b in rests if a > 0 and b < count)})
 
 

@@ -15,7 +15,6 @@ from mrdamper.rig_files.record import Finding, LineNumbers
 from mrdamper.rig_files.text.blocks import Block, find_blocks
 from mrdamper.rig_files.text.bulk import read_bulk
 from mrdamper.rig_files.text.cells import RowFormat, field_count, read_cells, split_rows
-from mrdamper.rig_files.text.labview import is_labview, named, stated_form
 from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
 from mrdamper.rig_files.text.spool import Spool
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, line_feeds, open_text, too_long
@@ -56,8 +55,7 @@ class DelimitedText(Reader):
         turned = turned_table(source, lines) if whole and form == FileForm() else None
         if turned is not None:
             return [turned]
-        layout = find_layout(lines, source, stated_form(lines, form) if is_labview(lines) else form)
-        layout = named(layout, lines) if is_labview(lines) else layout
+        layout = find_layout(lines, source, form)
         start = stream.start + sum(len(line) + 1 for line in raw[: layout.data_line - 1])
         blocks = find_blocks(stream, layout, start, stream.stop)
         return [self._table(stream, layout, block, i, len(blocks)) for i, block in enumerate(blocks)]

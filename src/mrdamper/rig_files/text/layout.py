@@ -24,6 +24,7 @@ from mrdamper.rig_files.vocabulary import words
 
 Kind = Literal["number", "stamp", "text"]
 SPACES = " "  # stands for any run of spaces
+X_VALUE = "X_Value"  # the clock of LabVIEW, whose cells may be empty
 _SEPARATORS = (";", "\t", ",", "|", SPACES)
 _COMMENT = re.compile(r"^\s*(#(?!N/A|REF!|VALUE!|DIV/0|NAME\?|NULL!|NUM!)|%|//)+")  # a sheet's errors are cells
 _LISTING = re.compile(
@@ -46,6 +47,7 @@ LISTED = re.compile(  # a numbered line that names a column and its unit: 1=Time
     r"(?P<name>[^\d\W][^;,\t\[\](){}=]*?)\"?\s*[;,\t\[({]\s*\"?(?P<unit>[^;,\t\[\](){}\"]{1,12})\"?[\])}]?[\s;,\"]*$",
     re.IGNORECASE,
 )
+_DECIMAL = re.compile(r"(?i)decimal[ _](?:separator|mark|sign|symbol)\"?\s*[:=;,\t]\s*\"?([.,])\"?;?")
 _DATE = re.compile(r"[0-9]{1,2}\.[0-9]{1,2}\.[0-9]{2,4}|[0-9]{4}\.[0-9]{1,2}\.[0-9]{1,2}")
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
@@ -93,7 +95,8 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     if width > MOST_COLUMNS:
         raise source.refuse("E_TOO_MANY_COLUMNS", f"{width} columns", "is one sample one line?", line=first + 1)
     rows = _rows(lines[first:], separator, width, trailing)
-    decimal = form.decimal or _decimal(rows, source, first)
+    stated = (match[1] for line in lines[:first] if (match := _DECIMAL.fullmatch(line.strip())))
+    decimal = form.decimal or next(stated, None) or _decimal(rows, source, first)
     if _counts(row[0] for row in rows):
         lines = [*_with_name_of_numbers(lines[:first], separator, width), *lines[first:]]
     header, unit_row = _header_lines(lines, first, separator, width, source, form)
@@ -112,6 +115,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     units = _cells(lines[unit_row], separator, width) if unit_row is not None else ("",) * width
     units = ("" if units[0].casefold() in _UNIT_KEYS else units[0], *units[1:])
     columns = [[row[i] for row in rows if len(row) > i] for i in range(width)]
+    names = tuple("" if n == X_VALUE and not any(c) else n for n, c in zip(names, columns, strict=True))
     written = rows if as_written is lines else _rows(as_written[first:], separator, width, trailing)
     behind = tuple(_unit_behind([row[i] for row in written if len(row) > i]) for i in range(width))
     units = tuple(own or its for own, its in zip(behind, units, strict=True))
