@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mrdamper.dampers.envelope import Envelope
+from mrdamper.dampers.piece import Pieces
 from mrdamper.dampers.published import all_published
 from mrdamper.dampers.published.base import AT_BOUNDS, fit_quadratic
 from mrdamper.data import Condition, Run
@@ -35,6 +36,7 @@ DOMINGUEZ = {
     "c1": 900.0, "c2": 500.0, "c3": 3.0, "c4": 300.0, "alpha1": 2e6, "alpha2": 4e6, "alpha3": 3.0, "alpha4": 8e5,
     "d2": 0.15, "d4": 0.4, "beta": 4e6, "gamma1": 4e6, "gamma2": 0.0, "k1": 700.0, "k2": 300.0, "f0": 47.0,
 }  # fmt: skip
+LV = {"fy0": 150.0, "fy1": 900.0, "fy2": -80.0, "m": 0.7, "consistency_log": 7.8, "f0": -12.0}
 
 
 def identified(models, conditions=CONDITIONS):
@@ -165,6 +167,31 @@ def test_refining_on_runs_finds_the_coefficients_they_were_made_with():
     assert "fy1" in far.provenance[AT_BOUNDS].split(", ")
 
 
+def a_run(condition, cycles=2):
+    """A noisy sine that rests first, so that every piece begins with another memory than the last one ended with."""
+    motion = sine(condition, cycles, 101)
+    force = 2e3 * motion.velocity + 300 * np.tanh(80 * motion.velocity) + 20 * np.sin(7 * motion.time)
+    window = (1 / condition.frequency_Hz, float(motion.time[-1]))
+    return Run(f"{condition}", motion.time, motion.displacement, force, condition.current_A, window=window)
+
+
+@pytest.mark.parametrize(("name", "own"), [("lei-type", LEI), ("lv-type", LV), ("dominguez-type", DOMINGUEZ)])
+def test_residuals_and_slopes_of_all_runs_at_once_are_those_of_single_ones(name, own, monkeypatch):
+    own = {**own, "gamma1": 3.1e6, "gamma2": 2e5} if name == "dominguez-type" else own  # else gamma is beta, a corner
+    damper = all_published()[name]("bench", own, REFERENCE, Envelope.of(CONDITIONS))
+    pieces = Pieces([a_run(condition) for condition in CONDITIONS])
+    at_once, slopes = pieces.residual(damper), pieces.slopes(damper)
+    assert slopes is not None, "a compiler is needed"
+    monkeypatch.setattr(Pieces, "_along", lambda *_: None)  # one after the other, as without a compiler
+    assert at_once == pytest.approx(pieces.residual(damper), abs=1e-12)
+    for coefficient, column in zip(own, slopes.T, strict=True):
+        step = 1e-6 * max(abs(own[coefficient]), 1e-3)
+        moved = [replace(damper, coefficients={**own, coefficient: own[coefficient] + s}) for s in (step, -step)]
+        difference = (pieces.residual(moved[0]) - pieces.residual(moved[1])) / (2 * step)
+        off = np.abs(column - difference) > 1e-5 * np.abs(difference).max()
+        assert np.mean(off) < 0.01, coefficient  # all but the samples that a corner lies between
+
+
 @pytest.mark.parametrize("currents", [(0.7,), (0.0, 1.0), (0.0, 0.5, 1.0), (0.0, 0.5, 1.0, 2.0)])
 def test_a_quadratic_has_as_many_terms_as_there_are_currents(currents):
     terms = min(3, len(currents))
@@ -186,9 +213,8 @@ def test_three_identifications_of_its_own_model_are_needed():
 
 @pytest.mark.parametrize("name", ["ali-type", "lei-type", "lv-type", "dominguez-type"])
 def test_a_saved_damper_has_the_same_laws_and_damaged_ones_are_refused(name):
-    lv = {"fy0": 150.0, "fy1": 900.0, "fy2": -80.0, "m": 0.7, "consistency_log": 7.8, "f0": -12.0}
     ali = {**ALI, "c1_floor": 1.0, "c0_floor": 1.0, "yield_force_floor": 1.0}
-    own = {"ali-type": ali, "lei-type": LEI, "dominguez-type": DOMINGUEZ, "lv-type": lv}
+    own = {"ali-type": ali, "lei-type": LEI, "dominguez-type": DOMINGUEZ, "lv-type": LV}
     cls, envelope = all_published()[name], Envelope.of(CONDITIONS)
     one = cls("bench", own[name], REFERENCE, envelope)
     saved = one.to_saved()

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass, field, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.data import Condition, Floats, Run, index_at
 from mrdamper.models import Model
+from mrdamper.models.recorded import CHANNELS, channels, compiled_outputs, traced_motion
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.sines import centred_motion, equivalent_sine
+from mrdamper.tracing import Tape
+from mrdamper.tracing.tangent import with_tangents
 
+_REFERENCE = ("I_r", "f_r", "A_r")  # names of a reference condition among the numbers of a damper
 _SAMPLES = 150  # a cycle
 
 
@@ -47,3 +55,55 @@ class Piece:
         if shape not in self.states:
             self.states[shape] = model.state(self.motion)
         return (model.force(self.motion, self.states[shape])[self.scored] - self.force) / self.scale
+
+
+class Pieces:
+    """Last cycles of runs, followed one after the other in one compiled pass, each from rest.
+
+    The dampers they are followed by are condition-dependent: coefficients, a reference, and a model at a condition.
+    """
+
+    def __init__(self, runs: Sequence[Run]):
+        self.pieces = [Piece.of(run) for run in runs]
+        sizes = [len(piece.motion) for piece in self.pieces]
+        self.begins = np.cumsum([0, *sizes])[:-1]
+        scored = [np.arange(size)[piece.scored] for piece, size in zip(self.pieces, sizes, strict=True)]
+        self.picked: NDArray[np.intp] = np.concatenate(
+            [rows + at for rows, at in zip(scored, self.begins, strict=True)]
+        )
+        self.force = np.concatenate([piece.force for piece in self.pieces])
+        self.scale = np.repeat([piece.scale for piece in self.pieces], [rows.size for rows in scored])
+
+    def residual(self, damper: Any) -> Floats:
+        """(N,) predicted minus measured force over the force scales; its squares sum to each run's nrmse_pp²."""
+        if (values := self._along(damper, ())) is not None:
+            return (values[0] - self.force) / self.scale
+        return np.concatenate([piece.residual(damper.model_at(piece.condition)) for piece in self.pieces])
+
+    def slopes(self, damper: Any) -> Floats | None:
+        """(N, D) derivatives of the residual by the coefficients; None without a compiler."""
+        values = self._along(damper, tuple(damper.coefficients))
+        return None if values is None else (values[1:] / self.scale).T
+
+    def _along(self, damper: Any, names: tuple[str, ...]) -> Floats | None:
+        def traced(tape: Tape, free: Mapping[str, Any], inputs: Sequence[Any]) -> Mapping[str, Any]:
+            *motion, frequency, amplitude = inputs
+            along = traced_motion(tape, motion)
+            sine = zip((along.current, frequency, amplitude), astuple(damper.reference), strict=True)
+            kept = {name: value for name, value in free.items() if name not in _REFERENCE}
+            one = replace(damper, coefficients=kept, reference=Condition(*(free[name] for name in _REFERENCE)))
+            model = one.model_at(Condition(*(tape.assume(symbol, example) for symbol, example in sine)))
+            return with_tangents(tape, model.force(along, model.state(along)), names)
+
+        kind: type = damper.__class__
+        return compiled_outputs((kind, names), damper.numbers, traced, self._inputs, self.picked, self.begins)
+
+    @cached_property
+    def _inputs(self) -> Mapping[str, Floats]:
+        """Channels of the motions, and the sine each of them is."""
+        motions = zip(*(channels(piece.motion) for piece in self.pieces), strict=True)
+        current, frequency, amplitude = np.repeat(
+            [astuple(piece.condition) for piece in self.pieces], [len(piece.motion) for piece in self.pieces], axis=0
+        ).T.copy()
+        inputs = dict(zip(CHANNELS, map(np.concatenate, motions), strict=True))
+        return inputs | {"current": current, "frequency": frequency, "amplitude": amplitude}

@@ -13,11 +13,11 @@ from mrdamper.data import Floats
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.path import memoize_per_path
 from mrdamper.physics.motion.traced import TracedMotion, TracedStep
-from mrdamper.tracing import Program, Tape, TraceError, program
+from mrdamper.tracing import Tape, TraceError, program
 from mrdamper.tracing.compiled.record import RecordProgram
 from mrdamper.tracing.tangent import with_tangents
 
-_CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", "turn", "turn_back", "move")
+CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", "turn", "turn_back", "move")
 S = TypeVar("S", bound=Callable[..., Floats])
 _MIN_COMPILED_SAMPLES = 2_000  # samples of a motion, from which compiled code is used; never the history of the process
 
@@ -66,26 +66,59 @@ def _along(
     outputs: Callable[[Any, Any, Tape], Mapping[str, Any]],
     picked: NDArray[np.intp] | None = None,
 ) -> Floats | None:
-    """(K, N) outputs of a program of the model along a motion; programs are kept by the names of their tangents."""
+    """(K, N) outputs of a program of the model along a motion."""
     kind: type = model.__class__
     values = model.values()
     if len(motion) < _MIN_COMPILED_SAMPLES or not all(isinstance(value, float | int) for value in values.values()):
         return None
+
+    def traced(tape: Tape, free: Mapping[str, Any], inputs: Sequence[Any]) -> Mapping[str, Any]:
+        return outputs(kind(**free), traced_motion(tape, inputs), tape)
+
+    return compiled_outputs((kind, names), values, traced, dict(zip(CHANNELS, channels(motion), strict=True)), picked)
+
+
+def compiled_outputs(
+    key: tuple[type, tuple[str, ...] | None],
+    values: Mapping[str, float],
+    traced: Callable[[Tape, Mapping[str, Any], Sequence[Any]], Mapping[str, Any]],
+    inputs: Mapping[str, Floats],
+    picked: NDArray[np.intp] | None = None,
+    begins: NDArray[np.intp] | None = None,
+) -> Floats | None:
+    """(K, N) outputs of a compiled program along a record, or None: no compiler, no derivative, no answer at a sample.
+
+    Parameters
+    ----------
+    key : (type, names)
+        Of the programs, which are kept: what is traced, and along which parameters there are tangents.
+    values : mapping of str to float
+        Parameters.
+    traced : function (tape, parameters, inputs)
+        Writes the outputs at one sample.
+    inputs : mapping of str to (N,) array
+    picked, begins : arrays of int, optional
+        Samples whose outputs are wanted, and those at which the memory starts anew.
+    """
     given = tuple(map(float, values.values()))
-    programs = _PROGRAMS.setdefault((kind, names), [])
+    programs = _PROGRAMS.setdefault(key, [])
     for record in programs:
         if (derived := record.prepare(given)) is not None:
             break
     else:
+        tape = Tape()
+        symbols = [tape.input(name) for name in inputs]
+        free = {name: tape.parameter(name, value) for name, value in values.items()}
         try:
-            record = RecordProgram(_traced(kind, values, outputs))
+            record = RecordProgram(program(tape, traced(tape, free, symbols)))
         except TraceError:
-            if names is None:
+            if key[1] is None:
                 raise
             return None
         derived = record.prepare(given)
         programs.append(record)
-    result = derived is not None and record.compiled_along(given, derived, record.starts, channels(motion), picked)
+    arrays = tuple(inputs.values())
+    result = derived is not None and record.compiled_along(given, derived, record.starts, arrays, picked, begins)
     return result.outputs if result and result.failed < 0 else None
 
 
@@ -106,10 +139,7 @@ def _steps(time: Floats) -> Floats:
     return np.maximum(rounding * np.round(steps / rounding), rounding)
 
 
-def _traced(model: type, values: dict[str, float], outputs: Callable[[Any, Any, Tape], Mapping[str, Any]]) -> Program:
-    """Trace a program of a model at one sample, its parameters free."""
-    tape = Tape()
-    x, v, a, current, dt, turn, back, move = (tape.input(name) for name in _CHANNELS)
-    motion = TracedMotion(tape, x, v, a, current, TracedStep(tape, dt), TracedStep(tape, move, (turn, back)))
-    free = model(**{name: tape.parameter(name, value) for name, value in values.items()})
-    return program(tape, outputs(free, motion, tape))
+def traced_motion(tape: Tape, inputs: Sequence[Any]) -> TracedMotion:
+    """Return the motion at one sample from the symbols of its channels."""
+    x, v, a, current, dt, turn, back, move = inputs
+    return TracedMotion(tape, x, v, a, current, TracedStep(tape, dt), TracedStep(tape, move, (turn, back)))

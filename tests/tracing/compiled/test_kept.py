@@ -2,8 +2,9 @@
 
 import re
 
-from mrdamper.models import recorded
 from mrdamper.models.play_bypass import PlayBypass
+from mrdamper.models.recorded import CHANNELS, traced_motion
+from mrdamper.tracing import Tape, program
 from mrdamper.tracing.compiled.writer import record_source
 from mrdamper.tracing.tangent import with_tangents
 
@@ -13,11 +14,10 @@ MODEL = PlayBypass(
 
 
 def test_a_number_that_is_kept_is_computed_in_one_place():
-    traced = recorded._traced(
-        PlayBypass,
-        MODEL.values(),
-        lambda free, motion, tape: with_tangents(tape, free.force(motion, free.state(motion)), ("T", "fy1", "Ic")),
-    )
-    places = re.findall(r"^ *(m\[\d+\]) = ", record_source(traced), re.MULTILINE)
+    tape = Tape()
+    motion = traced_motion(tape, [tape.input(name) for name in CHANNELS])
+    free = PlayBypass(**{name: tape.parameter(name, value) for name, value in MODEL.values().items()})
+    traced = with_tangents(tape, free.force(motion, free.state(motion)), ("T", "fy1", "Ic"))
+    places = re.findall(r"^ *(m\[\d+\]) = ", record_source(program(tape, traced)), re.MULTILINE)
     assert len(places) > 5
     assert len(places) == len(set(places))

@@ -12,14 +12,14 @@ import numpy as np
 from mrdamper.dampers.base import Damper, Saved
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.envelope import Envelope
-from mrdamper.dampers.piece import Piece
+from mrdamper.dampers.piece import Pieces
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification.problem import Identification
 from mrdamper.models import Model
 from mrdamper.physics.motion import sine
-from mrdamper.statistics.levenberg_marquardt import least_squares
+from mrdamper.statistics.levenberg_marquardt import forward_differences, least_squares
 
 _MAX_STEPS = 8
 AT_BOUNDS = "at a bound of the search"  # entry of the provenance: coefficients whose values are no estimates
@@ -135,21 +135,25 @@ class ConditionedDamper(Damper):
 
     def refined(self, runs: Sequence[Run]) -> Self:
         """Refine all coefficients on the last cycle of every run at once, each by its own force scale."""
-        pieces = [Piece.of(run) for run in runs]
+        pieces = Pieces(runs)
         names = list(self.coefficients)
         begin = np.array([self.coefficients[name] for name in names])
         size = np.maximum(np.abs(begin), 1e-3)
+        lower, upper = (begin / size + end for end in (-_COEFFICIENT_RANGE, _COEFFICIENT_RANGE))
+
+        def damper(u: Floats) -> Self:
+            return replace(self, coefficients=dict(zip(names, (u * size).tolist(), strict=True)))
 
         def residual(u: Floats) -> Floats:
-            damper = replace(self, coefficients=dict(zip(names, (u * size).tolist(), strict=True)))
-            return np.concatenate([piece.residual(damper.model_at(piece.condition)) for piece in pieces])
+            return pieces.residual(damper(u))
 
-        centre = begin / size
-        solution = least_squares(
-            residual, centre, centre - _COEFFICIENT_RANGE, centre + _COEFFICIENT_RANGE, most_steps=_MAX_STEPS
-        )
+        def slopes(u: Floats) -> Floats:
+            exact = pieces.slopes(damper(u))
+            return forward_differences(residual, u, residual(u), lower, upper) if exact is None else exact * size
+
+        solution = least_squares(residual, begin / size, lower, upper, most_steps=_MAX_STEPS, slopes=slopes)
         refined = replace(self, coefficients=dict(zip(names, (solution.point * size).tolist(), strict=True)))
-        ended = np.abs(solution.point - centre) > (1 - 1e-6) * _COEFFICIENT_RANGE
+        ended = np.abs(solution.point - begin / size) > (1 - 1e-6) * _COEFFICIENT_RANGE
         return refined.stating_bounds([name for name, at_bound in zip(names, ended, strict=True) if at_bound])
 
     def stating_bounds(self, names: Sequence[str]) -> Self:

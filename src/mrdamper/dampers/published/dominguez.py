@@ -141,4 +141,4 @@ def _rising(name: str, currents: Floats, values: Floats, knee: float) -> dict[st
 def _law(given: Mapping[str, float], name: str, current: float, knee: float) -> float:
     at_break, rise, rate, at_zero = (given[f"{name}{i}"] for i in range(1, 5))
     below, above = np.minimum(current, knee), np.maximum(current - knee, 0.0)
-    return at_zero + (at_break - at_zero) * below / knee + rise * (1 - np.exp(-max(rate, 0.0) * above))
+    return at_zero + (at_break - at_zero) * below / knee + rise * (1 - np.exp(-np.maximum(rate, 0.0) * above))

@@ -61,9 +61,10 @@ static inline real read_table(const real *nodes, const real (*cells)[7], int cou
 """
 
 _RECORD = """
-/* Outputs at every sample, or at the `count` samples whose ascending indices are picked. */
+/* Outputs at every sample, or at the `count` samples whose ascending indices are picked; the memory starts anew at
+   `begins`, which ends with the number of samples. */
 EXPORT whole along(const real *p, const real *d, real *memory, whole samples, const real *const *inputs,
-    const whole *strides, const whole *picked, whole count, real *outputs)
+    const whole *strides, const whole *picked, whole count, const whole *begins, real *outputs)
 {{
     real s[{memory}], u[{inputs}], out[{outputs}], m[{kept}];
     whole i, k, at = 0;
@@ -72,6 +73,10 @@ EXPORT whole along(const real *p, const real *d, real *memory, whole samples, co
         m[k] = NAN;
     }}
     for (i = 0; i < samples; i++) {{
+        if (begins && i == *begins) {{
+            memcpy(s, memory, sizeof s);
+            begins++;
+        }}
         for (k = 0; k < {inputs}; k++) {{
             u[k] = inputs[k][i * strides[k]];
         }}
@@ -178,7 +183,8 @@ class ArrayWriter(CWriter):
         return "".join(f"    {line}\n" for line in lines)
 
 
-_SLOW_INPUTS = frozenset({"dt", "current"})  # inputs that stay the same from sample to sample more often than not
+# Inputs that stay the same from sample to sample more often than not.
+_SLOW_INPUTS = frozenset({"dt", "current", "frequency", "amplitude"})
 _DEAR = frozenset({"divide", "power", "sqrt", "exp", "expm1", "log", "log1p", "tan", "arctan", "tanh", "arctanh"})
 
 
