@@ -148,8 +148,10 @@ class _Remainder:
         The error is quadratic in alpha, so each beta needs its loop once; children inherit most betas unchanged.
         """
         new = [beta for beta in dict.fromkeys(points[:, 1].tolist()) if beta not in self._products]
-        for beta, z in zip(new, self.states([max(beta, _TINY) for beta in new]) if new else (), strict=True):
-            self._products[beta] = float(z @ self.force), float(z @ z)
+        if new:
+            z = self.states([max(beta, _TINY) for beta in new])
+            products = (z @ self.force).tolist(), np.einsum("bn,bn->b", z, z).tolist()
+            self._products.update(zip(new, zip(*products, strict=True), strict=True))
         linear, square = np.array([self._products[beta] for beta in points[:, 1].tolist()]).T
         alpha, total = points[:, 0], float(self.force @ self.force)
         return np.sqrt(np.maximum(total - 2 * alpha * linear + alpha**2 * square, 0.0) / self.force.size)

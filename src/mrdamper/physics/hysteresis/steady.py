@@ -16,6 +16,7 @@ from mrdamper.errors import ExcitationError
 from mrdamper.physics.hysteresis.master_curve import SATURATED, MasterCurve, approach_rate, gauss_legendre, master_curve
 from mrdamper.physics.hysteresis.response import on_curve
 from mrdamper.physics.hysteresis.shape import Shape
+from mrdamper.physics.motion.path import memoize_per_path
 
 
 def steady_peak(shape: Shape, amplitude: ArrayLike) -> float | Floats:
@@ -44,8 +45,7 @@ def steady_loop(shape: Shape, amplitude: float, theta: ArrayLike) -> Floats:
     `shape`: one shape, or P of them; `amplitude` [m]; `theta` (N,): phase [rad]. Returns (N,) array, or (P, N): zeta
     [-].
     """
-    half_cycle, since_reversal = np.divmod(np.asarray(theta, dtype=float) + np.pi / 2, np.pi)
-    sign, share = 1.0 - 2.0 * (half_cycle % 2), _share_of_stroke(since_reversal)
+    sign, share = _half_cycles(np.asarray(theta, dtype=float))
     loops = list(_loops(shape, amplitude))
     if not shape.is_many:
         return sign * loops[0].loading(share)
@@ -138,7 +138,8 @@ class _SteadyLoop:
         r = reach  # the first step from r = 0
         for _ in range(100):
             miss = 2 * reach - curve.climb_distance(r) - _to_zero(curve, rho, r)
-            gap, rate = math.exp(-min(r, SATURATED)), float(approach_rate(np.array(r), n))
+            gap = math.exp(-min(r, SATURATED))
+            rate = -math.expm1(n * math.log1p(-gap)) / gap if gap < 1 else 1.0  # `approach_rate` of one number
             step = miss / (1 / rate + gap / ((1 - rho) + rho * gap * rate))
             r += max(step, 0.0)
             if step <= 4e-16 * r:
@@ -178,6 +179,13 @@ class _SteadyLoop:
         loss = (-np.expm1(-r)) ** (self.n + 1) / (rate * ((1 - self.rho) + self.rho * gap * rate))
         saturated = max(self.saturation - SATURATED, 0.0) / self.n
         return 2 * ((1 - self.rho) * float(weight @ loss) + saturated)
+
+
+@memoize_per_path
+def _half_cycles(theta: Floats) -> Floats:
+    """(2, N) direction of the motion at phases of a sine, and the share of the stroke behind."""
+    half_cycle, since_reversal = np.divmod(theta + np.pi / 2, np.pi)
+    return np.stack([1.0 - 2.0 * (half_cycle % 2), _share_of_stroke(since_reversal)])
 
 
 def _share_of_stroke(since_reversal: Floats) -> Floats:
