@@ -187,8 +187,29 @@ def _factored(columns: Floats, scale: Floats) -> tuple[Floats, Floats]:
 
 
 def nonnegative_least_squares(table: Floats, right: Floats) -> tuple[Floats, float]:
-    """Coefficients of least squares that are not negative, and the norm of the rest; SciPy is slow to import."""
-    return import_module("scipy.optimize").nnls(table, right)
+    """Coefficients of least squares that are not negative, and the norm of the rest.
+
+    By an active set [Lawson and Hanson 1974, Solving Least Squares Problems, algorithm 23.10]: SciPy, which has it, is
+    slow to import.
+    """
+    solution, free = np.zeros(table.shape[1]), np.zeros(table.shape[1], dtype=bool)
+    rounding = 10 * max(table.shape) * np.finfo(float).eps * float(np.abs(table).sum(axis=0).max(initial=0.0))
+    for _ in range(3 * solution.size):
+        gain = np.where(free, -np.inf, table.T @ (right - table @ solution))
+        if not gain.max(initial=-np.inf) > rounding:
+            break
+        free[gain.argmax()] = True
+        while True:
+            trial = np.zeros(solution.size)
+            trial[free] = np.linalg.lstsq(table[:, free], right, rcond=None)[0]
+            below = free & (trial <= 0)
+            if not below.any():
+                break
+            solution += np.min(solution[below] / (solution[below] - trial[below])) * (trial - solution)
+            free &= solution > rounding
+            solution[~free] = 0.0
+        solution = trial
+    return solution, float(np.linalg.norm(table @ solution - right))
 
 
 def solve_lower_triangle(triangle: NDArray[np.floating[Any]], right: Floats) -> Floats:
