@@ -78,10 +78,7 @@ def is_a(value: object, kind: type | tuple[type, ...]) -> bool:
 def require(value: object, kind: type | tuple[type, ...], wanted: str, remedy: str = "") -> None:
     """Refuse an argument of another kind in a public function.
 
-    Raises
-    ------
-    InputError
-        E_ARGUMENT, naming what came and what is wanted.
+    Raises `InputError`: E_ARGUMENT, naming what came and what is wanted.
     """
     if not isinstance(value, kind):
         raise InputError(f"a {type(value).__name__} in place of {wanted}", remedy=remedy, code="E_ARGUMENT")
@@ -187,10 +184,7 @@ def is_series(value: object) -> bool:
 def numbers(*values: object) -> tuple[float, ...]:
     """Values as floats.
 
-    Raises
-    ------
-    InputError
-        E_ARGUMENT if one is no number.
+    Raises `InputError`: E_ARGUMENT if one is no number.
     """
     try:
         return tuple(map(float, values))  # type: ignore[arg-type]
@@ -202,10 +196,7 @@ def numbers(*values: object) -> tuple[float, ...]:
 def series(**given: Any) -> tuple[NDArray[np.float64], ...]:
     """Arguments as (N,) arrays of finite numbers, all as long as the first; a single number holds throughout.
 
-    Raises
-    ------
-    InputError
-        E_ARGUMENT, naming the one that is none.
+    Raises `InputError`: E_ARGUMENT, naming the one that is none.
     """
     import numpy as np
 

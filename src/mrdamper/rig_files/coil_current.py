@@ -58,10 +58,8 @@ def current_of(
     try:
         stated = agreed(statements)
     except ValueError as error:
-        code, remedy = (
-            "E_RANGE" if "no coil current" in str(error) else "E_AMBIGUOUS",
-            "correct the name or the line that is wrong",
-        )
+        code, remedy = "E_AMBIGUOUS", "correct the name or the line that is wrong"
+        code = "E_RANGE" if "no coil current" in str(error) else code
         raise ColumnError(printable(str(error)), where=where, remedy=remedy, code=code) from None
     mean = None if channel is None or stated is None else contradicted(channel, stated.amperes)
     if stated is not None and mean is not None:

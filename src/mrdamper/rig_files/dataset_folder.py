@@ -145,7 +145,7 @@ def runs_table(folder: Path) -> list[dict[str, Any]]:
     path = folder / "runs.csv"
     if not path.is_file():
         hint = "write one row a run: run_id, current_A, ... (README, what a dataset is)"
-        if _holds_rig_files(folder):
+        if any(p.is_file() and p.name not in SAMPLE_FILES for p in folder.iterdir()):
             hint = f"are these files of a rig? mrdamper import {folder.name or folder} --out DATASET makes a dataset"
         raise DatasetError("runs.csv is missing", where=str(folder), remedy=hint)
     try:
@@ -188,10 +188,6 @@ def _rows_of(lines: Iterable[list[str]], path: Path) -> list[dict[str, Any]]:
             cells = [csv_value(cell) or None for cell in line] + [None] * (len(heads) - len(line))
             rows.append(dict(zip(heads, cells, strict=True)))
     return rows
-
-
-def _holds_rig_files(folder: Path) -> bool:
-    return any(p.is_file() and p.name not in SAMPLE_FILES for p in folder.iterdir())
 
 
 def run_of(row: Mapping[str, str | None], samples: Channels, path: Path) -> Run:
@@ -260,6 +256,7 @@ def _driven(channels: Channels, number: Callable[[str], float | None], where: st
 
 def _row(run: Run) -> dict[str, Any]:
     window = run.window or (None, None)
+    states = {name: v[run.in_window] for name, v in run.further.items() if name.endswith(("_C", "_Pa"))}  # of a damper
     return {
         "run_id": run.id,
         "rig": run.rig,
@@ -271,14 +268,9 @@ def _row(run: Run) -> dict[str, Any]:
         "steady_t1_s": window[1],
         "split": run.split,
         "repeatability_nrmse_pp": run.repeatability,
-        **{name: f"{np.nanmean(v[run.in_window]):.6g}" for name, v in run.further.items() if _summarised(name, v, run)},
+        **{name: f"{np.nanmean(v):.6g}" for name, v in states.items() if np.isfinite(v).any()},
         **run.notes,
     }
-
-
-def _summarised(name: str, values: np.ndarray, run: Run) -> bool:
-    """Tell if the mean of a further channel is useful: of a state of the damper, not of a motion or a force."""
-    return name.endswith(("_C", "_Pa")) and bool(np.isfinite(values[run.in_window]).any())
 
 
 def _write_samples(dataset: Dataset, folder: Path) -> None:

@@ -37,12 +37,7 @@ def read_samples(folder: Path, *, trusted: bool = False) -> dict[str, Channels]:
 
     Raises `DatasetError` or `ColumnError` or `UnitError` if the file is missing, damaged or larger than a test can
     be, or lacks a column.
-
-    Parameters
-    ----------
-    folder : path
-    trusted : bool
-        The file is our own: no process guards its reading.
+    No process guards the reading of a `trusted` file, which is our own.
     """
     path = next((folder / name for name in SAMPLE_FILES if (folder / name).is_file()), None)
     if path is None:

@@ -127,9 +127,7 @@ def _lines(lines: LineNumbers | None, rows: slice | np.ndarray) -> LineNumbers |
         return None
     if isinstance(rows, slice):
         return lines.part(rows.start, rows.stop)
-    at = np.asarray(lines[rows])
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(at) != 1) + 1])
-    return LineNumbers(at.size, tuple(map(int, starts)), tuple(int(at[i]) for i in starts))
+    return LineNumbers.of(np.asarray(lines[rows]))
 
 
 def _groups(table: RawTable, form: FileForm) -> list[RawTable]:

@@ -251,14 +251,9 @@ def profile_hash(profile: Profile) -> str:
 
 
 def current_in_name(name: str, profile: Profile) -> float | None:
-    """Coil current [A] a file name states, None if it states none or several.
+    """Coil current [A] a file name states, None if it states none or several; by the pattern of a profile that has one.
 
-    Parameters
-    ----------
-    name : str
-        `A5_-0.3A-_1.csv`, `2Hz_0x25A.txt`, `run_500mA.csv`; an x or p may stand for the point.
-    profile : Profile
-        Its pattern is the only way where it has one.
+    `A5_-0.3A-_1.csv`, `2Hz_0x25A.txt`, `run_500mA.csv`; an x or p may stand for the point.
 
     Raises `ProfileError`: E_AMBIGUOUS if the number that the pattern finds has another unit behind it, or none while
     the profile states none.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from typing import overload
 
 import numpy as np
@@ -65,11 +65,23 @@ class LineNumbers:
         return LineNumbers(stop - start, starts, (self[start], *(self.lines[i] for i in inner)))
 
     @classmethod
+    def of(cls, lines: np.ndarray) -> LineNumbers:
+        """Return the lines of samples from an array of them."""
+        starts = np.flatnonzero(np.diff(lines, prepend=-2) != 1) if lines.size else np.empty(0, dtype=int)
+        return cls(lines.size, tuple(map(int, starts)), tuple(map(int, lines[starts])))
+
+    @classmethod
     def concatenated(cls, parts: Sequence[LineNumbers]) -> LineNumbers:
         """Return the lines of samples behind each other."""
         begins = accumulate((part.size for part in parts), initial=0)
-        starts = tuple(begin + start for begin, part in zip(begins, parts, strict=False) for start in part.starts)
-        return cls(sum(part.size for part in parts), starts, tuple(line for part in parts for line in part.lines))
+        both = [
+            (at + s, line)
+            for at, p in zip(begins, parts, strict=False)
+            for s, line in zip(p.starts, p.lines, strict=True)
+        ]
+        goes_on = [line == last + at - start for (start, last), (at, line) in pairwise([(0, -1), *both])]
+        kept = [entry for entry, same in zip(both, goes_on, strict=True) if not same]
+        return cls(sum(part.size for part in parts), tuple(at for at, _ in kept), tuple(line for _, line in kept))
 
     def __array__(self, dtype=None, copy=None):
         return np.asarray(self[:], dtype=dtype)

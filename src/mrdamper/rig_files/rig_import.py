@@ -43,7 +43,7 @@ from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, name
 _PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")
 _TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
 _MAY_BE_PARTS = (
-    "E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER", "E_FIELD_COUNT",
+    "E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER", "E_FIELD_COUNT"
 )  # fmt: skip
 
 
@@ -125,16 +125,12 @@ def import_files(
     with unpacked(paths) as given:
         beside = [path / TESTS for path in given if (path / TESTS).is_file()]
         lists = [path for path in beside if not names_tests(path)]  # a laboratory's own, under the same name
-        beside = [path for path in beside if path not in lists]
-        if tests is None and beside:
-            tests = beside[0]
+        tests = next((path for path in beside if path not in lists), None) if tests is None else tests
         table = tests if tests is None or isinstance(tests, TestsTable) else load_tests(tests)
         files, left_out = files_in(given)
         texts = [*lists, *(path for path in left_out if path.suffix.lower() in TEXTS)]
-        texts = [path for path in texts if not profile.leaves_out(path.name)]
-        left_out += lists
-        left_out += [path for path in files if profile.leaves_out(path.name)]
-        files = [path for path in files if not profile.leaves_out(path.name)]
+        left_out += [*lists, *(path for path in files if profile.leaves_out(path.name))]
+        files, texts = ([path for path in of if not profile.leaves_out(path.name)] for of in (files, texts))
         intake = _Intake(profile, table)
         for number, path in enumerate(files):
             progress(path.name, number / len(files))
@@ -144,13 +140,10 @@ def import_files(
         if table is not None:
             table.require_found(intake.met)
         profile.require_matches([*intake.met, *((path, "") for path in files)])
-        refusals = intake.refusals
-        if intake.tests() or refusals:
-            left_out += [Path(note.file) for note in intake.notes]
-        else:
-            refusals = intake.notes
-        records = with_unique_ids(_with_folders(intake.tests()))
-        return ImportResult(records, tuple(refusals), tuple(path.name for path in left_out))
+        refusals = intake.refusals or ([] if intake.tests() else intake.notes)
+        left_out += [] if refusals is intake.notes else [Path(note.file) for note in intake.notes]
+        names = tuple(path.name for path in left_out)
+        return ImportResult(with_unique_ids(_with_folders(intake.tests())), tuple(refusals), names)
 
 
 class _Intake:
@@ -179,10 +172,8 @@ class _Intake:
             return
         records, refusals = _unchecked(path, profile)
         self.met += [] if records else [(path, "")]
-        if not records and not given and [type(refusal.error) for refusal in refusals] == [NoTableError]:
-            self.notes += refusals
-        else:
-            self.refusals += refusals
+        no_table = not records and not given and [type(refusal.error) for refusal in refusals] == [NoTableError]
+        (self.notes if no_table else self.refusals).extend(refusals)
         split = profile.file.blocks == "split" or (self._table and self._table.of_file(path))
         if refusals or split or not goes_on(records):
             self._take_parts()
@@ -240,14 +231,14 @@ class _Intake:
         others = [Path(refusal.file) for refusal in self.refusals if refusal.error.code in _MAY_BE_PARTS]
         others = [path for path in dict.fromkeys(others) if path.is_file()]
         used = self._join_channels(others, texts)
-        files = [path for path, _ in self._pending]
+        counts = Counter(path for path, _ in self._pending)
         for path, record in self._pending:
-            self._check(path, record, [], several=files.count(path) > 1)
+            self._check(path, record, [], several=counts[path] > 1)
         self._refuse_names_without_point()
         for path in [path for path in (*others, *texts) if path not in used and self._found]:
             stated = currents_beside(path, self._results(path), self.tests())
             if stated:
-                self._refuse(self._contradicted_by(stated))
+                self._refuse_contradicted(stated)
             elif path in others and path not in self._given and (is_list(path) or is_description(path)):
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
             else:
@@ -256,15 +247,15 @@ class _Intake:
         self._refuse(contradictions([record for _, record in self.tests()]))
         return used
 
-    def _contradicted_by(self, stated: Sequence[tuple[float, str]]) -> dict[int, InputError]:
-        """Return the refusals of accepted tests whose current another file contradicts, by their place."""
+    def _refuse_contradicted(self, stated: Sequence[tuple[float, str]]) -> None:
+        """Refuse accepted tests whose current another file contradicts."""
         refused: dict[int, InputError] = {}
         for i, ((file, record), (current, whence)) in enumerate(zip(self.tests(), stated, strict=True)):
             try:
                 with_stated_current(record, current, whence, file.name)
             except InputError as error:
                 refused[i] = error
-        return refused
+        self._refuse(refused)
 
     def _join_channels(self, others: list[Path], texts: Sequence[Path]) -> set[Path]:
         """Join channels of several files, and currents that other files state; the files that were used."""
@@ -287,8 +278,7 @@ class _Intake:
             if isinstance(records, InputError):
                 self.refusals.append(Refusal(str(group[0].path), records))
             else:
-                for record in records:
-                    self._take(group[0].path, record, several=len(records) > 1)
+                self._take_all(group[0].path, records)
         for path in [path for path in self._shares if path not in used]:
             problem = f"no other file of test {self._shares[path][0]!r} has the rest of its channels on the same clock"
             error = ColumnError(problem, where=path.name, remedy="correct file = ... of the channels in the profile")
@@ -314,9 +304,8 @@ class _Intake:
         """Return the tests without a current, apart for those of a file that a column numbers as results do."""
         tests: list[tuple[Path, Record]] = []
         for path in dict.fromkeys(path for path, _ in self._pending):
-            own = [record for file, record in self._pending if file == path]
             numbered = tests_by(path, results, self._profile.of_file(path.name)[1])
-            tests += [(path, record) for record in numbered or own]
+            tests += [(path, test) for test in numbered] or [test for test in self._pending if test[0] == path]
         return tests
 
     def _refuse_names_without_point(self) -> None:

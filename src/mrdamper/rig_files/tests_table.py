@@ -20,6 +20,7 @@ from mrdamper.rig_files.vocabulary import words
 
 NAME = "tests.csv"
 COLUMNS = ("file", "run", "current_A", "temperature_C", "split", "session", "specimen", "notes")
+_NOTED = ("file", "temperature_C", "session", "specimen")
 _LARGEST = 4 * 2**20  # bytes
 _MOST_ROWS = 10_000  # tests of one import
 _FILE, _RUN = words("table_file"), words("table_run")
@@ -153,24 +154,18 @@ def applied(record: Record, row: StatedTest | None, table: TestsTable) -> Record
 
 def tests_text(records: Sequence[Record]) -> str:
     """The table of tests that were read, to be completed and used with the same files."""
-    rows = []
+    rows: list[tuple[str, ...]] = [COLUMNS]
     for record in records:
         current = None
         if record.current is not None:
             mean, change = held_current(record.current[record.present])
             current = None if change else mean
         notes = record.provenance
-        rows.append(
-            {
-                "file": notes.get("file", ""), "run": record.id, "current_A": "" if current is None else f"{current:g}",
-                "temperature_C": notes.get("temperature_C", ""), "split": record.split,
-                "session": notes.get("session", ""), "specimen": notes.get("specimen", ""), "notes": "",
-            }
-        )  # fmt: skip
+        stated = "" if current is None else f"{current:g}"
+        file, temperature, session, specimen = (notes.get(key, "") for key in _NOTED)
+        rows.append((file, record.id, stated, temperature, record.split, session, specimen, ""))
     target = io.StringIO()
-    writer = csv.DictWriter(target, COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
+    csv.writer(target, lineterminator="\n").writerows(rows)
     return target.getvalue()
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_rate, stated_speed
 from mrdamper.rig_files.mapping.proposals import frequency_of, stated_frequencies
 from mrdamper.rig_files.profile import Profile
@@ -18,9 +21,31 @@ from mrdamper.rig_files.vocabulary import words
 
 _FRACTIONS = {"millisekunden": "ms"}
 _DATES = words("date")
+_AXIS_UNIT = re.compile(
+    r"(?i)^[\s\"]*(?P<axis>[xyz])[ _-]?axis[ _-]?unit\"?\s*[;,:=\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s;,\"]*$"
+)
+_LONGEST_LINE = 300
 _DAY_S = 86_400.0
 _SAME_RATE, _SAME_FREQUENCY = 0.2, 0.1  # relative differences of what is stated from what is measured
 _SAMPLES = 100_000  # looked at
+
+
+def with_axis_as_time(table: RawTable) -> RawTable:
+    """Take the x axis as time where a line gives it a unit of time: of keyed rows, or X and Y."""
+    axes = [m for line in table.remarks if (m := _AXIS_UNIT.match(line[:_LONGEST_LINE])) and is_unit(m["unit"])]
+    clocks = {m["unit"] for m in axes if m["axis"] in "xX" and split_name("", m["unit"]).dimension == "time"}
+    if len(clocks) != 1 or not table.names:
+        return table
+    names, units = list(table.names), list(table.units)
+    if names[0].casefold() == "name" and units[0].casefold() == "unit":
+        names[0], units[0] = "time", clocks.pop()
+        return replace(table, names=tuple(names), units=tuple(units))
+    others = {m["unit"] for m in axes if m["axis"] not in "xX"}
+    named = split_name(table.source.name.partition(".")[0])  # a channel a file: Run1_Force.txt
+    if len(others) != 1 or names[-2:-1] not in (["X"], ["x"]) or any(units) or named.role is None:
+        return table
+    names[-2:], units[-2:] = ["time", named.role], [clocks.pop(), others.pop()]
+    return replace(table, names=tuple(names), units=tuple(units))
 
 
 def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displacement: Floats) -> None:

@@ -20,11 +20,12 @@ from mrdamper.rig_files.column_names import (
     words_of,
 )
 from mrdamper.rig_files.conditions import currents_in, without_currents
+from mrdamper.rig_files.mapping.clocks import with_axis_as_time
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.layout import LISTED, X_VALUE, cells_of
 from mrdamper.rig_files.text.spool import rescale
-from mrdamper.rig_files.text.tokens import looks_numeric
+from mrdamper.rig_files.text.tokens import looks_numeric, number
 from mrdamper.rig_files.units import DIMENSION, is_unit, parse_unit
 from mrdamper.rig_files.vocabulary import meanings, words
 
@@ -44,9 +45,8 @@ _PER_COUNT = re.compile(
     re.IGNORECASE,
 )
 _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.IGNORECASE)
-_LABELS, _MONITOR = words("label"), words("monitor")
+_LABELS, _MONITOR, _SENSE_NAMES = words("label"), words("monitor"), words("sense")
 _LABVIEW = ("Delta_X", "X_Dimension")
-_LONGEST_CONDITIONS = 4000
 _COLON = re.compile(r"^([^:]+):\s+([^\s:]{1,12})$")  # force: N
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
 _INDEXED = re.compile(
@@ -58,27 +58,21 @@ NUMBERED = re.compile(r"(?i)(?:(?:ch(?:annel)?|kanal|canal|voie|canale)?[ ._]?|[
 _CHANNEL_IS = re.compile(
     r"(?i)(?<!\w)(?:ch(?:annel)?|kanal|canal|voie|canale)[ ._]?(?P<number>[0-9]{1,3})\s*[:=]\s*(?P<what>[^;|\t]{2,60})"
 )
-_FLOAT = re.compile(r"[+-]?[0-9]+(?:[.][0-9]*)?(?:[eE][+-]?[0-9]+)?")
-_AXIS_UNIT = re.compile(
-    r"(?i)^[\s\"]*(?P<axis>[xyz])[ _-]?axis[ _-]?unit\"?\s*[;,:=\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s;,\"]*$"
-)
-_SENSE_NAMES = words("sense")
 _SENSES = {1: tuple(words("tension_stems")), -1: tuple(words("compression_stems"))}
-_COUNTED = (  # force positive in compression; Force (compression positive)
-    re.compile(
-        r"(?i)(?P<what>[^\W\d_]+(?: [^\W\d_]+)?):? (?:is |are )?posit?iv[eo]? (?:in|for|on|bei|für|en) "
-        r"(?P<sense>[^\W\d_]+)"
-    ),
-    re.compile(r"(?i)(?P<what>[^\W\d_]+(?: [^\W\d_]+)?)[ ,:(]{1,3}(?P<sense>[^\W\d_]+) (?:is )?posit?iv[eo]?\b"),
-)
+_COUNTED = [  # force positive in compression; Force (compression positive)
+    re.compile(r"(?i)(?P<what>[^\W\d_]+(?: [^\W\d_]+)?)" + rest)
+    for rest in (
+        r":? (?:is |are )?posit?iv[eo]? (?:in|for|on|bei|für|en) (?P<sense>[^\W\d_]+)",
+        r"[ ,:(]{1,3}(?P<sense>[^\W\d_]+) (?:is )?posit?iv[eo]?\b",
+    )
+]
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _ZERO = re.compile(r"(?i)\bzero (?:is )?at ([+-]?[0-9]{1,10})(?![.,]?[0-9])")
 _FULL_SCALE = re.compile(  # sections of a header: Name=Stroke, FullScale=75, Unit=mm
     r"(?im)^name *= *(?P<name>[^=\n]{1,60})\n(?:[^=\n]*=[^\n]*\n){0,4}?full[ _]?scale *= *(?P<full>[0-9.]{1,12})\n"
     r"(?:[^=\n]*=[^\n]*\n){0,4}?unit *= *(?P<unit>\S{1,12})$"
 )
-_LONGEST_LINE = 300
-_FEWEST_PATHS = 3  # that have a beginning in common
+_LONGEST_LINE, _LONGEST_CONDITIONS = 300, 4000
 
 
 def completed(table: RawTable) -> RawTable:
@@ -90,7 +84,7 @@ def completed(table: RawTable) -> RawTable:
         return table
     table = _with_numbered_channels(_without_shared_path(table))
     table = _with_titles(_with_keyed_lines(table))
-    table = _with_listed_units(_with_keyed_axis(table))
+    table = _with_listed_units(with_axis_as_time(table))
     table = _with_stated_signs(_with_clocks_and_weights(table))
     return _with_sense(_with_scales(_with_counts(table)))
 
@@ -99,7 +93,7 @@ def _without_shared_path(table: RawTable) -> RawTable:
     """Names without the path that all signals of a model have in common: Platform()://Rig/Model Root/."""
     paths = {i: name.split("/") for i, name in enumerate(table.names) if name.count("/") > 1}
     differ = (n for n, level in enumerate(zip(*paths.values(), strict=False)) if len(set(level)) > 1)
-    shared = next(differ, 0) if len(paths) >= _FEWEST_PATHS else 0
+    shared = next(differ, 0) if len(paths) > 2 else 0  # two may agree by chance
     return table.named({i: ("/".join(path[shared:]), table.units[i]) for i, path in paths.items()}) if shared else table
 
 
@@ -124,10 +118,8 @@ def _with_sense(table: RawTable) -> RawTable:
 
 def _sign_of(label: str, remarks: Sequence[str]) -> int:
     """1 for tension, -1 for compression, by the word itself or by a line that explains it; 0 if neither says."""
-    words = [
-        label,
-        *(m[1] for line in remarks for m in re.finditer(rf"(?<!\w){re.escape(label)}\s*[=:]\s*([^\W\d]+)", line)),
-    ]
+    explained = re.compile(rf"(?<!\w){re.escape(label)}\s*[=:]\s*([^\W\d]+)")
+    words = [label, *(match[1] for line in remarks for match in explained.finditer(line))]
     signs = {sign for sign, stems in _SENSES.items() for word in words if word.casefold().startswith(stems)}
     return signs.pop() if len(signs) == 1 else 0
 
@@ -168,13 +160,10 @@ def _with_values_for_all(table: RawTable) -> RawTable:
             keyed[key] = stated.pop()
     units = {key[:-4]: unit for key, unit in keyed.items() if key.casefold().endswith("unit") and is_unit(unit)}
     units |= {"Delta_X": "s"} if keyed.get("X_Dimension") == "Time" else {}
-    lines = [f"{key}: {number}" for key, number in keyed.items() if split_name(key).unit and looks_numeric(number)]
-    lines += [
-        f"{key}: {number} {unit}"
-        for start, unit in units.items()
-        for key, number in keyed.items()
-        if start and key.startswith(start) and looks_numeric(number)
-    ]
+    numbers = {key: cell for key, cell in keyed.items() if looks_numeric(cell)}
+    lines = [f"{key}: {cell}" for key, cell in numbers.items() if split_name(key).unit]
+    for start, unit in units.items():
+        lines += [f"{key}: {cell} {unit}" for key, cell in numbers.items() if start and key.startswith(start)]
     sections = _FULL_SCALE.finditer("\n".join(table.remarks))
     lines += [f"{m['name']}: 100 % = {m['full']} {m['unit']}" for m in sections]
     lines += [f"DELTA_T: {line[8:].strip()} s" for line in table.remarks if line.startswith("DELTA_T=")]
@@ -232,10 +221,11 @@ def _with_listed_names(table: RawTable) -> RawTable:
     if any(i not in texts["name"] or not is_unit(texts["unit"].get(i, "")) for i in width):
         return table
     table = table.named({i - 1: (texts["name"][i], texts["unit"][i]) for i in width})
-    for i, scale in texts["scal"].items():
-        if i in width and _FLOAT.fullmatch(scale.strip()) and float(scale) not in (0.0, 1.0):
-            text = f"column {table.names[i - 1]!r} is scaled by {float(scale):g} as the file states"
-            table = _scaled(table, i - 1, table.names[i - 1], table.units[i - 1], float(scale), text)
+    for i, text in texts["scal"].items():
+        scale = number(text.strip(), ".")
+        if i in width and scale is not None and np.isfinite(scale) and scale not in (0.0, 1.0):
+            note = f"column {table.names[i - 1]!r} is scaled by {scale:g} as the file states"
+            table = _scaled(table, i - 1, table.names[i - 1], table.units[i - 1], scale, note)
     return table
 
 
@@ -251,24 +241,6 @@ def _with_numbered_channels(table: RawTable) -> RawTable:
         return table
     names = tuple(next(iter(what), name) for name, what in zip(table.names, meant, strict=True))
     return replace(table, names=names)
-
-
-def _with_keyed_axis(table: RawTable) -> RawTable:
-    """Take the x axis as time where a line gives it a unit of time: of keyed rows, or X and Y."""
-    axes = [m for line in table.remarks if (m := _AXIS_UNIT.match(line[:_LONGEST_LINE])) and is_unit(m["unit"])]
-    clocks = {m["unit"] for m in axes if m["axis"] in "xX" and split_name("", m["unit"]).dimension == "time"}
-    if len(clocks) != 1 or not table.names:
-        return table
-    names, units = list(table.names), list(table.units)
-    if names[0].casefold() == "name" and units[0].casefold() == "unit":
-        names[0], units[0] = "time", clocks.pop()
-        return replace(table, names=tuple(names), units=tuple(units))
-    others = {m["unit"] for m in axes if m["axis"] not in "xX"}
-    named = split_name(table.source.name.partition(".")[0])  # a channel a file: Run1_Force.txt
-    if len(others) != 1 or names[-2:-1] not in (["X"], ["x"]) or any(units) or named.role is None:
-        return table
-    names[-2:], units[-2:] = ["time", named.role], [clocks.pop(), others.pop()]
-    return replace(table, names=tuple(names), units=tuple(units))
 
 
 def _with_titles(table: RawTable) -> RawTable:

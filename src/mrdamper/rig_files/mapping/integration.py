@@ -42,12 +42,9 @@ def is_integrated(record: Record) -> bool:
 
 
 def displacement_of(time: Floats, velocity: Floats) -> Floats | None:
-    """Displacement [m] of a velocity that repeats, about the middle of its whole cycles; None under one cycle.
+    """Displacement [m] of a velocity [m/s] that repeats, about the middle of its whole cycles; None under one cycle.
 
-    Parameters
-    ----------
-    time, velocity : (N,) arrays
-        In s and m/s; NaN where a sample is missing, as in what is returned.
+    NaN where a sample is missing, as in what is returned.
     """
     there = np.isfinite(time) & np.isfinite(velocity)
     t, v = time[there], velocity[there]

@@ -85,10 +85,7 @@ def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -
 def damping_share(time: Floats, displacement: Floats, force: Floats) -> float:
     """Share of the force's variance beside a spring's that velocity explains, as a damper's does; 0 if it gives energy.
 
-    Parameters
-    ----------
-    time, displacement, force : (N,) arrays
-        In any units: the share does not depend on them.
+    Time, displacement and force may be in any units: the share does not depend on them.
     """
     there = np.flatnonzero(np.isfinite(time) & np.isfinite(displacement) & np.isfinite(force))
     if there.size < 50 or np.any(np.diff(time[there]) <= 0):

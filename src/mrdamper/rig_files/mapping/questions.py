@@ -49,12 +49,7 @@ class Question:
 def question_of(error: InputError, columns: Sequence[str] = ()) -> Question | None:
     """Return the question behind a refusal that a profile answers; None where the file itself must be corrected.
 
-    Parameters
-    ----------
-    error : InputError
-        The refusal.
-    columns : sequence of str
-        Names of the columns of the refused file, in order; empty ones have no name.
+    The columns are the names of those of the refused file, in order, empty where there is none.
     """
     match = _ROLE.search(error.remedy or "")
     role = match[1] if match else ""

@@ -40,10 +40,7 @@ class Results:
     def by_test(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
         """Return the current [A] of each test by its number, where one column of the table tells all of them apart.
 
-        Parameters
-        ----------
-        tests : sequence of iterables of str
-            What each test is called: its label, its file, the lines above it.
+        Of each test all that it is called is given: its label, its file, the lines above it.
         """
         names = [_names(texts) for texts in tests]
         one_of_several = len(tests) == 1 < len(self.current)  # a number in its name alone may count anything

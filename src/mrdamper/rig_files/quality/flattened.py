@@ -143,16 +143,12 @@ def _reach(values: Floats, level: float) -> float:
 
 def _is_cut_off(top: Top, speed: Floats, one_sided: bool) -> bool:
     """Tell an end of the force that is cut off from a plateau of the damper's own."""
+    start, stop = top.edges
     edges = speed[np.array(top.edges) % POINTS]
     if top.wider < _LEVEL and (one_sided or float(np.min(edges)) > _STILL_MOVES * float(np.max(speed))):
         return True
-    return top.wider < _FORCE_WIDER and _in_motion(top, speed)
-
-
-def _in_motion(top: Top, speed: Floats) -> bool:
-    start, stop = top.edges
     beyond = np.concatenate([np.arange(start - 3, start + 1), np.arange(stop, stop + 4)]) % POINTS
-    return bool(np.min(speed[beyond]) > _MOVES * np.max(speed))
+    return top.wider < _FORCE_WIDER and bool(np.min(speed[beyond]) > _MOVES * np.max(speed))
 
 
 def _force_goes_on(top: Top, force: CycleChannel) -> bool:

@@ -222,22 +222,6 @@ def _formula_of(says: Mapping[str, Any]) -> tuple[float, float] | None:
     return factor, offset if len(names) > 1 else 0.0
 
 
-def tests_across(shapes: Mapping[str, tuple[int, ...]]) -> tuple[str, ...]:
-    """Names of the tables whose rows are tests and whose columns are the samples of one clock; empty if there are none.
-
-    Two tables of K rows and N samples or more, N samples of a time, and else only N or K numbers each.
-    """
-    tables = [name for name, shape in shapes.items() if len(shape) == 2]
-    sizes = {shapes[name] for name in tables}
-    if len(tables) < 2 or len(sizes) != 1:
-        return ()
-    count, samples = sizes.pop()
-    rest = {name: shape for name, shape in shapes.items() if name not in tables}
-    clocks = [name for name, shape in rest.items() if shape == (samples,) and split_name(name).role == "time"]
-    whole = clocks and count != samples and all(shape in ((samples,), (count,)) for shape in rest.values())
-    return tuple(tables) if whole else ()
-
-
 def check_unpacked(source: Source, size: int) -> None:
     """Refuse tables that are far larger than their file: E_ARCHIVE_RATIO."""
     if size > RATIO_MATTERS_FROM and (size > MOST_RATIO * source.size or size > 10 * MOST_UNPACKED):

@@ -118,9 +118,8 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
     block, findings = _without_footer(form, block)
     block, cut = _without_cut_row(form, block)
     findings += cut
-    spool, odd, line, size = Spool(columns), False, block.line, 0
-    starts: list[int] = []
-    numbers: list[int] = []
+    spool, odd, line = Spool(columns), False, block.line
+    numbers: list[LineNumbers] = []
     fast = block.stop - block.start > BULK_FROM
     at = block.start
     for chunk in stream.chunks(block.start, block.stop):
@@ -130,20 +129,17 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
         if rows is None:
             rows = read_cells(chunk, line, form, final=at >= stream.stop)
         spool.add(rows.values)
-        for i in _stretches(rows.lines, numbers[-1] + size - starts[-1] if starts else None):
-            starts.append(size + int(i))
-            numbers.append(int(rows.lines[i]))
-        size += rows.lines.size
+        numbers.append(LineNumbers.of(rows.lines))
         odd |= rows.odd
         line += line_feeds(chunk)
     form.refuse_wrong()
-    if not size:
+    if not any(map(len, numbers)):
         raise stream.source.refuse("E_NO_DATA", "a header without data", "export the file again")
     damaged = any(_ODD.search(name) for i, name in enumerate(layout.names) if i not in columns)
     if odd or damaged:
         text = f"bytes that are no {'UTF-8' if stream.encoding == 'utf-8' else 'ASCII'} in columns that are not needed"
         findings = (*findings, Finding("W_ENCODING", text))
-    return Content(spool.arrays(), LineNumbers(size, tuple(starts), tuple(numbers)), findings)
+    return Content(spool.arrays(), LineNumbers.concatenated(numbers), findings)
 
 
 def _words(stream: TextStream, layout: Layout, block: Block, column: int) -> Words:
@@ -160,14 +156,6 @@ def _words(stream: TextStream, layout: Layout, block: Block, column: int) -> Wor
         line += line_feeds(chunk)
     form.refuse_wrong()
     return Words(np.concatenate(codes) if codes else np.empty(0, dtype=np.int32), tuple(indices))
-
-
-def _stretches(lines: np.ndarray, expected: int | None) -> np.ndarray:
-    """Rows at which the line is not the one after that of the row before."""
-    if not lines.size:
-        return np.empty(0, dtype=int)
-    jumps = np.flatnonzero(np.diff(lines) != 1) + 1
-    return jumps if expected == lines[0] else np.concatenate(([0], jumps))
 
 
 def _without_footer(form: RowFormat, block: Block) -> tuple[Block, tuple[Finding, ...]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -117,7 +117,7 @@ class _Walk:
         if item.dtype.names:  # a table of records states its conditions itself
             units = next((w for w in lists.values() if len(w) == len(item.dtype.names) and any(map(is_unit, w))), None)
             fields: dict[str, Any] = {
-                field: _stored(item.shape, item.dtype[field], lambda field=field: item[field])
+                field: Stored(item.shape, item.dtype[field], lambda field=field: item[field])
                 for field in item.dtype.names
             }
             fields |= {"units": dict(zip(item.dtype.names, units, strict=True))} if units else {}
@@ -161,11 +161,7 @@ class _Walk:
             values = unpacked(dataset.attrs, dataset[()])
             return values.T if turned else values
 
-        return _stored(shape, kind, read)
-
-
-def _stored(shape: tuple[int, ...], kind: np.dtype, read: Callable[[], np.ndarray]) -> Stored:
-    return Stored(tuple(shape), kind, read)
+        return Stored(shape, kind, read)
 
 
 def _is_matlab(item: Any) -> bool:
@@ -188,12 +184,12 @@ def _frame(items: Mapping[str, Any]) -> dict[str, Any]:
     index = items["axis1"]
     name = _text(index.attrs.get("name"))
     framed: dict[str, Any] = {
-        "index" if name in ("", "N.") else name: _stored(index.shape, index.dtype, index.__array__)
+        "index" if name in ("", "N.") else name: Stored(index.shape, index.dtype, index.__array__)
     }
     for key, block in items.items():
         if re.fullmatch(r"block[0-9]+_values", key) and key.replace("values", "items") in items:
             for i, item in enumerate(_words(items[key.replace("values", "items")][()])):
-                framed[item] = _stored(block.shape[:1], block.dtype, lambda block=block, i=i: block[:, i])
+                framed[item] = Stored(block.shape[:1], block.dtype, lambda block=block, i=i: block[:, i])
     return framed
 
 

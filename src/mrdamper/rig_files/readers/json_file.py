@@ -111,12 +111,7 @@ def _tree(value: Any) -> Any:
     if rows and all(isinstance(cell, (int, float)) or cell is None for row in value for cell in row):
         return np.array([[np.nan if cell is None else cell for cell in row] for row in value], dtype=float)
     items = [item for item in value if item is not None]
-    if items and all(isinstance(item, dict) for item in items) and _are_records(items):
+    records = len(items) >= _FEWEST and all(isinstance(item, dict) for item in items)
+    if records and all(v is None or isinstance(v, (int, float, str)) for item in items for v in item.values()):
         return items
     return [_tree(item) for item in items]
-
-
-def _are_records(items: list[dict[str, Any]]) -> bool:
-    return len(items) >= _FEWEST and all(
-        cell is None or isinstance(cell, (int, float, str)) for item in items for cell in item.values()
-    )

@@ -18,7 +18,7 @@ import numpy as np
 
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_clock
-from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, tests_across, titles_of
+from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
 from mrdamper.rig_files.units import is_unit, parse_unit
 from mrdamper.rig_files.vocabulary import KEYS
@@ -74,7 +74,11 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, togeth
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
     tree = _with_own_axes(_tests_of_rows(_spread({key: _object_in(value) for key, value in tree.items()})))
-    node.units = {**node.units, **_stated_units(tree)}
+    stated = next((v for key, v in tree.items() if key.casefold() in KEYS["unit"] and isinstance(v, Mapping)), {})
+    node.units = {
+        **node.units,
+        **{key: u for key, u in stated.items() if isinstance(u, str) and is_unit(u)},
+    }
     sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= _FEWEST_SAMPLES}
     for key, value in _paired(tree, node.units).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
@@ -164,13 +168,20 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Split tables whose rows are tests into a node each, with its own of the numbers of a vector of conditions."""
+    """Split tables whose rows are tests into a node each, with its own of the numbers of a vector of conditions.
+
+    Two tables of K rows and N samples or more, N samples of a time, and else only N or K numbers each.
+    """
     numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf"}
     shapes = {key: tuple(n for n in array.shape if n != 1) for key, array in numeric.items()}
-    tables = tests_across(shapes)
-    count = shapes[tables[0]][0] if tables else 0
-    conditions = [key for key, shape in shapes.items() if shape == (count,)]
-    if not conditions:
+    tables = [key for key, shape in shapes.items() if len(shape) == 2]
+    if len(tables) < 2 or len({shapes[key] for key in tables}) > 1:
+        return tree
+    count, samples = shapes[tables[0]]
+    vectors = {key: shape for key, shape in shapes.items() if key not in tables}
+    conditions = [key for key, shape in vectors.items() if shape == (count,)]
+    timed = any(shape == (samples,) and split_name(key).role == "time" for key, shape in vectors.items())
+    if not (timed and conditions) or count == samples or {*vectors.values()} - {(samples,), (count,)}:
         return tree
     arrays = {key: np.squeeze(np.asarray(numeric[key])) for key in (*tables, *conditions)}
     rest = {key: value for key, value in tree.items() if key not in tables and key not in conditions}
@@ -181,14 +192,6 @@ def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     ]
     rest = {key: value for key, value in rest.items() if key not in clocks}
     return {**rest, **{f"test_{i}": node for i, node in enumerate(own, 1)}}
-
-
-def _stated_units(tree: Mapping[str, Any]) -> dict[str, str]:
-    """Units that a mapping called units gives the columns by their names."""
-    stated = next(
-        (value for key, value in tree.items() if key.casefold() in KEYS["unit"] and isinstance(value, Mapping)), {}
-    )
-    return {key: value for key, value in stated.items() if isinstance(value, str) and is_unit(value)}
 
 
 def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, Any]:
@@ -269,7 +272,8 @@ def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
             break
     data = next((lower[name] for name in KEYS["data"] if isinstance(lower.get(name), Array)), None)
     if data is None or data.size < 2:
-        data = next((v["values"] for v in (lower.get("signals"),) if isinstance(v, Mapping) and "values" in v), None)
+        signals = lower.get("signals")
+        data = signals.get("values") if isinstance(signals, Mapping) else None
         if not isinstance(data, Array):
             return []
     time = next((lower[name] for name in KEYS["time"] if isinstance(lower.get(name), Array)), None)

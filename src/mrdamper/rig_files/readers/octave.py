@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import damaged
+from mrdamper.rig_files.readers.arrays import damaged, whole
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 from mrdamper.rig_files.text.short import decoded
 
 _MARKS = (b"# Created by Octave", b"# name: ")
-_LARGEST = 200 * 10**6  # bytes: a text of numbers, read as a whole
 
 
 class Octave(Reader):
@@ -31,11 +30,8 @@ class Octave(Reader):
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """Return the variables as one table."""
-        if source.size > _LARGEST:
-            raise source.refuse("E_FORMAT", f"Octave text of over {_LARGEST // 10**6} MB", "save it with -v7")
-        source.file.seek(0)
         variables: dict[str, Any] = {}
-        for name, kind, lines in _variables(decoded(source.file.read()).splitlines()):
+        for name, kind, lines in _variables(decoded(whole(source, self.title)).splitlines()):
             try:
                 value = _value(kind, lines)
             except ValueError as error:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
@@ -16,12 +14,6 @@ _DELIMITER = "-1"
 _KINDS = {8: "displacement", 11: "velocity", 12: "acceleration", 13: "force", 9: "force", 17: "time", 15: "pressure"}
 _HEADER = 11  # lines of a data set above its values
 _REAL = {2: 4, 4: 8}  # types of real numbers and their bytes
-
-
-@dataclass(frozen=True)
-class _Axis:
-    name: str
-    unit: str
 
 
 class Uff(Reader):
@@ -66,16 +58,17 @@ def _function(lines: list[str]) -> tuple[dict[str, object], dict[str, object]]:
     }
     kind, count, even = (int(lines[6][at : at + 10]) for at in (0, 10, 20))
     begin, step = float(lines[6][30:43]), float(lines[6][43:56])
-    x, y = _axis(lines[7]), _axis(lines[8])
+    (_, x_unit), (name, unit) = _axis(lines[7]), _axis(lines[8])
     numbers = np.array(" ".join(lines[_HEADER:]).split(), dtype=float)
     if kind not in _REAL or (not even and numbers.size < 2 * count) or numbers.size < count:
         raise ValueError("truncated: fewer values than it says, or complex ones")
     values = numbers[:count] if even else numbers[1 : 2 * count : 2]
     time = begin + step * np.arange(count) if even else numbers[: 2 * count : 2]
-    return texts, {"name": y.name, "unit": y.unit, "data": values, "time": time, "xunit": x.unit or "s"}
+    return texts, {"name": name, "unit": unit, "data": values, "time": time, "xunit": x_unit or "s"}
 
 
-def _axis(line: str) -> _Axis:
+def _axis(line: str) -> tuple[str, str]:
+    """Return the name of an axis and its unit."""
     name, unit = line[26:46].strip(), line[47:67].strip()
     kind = _KINDS.get(int(line[:10]), "")
-    return _Axis(kind if name in ("", "NONE") else name, "" if unit == "NONE" else unit)
+    return kind if name in ("", "NONE") else name, "" if unit == "NONE" else unit

@@ -106,7 +106,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         except csv.Error as error:
             raise source.refuse("E_QUOTE", "a quote is not closed", "close or remove it", line=header + 1) from error
     names, titles = form.names or ("",) * width, ()
-    below = _below_names(lines, header, unit_row, first)
+    below = [] if header is None else [lines[i] for i in range(header + 1, min(first, len(lines))) if i != unit_row]
     if header is not None and not form.names:
         names, titles = _names_and_titles(lines, header, below, separator, width)
     trailing |= header is not None and separator != SPACES and _names_notes(cells_of(lines[header], separator), width)
@@ -140,11 +140,6 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         _writes(rows),
         behind if any(behind) else (),
     )
-
-
-def _below_names(lines: Sequence[str], header: int | None, units: int | None, first: int) -> list[str]:
-    """Return the comments between the names of columns and the first row: lines that are no units."""
-    return [] if header is None else [lines[i] for i in range(header + 1, min(first, len(lines))) if i != units]
 
 
 def _counts(cells: Iterable[str]) -> bool:
@@ -375,7 +370,8 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
     before, content = content[:start], content[start:]
     sample = [cells_of(line, separator) for _, line in content[-_SAMPLE:]]
     rows = [cells for cells in sample if _is_row(cells)]
-    if separator == SPACES and len(content) < _FEWEST_LINES and all(map(_is_prose, rows)):
+    prose = all(sum(_WORD.match(cell) is not None for cell in cells) >= 2 for cells in rows)
+    if separator == SPACES and len(content) < _FEWEST_LINES and prose:
         raise NoTableError("E_NO_DATA", "text with numbers in it, but no rows of numbers", file=source.name)
     if not rows or (len(rows) == 1 and len(content) > 1 and not _is_row(sample[-1])):
         named = any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
@@ -393,11 +389,6 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
         header = [cells for cells in over if len(cells) in (width, width - 1)]
         trailing = not header or len(header[-1]) == width - 1 or not header[-1][-1]
     return first, width - trailing, trailing
-
-
-def _is_prose(cells: Sequence[str]) -> bool:
-    """Tell if a line with numbers holds several words, too."""
-    return sum(_WORD.match(cell) is not None for cell in cells) >= 2
 
 
 def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) -> tuple[int, list[str]]:
@@ -464,7 +455,9 @@ def _header_lines(
     roles = {i: len(_roles(own)) for i, own in cells.items()}
     filled = [i for i, line in enumerate(lines[:first]) if line.strip()]
     marked = [i for i in filled if is_comment(lines[i])]
-    plain = [] if _lists_columns(lines[:first], width) else [i for i in filled if i not in marked]
+    numbers = {int(match["number"]) for line in lines[:first] if (match := LISTED.match(line))}
+    listed = width > 1 and numbers == set(range(1, width + 1))  # lines name the columns by their numbers
+    plain = [] if listed else [i for i in filled if i not in marked]
     keyed = _keyed_lines({i: cells[i] for i in plain if i in cells}, roles)
     if keyed:
         return keyed
@@ -501,12 +494,6 @@ def _keyed_lines(cells: Mapping[int, Sequence[str]], roles: Mapping[int, int]) -
     units = [i for i, row in cells.items() if row[0].casefold() in _UNIT_KEYS and _is_units(row[1:])]
     named = {i: (row[0].casefold() == "name", roles[i], i) for i, row in cells.items() if i not in units}
     return (max(named, key=lambda i: named[i]), units[-1]) if units and named else None
-
-
-def _lists_columns(lines: Sequence[str], width: int) -> bool:
-    """Tell if lines name the columns by their numbers, one a line."""
-    numbers = {int(match["number"]) for line in lines if (match := LISTED.match(line))}
-    return width > 1 and numbers == set(range(1, width + 1))
 
 
 def _names_columns(line: str, separator: str) -> bool:
