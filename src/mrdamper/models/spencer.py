@@ -225,6 +225,6 @@ def series_rate(x: float, v: float, current: float, state: Floats, p: Floats, ou
     """d(r, zeta)/dt for p = (c0/c1, k0/c1, creep, 1/yield displacement, asymmetry, n)."""
     zeta = state[1]
     slip = (v - p[2] * zeta - p[1] * state[0]) / (1 + p[0])
-    grip = zeta * zeta if p[5] == 2 else abs(zeta) ** p[5]
+    grip = abs(zeta) ** p[5]
     out[0] = slip
     out[1] = p[3] * (slip * (1 - 0.5 * (1 + p[4]) * grip) - 0.5 * (1 - p[4]) * abs(slip) * np.sign(zeta) * grip)
