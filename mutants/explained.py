@@ -31,7 +31,6 @@ EXPLAINED = (
     Explained("paper.output", '"nrmse_pp": None', "", _ORDER),
     Explained("paper.", "keys = [", "items", _ORDER),
     Explained("paper.", "sorted(set(keys))", "sorted backwards", _ORDER),
-    Explained("paper.", "order.size // 60", "60 → 600", _BUDGET),
     Explained("paper.", "order.size // 60", "1 → 2", _BUDGET),
     Explained("paper.", "back[0]", "0 → 1", _BUDGET),
     Explained("paper.", "path.direction[inside][0]", "0 → 1", "a stroke has one direction"),
@@ -52,12 +51,6 @@ EXPLAINED = (
     Explained("systems.inverse", "status, outputs, memory = 1", "1 → 2", "any status but 0 is a refusal"),
     Explained("study.recipe", "in ([],", "items", _ORDER),
     Explained("paper.assumptions", "[-longest, longest]", "", "the gas is compressed at one end alone"),
-    Explained(
-        "paper.",
-        "range(1, path.stroke[-1])",
-        "1 → 2",
-        "the first stroke is as the others, and the last two samples lie in one",
-    ),
     Explained("paper.", "np.mean(steady.force)", "mean → median", "a loop's force has its mean in its middle"),
     Explained("paper.", "np.mean(record.force", "mean → median", "samples within five degrees have one force"),
     Explained("paper.", "< 1e-3", "0.001 → 0.01", "levels lie further apart"),
@@ -87,7 +80,6 @@ EXPLAINED = (
     Explained("dampers.modified", "identifications[0]", "0 → 1", "all identifications are of one model and rig"),
     Explained("dampers.modified", "if data.shape else 1.0", "1.0 → 10.0", "a model without a shape has no use for one"),
     Explained("dampers.covariance", "part.predicted.mean()", "Sub → Add", "beside a constant they span the same"),
-    Explained("dampers.random_effects", "self.unit = ", "", _SCALE),
     Explained("dampers.calibration", "np.multiply(", "arguments 0 and 1", _ALIKE),
     Explained("dampers.calibration", "size = np.sqrt(np.mean(table", "sqrt", _SCALE),
     Explained("dampers.calibration", "size = np.sqrt(np.mean(table", "mean", _SCALE),
@@ -101,7 +93,7 @@ EXPLAINED = (
     Explained("dampers.bands", "student(level, 1.0)", "1.0 → 10.0", "the level alone is checked"),
     Explained("dampers.bands", "**ends, **peaks", "exchanged", _ORDER),
     Explained("dampers.bands", "or 1.0", "1.0 → 10.0", "zero, whatever divides it"),
-    Explained("dampers.sessions", "point, step = np.log(", "", _BUDGET),
+    Explained("dampers.sessions", "point, step = np.log(", "→", _BUDGET),
     Explained("study.plan", "_PRIOR_LOG_DEVIATION**2", "2 → 3", "one, to whatever power"),
     Explained("dampers.sessions", "for start in (", "items", "another start of the same search"),
     Explained("dampers.sessions", "for start in (", "1.0 → 10.0", "another start of the same search"),
@@ -114,7 +106,6 @@ EXPLAINED = (
     Explained(
         "study.plan", "least = self.limits.opening", "Add → Sub", "more sessions than hold a record are tried, and lose"
     ),
-    Explained("study.plan", "free * (1 + 1e-12)", "Mult → Div", _GUARD),
     Explained("study.plan", "motion, last = sine(", "2 → 3", "the last of three cycles is as the last of two"),
     Explained("fleet.charts", "step = -(", "USub dropped: -(-values.size // _MOST_NORMALITY)", _ORDER),
     Explained("fleet.charts", "np.minimum((below * count)", "Sub → Add", _GUARD),
@@ -126,7 +117,6 @@ EXPLAINED = (
     Explained("dampers.joint", "solution = least_squares(", "slopes and curved exchanged", _BUDGET),
     Explained("dampers.joint", "_TRIAL_STEPS", "0.001 → 0.01", _BUDGET),
     Explained("dampers.joint", "len(axis.grid) > 1", "1 → 2", "no axis has two starts before the one of lengths"),
-    Explained("dampers.joint", "(RISE, FALL)", "items", _ORDER),
     Explained(
         "models.play_bypass",
         "turned = path.first_direction",
@@ -157,8 +147,6 @@ EXPLAINED = (
         "a part without samples, or the last without enough",
     ),
     Explained("paper.paper_method", "1e-6 * X", "Mult → Div: 1e-06 * X", _BUDGET),
-    Explained("paper.paper_method", "1e-6 * X", "Mult → Div: 20 * X", _BUDGET),
-    Explained("paper.paper_method", "1e-6 * X", "20 → 200", _BUDGET),
     Explained(
         "paper.paper_method",
         '"alpha": 0.0, "beta": 1.0',
@@ -235,6 +223,7 @@ EXPLAINED = (
     Explained("published.dominguez", "np.log(np.maximum(force, 1.0))", "1.0 → 10.0", _GUARD),
     Explained("published.dominguez", 'np.maximum(given["beta"], 1.0)', "1.0 → 10.0", _GUARD),
     Explained("published.dominguez", "np.log(total)", "log → log1p", "a loop's beta + gamma is far above one"),
+    Explained("published.dominguez", "np.log(total)", "exp → expm1", "a loop's beta + gamma is far above one"),
     Explained("published.lv", "max(viscous, 1.0)", "1.0 → 10.0", _GUARD),
     Explained("identification.covariance", "np.median(np.diff(time))", "median → mean", "samples are even, or nearly"),
     Explained("dampers.modified", "ends = zip(function.rates", "arguments", "nearness of two"),
@@ -244,15 +233,22 @@ EXPLAINED = (
     Explained("dampers.joint", "here, there = ", "items", _ALIKE),
     Explained("dampers.joint", "point, 1, _REFIT_STEPS", "1 → 2", "weights are found once more"),
     Explained("dampers.random_effects", "unit: Floats = np.sqrt(", "", _SCALE),
+    *(
+        Explained("dampers.random_effects", "self.unit = ", change, _SCALE)
+        for change in ("median →", "Div → Mult", "ptp → max", "2 → 3", "1.0 → 10.0", "Or → And")
+    ),
+    Explained("dampers.covariance", "error = moved + ", "Add → Sub", "a draw is as likely the other way"),
+    Explained("systems.inverse", "rises = np.where(", "0 → 1", "the current next to the lowest"),
+    Explained("systems.inverse", "rises = np.where(", "1 → 2", "the current next to the highest"),
+    Explained("systems.monte_carlo", "size = np.where(scale > 0", "1.0 → 10.0", "zero, whatever divides it"),
+    Explained("quality.loop", "velocity = np.roll(", "1 → 2", "a slope over three samples of a cycle, of any size"),
+    Explained("quality.loop", "view.strokes.steady or (0", "0 → 1", "a record without its first sample"),
     Explained("paper.paper_method", "issubclass(problem.model_type", "arguments", "no model is another's subclass"),
     Explained("paper.paper_method", 'values["c"] > 0', "0 → 1", "a damper has more than 1 N s/m"),
     Explained("dampers.sessions", "while step > 0.02", "0.02 → 0.2", _BUDGET),
-    Explained("dampers.sessions", "trials = np.clip(", "0 → 1", "directions that span the plane lead to one point"),
-    Explained("dampers.sessions", "trials = np.clip(", "1 → 2", "directions that span the plane lead to one point"),
     Explained("dampers.sessions", "step /= 2", "2 → 3", _BUDGET),
-    Explained("study.plan", "axis=(0, 1, 2)", "items", _ALIKE),
+    Explained("study.plan", "axis=(0, 1, 2)", "items 0 and 1 exchanged: (0, 1, 2)", _ALIKE),
     Explained("study.plan", "uncertainty.covariance + 1e-12", "Add → Sub", _GUARD),
-    Explained("study.plan", "range(_DRAWS + 1)", "1 → 2", _BUDGET),
     Explained(
         "study.plan", "n.value * math.exp(s)", "Mult → Div: n.value * math.exp(s)", "a draw is as likely the other way"
     ),

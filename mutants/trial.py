@@ -84,7 +84,7 @@ class Trial:
         """Make what forks share: fixtures of modules and of the session that are made of one another alone."""
         planted = set().union(*self.through.values())
         for item in session.items:
-            definitions = {name: found[-1] for name, found in item._fixtureinfo.name2fixturedefs.items()}
+            definitions = {name: found[-1] for name, found in _definitions(item).items()}
             for name in sorted(definitions, key=lambda name: self.seconds.get(_fixture(definitions[name]), 0.0)):
                 self._make_fixture(name, definitions, planted)
 
@@ -210,8 +210,12 @@ def _key(code: CodeType) -> tuple[str, str, int]:
 
 
 def _fixtures(item: pytest.Item) -> set[str]:
-    found = item._fixtureinfo.name2fixturedefs
-    return {_fixture(definition) for definitions in found.values() for definition in definitions}
+    return {_fixture(definition) for definitions in _definitions(item).values() for definition in definitions}
+
+
+def _definitions(item: Any) -> dict[str, list[Any]]:
+    """Fixtures of a test by their names, the nearest last; pytest has no public way to them."""
+    return item._fixtureinfo.name2fixturedefs
 
 
 def _fixture(definition: Any) -> str:

@@ -287,6 +287,14 @@ def test_errors_grow_with_the_distance_from_the_tests_as_they_were_made(gain, of
     assert none.force == none.energy == pytest.approx(beside_typical(0.0))
 
 
+def test_a_distance_widens_by_student_s_quantile_of_its_own_degrees_of_freedom():
+    growth, way = Growth(tuple(FORCE), tuple(PEAK), tuple(ENERGY), (1.0, 2.0, 1e9)), Distance(0.3, 0.4, 0.8)
+    for quantity, each in (("force", FORCE), ("peak", PEAK), ("energy", ENERGY)):
+        for level, quantiles in ((0.5, (1.0, np.sqrt(2 / 3), 0.6744898)), (0.9, (6.3137515, 2.9199856, 1.6448536))):
+            expected = np.sqrt(np.square(each * np.array(quantiles)) @ way.squares)
+            assert growth.half_width(quantity, way, level) == pytest.approx(expected)
+
+
 def test_the_scatter_at_the_tests_is_no_growth():
     """Errors away from the tests as at them: their mean square in excess of these is nothing."""
     at_tests = ModelError(force=0.02, peak=0.02, energy=0.02, gain=0.0, offset=0.0)

@@ -8,11 +8,11 @@ import pytest
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.calibration import Calibration, PredictedRun, StandardizedErrors, model_error
 from mrdamper.dampers.concatenated_runs import JointResiduals
-from mrdamper.dampers.covariance import _determined, _within, estimate_uncertainty
+from mrdamper.dampers.covariance import _determined, _Spread, _within, estimate_uncertainty
 from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.envelope import UNTESTED
 from mrdamper.dampers.joint import JointDamper, JointProblem
-from mrdamper.dampers.random_effects import GainsAndOffsets
+from mrdamper.dampers.random_effects import Draws, Effects, GainsAndOffsets
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.data import Condition, Run
 from mrdamper.identification.covariance import score_covariance
@@ -235,6 +235,15 @@ def test_student_s_interval_holds_its_share_of_errors_drawn_as_the_tests_scatter
     # Noise alone has the many degrees of freedom of its samples.
     still = estimate_uncertainty(fitted(runs_of(gain=0.0)), runs_of(gain=0.0)).uncertainty
     assert np.min(still.dof) > 20
+
+
+@pytest.mark.parametrize("dof", [4.0, 25.0])
+def test_where_no_gain_moves_the_parameters_the_degrees_of_freedom_are_those_within_the_runs(dof):
+    still = Draws(np.zeros((1, 1, 2)), np.zeros((200_000, 2)), np.ones((200_000, 2)))
+    within = np.diag([4.0, 1e-8])
+    spread = _Spread(("c", "fy"), [], within, np.full(2, 2 / dof), still, Effects(), [], np.ones(2), np.ones((1, 2)))
+    assert spread.covariance == pytest.approx(within)
+    assert spread.dof == pytest.approx(dof, rel=0.1)  # a quantile of 200,000 draws
 
 
 def test_what_gains_of_other_runs_moved_is_no_error_within_a_run():

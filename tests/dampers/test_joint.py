@@ -17,9 +17,9 @@ from mrdamper.dampers.concatenated_runs import RunRows, concatenate
 from mrdamper.dampers.envelope import UNTESTED, Envelope
 from mrdamper.dampers.joint import FALL, RISE, JointDamper, JointFit, JointProblem, damper_of
 from mrdamper.dampers.model_file import dump_model, parse_model
-from mrdamper.dampers.uncertainty import FittedParameter
+from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Condition, Run
-from mrdamper.errors import IdentificationError, RunError
+from mrdamper.errors import IdentificationError, InputError, RunError
 from mrdamper.models import Scale
 from mrdamper.models.play_bypass import PlayBypass, play_position
 from mrdamper.physics.motion import random_motion, sine, sweep
@@ -134,7 +134,7 @@ def test_of_each_length_the_best_start_and_the_first_length_first_unless_another
 
 def ended(error, knee):
     damper = replace(joint_damper(), model=replace(joint_damper().model, d=knee / 2))
-    return JointFit(damper, np.array([error / 2, 3 * error / 2]), (), np.zeros(2), StopReason.SETTLED, 9, 0.1)
+    return JointFit(damper, np.array([error / 2, 3 * error / 2]), (), np.zeros(2), StopReason.SETTLED, 0.1)
 
 
 @pytest.mark.parametrize(
@@ -182,6 +182,28 @@ def test_own_numbers_are_those_the_tests_gave_with_their_units_and_scales(fit):
     bare = damper_of(TRUTH)
     assert (bare.model, bare.rig, bare.free, bare.envelope) == (TRUTH, "", (), UNTESTED)
     assert damper_of(held) is held
+
+
+@pytest.mark.parametrize("name", ["play-bypass", "bouc-wen", "spencer", "bingham"])
+def test_an_axis_is_entangled_if_it_moves_another_parameter_than_that_of_its_name(runs, name):
+    problem = JointProblem(runs, name)
+    lower, upper = problem.box() if problem.axes else (np.zeros(0), np.zeros(0))
+    point = lower + 0.4 * (upper - lower)
+    plain = problem.without_linear(point).values()
+    for i, axis in enumerate(problem.axes):
+        moved = problem.without_linear(point + 0.02 * (upper - lower) * (np.arange(point.size) == i)).values()
+        others = {n for n in plain if moved[n] != plain[n]} ^ {axis.name}
+        assert (i in problem._entangled_axes) == bool(others), axis.name
+
+
+def test_a_damper_holds_parameters_of_its_model_only():
+    held = replace(joint_damper(), uncertainty=Uncertainty((), (), np.zeros((0, 0)), np.zeros(0), (), ())).holding(
+        {"c1": 1234.0}
+    )
+    assert held.model == replace(joint_damper().model, c1=1234.0)
+    assert held.uncertainty is None
+    with pytest.raises(InputError, match="k9"):
+        joint_damper().holding({"k9": 1.0})
 
 
 def test_a_coil_is_looked_for_where_a_current_changes_or_taken_as_given(runs, problem):

@@ -211,6 +211,23 @@ def test_three_identifications_of_its_own_model_are_needed():
         all_published()["lei-type"].regressed(some)
 
 
+@pytest.mark.parametrize(
+    ("name", "own", "common"),
+    [
+        ("ali-type", {**ALI, "c1_floor": 1.0, "c0_floor": 1.0, "yield_force_floor": 1.0},
+         ("k0", "k1", "f0", "yield_displacement_log")),
+        ("lei-type", LEI, ("f0",)),
+        ("dominguez-type", DOMINGUEZ, ("f0",)),
+    ],
+)  # fmt: skip
+def test_one_run_far_off_moves_no_parameter_that_all_conditions_share(name, own, common):
+    cls, envelope = all_published()[name], Envelope.of(CONDITIONS)
+    other = cls("bench", own | {n: 0.7 * own[n] for n in common}, REFERENCE, envelope)
+    models = [cls("bench", own, REFERENCE, envelope).model_at(c) for c in CONDITIONS]
+    models[3] = other.model_at(CONDITIONS[3])
+    close(cls.regressed(identified(models)).coefficients, {n: own[n] for n in common})
+
+
 @pytest.mark.parametrize("name", ["ali-type", "lei-type", "lv-type", "dominguez-type"])
 def test_a_saved_damper_has_the_same_laws_and_damaged_ones_are_refused(name):
     ali = {**ALI, "c1_floor": 1.0, "c0_floor": 1.0, "yield_force_floor": 1.0}

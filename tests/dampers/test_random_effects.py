@@ -28,6 +28,14 @@ class Residuals(SimpleNamespace):
         return table * self.weight[:, None]
 
 
+class SampledUnevenly(Residuals):
+    """Residuals of a run whose samples count by the time that they stand for."""
+
+    @property
+    def weight(self):
+        return super().weight / np.sqrt(self.density)
+
+
 def covariance_of(scatter, effects):
     moved = scatter.draws(effects).moved
     return moved.T @ moved / len(moved)
@@ -87,6 +95,21 @@ def test_noise_alone_is_no_scatter_of_gains():
     # Of white noise of 50 N in 120 samples: (50/√120)² over the square of the force, or alone; most is taken off.
     seen = np.array([(50 / np.sqrt(120) / (100 / np.sqrt(2))) ** 2, 50**2 / 120])
     assert np.all(np.mean(squares, axis=0) < 0.25 * seen)
+
+
+def test_noise_is_averaged_over_time_however_densely_a_part_is_sampled():
+    """Noise of 8 N in one half of the time, where two samples stand for one, and of 24 N in the other."""
+    (gains, _), _ = drawn(12, 1, seed=9)
+    at = np.concatenate([np.repeat(np.arange(60), 2), np.arange(60, 120)])
+    noise = np.where(np.arange(120) < 60, 8.0, 24.0) * (-1.0) ** np.arange(120)
+    runs = runs_of(gains, np.zeros(12), [None] * 12)
+    for run in runs:
+        run.predicted, run.residual, run.picked = FORCE[at], (run.residual + noise)[at], np.arange(at.size)
+        run.density = np.repeat([2.0, 1.0], [120, 60])
+    dense = effects_of([SampledUnevenly(**vars(run)) for run in runs], np.zeros((180, 1)), np.zeros((1, 180)))
+    seen = np.mean(gains**2) - dense.effects().run_gain ** 2
+    # Of the variance that noise shows, half a cycle sampled twice has half of its half.
+    assert seen == pytest.approx(0.75 * (8.0**2 + 24.0**2) / 2 / (FORCE @ FORCE), rel=0.02)
 
 
 def test_labels_and_order_change_nothing():

@@ -38,7 +38,7 @@ def scored(fit):
     ],
 )
 def test_a_search_that_did_not_converge_is_said_so_in_a_sentence(why, said):
-    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), why, 9, 0.1)
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), why, 0.1)
     sentences = [s for s in texts(fit) if "did not converge" in s]
     assert len(sentences) == (said is not None)
     if said:
@@ -46,7 +46,7 @@ def test_a_search_that_did_not_converge_is_said_so_in_a_sentence(why, said):
 
 
 def test_a_second_end_of_the_search_is_told_with_its_error():
-    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 9, 0.1)
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 0.1)
     worse, better = (LocalMinimum(1.4e-3, e, 4e-4, 0.0266) for e in (0.0273, 0.026))
     start = "Second local minimum of the fit: yield displacement 1.40 mm instead of 0.40 mm, mean error"
     assert f"{start} 2.73 % instead of 2.66 %." in texts(replace(fit, second=worse))
@@ -56,7 +56,7 @@ def test_a_second_end_of_the_search_is_told_with_its_error():
 
 
 def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
-    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), ("d",), np.zeros(2), StopReason.SETTLED, 9, 0.1)
+    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), ("d",), np.zeros(2), StopReason.SETTLED, 0.1)
     sentences = texts(fit)
     assert any("4.5 times the median" in s for s in sentences)
     assert any("(interval one-sided): d (" in s for s in sentences)
@@ -65,7 +65,7 @@ def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
 
 
 def test_limitations_are_grouped_and_the_tested_range_stands_last():
-    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), (), np.zeros(2), StopReason.SETTLED, 9, 0.1)
+    fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), (), np.zeros(2), StopReason.SETTLED, 0.1)
     found = limitations(scored(fit), ())
     groups = by_group(found)
     assert list(groups)[-1] == RANGE
@@ -78,7 +78,7 @@ def test_the_worst_run_tells_its_kind_of_motion_apart_from_its_range():
         return RunScore("chirp", "rig", Condition(0.0, 5.3, 0.0017), Scores(error, *5 * (0.0,)), None, flags)
 
     runs = Validation("worst", (run(0.02), run(0.02), run(0.11, ("amplitude", "not a sine"))))
-    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 9, 0.1)
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 0.1)
     text = next(s.text for s in limitations(replace(scored(fit), validation=runs), ()) if "Largest error" in s.text)
     assert "5.3 Hz, 1.7 mm, not a sine; amplitude outside the tested range)" in text
 
@@ -93,7 +93,7 @@ def test_the_worst_run_tells_its_kind_of_motion_apart_from_its_range():
     ],
 )
 def test_what_the_design_of_the_tests_cannot_show_is_stated_first(conditions, said):
-    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 9, 0.1)
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 0.1)
     tests = {f"t{k}": Condition(*condition) for k, condition in enumerate(conditions)}
     runs = tuple(RunScore(name, "rig", at, Scores(0.02, *5 * (0.0,)), None, ()) for name, at in tests.items())
     loops = [

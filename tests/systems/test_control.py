@@ -130,6 +130,33 @@ def linear_in_current(*fy, c=(800.0,), f0=(30.0,), coil=None):
     return ModifiedModel("bench", ParameterMap(model_type("bingham"), functions), ENVELOPE, coil=coil)
 
 
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_the_inverse_is_the_same_for_forces_of_any_size(size):
+    """Of a friction that rises with the square of the current, beside which viscous force and offset are nothing."""
+    made = linear_in_current(500.0 * size, 100.0 * size, 0.0, c=(0.0,), f0=(0.0,))
+    plain = linear_in_current(500.0, 100.0, 0.0, c=(0.0,), f0=(0.0,))
+    for wanted in (30.0, 150.0, 400.0):
+        found, expected = (invert(m).step(0.001, 0.1, 0.0, s * wanted, 1e-3) for m, s in ((made, size), (plain, 1.0)))
+        assert found.current == pytest.approx(expected.current, rel=1e-9)
+
+
+def test_the_width_is_that_of_the_direction_in_which_the_force_changes_most():
+    """An offset that rises with the current adds to the friction in extension, and takes from it in compression."""
+    for rise in (200.0, -200.0):
+        assert check_monotone(linear_in_current(600.0, 100.0, f0=(rise, 0.0))) == pytest.approx(800.0)
+
+
+def test_a_coil_faster_than_the_samples_is_led_by_its_share_of_two_of_them():
+    """Of 0.8 ms beside samples of 1 ms, from 0.4 A to 0.5 A: 0.1 A (1 + 0.8 / 2) over what it had."""
+    inverse = invert(linear_in_current(600.0, 100.0, coil=Coil(0.8e-3, 0.8e-3)))
+    asked = [30 + 80 + 100 + 600 * wanted for wanted in (0.4, 0.5)]
+    for _ in range(40):
+        before = inverse.step(0.001, 0.1, 0.0, asked[0], 1e-3).current
+    after = inverse.step(0.001, 0.1, 0.0, asked[1], 1e-3).current
+    assert before == pytest.approx(0.4, rel=1e-3)
+    assert after - before == pytest.approx(0.1 * 1.4, rel=1e-3)
+
+
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 def test_the_inverse_of_a_force_linear_in_the_current_is_that_line(size):
     """Found at once, and taken but for a share of a ten thousandth: the current is kept where none is told."""

@@ -40,13 +40,24 @@ def certain(damper, names, sizes, gain=0.0, offset=0.0):
 DAMPERS = {"joint": (joint_damper(), ("c0", "c1")), "modified": (modified_damper(), ("c.0", "yield_force.3"))}
 
 
-def test_parameters_of_other_sizes_are_drawn_alike():
-    """Standard deviations of 2 N and 1e9 N/m, nearly a line: a covariance that rounding makes indefinite."""
+def test_a_covariance_that_rounding_makes_indefinite_is_drawn():
+    """Standard deviations of 2 N and 1e9 N/m, nearly a line."""
     damper = certain(joint_damper(), ("f0", "k"), [2.0, 1e9])
     covariance = np.array([[4.0, 2e9 * (1 - 1e-9)], [2e9 * (1 - 1e-9), 1e18 * (1 - 1e-8)]])
     damper = replace(damper, uncertainty=replace(damper.uncertainty, covariance=covariance))
     offsets = [row["d"].numbers["f0"] - damper.model.f0 for row in draw({"d": damper}, 4000)]
     assert np.std(offsets) == pytest.approx(2.0, rel=0.06)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_parameters_of_any_size_are_drawn_with_their_correlation(size):
+    damper = certain(joint_damper(), ("f0", "k"), [2.0, size])
+    damper = replace(damper, model=replace(damper.model, k=0.0))
+    covariance = np.array([[4.0, size], [size, size**2]])  # a correlation of a half
+    damper = replace(damper, uncertainty=replace(damper.uncertainty, covariance=covariance))
+    drawn = np.array([[row["d"].numbers[n] for n in ("f0", "k")] for row in draw({"d": damper}, 4000)])
+    assert np.std(drawn, axis=0) == pytest.approx([2.0, size], rel=0.06)
+    assert np.corrcoef(drawn.T)[0, 1] == pytest.approx(0.5, abs=0.05)
 
 
 @pytest.mark.parametrize("dof", [5.0, 40.0])
@@ -86,6 +97,14 @@ def test_draws_take_twice_the_step_of_the_mean_but_not_less_than_half_the_first(
     bands = monte_carlo(loop, [{}, {}], SimpleNamespace(step=found, peaks={}))
     assert steps == pytest.approx([taken] * 3)
     assert bands.step == pytest.approx(taken)
+
+
+def test_the_change_by_the_step_is_over_the_peaks_of_the_mean(monkeypatch):
+    monkeypatch.setattr(many, "measures", lambda done: {})
+    coarse = SimpleNamespace(peaks={"force_N": np.array([2.0, 5.0])})
+    loop = SimpleNamespace(first_step=5e-4, run=lambda step, **_: coarse, links=(), stages=(), system=None)
+    mean = SimpleNamespace(step=1e-4, peaks={"force_N": np.array([1.0, 4.0])})
+    assert monte_carlo(loop, [{}, {}], mean).step_change == pytest.approx(1 / 4)
 
 
 def test_two_draws_are_the_fewest():

@@ -166,7 +166,6 @@ class JointFit:
     point : (D,) array
         Where the search ended, on its axes.
     ending : StopReason
-    evaluations : int
     seconds : float
     searched : tuple of str
         Names of the search axes.
@@ -178,7 +177,6 @@ class JointFit:
     at_bounds: tuple[str, ...]
     point: Floats
     ending: StopReason
-    evaluations: int
     seconds: float
     searched: tuple[str, ...] = ()
     second: LocalMinimum | None = None
@@ -391,7 +389,7 @@ class JointProblem:
         to_the_last_digit: bool = False,
     ) -> JointFit:
         """Search in rounds, with weights by the errors the last one left."""
-        evaluations, ending, curved = 0, StopReason.SOLVED, settled < _SEARCH_TOLERANCE
+        ending, curved = StopReason.SOLVED, settled < _SEARCH_TOLERANCE
         for left in reversed(range(rounds)):
             if self.axes:
                 solution = least_squares(
@@ -399,7 +397,6 @@ class JointProblem:
                     slopes=table.slopes, curved=curved, lengthened=True,
                 )  # fmt: skip
                 point, ending = solution.point, solution.ending
-                evaluations += solution.evaluations
                 if to_the_last_digit and not left:
                     point = newton_refine(table.gradient, point, *self.box())
             table.weigh(table.solve(point).nrmse_pp)
@@ -410,7 +407,6 @@ class JointProblem:
             (*self._at_bounds(point), *solved.held),
             point,
             ending,
-            evaluations,
             time.perf_counter() - begin,
             tuple(axis.name for axis in self.axes),
         )

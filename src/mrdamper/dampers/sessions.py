@@ -163,7 +163,7 @@ class RunScatter:
                 point, step = np.log([*start]), 2.0
                 (least,), (scale,) = costs(point[None], near)
                 while step > 0.02:
-                    trials = np.clip(point + step * np.array([(1, 0), (0, 1), (-1, 0), (0, -1)]), -14, 9)
+                    trials = np.clip(point + step * np.concatenate([np.eye(2), -np.eye(2)]), -14, 9)
                     tried, scales = costs(trials, near)
                     at = int(np.argmin(tried))
                     if tried[at] < least - 1e-9:
