@@ -170,7 +170,8 @@ def test_one_session_gives_a_band_for_sessions_like_it_and_one_run_none(tmp_path
         if few is runs:
             assert around is not None
             assert "for sessions like the tested ones" in got.stderr
-            assert "session corrected" not in got.stderr and "session 0 N" not in got.stderr
+            assert "session corrected" not in got.stderr
+            assert "session 0 N" not in got.stderr
             assert "force_low_N" in got.stdout
         else:
             assert around is None
