@@ -37,8 +37,8 @@ def test_model_classes_are_imported_by_their_names():
 
 
 def test_a_name_that_does_not_exist_is_an_attribute_error():
-    for name in ("workflows", "BoucWenn"):
-        with pytest.raises(AttributeError, match=f"no attribute '{name}'"):
+    for name, near in (("workflows", "$"), ("BoucWenn", "$"), ("plan", "; did you mean plan_tests?")):
+        with pytest.raises(AttributeError, match=f"'mrdamper' has no attribute '{name}'{near}".replace("?", r"\?")):
             getattr(mrdamper, name)
     with pytest.raises(ModuleNotFoundError):
         importlib.import_module("mrdamper.workflows")

@@ -92,8 +92,11 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         return importlib.import_module("importlib.metadata").version(__name__)
     if name[:1].isupper():  # the class of a model: from mrdamper import BoucWen
-        return getattr(importlib.import_module(f"{__name__}.models"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        models = importlib.import_module(f"{__name__}.models")
+        if name in dir(models):
+            return getattr(models, name)
+    near = " or ".join(public for public in _HOME if name.lower() in public.lower() or public in name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}" + (f"; did you mean {near}?" if near else ""))
 
 
 def __dir__() -> list[str]:

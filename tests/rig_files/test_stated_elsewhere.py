@@ -7,6 +7,7 @@ from scipy.io import savemat
 
 from mrdamper.rig_files.mapping.integration import displacement_of
 from mrdamper.rig_files.profile import parse_profile
+from mrdamper.rig_files.recorded_at import recording_time
 from mrdamper.rig_files.rig_import import import_files
 
 T = np.arange(0.0, 3.0, 0.002)
@@ -129,3 +130,41 @@ def test_a_current_of_the_profile_is_compared_with_a_channel_that_the_profile_do
     found = import_files([tmp_path], parse_profile(f"[file]\nblocks = 'join'\n[current]\nvalue = {value}"))
     assert [refusal.error.code for refusal in found.refusals] == codes
     assert [float(np.mean(record.current)) for record in found.records] == ([] if codes else [value])
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "displacement and force positive in compression",
+        "Weg und Kraft positiv bei Druck",
+        "displacement positive in compression, force positive in compression",
+    ],
+)
+def test_a_line_that_counts_both_channels_positive_in_compression_changes_both_signs(tmp_path, line):
+    table(tmp_path / "a_0.5A.csv", [f"# {line}", "time [s],displacement [mm],force [N]"], T, -X, -force(0.5))
+    (record,) = import_files([tmp_path / "a_0.5A.csv"]).records
+    assert record.displacement == pytest.approx(1e-3 * X, abs=1e-8)
+    assert record.force == pytest.approx(force(0.5), abs=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("lines", "note"),
+    [
+        (["Datum;12.03.2024 09:15:00"], {"recorded_at": "2024-03-12T09:15:00"}),
+        (['"Test date","2023-05-10"'], {"recorded_at": "2023-05-10"}),
+        (["Date,2024/03/12", "Time,2:05:10.25 PM"], {"recorded_at": "2024-03-12T14:05:10"}),
+        (["# Recorded: 5 Mar 2024"], {"recorded_at": "2024-03-05"}),
+        (["Date: 31/12/2024 7:00"], {"recorded_at": "2024-12-31T07:00:00"}),
+        (["Date: 03/04/2024 7:00"], {"session": "03/04/2024"}),  # of March or of April
+        (["Calibration date: 2020-01-01"], {}),
+        (["Date: 2024-05-31", "Test date: 2024-06-01"], {}),
+        (["Date: 99.99.2024"], {}),
+        (["Date: 2024-05-31", "Time: 99:10"], {"recorded_at": "2024-05-31"}),
+    ],
+)
+def test_the_day_of_a_test_is_that_of_its_own_lines(tmp_path, lines, note):
+    assert recording_time(lines) == note
+    table(tmp_path / "a_0.5A.csv", [*lines, "time [s],displacement [mm],force [N]"], T, X, force(0.5))
+    (record,) = import_files([tmp_path / "a_0.5A.csv"]).records
+    assert note.items() <= record.provenance.items()
+    assert bool(note) == bool({"recorded_at", "session"} & set(record.provenance))

@@ -10,6 +10,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -176,6 +178,14 @@ class Damper(Displayable):
     def yield_length(self) -> float | None:
         """Motion after a reversal in which the force turns over [m], where the model has such a length."""
         return None
+
+    def save(self, path: str | Path) -> None:
+        """Write the damper as JSON; see `mrdamper.save_model`."""
+        import_module("mrdamper").save_model(self, path)
+
+    def score(self, runs: Iterable[Run]) -> Any:
+        """Score the predictions of runs or of a dataset; see `mrdamper.validate`."""
+        return import_module("mrdamper").validate(self, runs)
 
     def to_saved(self) -> Saved:
         """Its own part of a saved model.

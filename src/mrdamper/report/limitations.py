@@ -86,7 +86,7 @@ def _explained(entries: Sequence[Limitation], damper: Damper) -> list[Limitation
     meanings = {info.name: info.meaning for info in parameters if info.name not in _WORDS} | _SEARCHED
     explained = list(entries)
     for name, meaning in meanings.items():
-        named = re.compile(rf"(?<![\w.^])(?<!\d ){re.escape(name)}(\.\d+)?(?![\w^])")
+        named = re.compile(rf"(?<![\w.^/])(?<!\d ){re.escape(name)}(\.\d+)?(?![\w^])")
         first = next((i for i, one in enumerate(explained) if named.search(one.text)), None)
         if first is not None:
             text = named.sub(lambda match, meaning=meaning: f"{match[0]} ({meaning})", explained[first].text, count=1)

@@ -22,6 +22,7 @@ from mrdamper.rig_files.profile import Correction, Profile
 from mrdamper.rig_files.readers import suffixes
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import FURTHER, OPTIONAL, Finding, Record
+from mrdamper.rig_files.recorded_at import recording_time
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.units import Unit
 from mrdamper.rig_files.vocabulary import words
@@ -60,7 +61,12 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
             text = f'cut at its rests or steps of the current into {len(stretches)} tests (blocks = "join" keeps it)'
             findings.append(Finding("W_CUT", text))
     motion = stated_motion(stated_quantities(table.remarks, decimal=table.decimal))
-    remarks = {**_remarks(table, assigned), "time_from": rate, "motion_stated": motion if len(stretches) == 1 else ""}
+    remarks = {
+        **_remarks(table, assigned),
+        **recording_time(table.remarks),
+        "time_from": rate,
+        "motion_stated": motion if len(stretches) == 1 else "",
+    }
     remarks = {key: text for key, text in remarks.items() if text}
     for name, why in left_out(table, profile, assigned).items():
         findings.append(Finding("W_COLUMN", f"the {name} channel is left out: {why}"))

@@ -60,12 +60,13 @@ _CHANNEL_IS = re.compile(
 )
 _SENSES = {1: tuple(words("tension_stems")), -1: tuple(words("compression_stems"))}
 _COUNTED = [  # force positive in compression; Force (compression positive)
-    re.compile(r"(?i)(?P<what>[^\W\d_]+(?: [^\W\d_]+)?)" + rest)
+    re.compile(r"(?i)(?P<what>[^\W\d_]+(?:(?: and| und| et| y| e|) [^\W\d_]+)?)" + rest)
     for rest in (
         r":? (?:is |are )?posit?iv[eo]? (?:in|for|on|bei|für|en) (?P<sense>[^\W\d_]+)",
         r"[ ,:(]{1,3}(?P<sense>[^\W\d_]+) (?:is )?posit?iv[eo]?\b",
     )
 ]
+_AND = re.compile(r"(?i) (?:and|und|et|y|e) ")
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _ZERO = re.compile(r"(?i)\bzero (?:is )?at ([+-]?[0-9]{1,10})(?![.,]?[0-9])")
 _FULL_SCALE = re.compile(  # sections of a header: Name=Stroke, FullScale=75, Unit=mm
@@ -130,7 +131,8 @@ def _with_stated_signs(table: RawTable) -> RawTable:
     for line in table.remarks:
         matches = next(filter(None, (list(form.finditer(line[:_LONGEST_LINE])) for form in _COUNTED)), [])
         for match in matches:
-            stated.setdefault(role_of(match["what"]) or "", set()).add(_sign_of(match["sense"], ()))
+            for what in _AND.split(match["what"]):
+                stated.setdefault(role_of(what) or "", set()).add(_sign_of(match["sense"], ()))
     for role in ("displacement", "force"):
         columns = table.columns(role)
         if stated.get(role) == {-1} and len(columns) == 1:
