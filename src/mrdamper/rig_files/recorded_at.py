@@ -17,7 +17,7 @@ _YEAR_LAST = re.compile(
     r"(?<!\d)(?P<first>\d{1,2})(?P<mark>[-./])(?P<second>\d{1,2})(?P=mark)(?P<year>(?:19|20)\d\d)(?!\d)"
 )
 _NAMED = re.compile(
-    r"(?i)(?<![\w])(?:(?P<day>\d{1,2})[. -]+(?P<month>[a-z]{3,9})|(?P<month_first>[a-z]{3,9})[. ]+(?P<day_last>\d{1,2}))"
+    r"(?i)(?<!\w)(?:(?P<day>\d{1,2})[. -]+(?P<month>[a-z]{3,9})|(?P<month_first>[a-z]{3,9})[. ]+(?P<day_last>\d{1,2}))"
     r"[., -]+(?P<year>(?:19|20)\d\d)(?!\d)"
 )
 _TIME = re.compile(
