@@ -466,7 +466,8 @@ def without_contradictions(dataset: Dataset, keep: Collection[str] = ()) -> tupl
     Raises
     ------
     ContradictionError
-        If more than a third of the identification runs contradict the others.
+        If more than a third of the identification runs contradict the others, or their forces differ as those of
+        two dampers do.
     """
     contradictions = tuple(find_contradictions(accepted_runs(dataset)[0], keep))
     aside = {one.run_id for one in contradictions}

@@ -63,7 +63,7 @@ def gain_differences(evidence: Evidence, products: Sequence[RowProducts]) -> Gai
 
 
 def _grown(evidence: Evidence, products: Sequence[RowProducts]) -> GainDifferences:
-    """Add and remove runs one by one while the odds rise."""
+    """Add a run to the group or remove one from it for as long as this raises the odds."""
     group, size, now = frozenset[int](), len(products), -inf
     every = range(size)
     for _ in range(_ROUNDS):

@@ -136,7 +136,7 @@ class Search:
         """Logarithm of the odds of a proposal, where a cause found in other runs is as probable as in a group."""
         if not self._is_shared(proposal.explanations.values()):
             return proposal.gain
-        return proposal.gain + max(0.0, *(e.trial.odds - _MEMBER_ODDS for e in proposal.explanations.values()))
+        return proposal.gain + max([0.0, *(e.trial.odds - _MEMBER_ODDS for e in proposal.explanations.values())])
 
     def _is_shared(self, explanations: Iterable[Explanation]) -> bool:
         """Tell whether explanations have causes that were found in other runs."""
