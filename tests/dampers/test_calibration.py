@@ -13,6 +13,7 @@ from mrdamper.dampers.calibration import (
     ModelError,
     PredictedRun,
     StandardizedErrors,
+    measured_peak,
     model_error,
     scatter_between_sessions,
 )
@@ -66,6 +67,18 @@ def test_a_run_is_compared_inside_its_window_with_what_it_takes_out_of_the_motio
     still = replace(found, predicted=np.full(5, 7.0), measured=np.full(5, 9.0))
     assert still.gain_and_offset == pytest.approx((1.0, 2.0))  # a constant shows no gain
     assert still.half == 1.0  # nor a swing: errors are then in N
+
+
+def test_the_peak_of_several_cycles_is_that_of_most_of_them():
+    """The start of a motion and a spike are in few cycles; noise of many cycles does not add up."""
+    time = np.arange(0.0, 10.0, 0.002)
+    force = 100 * np.sin(2 * np.pi * time)
+    struck = force.copy()
+    struck[20], struck[2300] = 400.0, -300.0
+    one = Run("a", time, 0.01 * np.sin(2 * np.pi * time), struck, 0.0)
+    assert measured_peak(one) == pytest.approx(100.0, rel=1e-3)
+    compared = PredictedRun.of(one, force, np.gradient(0.01 * np.sin(2 * np.pi * time), time))
+    assert compared.peak == pytest.approx([1.0], rel=1e-3)
 
 
 def test_a_record_of_changing_current_is_compared_cycle_by_cycle():

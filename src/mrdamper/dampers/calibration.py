@@ -75,7 +75,7 @@ class PredictedRun:
         """From the prediction (N,) [N] along the whole run; raises E_CLOCK as `session_of`."""
         at = np.flatnonzero(run.in_window)
         loops, forces = _loops(run, at), (run.force, predicted)
-        peaks = np.array([[peak_force(force[loop]) for loop in loops] for force in forces])
+        peaks = np.array([[_peak(run, loop, force) for loop in loops] for force in forces])
         powers = np.array(
             [[dissipated_power(force[loop], velocity[loop], run.time[loop]) for loop in loops] for force in forces]
         )
@@ -132,6 +132,21 @@ def _loops(run: Run, at: NDArray[np.intp]) -> list[NDArray[np.intp]]:
     cycles = np.array_split(at, count)
     moved = [np.ptp(run.displacement[cycle]) for cycle in cycles]
     return [cycle for cycle, swing in zip(cycles, moved, strict=True) if swing >= sine.condition.amplitude_m] or [at]
+
+
+def measured_peak(run: Run) -> float:
+    """Half the peak-to-peak force [N] in the steady window of a run, which the interval of the peak is compared with.
+
+    Of a sine of several cycles it is the median: the first may still hold the start of the motion, and one a spike.
+    """
+    at = np.flatnonzero(run.in_window)
+    return _peak(run, at, run.force) if len(_loops(run, at)) == 1 else peak_force(run.force[at])
+
+
+def _peak(run: Run, loop: NDArray[np.intp], force: Floats) -> float:
+    """Median over the cycles of a loop of half their peak-to-peak force [N]."""
+    count = int(np.ptp(run.time[loop]) * equivalent_sine(run).condition.frequency_Hz)
+    return float(np.median([peak_force(force[cycle]) for cycle in np.array_split(loop, max(count, 1))]))
 
 
 @dataclass(frozen=True)

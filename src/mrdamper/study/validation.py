@@ -10,12 +10,12 @@ import numpy as np
 
 from mrdamper.dampers.bands import band, session_band
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.calibration import PredictedRun
+from mrdamper.dampers.calibration import PredictedRun, measured_peak
 from mrdamper.dampers.prediction import Prediction
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, GainOffset, RecordingTime, SessionCorrection, Sessions
 from mrdamper.data import Condition, Displayable, Floats, Run
 from mrdamper.errors import InputError, RunError, UnknownNameError, require, validate_arguments
-from mrdamper.statistics.metrics import Scores, dissipated_power, peak_force, score
+from mrdamper.statistics.metrics import Scores, dissipated_power, score
 
 _MIN_SWING_N = 1e-100  # of a force, and its inverse the most [N]: their squares are numbers
 
@@ -224,7 +224,7 @@ def peak_band(
     velocity, time = prediction.motion.velocity[inside], run.time[inside]
     cycles = max(prediction.condition.frequency_Hz, 1e-9)
     energy = dissipated_power(run.force[inside], velocity, time) / cycles
-    row = {"peak_force_measured_N": peak_force(run.force[inside]), "energy_measured_J": energy}
+    row = {"peak_force_measured_N": measured_peak(run), "energy_measured_J": energy}
     if interval is None:
         return row
     predicted = dissipated_power(prediction.force[inside], velocity, time) / cycles

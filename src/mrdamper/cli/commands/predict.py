@@ -167,7 +167,8 @@ def _said(prediction: Prediction, interval: Band, level: float, where: str) -> s
     return "\n".join(
         (
             f"peak force (half the peak-to-peak force) {peak_force(prediction.force):.4g} N, "
-            f"{100 * level:g} % prediction interval {interval.peak[0]:.4g} to {interval.peak[1]:.4g} N {where}{corrected}",
+            f"{100 * level:g} % prediction interval {interval.peak[0]:.4g} to {interval.peak[1]:.4g} N "
+            f"{where}{corrected}",
             f"dissipated energy {energy:.4g} J per cycle ({energy * low:.4g} to {energy * high:.4g})",
             f"equivalent damping {damping:.4g} N s/m ({damping * low:.4g} to {damping * high:.4g})",
             f"standard deviation of the force: {parts}",
