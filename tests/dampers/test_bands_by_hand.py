@@ -61,12 +61,20 @@ def _slopes(monkeypatch):
     monkeypatch.setattr(bands, "_by_parameters", lambda damper, loop: np.full(3, np.inf))
 
 
-def reach(level, *parts, at=slice(None)):
-    """Half a band: Student's t with degrees of freedom by Welch and Satterthwaite."""
+def reach(level, *parts, known=True, at=slice(None)):
+    """Half a band: Student's t after Satterthwaite; parameters and sessions, known by the same sessions, as one."""
     whole, shares = sum(parts), np.mean(SLOPES[at] ** 2, axis=0) * np.diag(COVARIANCE)
-    of_parameters = shares.sum() / (shares[0] / 12.0 + shares[1] / 5.0)
-    dof = whole**2 / sum(part**2 / d for part, d in zip(parts, (of_parameters, 3.0, 8.0), strict=True))
+    by_sessions = 3.0 if known else shares.sum() / (shares[0] / 12.0 + shares[1] / 5.0)
+    dof = whole**2 / ((parts[0] + parts[1]) ** 2 / by_sessions + parts[2] ** 2 / 8.0)
     return students_t.ppf((1 + level) / 2, dof) * np.sqrt(whole)
+
+
+def test_of_unknown_sessions_parameters_have_degrees_of_freedom_of_their_own():
+    own = np.einsum("np,pq,nq->n", SLOPES, COVARIANCE, SLOPES)
+    form = (0.012 * FORCE) ** 2 + 2.5**2 + (0.02 * np.ptp(FORCE) / 2) ** 2
+    unknown = replace(KNOWN, gain=0.0, offset=0.0, session_dof=0.0, growth=Growth())
+    t = reach(0.9, own.mean(), 0.0, form.mean(), known=False) / np.sqrt(np.mean(own + form))
+    assert band(damper(unknown), PREDICTION).high - FORCE == pytest.approx(t * np.sqrt(own + form))
 
 
 @pytest.mark.parametrize("level", [0.5, 0.9, 0.99])

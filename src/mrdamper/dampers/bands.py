@@ -112,15 +112,15 @@ def band(
         return np.sqrt(at_tests**2 + uncertainty.growth.half_width(quantity, distance, level) ** 2)
 
     variance: Floats = parameter + session + model
-    t = reach("force", [float(np.mean(v)) for v in (parameter, session, model)])
+    t = reach("force", [float(np.mean(v)) for v in (variance - model, model)])
     t /= float(np.sqrt(np.mean(variance))) or 1.0
     width = half * with_growth(t * np.sqrt(variance) / (half or 1.0), "force")
     of_peak = own[1] + of_run + uncertainty.peak**2
-    at_tests = reach("peak", [own[1], of_session, of_run + uncertainty.peak**2])
+    at_tests = reach("peak", [own[1] + of_session, of_run + uncertainty.peak**2])
     # A known session leaves its part of the variance out, at the same quantile.
     own_session = at_tests * float(np.sqrt(of_peak / ((of_peak + of_session) or 1.0)))
     future, known_session = (half * with_growth(each, "peak") for each in (at_tests, own_session))
-    loss = float(with_growth(reach("energy", [own[2], of_session, of_run + uncertainty.energy**2]), "energy"))
+    loss = float(with_growth(reach("energy", [own[2] + of_session, of_run + uncertainty.energy**2]), "energy"))
     model = model + uncertainty.growth.variance("force", distance) * half**2
     return Band(
         force - width, force + width, np.sqrt(parameter), np.sqrt(session), np.sqrt(model),
@@ -135,17 +135,19 @@ def _by_parameters(damper: Damper, loop: Prediction) -> Floats:
     return relative_variances(slopes, uncertainty.covariance, loop.force, motion.velocity, motion.time)
 
 
-def _degrees_of_freedom(uncertainty: Uncertainty, slopes: Floats, level: float) -> tuple[float, float, float]:
-    """Behind the variances of parameters, sessions and the rest, which calibration counts itself within its reach.
+def _degrees_of_freedom(uncertainty: Uncertainty, slopes: Floats, level: float) -> tuple[float, float]:
+    """Behind the variance of parameters and sessions, and of the rest, which calibration counts within its reach.
 
-    Those of the parameters are their harmonic mean, each by its variance of the force.
+    The same few sessions show their scatter and what it moves the parameters by: these two variances are wrong
+    together. Of unknown sessions, those of the parameters are their harmonic mean, each by its variance of the force.
     """
-    shares = np.mean(slopes**2, axis=0) * np.diag(uncertainty.covariance)
-    doubt = float(np.sum(shares / uncertainty.dof))
-    parameters = max(float(np.sum(shares)) / doubt, 1.0) if doubt > 0 else 1.0
     calibration = uncertainty.calibration
     runs = np.inf if calibration and level <= calibration.reachable else max(uncertainty.run_dof, 1.0)
-    return parameters, max(uncertainty.session_dof, 1.0), float(runs)
+    if uncertainty.of_sessions:
+        return max(uncertainty.session_dof, 1.0), float(runs)
+    shares = np.mean(slopes**2, axis=0) * np.diag(uncertainty.covariance)
+    doubt = float(np.sum(shares / uncertainty.dof))
+    return max(float(np.sum(shares)) / doubt, 1.0) if doubt > 0 else 1.0, float(runs)
 
 
 def scope(damper: Damper, level: float) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Floats, Run
 from mrdamper.identification.covariance import alike_groups, score_covariance
-from mrdamper.identification.intervals import dof_of_quantile, interval_about, relative_width, weaknesses
+from mrdamper.identification.intervals import dof_of_quantile, interval_about, relative_width, student, weaknesses
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 
 _MAX_RUN_SHARE = 0.6  # share of the information on a parameter from which one run mainly determines it
@@ -155,25 +156,31 @@ class _Spread:
         factors = np.maximum(np.sqrt(np.mean((fits[1:] - fits[0]) ** 2, axis=0)) / size, 1.0)
         return replace(self, draws=replace(self.draws, moved=self.draws.moved * factors))
 
-    @property
-    def covariance(self) -> Floats:
-        """(P, P) of the parameters, or of their logarithms."""
-        return self.within + self.draws.moved.T @ self.draws.moved / len(self.draws.moved)
-
-    @property
-    def dof(self) -> Floats:
-        """(P,) degrees of freedom at which Student's interval holds its share of the draws.
+    @cached_property
+    def quantiles(self) -> Floats:
+        """(P,) share `_LEVEL` of errors of the draws, each over the standard error that its own residuals would show.
 
         The scatter of sessions that the residuals of a draw show depends on the gains that move its parameters: the
-        ratio of an error to its standard error is not distributed as Student's [bootstrap-t: Hall 1988, Ann. Stat. 16,
-        927].
+        ratio is not distributed as Student's [bootstrap-t: Hall 1988, Ann. Stat. 16, 927].
         """
         rng, moved, within = np.random.default_rng(_SEED), self.draws.moved, np.diag(self.within)
         free = 2 / np.maximum(self.doubt, 1e-9)
         error = moved + np.sqrt(within) * rng.standard_normal(moved.shape)
         variance = within * rng.chisquare(free, moved.shape) / free + self.draws.shown * np.mean(moved**2, axis=0)
         ratio = np.abs(error) / np.sqrt(np.maximum(variance, np.finfo(float).tiny))
-        return np.array([dof_of_quantile(float(q), _LEVEL) for q in np.quantile(ratio, _LEVEL, axis=0)])
+        return np.array([float(np.quantile(column, _LEVEL)) for column in ratio.T])
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """(P, P) of the parameters, or of their logarithms; smaller where a normal interval is wider than the draws."""
+        whole: Floats = self.within + self.draws.moved.T @ self.draws.moved / len(self.draws.moved)
+        shares: Floats = np.minimum(self.quantiles / student(_LEVEL, np.inf), 1.0)
+        return shares[:, None] * whole * shares
+
+    @property
+    def dof(self) -> Floats:
+        """(P,) degrees of freedom at which Student's interval holds its share of the draws."""
+        return np.array([dof_of_quantile(float(q), _LEVEL) for q in self.quantiles])
 
     def effective(self, samples: int) -> dict[str, float]:
         """Return independent samples behind each parameter, of those that there are."""

@@ -1,16 +1,18 @@
 """Gains and offsets that differ between sessions and between runs, estimated from what a fit leaves over.
 
 A measured force is (1 + g + h) F + o + p and a remainder: g and o are those of its session, h and p those of the
-run. Their four variances follow from quadratic statistics of the gains and offsets that the residuals of each run
-show, less what noise shows, with the share counted that the fit has absorbed [Rao 1971; Searle, Casella and
-McCulloch 1992, Variance Components, chapter 5]. A variance is not negative (non-negative least squares), and one of
-which the fit has absorbed nearly everything is not estimated.
+run. Their four variances follow from quadratic forms of the gains and offsets that the residuals of each run show, of
+least variance at the variances themselves, which are iterated (MINQUE; for normal effects the end is that of
+restricted maximum likelihood) [Rao 1971, J. Multivar. Anal. 1, 445; Searle, Casella and McCulloch 1992, Variance
+Components, chapters 6 and 11]. A variance is not negative (non-negative least squares), and one of which the fit has
+absorbed nearly everything is not estimated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -19,7 +21,9 @@ from mrdamper.data import SESSIONS_NEEDED, Floats
 from mrdamper.statistics.linear import nonnegative_least_squares
 
 _MIN_RETAINED = 0.05  # share of a variance that the fit must have left in the residuals for it to be estimated
-_MAX_CONDITION = 100.0  # condition number of the moment equations; beyond, runs and sessions are not separated
+_MAX_CONDITION = 100.0  # condition number of the equations; beyond, runs and sessions are not separated
+_ITERATIONS = 4  # of the variances at which the quadratic forms are of least variance
+_MIN_SHARE = 1e-4  # of the largest variance, with which every other one counts in these forms
 _DRAWS, _ROUNDS, _SEED = 600, 4, 20240813  # draws of gains and offsets; rounds of weights, as in the joint fit
 _MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
 
@@ -66,27 +70,43 @@ class Draws:
 
 
 @dataclass(frozen=True, eq=False)
-class _Component:
-    """Variance of gains (0) or offsets (1) shared by groups of runs.
+class _Forms:
+    """Quadratic forms of what residuals show, of least variance at some variances, and their expectations.
 
     Attributes
     ----------
-    which : int
-    members : (K, R) array or None
-        One where a run belongs to a group; None where every run is a group of its own.
+    weights : sequence of (K, K) arrays
+    table : (C, C) array
+        Expectation of each form by each variance.
+    noise : (C,) array
+        By noise alone.
     """
 
-    which: int
-    members: Floats | None
+    weights: Sequence[Floats]
+    table: Floats
+    noise: Floats
 
-    def sums(self, table: Floats) -> Floats:
-        """Return sums of the rows (R, ·) of each group."""
-        return table if self.members is None else self.members @ table
+    @classmethod
+    def of(cls, variances: Floats, designs: Sequence[Floats], noise: Floats) -> _Forms:
+        """Of variances (C,), the covariance (K, K) that one of each gives, and that of the noise."""
+        least = _MIN_SHARE * float(variances.max())
+        whole: Floats = noise + least * _MIN_SHARE * np.eye(len(noise))
+        for variance, design in zip(variances.tolist(), designs, strict=True):
+            whole = whole + max(variance, least) * design
+        inverse: Floats = np.linalg.inv(whole).astype(float)
+        weights: list[Floats] = [inverse @ design @ inverse for design in designs]
+        table = np.array([[np.sum(weight * design) for design in designs] for weight in weights])
+        return cls(weights, table, np.array([np.sum(weight * noise) for weight in weights]))
 
-    @property
-    def sizes(self) -> Floats | float:
-        """Runs of each group, as a column."""
-        return 1.0 if self.members is None else np.maximum(self.members.sum(axis=1, keepdims=True), 1.0)
+    def variances(self, shown: Floats, noise: float = 1.0) -> Floats:
+        """(D, C) variances, none of them negative, by what residuals show (D, K), with a share of the noise in it."""
+        size = np.sqrt(np.diag(self.table))
+        forms = np.array([np.einsum("dk,kl,dl->d", shown, weight, shown, optimize=True) for weight in self.weights]).T
+        table, right = self.table / np.outer(size, size), (forms - noise * self.noise) / size
+        solved = np.linalg.solve(table, right.T).T
+        for row in np.flatnonzero((solved < 0).any(axis=1)):
+            solved[row] = nonnegative_least_squares(table, right[row])[0]
+        return solved / size
 
 
 class GainsAndOffsets:
@@ -119,18 +139,55 @@ class GainsAndOffsets:
         names = sorted({run.session for run in runs if run.session is not None})
         members = [[k for k, run in enumerate(runs) if run.session == name] for name in names]
         self.sessions = members if len(names) >= SESSIONS_NEEDED else []
+        turned, sizes, _ = np.linalg.svd(self._shown)
+        self._turned = turned[:, sizes > _MIN_RETAINED].T  # to what the fit has not absorbed
+
+    def _groups(self, component: int) -> Floats:
+        """(2R, G) gains or offsets of the runs by those of sessions (components 0 and 1) or of runs (2 and 3)."""
+        groups = self.sessions if component < 2 else [[k] for k in range(len(self.runs))]
+        table = np.zeros((len(self._shown), len(groups)))
+        for k, members in enumerate(groups):
+            table[2 * np.array(members) + component % 2, k] = 1.0
+        return table
+
+    @cached_property
+    def _designs(self) -> dict[int, Floats]:
+        """Covariance (K, K) of what residuals show by one of each variance that they can tell."""
+        tables = {component: self._groups(component) for component in range(4)}
+        shown = {c: self._turned @ self._shown @ table for c, table in tables.items()}
+        enough = {c: np.sum(shown[c] ** 2) >= _MIN_RETAINED * max(table.sum(), 1.0) for c, table in tables.items()}
+        used = [c for c in tables if enough[c] and enough[c - c % 2]]  # offsets only where gains show
+        designs = {c: shown[c] @ shown[c].T for c in used}
+        if 0 in used and 2 in used:
+            unit = [design.ravel() / np.linalg.norm(design) for design in designs.values()]
+            if np.linalg.cond(np.inner(unit, unit)) > _MAX_CONDITION:
+                # Sessions of one run each: all scatter is counted as that between sessions.
+                return {c: design for c, design in designs.items() if c < 2}
+        return designs
+
+    def _forms(self, variances: Floats) -> _Forms:
+        return _Forms.of(variances, list(self._designs.values()), self._turned * self._noise @ self._turned.T)
 
     def effects(self) -> Effects:
         """Return the four standard deviations and the degrees of freedom behind them."""
-        single = [[k] for k in range(len(self.runs))]
-        between, within = self._pair(self.sessions), self._pair(single)
-        if not between or self._dof(between[0], len(self.sessions)) < 1:
-            between = []
-        if not within:
-            return self._solved(between, [])
-        if between and self._condition([*between, *within]) > _MAX_CONDITION:
-            within = []  # sessions of one run each: all scatter is counted as that between sessions
-        return self._solved(between, within)
+        designs, shown = self._designs, (self._turned @ self._read)[None]
+        used = list(designs)
+        variances, dof = np.zeros(4), np.zeros(4)
+        fitted = np.full(len(used), float(np.mean(shown**2)) if used else 0.0)
+        if not fitted.any():
+            return Effects()
+        forms = self._forms(fitted)
+        for _ in range(_ITERATIONS):
+            if not (fitted := forms.variances(shown)[0]).any():
+                return Effects()
+            forms = self._forms(fitted)
+        variances[used] = fitted
+        for c, weight in zip(used, forms.weights, strict=True):  # Satterthwaite of a form
+            product = weight @ designs[c]
+            count = len(self.sessions) if c < 2 else len(self.runs)
+            dof[c] = min(np.trace(product) ** 2 / np.sum(product * product.T), count - 1.0)
+        gain, offset, run_gain, run_offset = (np.sqrt(variances) * [1.0, self.unit, 1.0, self.unit]).tolist()
+        return Effects(gain, offset, float(dof[0]), run_gain, run_offset, float(dof[2]))
 
     def by_gains(self) -> Floats:
         """(P,) change of the parameters by the gains and offsets that the residuals show."""
@@ -156,99 +213,22 @@ class GainsAndOffsets:
         shared = rng.standard_normal((_DRAWS, len(self.sessions), 2)) * [effects.gain, effects.offset]
         for k, members in enumerate(self.sessions):
             drawn[:, members] += shared[:, k : k + 1]
-        moved, read = self._refitted(drawn)
-        by_run = self.effect.reshape(len(self.effect), count, 2)
-        shares: list[Floats] = []
-        for members, spreads in (
-            (self.sessions, (effects.gain, effects.offset / self.unit)),
-            ([[k] for k in range(count)], (effects.run_gain, effects.run_offset / self.unit)),
-        ):
-            for which, spread in enumerate(spreads):
-                sums = [by_run[:, group, which].sum(axis=1) * spread for group in members]
-                shares.append(np.sum(np.square(sums), axis=0) if sums else np.zeros(len(self.effect)))
-        total = np.maximum(np.sum(shares, axis=0), np.finfo(float).tiny)
-        return Draws(drawn, moved, self._variances_over(read, effects) @ (np.array(shares) / total))
+        return Draws(drawn, self._refitted(drawn), self._variances_over(drawn, effects))
 
-    def _variances_over(self, read: Floats, effects: Effects) -> Floats:
-        """(D, 4) variances that draws of readings (D, R, 2) would show, over those they were drawn with."""
-        drawn_with = (effects.gain, effects.offset / self.unit, effects.run_gain, effects.run_offset / self.unit)
-        between, within = self._pair(self.sessions), self._pair([[k] for k in range(len(self.runs))])
-        used = [
-            (i, c) for i, c in enumerate([*(between or [None] * 2), *within]) if c is not None and drawn_with[i] > 0
-        ]
-        shown = np.ones((len(read), 4))
-        if not used:
-            return shown
-        own = np.array([self._moment(c, c) for _, c in used])
-        squares = [np.sum(c.sums(read[:, :, c.which].T) ** 2 / c.sizes, axis=0) for _, c in used]
-        right = np.column_stack(squares) / own
-        table = self._equations([c for _, c in used])
-        solved = np.linalg.solve(table, right.T).T
-        for row in np.flatnonzero((solved < 0).any(axis=1)):
-            solved[row] = nonnegative_least_squares(table, right[row])[0]
-        shown[:, [i for i, _ in used]] = solved / np.square([drawn_with[i] for i, _ in used])
-        return shown
+    def _variances_over(self, drawn: Floats, effects: Effects) -> Floats:
+        """(D, P) variances of the parameters that residuals of draws (D, R, 2) show, over those of the draws."""
+        used = list(self._designs)
+        roots = np.array([effects.gain, effects.offset / self.unit, effects.run_gain, effects.run_offset / self.unit])
+        variances = np.square(roots)[used]
+        if not variances.any():
+            return np.ones((len(drawn), len(self.effect)))
+        moved = np.array([np.sum((self.effect @ self._groups(c)) ** 2, axis=1) for c in used])
+        read = (drawn / [1.0, self.unit]).reshape(len(drawn), -1) @ (self._turned @ self._shown).T
+        shown = self._forms(variances).variances(read, noise=0.0) @ moved
+        return shown / np.maximum(variances @ moved, np.finfo(float).tiny)
 
-    def _pair(self, groups: Sequence[Sequence[int]]) -> list[_Component]:
-        """Gain and offset shared by groups of runs; empty unless the residuals still show the gain."""
-        table = None
-        if len(groups) < len(self.runs):
-            table = np.zeros((len(groups), len(self.runs)))
-            for k, members in enumerate(groups):
-                table[k, members] = 1.0
-        components = [_Component(which, table) for which in (0, 1)]
-        return components if groups and self._retained(components[0]) >= _MIN_RETAINED else []
-
-    def _read_by(self, statistic: _Component, component: _Component) -> Floats:
-        """(J, K) effects of the groups of a component on a statistic: sums of groups over the root of their size."""
-        block = self._shown[statistic.which :: 2, component.which :: 2]
-        return statistic.sums(component.sums(block.T).T) / np.sqrt(statistic.sizes)
-
-    def _moment(self, statistic: _Component, component: _Component) -> float:
-        return float(np.sum(self._read_by(statistic, component) ** 2))
-
-    def _retained(self, component: _Component) -> float:
-        """Share of a component's variance that the fit has left."""
-        count = len(self.runs) if component.members is None else float(component.members.sum())
-        return self._moment(component, component) / count
-
-    def _excess(self, component: _Component) -> float:
-        """Return the statistic of a component, less what noise alone gives it."""
-        read, noise = (values[component.which :: 2, None] for values in (self._read, self._noise))
-        return float(np.sum((component.sums(read) ** 2 - component.sums(noise)) / component.sizes))
-
-    def _dof(self, component: _Component, count: int) -> float:
-        """Degrees of freedom of a variance read by its statistic, at most one less than the groups it is of."""
-        shown = self._read_by(component, component)
-        gram = shown.T @ shown
-        trace, square = float(np.trace(gram)), float(np.sum(gram**2))
-        return min(trace**2 / square, count - 1.0)
-
-    def _equations(self, components: Sequence[_Component]) -> Floats:
-        """Return expectation of each statistic by each variance, every row over its own diagonal."""
-        table = np.array([[self._moment(a, b) for b in components] for a in components])
-        return table / np.maximum(np.diag(table), np.finfo(float).tiny)[:, None]
-
-    def _condition(self, components: Sequence[_Component]) -> float:
-        return float(np.linalg.cond(self._equations(components)))
-
-    def _solved(self, between: Sequence[_Component], within: Sequence[_Component]) -> Effects:
-        used = [c for c in (*between, *within) if self._retained(c) >= _MIN_RETAINED]
-        if not used:
-            return Effects()
-        own = np.array([self._moment(c, c) for c in used])
-        read = np.array([self._excess(c) for c in used])
-        fitted, _ = nonnegative_least_squares(self._equations(used), read / own)
-        variances: dict[int, float] = dict(zip(map(id, used), fitted.tolist(), strict=True))
-        gain, offset = (float(np.sqrt(variances.get(id(c), 0.0))) for c in between) if between else (0.0, 0.0)
-        run_gain, run_offset = (float(np.sqrt(variances.get(id(c), 0.0))) for c in within) if within else (0.0, 0.0)
-        return Effects(
-            gain, offset * self.unit, self._dof(between[0], len(self.sessions)) if between else 0.0,
-            run_gain, run_offset * self.unit, self._dof(within[0], len(self.runs)) if within else 0.0,
-        )  # fmt: skip
-
-    def _refitted(self, shift: Floats) -> tuple[Floats, Floats]:
-        """(D, P) parameters, and the gains and offsets (D, R, 2) that residuals show, by draws (D, R, 2) of them."""
+    def _refitted(self, shift: Floats) -> Floats:
+        """(D, P) parameters by draws of gains and offsets (D, R, 2)."""
         size, count = self.slopes[0].shape[1], len(self.runs)
         grams, rest = np.empty((count, size + 2, size + 2)), np.empty(count)
         for i, (run, slope) in enumerate(zip(self.runs, self.slopes, strict=True)):
@@ -271,5 +251,4 @@ class GainsAndOffsets:
             left = np.concatenate([np.broadcast_to(moved[:, None, :], (len(shift), count, size)), -shift], axis=2)
             squares = np.einsum("drp,rpq,drq->dr", left, grams, left, optimize=True) + rest
             weight = 1 / np.maximum(np.sqrt(np.maximum(squares, 0)), _MIN_ERROR_PP)
-        own = np.linalg.solve(grams[:, size:, size:], grams[:, size:, :size])
-        return moved, (np.einsum("rkp,dp->drk", own, moved) - shift) / [1.0, self.unit]
+        return moved
