@@ -180,6 +180,8 @@ def test_residuals_and_slopes_of_all_runs_at_once_are_those_of_single_ones(name,
     own = {**own, "gamma1": 3.1e6, "gamma2": 2e5} if name == "dominguez-type" else own  # else gamma is beta, a corner
     damper = all_published()[name]("bench", own, REFERENCE, Envelope.of(CONDITIONS))
     pieces = Pieces([a_run(condition) for condition in CONDITIONS])
+    exchanged = replace(damper, coefficients=dict(reversed(own.items())))
+    assert pieces.residual(exchanged) == pytest.approx(pieces.residual(damper), abs=1e-12)
     at_once, slopes = pieces.residual(damper), pieces.slopes(damper)
     assert slopes is not None, "a compiler is needed"
     monkeypatch.setattr(Pieces, "_along", lambda *_: None)  # one after the other, as without a compiler

@@ -56,7 +56,7 @@ def _force(model: Any, motion: Any) -> Any:
     return model.force(motion, model.state(motion))
 
 
-_PROGRAMS: dict[tuple[type, tuple[str, ...] | None], list[RecordProgram]] = {}
+_PROGRAMS: dict[tuple[object, ...], list[RecordProgram]] = {}
 
 
 def _along(
@@ -101,7 +101,9 @@ def compiled_outputs(
         Samples whose outputs are wanted, and those at which the memory starts anew.
     """
     given = tuple(map(float, values.values()))
-    programs = _PROGRAMS.setdefault(key, [])
+    programs = _PROGRAMS.setdefault(
+        (*key, *values), []
+    )  # values are given by position: another order is another program
     for record in programs:
         if (derived := record.prepare(given)) is not None:
             break
