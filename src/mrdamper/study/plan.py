@@ -30,6 +30,7 @@ from mrdamper.study.recipe import Progress
 
 _SAMPLES = 24  # of a cycle that count; model error leaves fewer independent ones than a rig records
 _DRAWS = 2  # of the parameters, beside the estimate
+_NEARER = (1.0, 0.5, 0.25, 0.125, 0.0)  # shares of a draw that are tried until the model has a force
 _MIN_ERROR_RATIO = 0.01  # of half the peak-to-peak force: what no record is better than
 _MIN_SESSION_GAIN = 1e-4  # standard deviation of the gain between sessions, at least [-]
 _MIN_SESSION_OFFSET = 1e-3  # the same of the offset, over half the peak-to-peak force
@@ -266,22 +267,40 @@ class ExperimentDesign:
 
 
 def _slopes(damper: Damper, uncertainty: Uncertainty, names: Sequence[str], condition: Condition) -> Floats:
-    """(D, K, P + 2) derivatives over half the peak-to-peak force: by the parameters, by a gain, by an offset [N]."""
+    """(D, K, P + 2) derivatives over half the peak-to-peak force: by the parameters, by a gain, by an offset [N].
+
+    A draw at which the model has no force (a rate of the current far beyond its estimate) is taken nearer to the
+    estimate.
+    """
     rng = np.random.default_rng(_SEED)
     root = np.linalg.cholesky(uncertainty.covariance + 1e-12 * np.diag(np.diag(uncertainty.covariance)))
-    motion, last = sine(condition, 2, 4 * _SAMPLES), slice(-4 * _SAMPLES, None, 4)
     slopes: list[Floats] = []
     for draw in range(_DRAWS + 1):
         shift = 0.5 * root @ rng.standard_normal(len(uncertainty.names)) * (draw > 0)
-        own = [damper.fitted_parameters[name] for name in uncertainty.names]
-        moved = [n.value * math.exp(s) if n.log else n.value + s for n, s in zip(own, shift, strict=True)]
-        values = {name: float(np.clip(v, *n.bounds)) for name, v, n in zip(uncertainty.names, moved, own, strict=True)}
-        drawn = damper.with_parameters(values)
-        base = Prediction(motion, drawn.force_along(motion, condition), condition, ())
-        force = base.force[last]
-        half = float(np.ptp(force) / 2) or 1.0
-        slopes.append(np.column_stack([force_slopes(drawn, base, names)[last], force, np.ones(force.size)]) / half)
+        for share in _NEARER:
+            try:
+                with np.errstate(over="ignore"):
+                    slopes.append(_slopes_at(share * shift, damper, uncertainty, names, condition))
+                break
+            except InputError:
+                if share == 0:
+                    raise
     return np.array(slopes)
+
+
+def _slopes_at(
+    shift: Floats, damper: Damper, uncertainty: Uncertainty, names: Sequence[str], condition: Condition
+) -> Floats:
+    """(K, P + 2) these derivatives with the parameters moved by (P,) a shift."""
+    motion, last = sine(condition, 2, 4 * _SAMPLES), slice(-4 * _SAMPLES, None, 4)
+    own = [damper.fitted_parameters[name] for name in uncertainty.names]
+    moved = [n.value * math.exp(s) if n.log else n.value + s for n, s in zip(own, shift, strict=True)]
+    values = {name: float(np.clip(v, *n.bounds)) for name, v, n in zip(uncertainty.names, moved, own, strict=True)}
+    drawn = damper.with_parameters(values)
+    base = Prediction(motion, drawn.force_along(motion, condition), condition, ())
+    force = base.force[last]
+    half = float(np.ptp(force) / 2) or 1.0
+    return np.column_stack([force_slopes(drawn, base, names)[last], force, np.ones(force.size)]) / half
 
 
 def least_informative_runs(damper: Damper, least: int = 3) -> list[tuple[str, float]]:
