@@ -24,7 +24,7 @@ _LATEX = str.maketrans(
     | {"<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}"}
 )
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "!\"#$%&'()*+,-./:;<=>?@[\\]^_`{|}~"})
-_FORMULA = re.compile(r"'*[=+\-@\t\r]")  # what a spreadsheet computes instead of showing
+_FORMULA = re.compile(r"'*\s*[=+\-@\t\r]")  # what a spreadsheet computes instead of showing
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # that Windows keeps for itself
 _MAX_NAME_PART = 48  # characters; of four bytes each, with prefix, suffix and hash, below 255
 
