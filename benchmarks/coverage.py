@@ -214,7 +214,7 @@ def _textbook(problem: JointProblem, fit: JointFit) -> dict[str, float]:
 
 
 def _in_bands(rig: Rig, made: Damper, rng: np.random.Generator, repeat: int) -> Floats:
-    """Whether the peak of a run of a new session lies in its 90 % band, and the share of its samples that do."""
+    """One if the peak of a run of a new session lies in its 90 % prediction interval, and the share of its samples."""
     run = rig.runs[repeat % len(rig.runs)]
     gain, offset = rng.standard_normal(2)
     noise = NOISE * np.ptp(run.force[run.in_window]) / 2 * rng.standard_normal(run.force.size)
@@ -253,7 +253,7 @@ def table(repeats: int, workers: int = 1, only: Sequence[str] = ()) -> str:
         if parts[0][1].size:
             bands = dict(zip(("peak force", "samples"), np.mean([i for _, i in parts], axis=0), strict=True))
             lines.append(
-                "  a new session in its 90 % band: " + ", ".join(f"{k} {100 * v:.1f} %" for k, v in bands.items())
+                "  a new session in its 90 % prediction interval: " + ", ".join(f"{k} {100 * v:.1f} %" for k, v in bands.items())
             )
             outside += _outside(title, bands, BAND_WITHIN)
     error = 100 * np.sqrt(LEVEL * (1 - LEVEL) / repeats)

@@ -17,6 +17,7 @@ from mrdamper.dampers.model_file import dump_model, parse_model, save_model
 from mrdamper.dampers.uncertainty import Uncertainty, table, uncertainty_warnings
 from mrdamper.data import Condition
 from mrdamper.errors import InputError, ModelFileError
+from mrdamper.study.validation import validate
 
 
 @pytest.fixture(scope="module")
@@ -139,6 +140,14 @@ def test_functions_have_a_spread_too():
     low, high = made.uncertainty.interval(made, "f0.0")
     assert low < 30.0 < high
     assert isinstance(parse_model(dump_model(made)).uncertainty, Uncertainty)
+
+
+def test_a_damper_saves_itself_and_scores_runs_as_the_functions_do(tmp_path):
+    truth, path = joint_damper(), tmp_path / "m.json"
+    runs = session_runs(truth)
+    truth.save(path)
+    assert path.read_text() == dump_model(truth)
+    assert truth.score(runs[:3]).median("nrmse_pp") == validate(truth, runs[:3]).median("nrmse_pp")
 
 
 def test_the_command_writes_the_band(damper, tmp_path):

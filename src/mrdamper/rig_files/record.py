@@ -118,7 +118,7 @@ class Record:
     segments: tuple[tuple[int, int], ...] = ()  # sample ranges without a gap in time; empty before the checks looked
     lines: LineNumbers | None = None  # of every sample, where the file is text
     window: tuple[float, float] | None = None  # steady window of a stored run [s]; of a new record it is found
-    steady: SteadyPart | None = None  # as the checks found it; of a long record, judged part by part, found later
+    steady: SteadyPart | None = None  # found by the checks; of a long record, checked in parts, found afterwards
 
     @property
     def channels(self) -> dict[str, Floats]:

@@ -48,7 +48,7 @@ def short_lines(path: Path) -> list[str]:
 
 
 def _mapping(lines: list[str]) -> dict[str, Any]:
-    """Return pairs, pairs in braces, and lists of objects of a YAML text; all other structure is left out."""
+    """Return pairs, pairs in braces, and lists of objects of a YAML text; all other structure is omitted."""
     tree: dict[str, Any] = {}
     items: list[dict[str, Any]] = []
     for line in (text.split(" #")[0].rstrip() for text in lines):
