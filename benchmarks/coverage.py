@@ -253,7 +253,8 @@ def table(repeats: int, workers: int = 1, only: Sequence[str] = ()) -> str:
         if parts[0][1].size:
             bands = dict(zip(("peak force", "samples"), np.mean([i for _, i in parts], axis=0), strict=True))
             lines.append(
-                "  a new session in its 90 % prediction interval: " + ", ".join(f"{k} {100 * v:.1f} %" for k, v in bands.items())
+                "  a new session in its 90 % prediction interval: "
+                + ", ".join(f"{k} {100 * v:.1f} %" for k, v in bands.items())
             )
             outside += _outside(title, bands, BAND_WITHIN)
     error = 100 * np.sqrt(LEVEL * (1 - LEVEL) / repeats)
