@@ -14,9 +14,12 @@ from mrdamper.dampers.bands import band, no_band, portable_band
 from mrdamper.dampers.calibration import PredictedRun
 from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.model_file import dump_model, parse_model, save_model
+from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.dampers.uncertainty import Uncertainty, table, uncertainty_warnings
 from mrdamper.data import Condition
 from mrdamper.errors import InputError, ModelFileError
+from mrdamper.models import model_type
+from mrdamper.statistics.functions.forms import ParameterFunction
 from mrdamper.study.validation import validate
 
 
@@ -215,3 +218,30 @@ def test_what_does_the_same_to_the_force_has_no_interval_though_the_rest_has():
     assert set(made.uncertainty.unknown) == {"c0", "c1", "fy0", "fy1", "h0", "h1"}
     low, high = made.uncertainty.interval(made, "f0")
     assert low < truth.model.f0 < high
+
+
+def test_a_yield_displacement_too_small_to_show_is_not_identifiable_and_widens_nothing():
+    functions = {
+        "c": ParameterFunction("linear-current", (500.0, 1000.0)),
+        "yield_force": ParameterFunction("linear-current", (1000.0, 60.0)),
+        "yield_displacement": ParameterFunction("constant", (-13.5,), log=True),  # no sample lies on its branch
+    }
+    truth = replace(modified_damper(), parameters=ParameterMap(model_type("bouc-wen"), functions))
+    made = estimate_uncertainty(truth, named(session_runs(truth, noise=30.0)))
+    assert made.uncertainty.unknown == ("yield_displacement.0",)
+    around = band(made, made.predict(Condition(0.5, 1.0, 0.01)))
+    assert np.all(around.parameter < 0.1 * around.peak[1])
+
+
+def test_the_share_of_a_coefficient_in_a_logarithm_is_the_change_of_its_parameter():
+    damper, step = modified_damper(), 1e-4
+    corners = damper.envelope.corners
+    for i, exponent in enumerate(damper.fitted_parameters[f"yield_displacement.{i}"].exponent for i in range(2)):
+        name = f"yield_displacement.{i}"
+        moved = damper.with_parameters({name: damper.fitted_parameters[name].value + step})
+        before, after = (
+            [d.functions["yield_displacement"](c.current_A, c.frequency_Hz, c.amplitude_m) for c in corners]
+            for d in (damper, moved)
+        )
+        assert exponent == pytest.approx(np.max(np.abs(np.log(np.divide(after, before)))) / step, rel=1e-6)
+    assert damper.fitted_parameters["c.0"].exponent == 0

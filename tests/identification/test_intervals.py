@@ -97,3 +97,12 @@ def test_an_interval_over_three_decades_is_none():
     )
     assert interval_about(0.0, 0.0, 5.0, 0.95, log=False) == (0.0, 0.0)
     assert interval_about(0.0, 1e-9, 5.0, 0.95, log=False) is None
+
+
+@pytest.mark.parametrize("multiple", [0.5, 1.0, 4.0])
+@pytest.mark.parametrize("half", [3.4, 3.5, 6.8, 7.0, 400.0])  # half of ln 1000 is 3.45
+def test_a_coefficient_of_a_logarithm_is_identifiable_as_what_it_multiplies(half, multiple):
+    error = half / multiple / student(0.95, 8.0)
+    parameter = interval_about(1e-6, multiple * error, 8.0, 0.95, log=True)
+    for coefficient in (0.0, -13.8, 2000.0):
+        assert (interval_about(coefficient, error, 8.0, 0.95, False, multiple) is None) == (parameter is None)

@@ -206,17 +206,21 @@ def _identifiable(
         spread = _Spread.of(names, parts, slopes, inverse)
         errors = np.sqrt(np.diag(spread.covariance))
         ends = [
-            interval_about(own[n].value, float(e), float(d), _LEVEL, own[n].log)
+            interval_about(own[n].value, float(e), float(d), _LEVEL, own[n].log, own[n].exponent)
             for n, e, d in zip(names, errors, spread.dof, strict=True)
         ]
         lost = [i for i, each in enumerate(ends) if each is None and names[i] in sized]
         if not lost:
             return spread, wide
         wide |= {names[i] for i in lost}
-        worst = max(lost, key=lambda i: relative_width(own[names[i]].value, float(errors[i]), own[names[i]].log))
+        worst = max(lost, key=lambda i: _width(own[names[i]], float(errors[i])))
         keep = [i for i in range(len(names)) if i != worst]
         names, slopes = [names[i] for i in keep], [slope[:, keep] for slope in slopes]
         inverse = _determined(slopes, parts, len(keep))[3]
+
+
+def _width(own: FittedParameter, half: float) -> float:
+    return relative_width(own.value, half, own.log, own.exponent)
 
 
 def _determined(

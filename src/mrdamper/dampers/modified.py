@@ -132,10 +132,20 @@ class ModifiedModel(Damper):
     @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:
         return {
-            f"{name}.{i}": FittedParameter(value)
+            f"{name}.{i}": FittedParameter(value, exponent=exponent)
             for name, function in self.functions.items()
-            for i, value in enumerate((*function.coefficients, *function.rates))
+            for i, (value, exponent) in enumerate(
+                zip((*function.coefficients, *function.rates), self._exponents(function), strict=True)
+            )
         }
+
+    def _exponents(self, function: ParameterFunction) -> Sequence[float]:
+        """Return the largest multiple of each coefficient in the logarithm of a parameter at the tests."""
+        count = len(function.coefficients) + len(function.rates)
+        if not function.log:
+            return [0.0] * count
+        columns = FORMS[function.form].columns(*features(self.envelope.corners), function.rates)
+        return [*np.abs(columns).max(axis=0).tolist(), *[0.0] * len(function.rates)]
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         functions = {}

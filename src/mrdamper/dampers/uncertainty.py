@@ -29,12 +29,16 @@ _MAX_RELATIVE_ERROR = 0.5  # standard error over the estimate from which a param
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """A parameter of a damper determined from data; `log` where its logarithm is searched."""
+    """A parameter of a damper determined from data; `log` where its logarithm is searched.
+
+    A coefficient of the logarithm of a parameter enters it, at the tests, as at most `exponent` times itself.
+    """
 
     value: float
     bounds: tuple[float, float] = (-np.inf, np.inf)
     log: bool = False
     unit: str = ""
+    exponent: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +130,8 @@ class Uncertainty:
         if name not in self.names or name in self.unknown:
             return None
         i = self.names.index(name)
-        error = float(np.sqrt(self.covariance[i, i]))
-        return interval_about(damper.fitted_parameters[name].value, error, self.dof[i], level, self.logs[i])
+        own, error = damper.fitted_parameters[name], float(np.sqrt(self.covariance[i, i]))
+        return interval_about(own.value, error, self.dof[i], level, self.logs[i], own.exponent)
 
     def interval(self, damper: Damper, name: str, level: float = 0.95) -> tuple[float, float]:
         """Return the ends of a parameter's interval.

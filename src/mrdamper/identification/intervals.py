@@ -68,22 +68,25 @@ def dof_of_quantile(quantile: float, level: float) -> float:
     return math.exp(many)
 
 
-def interval_about(value: float, error: float, dof: float, level: float, log: bool) -> tuple[float, float] | None:
+def interval_about(
+    value: float, error: float, dof: float, level: float, log: bool, exponent: float = 0.0
+) -> tuple[float, float] | None:
     """Calculate the ends of an interval; of a logarithm where `log`, then `error` is that of the logarithm.
 
     None where the parameter is not identifiable: an error that is not finite, ends a factor of more
-    than a thousand apart, or a half width of more than a thousand times the estimate.
+    than a thousand apart, or a half width of more than a thousand times the estimate. For a coefficient that enters the
+    logarithm of a parameter as `exponent` times it, these ends are those of the parameter.
     """
     half = student(level, dof) * error
-    if not math.isfinite(half) or relative_width(value, half, log) > 1:
+    if not math.isfinite(half) or relative_width(value, half, log, exponent) > 1:
         return None
     return (value * math.exp(-half), value * math.exp(half)) if log else (value - half, value + half)
 
 
-def relative_width(value: float, half: float, log: bool) -> float:
-    """Half an interval over the widest one of an identifiable parameter."""
-    if log:
-        return half / (math.log(_MAX_RATIO) / 2)
+def relative_width(value: float, half: float, log: bool, exponent: float = 0.0) -> float:
+    """Half an interval over the widest one of an identifiable parameter; `exponent` as for `interval_about`."""
+    if log or exponent:
+        return half * (1.0 if log else exponent) / (math.log(_MAX_RATIO) / 2)
     return half / (_MAX_RATIO * abs(value)) if value else math.inf if half else 0.0
 
 

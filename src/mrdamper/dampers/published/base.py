@@ -23,6 +23,7 @@ from mrdamper.statistics.levenberg_marquardt import forward_differences, least_s
 
 _MAX_STEPS = 8
 AT_BOUNDS = "at a bound of the search"  # entry of the provenance: coefficients whose values are no estimates
+_LOGARITHM = "_log"  # end of the name of a coefficient that is the logarithm of a parameter
 _COEFFICIENT_RANGE = 0.8  # a coefficient may move by this share of its start, or of one
 Tables = dict[str, list[float] | list[list[float]]]
 
@@ -162,7 +163,10 @@ class ConditionedDamper(Damper):
 
     @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:
-        return {name: FittedParameter(value) for name, value in self.coefficients.items()}
+        return {
+            name: FittedParameter(value, exponent=float(name.endswith(_LOGARITHM)))
+            for name, value in self.coefficients.items()
+        }
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
         return replace(self, coefficients={**self.coefficients, **values})
