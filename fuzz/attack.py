@@ -1,7 +1,7 @@
 """`make attack`: hostile names, models, tables and calls, killed and starved commands; counts a kind, tried and held.
 
 All kinds together take a share of their numbers, and end within ten minutes whatever the machine;
-one kind by itself is tried in full: `python -m fuzz.attack kills` (200 of them), `limits` (20
+kinds that are named are tried in full: `python -m fuzz.attack kills` (200 of them), `limits` (20
 points of each command; `--of study compare` for some), `soak` (ten minutes), `names` (10,000).
 `--share 0.1` takes a tenth. What did not hold is printed with what it came from, and the exit
 status is 1.
@@ -44,6 +44,7 @@ KINDS = {
 }
 SHARES = {"kills": 0.4, "limits": 0.25, "extremes": 0.2, "pages": 0.2, "soak": 0.15}  # where all are tried
 TIMED = "soak"  # by itself, at the end
+_COMMAND = (sys.executable, "-m", "fuzz.attack")
 _ALL_S = 9 * 60  # seconds in which a further one is begun
 
 
@@ -55,8 +56,12 @@ def main() -> None:
     arguments.add_argument("--seconds", type=float, default=math.inf, help="after which no further one is tried")
     arguments.add_argument("--of", nargs="+", default=[], help=f"commands that are stopped, of {', '.join(COMMANDS)}")
     chosen = arguments.parse_args()
+    if len(chosen.kinds) > 1:  # each in a process of its own: a fork of one whose threads have begun may wait for ever
+        rest = [word for word in sys.argv[1:] if word not in chosen.kinds]
+        runs = [subprocess.run([*_COMMAND, kind, *rest], check=False) for kind in chosen.kinds]
+        sys.exit(max(run.returncode != 0 for run in runs))
     if chosen.kinds:
-        sys.exit(max(attack_one(kind, chosen.share, chosen.seconds, chosen.of) for kind in chosen.kinds))
+        sys.exit(attack_one(*chosen.kinds, chosen.share, chosen.seconds, chosen.of))
     sys.exit(attack_all(chosen.share))
 
 
@@ -81,8 +86,8 @@ def attack_all(share: float) -> int:
 
     def attack(kind: str) -> int:
         seconds = max(1.0, until - time.monotonic()) if kind != TIMED else math.inf
-        command = [sys.executable, "-m", "fuzz.attack", kind, "--seconds", str(seconds)]
-        return subprocess.run([*command, "--share", str(share * SHARES.get(kind, 1.0))], check=False).returncode
+        command = [*_COMMAND, kind, "--seconds", str(seconds), "--share", str(share * SHARES.get(kind, 1.0))]
+        return subprocess.run(command, check=False).returncode
 
     with ThreadPoolExecutor(2) as pool:
         codes = list(pool.map(attack, aside))

@@ -10,7 +10,7 @@ from mutants.faults import Fault
 class Explained(NamedTuple):
     """Changes of lines, each by a part of it, where an empty one stands for any.
 
-    A change may be given whole, as `change: the expression that is changed`.
+    A change may be given from the beginning of one of its words, or whole, as `change: the expression that is changed`.
     """
 
     module: str
@@ -44,9 +44,6 @@ EXPLAINED = (
         _ORDER,
     ),
     Explained("paper.options", "for name, (low, high) in", "items 0 and 1", _ORDER),
-    Explained(
-        "systems.inverse", "if not 0 < width.max()", "0 → 1", "the force of a damper changes by far more than 1 N"
-    ),
     Explained("systems.inverse", "sample = (x, v, -(omega**2) * x)", "USub", "inertia is the same at every current"),
     Explained("systems.inverse", "status, outputs, memory = 1", "1 → 2", "any status but 0 is a refusal"),
     Explained("study.recipe", "in ([],", "items", _ORDER),
@@ -80,7 +77,12 @@ EXPLAINED = (
     Explained("dampers.modified", "identifications[0]", "0 → 1", "all identifications are of one model and rig"),
     Explained("dampers.modified", "if data.shape else 1.0", "1.0 → 10.0", "a model without a shape has no use for one"),
     Explained("dampers.covariance", "part.predicted.mean()", "Sub → Add", "beside a constant they span the same"),
-    Explained("dampers.calibration", "np.multiply(", "arguments 0 and 1", _ALIKE),
+    Explained(
+        "dampers.calibration",
+        "np.multiply(",
+        "arguments 0 and 1 exchanged: np.multiply(getattr(self, quantity), quantiles)",
+        _ALIKE,
+    ),
     Explained("dampers.calibration", "size = np.sqrt(np.mean(table", "sqrt", _SCALE),
     Explained("dampers.calibration", "size = np.sqrt(np.mean(table", "mean", _SCALE),
     Explained("dampers.calibration", "size = np.sqrt(np.mean(table", "Pow", _SCALE),
@@ -235,7 +237,7 @@ EXPLAINED = (
     Explained("dampers.random_effects", "unit: Floats = np.sqrt(", "", _SCALE),
     *(
         Explained("dampers.random_effects", "self.unit = ", change, _SCALE)
-        for change in ("median →", "Div → Mult", "ptp → max", "2 → 3", "1.0 → 10.0", "Or → And")
+        for change in ("median →", "Div → Mult", "ptp → max", "2 → 3", "1.0 → 10.0")
     ),
     Explained("dampers.covariance", "error = moved + ", "Add → Sub", "a draw is as likely the other way"),
     Explained("systems.inverse", "rises = np.where(", "0 → 1", "the current next to the lowest"),
@@ -261,7 +263,7 @@ def reason(fault: Fault) -> str:
         if (
             module in fault.module
             and line in fault.text
-            and (change in fault.change or change == f"{fault.change}: {fault.of}")
+            and (f" {change}" in f" {fault.change}" or change == f"{fault.change}: {fault.of}")
         ):
             return why
     return ""
