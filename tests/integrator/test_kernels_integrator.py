@@ -50,11 +50,11 @@ def tolerances_agree(model, rate, parameters, scale):
 @pytest.mark.parametrize("values", LUGRE, ids=lambda v: "-".join(f"{x:.0e}" for x in v.values()))
 def test_lugre_at_the_corners_does_not_depend_on_the_tolerance(values):
     model = LuGre.build({**values, "fc": 1e3, "sigma1": 0.0, "sigma2": 100.0})
-    tolerances_agree(model, bristle_rate, [values["presliding"], values["stribeck"], values["vs"]], [1.0])
+    tolerances_agree(model, bristle_rate, [1 / values["presliding"], values["stribeck"], 1 / values["vs"]], [1.0])
 
 
 @pytest.mark.parametrize("values", SPENCER, ids=lambda v: "-".join(f"{x:.0e}" for x in v.values()))
 def test_spencer_at_the_corners_does_not_depend_on_the_tolerance(values):
     length = values["yield_displacement"]
-    parameters = [values["c0_ratio"], values["k0_rate"], values["creep"], 1 / length, 0.0, 2.0]
+    parameters = [1 / (1 + values["c0_ratio"]), values["k0_rate"], values["creep"], 1 / length, 0.0, 2.0]
     tolerances_agree(Spencer.build({**values, "c1": 1e4}), series_rate, parameters, [length, 1.0])

@@ -83,7 +83,7 @@ class LuGre(Model):
     def state(self, motion: Excitation) -> Floats:
         """(N,) u, the deflection of the bristles over that while sliding, from 0."""
         channels = (motion.time, motion.displacement, motion.velocity, motion.current)
-        shape = (self.presliding, self.stribeck, self.vs)
+        shape = (1 / self.presliding, self.stribeck, 1 / self.vs)
         return integrate(bristle_rate, shape, channels, (0.0,), (1.0,))[:, 0]
 
     def force(self, motion: Excitation, state: Floats) -> Floats:
@@ -106,6 +106,6 @@ class LuGre(Model):
 
 
 def bristle_rate(x: float, v: float, current: float, state: Floats, p: Floats, out: Floats) -> None:
-    """du/dt for p = (z_c, s, v_s)."""
-    onset = 1 + (p[1] - 1) * np.exp(-((v / p[2]) ** 2))
-    out[0] = (v - abs(v) * state[0] / onset) / p[0]
+    """du/dt for p = (1/z_c, s, 1/v_s)."""
+    onset = 1 + (p[1] - 1) * np.exp(-((v * p[2]) ** 2))
+    out[0] = (v - abs(v) * state[0] / onset) * p[0]

@@ -67,9 +67,10 @@ def _along(
     picked: NDArray[np.intp] | None = None,
 ) -> Floats | None:
     """(K, N) outputs of a program of the model along a motion."""
-    kind: type = model.__class__
+    kind: Any = model.__class__
     values = model.values()
-    if len(motion) < _MIN_COMPILED_SAMPLES or not all(isinstance(value, float | int) for value in values.values()):
+    short = len(motion) < _MIN_COMPILED_SAMPLES and not kind.integrated
+    if short or not all(isinstance(value, float | int) for value in values.values()):
         return None
 
     def traced(tape: Tape, free: Mapping[str, Any], inputs: Sequence[Any]) -> Mapping[str, Any]:

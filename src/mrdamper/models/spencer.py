@@ -167,7 +167,8 @@ class Spencer(Model):
     def state(self, motion: Excitation) -> Floats:
         """(N, 2): r = x − y [m] and z/z_max, from 0."""
         channels = (motion.time, motion.displacement, motion.velocity, motion.current)
-        shape = (self.c0_ratio, self.k0_rate, self.creep, 1 / self.yield_displacement, self.asymmetry, self.n)
+        share = 1 / (1 + self.c0_ratio)
+        shape = (share, self.k0_rate, self.creep, 1 / self.yield_displacement, self.asymmetry, self.n)
         return integrate(series_rate, shape, channels, (0.0, 0.0), (self.yield_displacement, 1.0))
 
     def force(self, motion: Excitation, state: Floats) -> Floats:
@@ -222,9 +223,9 @@ class Spencer(Model):
 
 
 def series_rate(x: float, v: float, current: float, state: Floats, p: Floats, out: Floats) -> None:
-    """d(r, zeta)/dt for p = (c0/c1, k0/c1, creep, 1/yield displacement, asymmetry, n)."""
+    """d(r, zeta)/dt for p = (c1/(c0 + c1), k0/c1, creep, 1/yield displacement, asymmetry, n)."""
     zeta = state[1]
-    slip = (v - p[2] * zeta - p[1] * state[0]) / (1 + p[0])
-    grip = abs(zeta) ** p[5]
+    slip = (v - p[2] * zeta - p[1] * state[0]) * p[0]
+    grip = zeta * zeta if p[5] == 2 else abs(zeta) ** p[5]
     out[0] = slip
-    out[1] = p[3] * (slip * (1 - 0.5 * (1 + p[4]) * grip) - 0.5 * (1 - p[4]) * abs(slip) * np.sign(zeta) * grip)
+    out[1] = p[3] * (slip - grip * (0.5 * (1 + p[4]) * slip + 0.5 * (1 - p[4]) * abs(slip) * np.sign(zeta)))

@@ -91,13 +91,12 @@ class ProgramCopy:
             return copies[id(part)] if isinstance(part, Expression) else part
 
         if isinstance(node, TracedLoop):
-            loop = loops.setdefault(id(node), TracedLoop((), node.most))
+            loop = loops.setdefault(id(node), TracedLoop((), node.most, node.still))
             loop.start, loop.updates = tuple(map(of, node.start)), tuple(map(of, node.updates))
             loop.going = of(node.going)
-            loop.carries = tuple(Expression(self.tape, "carry", (loop, i), SAMPLE) for i in range(len(node.start)))
             return loop
         if node.op == "carry":
-            loop = loops.setdefault(id(node.args[0]), TracedLoop((), node.args[0].most))
+            loop = loops.setdefault(id(node.args[0]), TracedLoop((), node.args[0].most, node.args[0].still))
             return Expression(self.tape, "carry", (loop, node.args[1]), SAMPLE)
         if node.op == "result":
             return Expression(self.tape, "result", (copies[id(node.args[0])], node.args[1]), SAMPLE)

@@ -1,7 +1,8 @@
 """Forward tangents: derivatives of a traced program along some of its parameters, in the same pass.
 
 Every operation on the tape is followed by its derivative, and every memory that depends on a parameter has a
-derivative that is remembered beside it. Where a function has a corner the derivative is that of the branch taken.
+derivative that is remembered beside it; so has what a loop carries, but for what its steps are measured by. Where a
+function has a corner the derivative is that of the branch taken.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.tracing.expression import Expression, TraceError
+from mrdamper.tracing.expression import SAMPLE, Expression, TraceError
 from mrdamper.tracing.program import postorder
 from mrdamper.tracing.tape import Tape, TracedLoop
 
@@ -29,29 +30,36 @@ _BY_ARGUMENT: Mapping[str, Callable[[Any, Any], Any]] = {
     "arctanh": lambda a, y: 1.0 / (1.0 - a * a),
 }
 _FLAT = frozenset({"sign", "input"})
+_TINY = 1e-300
 
 
 def with_tangents(tape: Tape, output: Any, along: Sequence[str]) -> dict[str, Any]:
     """Write the derivatives of an output by parameters on its tape; all of them by name, the output first.
 
-    Raises
-    ------
-    TraceError
-        If an operation has no derivative here: loops and tables.
+    Loops carry the derivatives of what they carry. Raises `TraceError` if an operation has no derivative here: tables.
     """
-    every = postorder([output, *tape.updates.values()])
-    if any(isinstance(node, TracedLoop) for node in every):
-        raise TraceError("a loop has no derivative here")
-    nodes = [node for node in every if not node.logical]
+    nodes = postorder([output, *tape.updates.values()])
     updates = dict(tape.updates)
+    loops = {id(node): (node.start, node.updates) for node in nodes if isinstance(node, TracedLoop)}
     outputs = {"value": output}
     for name in along:
-        moving = _moving(nodes, updates, name)
+        moving = _moving(nodes, updates, loops, name)
         slopes: dict[int, Any] = {id(tape.parameters[name]): 1.0}
         held = {m: tape.remember(f"{m}_by_{name}") for m, value in updates.items() if id(value) in moving}
         slopes |= {id(tape.memory[m]): slope for m, slope in held.items()}
+        opened: dict[int, dict[int, int]] = {}  # by loop: where the derivative of what is carried at a place is carried
         for node in nodes:
-            if id(node) in moving and id(node) not in slopes:
+            if isinstance(node, TracedLoop):
+                _, after = loops[id(node)]
+                node.updates = (*node.updates, *(slopes.get(id(after[i]), 0.0) for i in opened.get(id(node), ())))
+            elif id(node) not in moving or id(node) in slopes:
+                continue
+            elif node.op in ("carry", "result"):
+                loop, place = node.args
+                if id(loop) not in opened:
+                    opened[id(loop)] = _open(loop, *loops[id(loop)], moving, slopes)
+                slopes[id(node)] = Expression(tape, node.op, (loop, opened[id(loop)][place]), SAMPLE)
+            else:
                 slopes[id(node)] = _slope(tape, node, slopes)
         for memory, slope in held.items():
             tape.update(slope, slopes[id(updates[memory])])
@@ -59,19 +67,50 @@ def with_tangents(tape: Tape, output: Any, along: Sequence[str]) -> dict[str, An
     return outputs
 
 
-def _moving(nodes: Sequence[Expression], updates: Mapping[str, Any], name: str) -> set[int]:
-    """Expressions that depend on a parameter, through memory too."""
+def derivatives(tape: Tape, values: Sequence[Any], by: Any) -> list[Any]:
+    """Write the derivatives of values by one expression they are computed from, what is between them alone."""
+    slopes: dict[int, Any] = {id(by): 1.0}
+    for node in postorder(list(values)):
+        differs = isinstance(node, Expression) and not node.logical and node.op not in _FLAT
+        if differs and id(node) not in slopes and any(id(part) in slopes for part in node.args):
+            slopes[id(node)] = _slope(tape, node, slopes)
+    return [slopes.get(id(value), 0.0) for value in values]
+
+
+def _moving(
+    nodes: Sequence[Any],
+    updates: Mapping[str, Any],
+    loops: Mapping[int, tuple[Sequence[Any], Sequence[Any]]],
+    name: str,
+) -> set[int]:
+    """Expressions that depend on a parameter, through memory and loops too."""
     moving: set[int] = set()
-    remembered: set[str] = set()
-    while True:
-        for node in nodes:
-            depends = node.name == name if node.op == "parameter" else node.op == "memory" and node.name in remembered
-            if depends or (node.op not in _FLAT and any(id(part) in moving for part in node.args)):
-                moving.add(id(node))
-        now = {memory for memory, value in updates.items() if id(value) in moving}
-        if now == remembered:
-            return moving
-        remembered = now
+
+    def depends(node: Expression) -> bool:
+        if node.op == "parameter":
+            return node.name == name
+        if node.op == "memory":
+            return id(updates.get(node.name)) in moving
+        if node.op in ("carry", "result"):
+            loop, place = node.args
+            return place >= loop.still and any(id(values[place]) in moving for values in loops[id(loop)])
+        return not node.logical and node.op not in _FLAT and any(id(part) in moving for part in node.args)
+
+    before = -1
+    while len(moving) > before:
+        before = len(moving)
+        moving |= {id(node) for node in nodes if isinstance(node, Expression) and depends(node)}
+    return moving
+
+
+def _open(
+    loop: TracedLoop, start: Sequence[Any], updates: Sequence[Any], moving: set[int], slopes: Mapping[int, Any]
+) -> dict[int, int]:
+    """Let a loop carry derivatives, from those of its start; their places by the places of what is carried."""
+    moved = [i for i in range(loop.still, len(start)) if {id(start[i]), id(updates[i])} & moving]
+    places = {place: len(loop.start) + k for k, place in enumerate(moved)}
+    loop.start = (*loop.start, *(slopes.get(id(start[i]), 0.0) for i in moved))
+    return places
 
 
 def _slope(tape: Tape, node: Expression, slopes: Mapping[int, Any]) -> Any:
@@ -99,8 +138,9 @@ def _slope(tape: Tape, node: Expression, slopes: Mapping[int, Any]) -> Any:
     if node.op == "maximum":
         return tape.select(a > b, da, db)
     if node.op == "power":
-        by_exponent = _times(db, node * np.log(a)) if isinstance(b, Expression) else 0.0
-        return _plus(_times(da, node * b / a), by_exponent)
+        positive = np.maximum(a, _TINY)  # of a power of zero they are zero
+        by_exponent = _times(db, node * np.log(positive)) if isinstance(b, Expression) else 0.0
+        return _plus(_times(da, node * b / positive), by_exponent)
     raise TraceError(f"{node.op} has no derivative here")
 
 

@@ -39,11 +39,13 @@ class LookupTable(Protocol):
 
 
 class TracedLoop:
-    """A bounded repetition: carried values change until the condition fails."""
+    """A bounded repetition: carried values change until the condition fails.
 
-    def __init__(self, start: Sequence[Any], most: int):
-        self.start, self.most = tuple(start), most
-        self.carries: tuple[Expression, ...] = ()
+    The first `still` of them measure its steps and have no derivative: a step of given size is differentiated.
+    """
+
+    def __init__(self, start: Sequence[Any], most: int, still: int = 0):
+        self.start, self.most, self.still = tuple(start), most, still
         self.going: Any = None
         self.updates: tuple[Any, ...] = ()
 
@@ -155,11 +157,11 @@ class Tape:
         start: Sequence[Any],
         body: Callable[..., tuple[Any, Sequence[Any]]],
         most: int,
+        still: int = 0,
     ) -> tuple[Expression, ...]:
         """Do `body(*carried) -> (whether to go on, new values)`, and again, at most so often."""
-        loop = TracedLoop([plain(value) for value in start], most)
-        loop.carries = tuple(Expression(self, "carry", (loop, i), SAMPLE) for i in range(len(loop.start)))
-        loop.going, updates = body(*loop.carries)
+        loop = TracedLoop([plain(value) for value in start], most, still)
+        loop.going, updates = body(*(Expression(self, "carry", (loop, i), SAMPLE) for i in range(len(loop.start))))
         loop.updates = tuple(plain(value) for value in updates)
         return tuple(Expression(self, "result", (loop, i), SAMPLE) for i in range(len(loop.start)))
 

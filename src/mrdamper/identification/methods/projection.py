@@ -2,7 +2,8 @@
 
 Given the internal state, the force is linear in most parameters. They are eliminated by
 least squares inside the search, so what is left is one to three well-scaled coordinates:
-a coarse grid, then Levenberg–Marquardt. Golub and Pereyra (1973), SIAM J. Numer. Anal. 10.
+a coarse grid, then Levenberg–Marquardt. Golub and Pereyra (1973), SIAM J. Numer. Anal. 10;
+Kaufman (1975), BIT 15, 49–57.
 """
 
 from __future__ import annotations
@@ -22,17 +23,19 @@ from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.elimination import Elimination
 from mrdamper.identification.problem import DELAY, DELAY_LIMIT, Method, Problem, Solution
 from mrdamper.models import Model, Scale, SearchAxis
+from mrdamper.models.recorded import force_tangents
 from mrdamper.physics.hysteresis import Shape
 from mrdamper.physics.hysteresis.batch import batch_cost
 from mrdamper.physics.motion import Path
-from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares
-from mrdamper.statistics.linear import on_one_blas_thread, solve_bounded
+from mrdamper.statistics.levenberg_marquardt import Minimum, forward_differences, least_squares
+from mrdamper.statistics.linear import on_one_blas_thread, project_out_columns, solve_bounded
 from mrdamper.statistics.scalar_least_squares import least_squares_in_one
 from mrdamper.statistics.stop_reason import StopReason
 
 _GRID_SAMPLES = 1500  # the grid only has to find the valley
 _GRID_SAMPLES_A_CYCLE, _GRID_CYCLES = 100, 3  # where all shapes are tried at once
 _LONG_RECORD_SAMPLES = 40_000  # samples from which the search of a model that is stepped is rehearsed on a piece
+_MAX_TANGENT_STEPS = 100  # steps of a refinement by exact slopes, whose cost falls to its end
 _PIECE_CYCLES, _PIECE_SAMPLES_A_CYCLE = 5, 500
 
 
@@ -90,6 +93,7 @@ class Projected:
     model: Model
     residual: Floats
     at_bounds: tuple[str, ...]
+    columns: Floats  # (N, L) of the linear parameters that are not at a bound
 
 
 def _project(problem: Problem, point: Mapping[str, float], thin: int = 1) -> Projected:
@@ -107,9 +111,8 @@ def _project(problem: Problem, point: Mapping[str, float], thin: int = 1) -> Pro
     solution, held = solve_bounded(columns, measured - base, *bounds_of(linear))
     names = [i.name for i in linear]
     model = replace(bare, **{name: float(s) for name, s in zip(names, solution, strict=True)})
-    return Projected(
-        model, base + columns @ solution - measured, tuple(n for n, h in zip(names, held, strict=True) if h)
-    )
+    at_bounds = tuple(n for n, h in zip(names, held, strict=True) if h)
+    return Projected(model, base + columns @ solution - measured, at_bounds, columns[:, ~np.asarray(held, dtype=bool)])
 
 
 def search_axes(problem: Problem) -> tuple[SearchAxis, ...]:
@@ -124,6 +127,7 @@ def search_axes(problem: Problem) -> tuple[SearchAxis, ...]:
 
 def _refined(problem: Problem, axes: tuple[SearchAxis, ...], elimination: Elimination | None, start: Floats) -> Minimum:
     """Minimum next to a start point, the linear parameters eliminated."""
+    names = [axis.name for axis in axes]
     lower = np.array([axis.coordinate(axis.lower) for axis in axes])
     upper = np.array([axis.coordinate(axis.upper) for axis in axes])
     shaped = elimination is not None and elimination.kind.has_shape
@@ -133,12 +137,40 @@ def _refined(problem: Problem, axes: tuple[SearchAxis, ...], elimination: Elimin
         if quick is not None:
             return quick
 
+    if problem.model_type.integrated and DELAY not in names:
+        return _refined_by_tangents(problem, axes, start, lower, upper)
+
     def residual(u: Floats) -> Floats:
         point = _point(axes, u)
         fit = elimination.residual(point) if elimination else None
         return _project(problem, point).residual if fit is None else fit
 
     return least_squares(residual, start, lower, upper, curved=shaped)
+
+
+def _refined_by_tangents(
+    problem: Problem, axes: tuple[SearchAxis, ...], start: Floats, lower: Floats, upper: Floats
+) -> Minimum:
+    """Minimum of a model whose state is integrated: differences would be those of its steps, too."""
+    names = tuple(axis.name for axis in axes)
+    picked = np.arange(len(problem.motion))[problem.scored]
+    latest: dict[bytes, Projected] = {}
+
+    def residual(u: Floats) -> Floats:
+        latest.clear()
+        latest[u.tobytes()] = _project(problem, _point(axes, u))
+        return latest[u.tobytes()].residual
+
+    def slopes(u: Floats) -> Floats:
+        """Slopes of the projected residual but for those along the columns [Kaufman 1975]."""
+        at = latest.get(u.tobytes()) or _project(problem, _point(axes, u))
+        tangents = force_tangents(at.model, problem.motion, names, picked)
+        if tangents is None:
+            return forward_differences(residual, u, at.residual, lower, upper)
+        factors = [getattr(at.model, axis.name) if axis.log else 1.0 for axis in axes]
+        return project_out_columns(at.columns, tangents[1:].T * factors)
+
+    return least_squares(residual, start, lower, upper, _MAX_TANGENT_STEPS, slopes=slopes)
 
 
 def _best_of_grid(

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from mrdamper.tracing import Tape
+from mrdamper.tracing.tangent import derivatives
 
 Rate = Callable[[Any, Any, Any, Any, Any, Any], None]
 MOST_STEPS = 400  # between two samples; a sound model takes a handful
-_STATE_DIFFERENCE, _TIME_DIFFERENCE = 1e-7, 1e-5  # for derivatives by differences
+_AHEAD = 1e-5  # of a step, for the derivative by time
 
 
 class _Columns(list[Any]):
@@ -59,7 +60,7 @@ def integrate_step(
         next_share = np.minimum(tape.select(worst < 1e9, h * factor, h * 0.1) / width, 1.0)
         return after < width * (1 - 1e-12), [after, next_share, *kept]
 
-    walked, share, *reached = tape.loop([0.0, tape.apply("maximum", size, 1e-3), *held], advance, most)
+    walked, share, *reached = tape.loop([0.0, tape.apply("maximum", size, 1e-3), *held], advance, most, still=2)
     later = [tape.select(tape.first, h, r) for h, r in zip(held, reached, strict=True)]
     for memory, value in zip((*held, size), (*later, tape.select(tape.first, size, share)), strict=True):
         tape.update(memory, value)
@@ -70,12 +71,13 @@ def integrate_step(
 def _between(ends: Sequence[tuple[Any, Any]], width: Any) -> Callable[[Any], tuple[Any, Any, Any]]:
     """Displacement, velocity and current between two samples: a cubic, its slope, a straight line."""
     (x0, x1), (v0, v1), (i0, i1) = ends
-    mean = (x1 - x0) / width
+    rate = 1 / width
+    mean = (x1 - x0) * rate
     square, cube = 3 * mean - 2 * v0 - v1, v0 + v1 - 2 * mean
 
     def at(t: Any) -> tuple[Any, Any, Any]:
-        s = t / width
-        x = x0 + width * s * (v0 + s * (square + s * cube))
+        s = t * rate
+        x = x0 + t * (v0 + s * (square + s * cube))
         return x, v0 + s * (2 * square + 3 * s * cube), i0 + s * (i1 - i0)
 
     return at
@@ -92,50 +94,47 @@ def _rodas3(
 ) -> tuple[list[Any], Any]:
     """One step, and its error over the tolerance. [Sandu et al. 1997]
 
-    Derivatives by differences: small errors in them cost Rodas3 accuracy, not stability. A step may not change
-    a state by more than itself: the method would else step over a pole.
+    A step may not change a state by more than itself: the method would else step over a pole. The derivative by time
+    looks ahead, for a step often begins where the velocity, and with it a rate, turns.
     """
     order = range(len(y))
-    sizes = [np.maximum(abs(y[j]), scale[j]) for j in order]
     f = slopes(t, y)
-    columns: list[list[Any]] = []
-    for j in order:
-        nudge = _STATE_DIFFERENCE * sizes[j]
-        moved = slopes(t, [y[i] + nudge if i == j else y[i] for i in order])
-        columns.append([(moved[i] - f[i]) / nudge for i in order])
-    later = slopes(t + _TIME_DIFFERENCE * h, y)
-    slope = [(later[i] - f[i]) / _TIME_DIFFERENCE for i in order]
-    solve = _solver([[columns[j][i] for j in order] for i in order], h)
+    columns = [derivatives(tape, f, state) for state in y]
+    later = slopes(t + _AHEAD * h, y)
+    slope = [(later[i] - f[i]) * (1 / _AHEAD) for i in order]
+    rate = 1 / h
+    solve = _solver([[column[i] for column in columns] for i in order], rate)
     k0 = solve([f[i] + 0.5 * slope[i] for i in order])
-    k1 = solve([f[i] + 4 / h * k0[i] + 1.5 * slope[i] for i in order])
+    k1 = solve([f[i] + 4 * rate * k0[i] + 1.5 * slope[i] for i in order])
     here = [y[i] + 2 * k0[i] for i in order]
     f2 = slopes(t + h, here)
-    k2 = solve([f2[i] + (k0[i] - k1[i]) / h for i in order])
+    k2 = solve([f2[i] + (k0[i] - k1[i]) * rate for i in order])
     here = [here[i] + k2[i] for i in order]
     f3 = slopes(t + h, here)
-    k3 = solve([f3[i] + (k0[i] - k1[i] - 8 / 3 * k2[i]) / h for i in order])
+    k3 = solve([f3[i] + (k0[i] - k1[i] - 8 / 3 * k2[i]) * rate for i in order])
     new = [here[i] + k3[i] for i in order]
     worst: Any = 0.0
     for i in order:
-        error = np.maximum(abs(k3[i]) / (tolerance * sizes[i]), abs(new[i] - y[i]) / sizes[i])
+        size = 1 / np.maximum(abs(y[i]), scale[i])
+        error = np.maximum(abs(k3[i]) * (1 / tolerance), abs(new[i] - y[i])) * size
         worst = error if isinstance(worst, float) else np.maximum(worst, error)
     # A number that is none compares false: such a step is never good.
     return new, worst
 
 
-def _solver(jacobian: list[list[Any]], h: Any) -> Callable[[list[Any]], list[Any]]:
-    """Solutions of (2/h − J) k = right, by Cramer's rule: models have few states."""
+def _solver(jacobian: list[list[Any]], rate: Any) -> Callable[[list[Any]], list[Any]]:
+    """Solutions of (2 rate − J) k = right, by Cramer's rule: models have few states."""
     size = len(jacobian)
+    matrix = [[2 * rate - value if i == j else -value for j, value in enumerate(row)] for i, row in enumerate(jacobian)]
     if size == 1:
-        pivot = 2 / h - jacobian[0][0]
-        return lambda right: [right[0] / pivot]
-    matrix = [[2 / h - value if i == j else -value for j, value in enumerate(row)] for i, row in enumerate(jacobian)]
+        inverse = 1 / matrix[0][0]
+        return lambda right: [right[0] * inverse]
     order = tuple(range(size))
     cofactors = [
         [(-1) ** (i + j) * _determinant(matrix, _without(order, i), _without(order, j)) for j in order] for i in order
     ]
-    determinant = _sum([matrix[0][j] * cofactors[0][j] for j in order])
-    return lambda right: [_sum([cofactors[i][j] * right[i] for i in order]) / determinant for j in order]
+    inverse = 1 / _sum([matrix[0][j] * cofactors[0][j] for j in order])
+    return lambda right: [_sum([cofactors[i][j] * right[i] for i in order]) * inverse for j in order]
 
 
 def _determinant(matrix: list[list[Any]], rows: tuple[int, ...], columns: tuple[int, ...]) -> Any:
