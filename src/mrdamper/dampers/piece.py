@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,13 +11,14 @@ from numpy.typing import NDArray
 
 from mrdamper.data import Condition, Floats, Run, index_at
 from mrdamper.models import Model
-from mrdamper.models.recorded import CHANNELS, channels, compiled_outputs, traced_motion
+from mrdamper.models.recorded import CHANNELS, channel, compiled_outputs, traced_motion
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.sines import centred_motion, equivalent_sine
 from mrdamper.tracing import Tape
 from mrdamper.tracing.tangent import with_tangents
 
 _REFERENCE = ("I_r", "f_r", "A_r")  # names of a reference condition among the numbers of a damper
+_SINE = {"current": "current_A", "frequency": "frequency_Hz", "amplitude": "amplitude_m"}  # inputs that a sine gives
 _SAMPLES = 150  # a cycle
 
 
@@ -72,6 +72,7 @@ class Pieces:
             [rows + at for rows, at in zip(scored, self.begins, strict=True)]
         )
         self.force = np.concatenate([piece.force for piece in self.pieces])
+        self._channels: dict[str, Floats] = {}
         self.scale = np.repeat([piece.scale for piece in self.pieces], [rows.size for rows in scored])
 
     def residual(self, damper: Any) -> Floats:
@@ -96,14 +97,26 @@ class Pieces:
             return with_tangents(tape, model.force(along, model.state(along)), names)
 
         kind: type = damper.__class__
-        return compiled_outputs((kind, names), damper.numbers, traced, self._inputs, self.picked, self.begins)
+        return compiled_outputs(
+            (kind, names),
+            damper.numbers,
+            traced,
+            tuple(dict.fromkeys((*CHANNELS, *_SINE))),
+            self._channel,
+            self.picked,
+            self.begins,
+        )
 
-    @cached_property
-    def _inputs(self) -> Mapping[str, Floats]:
-        """Channels of the motions, and the sine each of them is."""
-        motions = zip(*(channels(piece.motion) for piece in self.pieces), strict=True)
-        current, frequency, amplitude = np.repeat(
-            [astuple(piece.condition) for piece in self.pieces], [len(piece.motion) for piece in self.pieces], axis=0
-        ).T.copy()
-        inputs = dict(zip(CHANNELS, map(np.concatenate, motions), strict=True))
-        return inputs | {"current": current, "frequency": frequency, "amplitude": amplitude}
+    def _channel(self, name: str) -> Floats:
+        """(N,) channel of the motions, or of the sine each of them is."""
+        if name not in self._channels:
+            sine = _SINE.get(name)
+            self._channels[name] = np.concatenate(
+                [
+                    channel(piece.motion, name)
+                    if sine is None
+                    else np.full(len(piece.motion), getattr(piece.condition, sine))
+                    for piece in self.pieces
+                ]
+            )
+        return self._channels[name]

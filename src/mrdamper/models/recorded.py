@@ -15,9 +15,11 @@ from mrdamper.physics.motion.path import memoize_per_path
 from mrdamper.physics.motion.traced import TracedMotion, TracedStep
 from mrdamper.tracing import Tape, TraceError, program
 from mrdamper.tracing.compiled.record import RecordProgram
+from mrdamper.tracing.program import postorder
 from mrdamper.tracing.tangent import with_tangents
 
-CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", "turn", "turn_back", "move")
+_MOVES = ("turn", "turn_back", "move")
+CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", *_MOVES)
 S = TypeVar("S", bound=Callable[..., Floats])
 _MIN_COMPILED_SAMPLES = 2_000  # samples of a motion, from which compiled code is used; never the history of the process
 
@@ -76,14 +78,15 @@ def _along(
     def traced(tape: Tape, free: Mapping[str, Any], inputs: Sequence[Any]) -> Mapping[str, Any]:
         return outputs(kind(**free), traced_motion(tape, inputs), tape)
 
-    return compiled_outputs((kind, names), values, traced, dict(zip(CHANNELS, channels(motion), strict=True)), picked)
+    return compiled_outputs((kind, names), values, traced, CHANNELS, lambda name: channel(motion, name), picked)
 
 
 def compiled_outputs(
     key: tuple[type, tuple[str, ...] | None],
     values: Mapping[str, float],
     traced: Callable[[Tape, Mapping[str, Any], Sequence[Any]], Mapping[str, Any]],
-    inputs: Mapping[str, Floats],
+    inputs: Sequence[str],
+    channel: Callable[[str], Floats],
     picked: NDArray[np.intp] | None = None,
     begins: NDArray[np.intp] | None = None,
 ) -> Floats | None:
@@ -97,7 +100,9 @@ def compiled_outputs(
         Parameters.
     traced : function (tape, parameters, inputs)
         Writes the outputs at one sample.
-    inputs : mapping of str to (N,) array
+    inputs : sequence of str
+    channel : function (name)
+        (N,) array of an input; asked for what the program reads alone.
     picked, begins : arrays of int, optional
         Samples whose outputs are wanted, and those at which the memory starts anew.
     """
@@ -113,23 +118,33 @@ def compiled_outputs(
         symbols = [tape.input(name) for name in inputs]
         free = {name: tape.parameter(name, value) for name, value in values.items()}
         try:
-            record = RecordProgram(program(tape, traced(tape, free, symbols)))
+            record = RecordProgram(program(tape, _without_unread(tape, traced(tape, free, symbols))))
         except TraceError:
             if key[1] is None:
                 raise
             return None
         derived = record.prepare(given)
         programs.append(record)
-    arrays = tuple(inputs.values())
+    arrays = [channel(name) for name in record.program.tape.inputs]
     result = derived is not None and record.compiled_along(given, derived, record.starts, arrays, picked, begins)
     return result.outputs if result and result.failed < 0 else None
 
 
-def channels(motion: Excitation) -> tuple[Floats, ...]:
-    """Name the inputs of a program that follows a motion: its channels, the time steps and the moves of its path."""
-    steps = _steps(motion.time)
-    arrays = (motion.displacement, motion.velocity, motion.acceleration, motion.current)
-    return (*arrays, steps, *motion.path.moves)
+def _without_unread(tape: Tape, outputs: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the outputs, and take the inputs off the tape that nothing reads; the first stays and gives the length."""
+    questions = [question for question, _ in tape.guards]
+    read = {id(node) for node in postorder([*outputs.values(), *tape.updates.values(), *questions])}
+    for place, (name, symbol) in enumerate([*tape.inputs.items()]):
+        if place and id(symbol) not in read:
+            del tape.inputs[name]
+    return outputs
+
+
+def channel(motion: Excitation, name: str) -> Floats:
+    """Return an input of a program that follows a motion: a channel, the time steps, or the moves of its path."""
+    if name == "dt":
+        return _steps(motion.time)
+    return motion.path.moves[_MOVES.index(name)] if name in _MOVES else getattr(motion, name)
 
 
 @memoize_per_path

@@ -28,7 +28,7 @@ _DAY = 86_400.0  # s
 _GIVEN_UP = 3_600.0  # s for which a compiler that failed is not tried again
 _KEY = "mrdamper_source"  # name of the constant by which a library says what it was made of
 
-_loaded: dict[str, ctypes.CDLL] = {}
+_loaded: dict[tuple[str, str], ctypes.CDLL] = {}  # by compiler and source
 _unusable: dict[str, str] = {}  # by compiler: why it was given up in this process
 
 
@@ -57,13 +57,14 @@ def load(source: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | Non
     compiler = find_compiler()
     if compiler is None:
         return None
-    key = hashlib.sha256((compiler.identity + source).encode()).hexdigest()[:32]
-    if key not in _loaded:
+    made_of = (compiler.identity, source)
+    if made_of not in _loaded:
+        key = hashlib.sha256((compiler.identity + source).encode()).hexdigest()[:32]
         library = _kept(key) or _compiled(compiler, key, source, holds)
         if library is None:
             return None
-        _loaded[key] = library
-    return _loaded[key]
+        _loaded[made_of] = library
+    return _loaded[made_of]
 
 
 def unusable_reason() -> str:
