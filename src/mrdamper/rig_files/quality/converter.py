@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mrdamper.data import Floats
 from mrdamper.rig_files.quality.cycles import steady_cycles
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
@@ -21,6 +22,7 @@ _SHORT_LINE = 2  # samples: shorter ones are the two sides of a bend between sam
 _LEAP, _STANDS_OUT = 0.02, 6.0  # of the peak-to-peak force; times the steps around it
 _FAST = 0.3  # of the peak velocity: slower, friction makes a force leap
 _LEAPS, _LEAPS_A_CYCLE = 6, 2.0  # at least; bundled rigs reach 0.5 a cycle
+_EDGE = 0.05  # of two bands: what samples leave of the band between skipped ones
 _AROUND = (-4, -3, -2, 2, 3, 4)  # samples
 
 
@@ -74,25 +76,56 @@ def is_not_stored_on_change(view: View) -> Iterator[Finding]:
 
 
 def no_bit_is_stuck(view: View) -> Iterator[Finding]:
-    """Report a force that leaps in full motion, several times a cycle: levels of its converter are skipped."""
+    """Report a force that skips levels which it crosses in full motion, or leaves its course for single samples."""
     cycles = steady_cycles(view)
     if cycles is None or view.noticed("W_FROZEN", "W_CLIPPED", "W_NOISE", "W_HELD"):
         return
-    steps = np.abs(np.diff(view.steady.force))
-    if float(np.max(steps)) < _LEAP * cycles.force.span:
+    force, least = view.steady.force, _LEAP * cycles.force.span
+    if not np.any(np.abs(np.diff(force)) >= least):
         return
+    levels = np.unique(force)
+    width = _every_second_band(levels, least) or _crossed_in_motion(view, levels, least, len(cycles.starts))
+    if width:
+        yield Finding(
+            "W_COARSE",
+            f"the force leaps by about {width:.3g} N in full motion, over levels that no sample has or for a single "
+            "sample: a bit of its converter is stuck or flips",
+        )
+
+
+def _every_second_band(levels: Floats, least: float) -> float:
+    """Width of the bands of equal width and spacing in which no level lies, while levels fill those between [N]."""
+    wide = np.flatnonzero(np.diff(levels) > least)
+    if wide.size < 2:
+        return 0.0
+    middles = 0.5 * (levels[wide] + levels[wide + 1])
+    period = float(np.median(np.diff(middles)))
+    phases = np.sort((levels - middles[0]) / period % 1)
+    low, high = phases[0], 1 - phases[-1]
+    even = max(abs(low - 0.25), abs(high - 0.25)) < _EDGE and float(np.max(np.diff(phases))) < _EDGE
+    return 0.5 * period if even else 0.0
+
+
+def _crossed_in_motion(view: View, levels: Floats, least: float, cycles: int) -> float:
+    """Median leap of the force in full motion over bands without a level, or for one sample [N]; 0 for few of them."""
+    force = view.steady.force
+    changes = np.diff(force)
+    steps = np.abs(changes)
     start, stop = view.strokes.steady or (0, view.run.time.size)
     velocity = view.moving.velocity[start:stop][1:]
     around = np.max([np.roll(steps, shift) for shift in _AROUND], axis=0)
-    at = np.flatnonzero((steps > _STANDS_OUT * around) & (steps > _LEAP * cycles.force.span))
+    at = np.flatnonzero((steps > _STANDS_OUT * around) & (steps > least))
     beside = velocity[np.clip(at[:, None] + np.arange(-4, 5), 0, velocity.size - 1)]  # a reversal is not near
     limit = _FAST * float(np.max(np.abs(velocity)))
-    leaps = at[(np.min(beside, axis=1) > limit) | (np.max(beside, axis=1) < -limit)]
-    count = leaps.size
-    if count >= max(_LEAPS, _LEAPS_A_CYCLE * len(cycles.starts)):
-        size = float(np.median(steps[leaps]))
-        yield Finding(
-            "W_COARSE",
-            f"the force leaps by about {size:.3g} N in full motion, {count} times: a bit of its converter is stuck, "
-            "or ranges are switched",
-        )
+    at = at[(np.min(beside, axis=1) > limit) | (np.max(beside, axis=1) < -limit)]
+    middles, size = 0.5 * (force[at] + force[at + 1]), steps[at]
+
+    def skipped(place: float) -> np.ndarray:
+        """Where no level lies within a quarter of the leap's size of a place, in sizes from its middle."""
+        ends = (np.searchsorted(levels, middles + (place + side) * size) for side in (-0.25, 0.25))
+        return np.equal(*ends)
+
+    returns = [np.abs(changes[at] + np.roll(changes, shift)[at]) < 0.25 * size for shift in (-1, 1)]
+    # Over a band, from the edge of one to that of the next, or to a sample and back; a damper's own leap is none.
+    leaps = size[skipped(0) | (skipped(-1) & skipped(1)) | returns[0] | returns[1]]
+    return float(np.median(leaps)) if leaps.size >= max(_LEAPS, _LEAPS_A_CYCLE * cycles) else 0.0
