@@ -141,6 +141,56 @@ def test_a_clean_element_of_any_yield_displacement_is_not_late(bend):
     assert lag is None or not lag.is_clear
 
 
+def jumping(jump, at):
+    """A viscous force beside friction that changes by `jump` [N] where the piston passes a place."""
+
+    def force(x, v):
+        return 3000 * v + (600 + jump * (x > at)) * np.tanh(v / 0.01)
+
+    return force
+
+
+@pytest.mark.parametrize("size", np.linspace(0.05, 0.18, 8))
+def test_a_stuck_bit_skips_levels_of_the_force(size):
+    kind = next(kind for kind in operator_faults.KINDS if kind.name == "bit of the force stuck")
+    assert "W_COARSE" in codes_of(kind.change(sine_record(points=1000), size, np.random.default_rng(3)))
+
+
+@pytest.mark.parametrize("jump", [-300, -100, -60, 60, 100, 300])
+@pytest.mark.parametrize("at", [-0.006, 0.0, 0.006])
+def test_a_force_that_leaps_by_itself_skips_no_level(jump, at):
+    assert "W_COARSE" not in codes_of(sine_record(jumping(jump, at)))
+
+
+def leaking(leak, stiffness, power):
+    """A yield force of 1400 N that builds up over a leak velocity [m/s], in series with a spring [N/m]."""
+
+    def force(x, v):
+        def dashpot(w):
+            share = abs(w) / leak
+            return np.sign(w) * (1400 * np.minimum(share**power, 1) + 1500 * np.maximum(abs(w) - leak, 0))
+
+        flows = np.linspace(-1, 1, 2001)
+        forces = dashpot(flows)
+        state, states = 0.0, []
+        fine = np.interp(np.arange(0, x.size - 1, 0.1), np.arange(x.size), x)
+        for step in np.diff(fine, prepend=fine[0]):  # implicit: the spring's force changes by k (dx - w dt)
+            time = 0.1 / 200
+            w = np.interp(state + stiffness * step, forces + stiffness * flows * time, flows)
+            state = np.interp(w, flows, forces)
+            states.append(state)
+        return np.append(states[::10], states[-1]) + 45 * np.tanh(v / 0.002)
+
+    return force
+
+
+@pytest.mark.parametrize("leak", [0.03, 0.07])
+@pytest.mark.parametrize("stiffness", [2.5e6, 1e8])
+@pytest.mark.parametrize("power", [1.5, 2.0, 3.0])
+def test_a_yield_force_that_leaks_is_not_early(leak, stiffness, power):
+    assert "W_LAG" not in codes_of(sine_record(leaking(leak, stiffness, power), points=200))
+
+
 @pytest.mark.parametrize("noise", [0.5, 5.0, 50.0])
 @pytest.mark.parametrize("share", [-0.06, 0.0, 0.06])
 def test_ending_the_search_for_a_lag_early_changes_no_finding(noise, share, monkeypatch):

@@ -11,7 +11,9 @@ What has no corner cannot be dated: a smooth force that is late is, on one sine,
 spring, and friction without a yield displacement behind a first-order filter is hysteresis of another
 shape: only noise shows that filter. A smooth force that is early has a
 spring of negative stiffness, which only a moving mass has, and then in proportion to frequency squared:
-a mass no damper has is reported as a lead. The limits stand beyond what clean records of thirteen model
+a mass no damper has is reported as a lead. A delay is none where a force that rises with the velocity in any
+way, behind a spring, explains the loop as well: one that leaks below the yield force falls long before the motion
+turns. The limits stand beyond what clean records of thirteen model
 families and of the bundled rigs show; docs/rig-procedure.md has what is found from which size on.
 """
 
@@ -46,6 +48,9 @@ _YIELD = np.geomspace(0.0005, 1.0, 40)  # yield displacements, of half the strok
 _BETWEEN, _LARGEST = 9, 2  # yield displacements tried between the neighbours of those that act most
 _SOFT = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.4])  # velocities in which a yield force builds up, of the peak
 _THINNING = np.array([0.3, 0.6])  # powers of the velocity: fluids that thin with shear
+# Velocities, of the peak, between which a force rises:
+_EDGES = np.array([0, 3, 6, 10, 14, 18, 22, 26, 30, 35, 40, 45, 50, 55, 60, 70, 80, 90, 100]) / 100
+_SERIES = np.array([0, 0.01, 0.02, 0.05, 0.1, 0.2])  # elastic displacement at the peak force, of the amplitude
 _LEAD = 0.015  # share of the force that acts as a negative spring
 _MASS = 30.0  # [kg] that would explain it
 
@@ -67,7 +72,7 @@ class ForceLag:
 
     def misfit(self, lag: Lag) -> float:
         """Misfit of a lag, less the noise."""
-        return float(np.sqrt(max(self.tried[lag] ** 2 - self.noise**2, (_LEAST * self.noise) ** 2)))
+        return _beyond(self.tried[lag], self.noise)
 
     @property
     def best(self) -> Lag:
@@ -91,6 +96,11 @@ class ForceLag:
         return _is_clear(self.best, self.misfit(Lag()), self.misfit(self.best))
 
 
+def _beyond(misfit: float, noise: float) -> float:
+    """Misfit less the noise."""
+    return float(np.sqrt(max(misfit**2 - noise**2, (_LEAST * noise) ** 2)))
+
+
 def _is_clear(lag: Lag, without: float, misfit: float) -> bool:
     """Check that a lag explains more of a misfit than any rate dependence may."""
     if lag.constant:
@@ -102,7 +112,7 @@ def _is_clear(lag: Lag, without: float, misfit: float) -> bool:
 
 def _may_be_clear(misfit: float, noise: float) -> bool:
     """Check that what is left without a lag is so much beyond the noise that some lag could be clear."""
-    without = float(np.sqrt(max(misfit**2 - noise**2, (_LEAST * noise) ** 2)))
+    without = _beyond(misfit, noise)
     return any(_is_clear(lag, without, _LEAST * noise) for lag in (Lag(1.0), Lag(-1.0), Lag(0.0, 1.0)))
 
 
@@ -230,6 +240,8 @@ def force_lag(view: View) -> ForceLag | None:
             behind[constant] = _Behind(finer, constant)
             tried[Lag(0.0, float(constant))] = behind[constant].fit(force)[0]
     lag = ForceLag(tried, noise, force)
+    if lag.best.delay and lag.is_clear and _is_shape(motion, force, moved(lag.best), lag):
+        return None
     best = behind[lag.best.constant]
     return replace(lag, cycle=mean + best.elements @ best.fit(moved(lag.best))[1])
 
@@ -240,6 +252,22 @@ def _elements(x: Floats, v: Floats, yields: Floats) -> Floats:
     loops = elastic_plastic(x, v > 0, yields * 0.5 * float(np.ptp(x)))
     thinning = np.sign(v)[:, None] * np.abs(v[:, None]) ** _THINNING
     return np.column_stack([either, v, np.tanh(v[:, None] / _SOFT), thinning, loops])
+
+
+def _is_shape(motion: tuple[Floats, Floats], force: Floats, moved: Floats, lag: ForceLag) -> bool:
+    """Check that a force which rises with the velocity in any way leaves no need of the lag.
+
+    One that leaks below the yield force falls long before the motion turns; behind a spring it looks early.
+    """
+    early, left = lag.best.delay < 0, []
+    for loop in (force, moved):
+        rate = 0.5 * POINTS * (np.roll(loop, -1) - np.roll(loop, 1)) / (2 * np.pi * float(np.max(np.abs(loop))))
+        flow = motion[1][:, None] - (_SERIES if early else _SERIES[:1]) * rate[:, None]  # velocity without the spring's
+        share = np.clip((np.abs(flow)[..., None] - _EDGES[:-1]) / np.diff(_EDGES), 0, 1)
+        rising = (np.sign(flow)[..., None] * share).reshape(POINTS, -1)
+        misfit = _Behind(np.column_stack([_elements(*motion, _YIELD), rising])).fit(loop)[0]
+        left.append(_beyond(misfit, lag.noise))
+    return left[1] > _MUCH_BETTER * left[0] or (early and left[0] < _NEARLY)
 
 
 _FREE = 7  # columns of `_elements` that may have either sign
