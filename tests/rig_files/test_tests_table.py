@@ -1,11 +1,13 @@
 """`tests.csv`, adding to a dataset and holding runs out: by the command line, as users do."""
 
 import time
+from pathlib import Path
 
+import numpy as np
 import pytest
 from support import lab_exports
 from support.lab_exports import Lab, campaign
-from support.rig_files import text, write
+from support.rig_files import rows, text, write
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
@@ -191,7 +193,20 @@ def test_the_same_refusal_of_many_files_is_one_line(tmp_path):
     done = run("import", tmp_path, "--out", tmp_path / "ds", "--quiet")
     refused = [line for line in done.output.splitlines() if line.startswith("refused")]
     assert len(refused) == 3  # a line a channel: all that is wrong is said at once
-    assert all(line.startswith("refused 5 times (a0.csv, a1.csv, a2.csv and 2 more)") for line in refused)
+    said = f"refused 5 tests in {tmp_path} (a0.csv, a1.csv, a2.csv and 2 more): "
+    assert all(line.startswith(said) for line in refused)
+
+
+def test_refusals_that_differ_in_a_figure_are_one_line_with_names_below_a_common_folder(tmp_path):
+    noise = np.random.default_rng(2).standard_normal(len(rows()))
+    for i in range(4):
+        (tmp_path / f"day{i}").mkdir()
+        table = rows() * [1, 1, -1] + np.outer(50 * i * noise, [0, 0, 1])
+        write(tmp_path / f"day{i}", "1A.csv", text(table))
+    done = run("import", tmp_path, "--out", tmp_path / "ds", "--quiet")
+    (line,) = [line for line in done.output.splitlines() if line.startswith("refused")]
+    names = ", ".join(str(Path(f"day{i}") / "1A.csv") for i in range(3))
+    assert line.startswith(f"refused 4 tests in {tmp_path} ({names} and 1 more): the first of them: ")
 
 
 def test_a_table_of_far_too_many_rows_is_refused_at_once(tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -322,21 +324,27 @@ def _finding_lines(result: ImportResult, verbose: bool) -> list[str]:
 
 
 def _refused_lines(result: ImportResult) -> list[str]:
-    """One line a refusal; the same refusal of several files is one line with their number."""
-    alike: dict[tuple[str, str, str], list[Refusal]] = {}
+    """One line a refusal; those of several files that differ in numbers only are one, with folder and number."""
+    alike: dict[tuple[str, ...], list[Refusal]] = {}
     for refusal in result.refusals:
         error = refusal.error
-        alike.setdefault((error.code, error.found, error.remedy), []).append(refusal)
+        kind = (re.sub(r"[0-9]+([.,][0-9]+)*", "#", text) for text in (error.found, error.remedy))
+        alike.setdefault((error.code, *kind), []).append(refusal)
     lines = []
     for refusals in alike.values():
         error = refusals[0].error
         if len(refusals) == 1:
             lines.append(f"refused: {error}")
             continue
-        names = [Path(refusal.file).name for refusal in refusals]
+        files = [Path(refusal.file) for refusal in refusals]
+        if not all(file.is_absolute() for file in files):
+            files = [Path(os.path.relpath(file)) for file in files]
+        folder = Path(os.path.commonpath([file.parent for file in files]))
+        names = list(dict.fromkeys(str(file.relative_to(folder)) for file in files))
         shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")
+        first = "" if len({refusal.error.found for refusal in refusals}) == 1 else "the first of them: "
         remedy = f"; {error.remedy}" if error.remedy else ""
-        lines.append(f"refused {len(names)} times ({shown}): {error.found}{remedy} [{error.code}]")
+        lines.append(f"refused {len(files)} tests in {folder} ({shown}): {first}{error.found}{remedy} [{error.code}]")
     return lines
 
 
