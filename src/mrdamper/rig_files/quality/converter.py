@@ -121,7 +121,7 @@ def _crossed_in_motion(view: View, levels: Floats, least: float, cycles: int) ->
     middles, size = 0.5 * (force[at] + force[at + 1]), steps[at]
 
     def skipped(place: float) -> np.ndarray:
-        """Where no level lies within a quarter of the leap's size of a place, in sizes from its middle."""
+        """Mask of the leaps with no level within a quarter of the leap's size of a place, in sizes from its middle."""
         ends = (np.searchsorted(levels, middles + (place + side) * size) for side in (-0.25, 0.25))
         return np.equal(*ends)
 

@@ -48,6 +48,7 @@ _YIELD = np.geomspace(0.0005, 1.0, 40)  # yield displacements, of half the strok
 _BETWEEN, _LARGEST = 9, 2  # yield displacements tried between the neighbours of those that act most
 _SOFT = np.array([0.01, 0.02, 0.05, 0.1, 0.2, 0.4])  # velocities in which a yield force builds up, of the peak
 _THINNING = np.array([0.3, 0.6])  # powers of the velocity: fluids that thin with shear
+_HARDLY_BETTER, _NO_BETTER, _EXPLAINED = 0.45, 0.8, 0.002  # of the misfit beside any function of velocity; of the force
 # Velocities, of the peak, between which a force rises:
 _EDGES = np.array([0, 3, 6, 10, 14, 18, 22, 26, 30, 35, 40, 45, 50, 55, 60, 70, 80, 90, 100]) / 100
 _SERIES = np.array([0, 0.01, 0.02, 0.05, 0.1, 0.2])  # elastic displacement at the peak force, of the amplitude
@@ -267,7 +268,7 @@ def _is_shape(motion: tuple[Floats, Floats], force: Floats, moved: Floats, lag: 
         rising = (np.sign(flow)[..., None] * share).reshape(POINTS, -1)
         misfit = _Behind(np.column_stack([_elements(*motion, _YIELD), rising])).fit(loop)[0]
         left.append(_beyond(misfit, lag.noise))
-    return left[1] > _MUCH_BETTER * left[0] or (early and left[0] < _NEARLY)
+    return left[1] > (_NO_BETTER if early else _HARDLY_BETTER) * left[0] or (early and left[0] < _EXPLAINED)
 
 
 _FREE = 7  # columns of `_elements` that may have either sign
