@@ -105,7 +105,7 @@ def test_predict_along_a_motion_from_a_file(model, tmp_path):
 def test_extrapolation_is_warned_of_and_flagged(model):
     done = mrdamper("predict", model, "--current", 2, "--frequency", 2, "--amplitude", 10, "--json")
     assert done.returncode == 0
-    assert "warning: current lies outside the tested range" in done.stderr
+    assert "warning: current 2 A lies above the tested range (" in done.stderr
     assert json.loads(done.stdout)[0]["extrapolation"] == "current"
 
 

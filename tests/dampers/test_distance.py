@@ -6,6 +6,7 @@ import pytest
 from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.data import Condition
+from mrdamper.physics.motion import Excitation
 
 LEVELS, MOTIONS = (0.0, 0.5, 2.0), ((0.5, 0.02), (1.0, 0.02), (2.0, 0.008))
 TESTS = [Condition(current, *motion) for current in LEVELS for motion in MOTIONS]
@@ -50,3 +51,26 @@ def test_records_with_a_current_that_changes_pass_through_all_currents():
 
 def test_where_only_ranges_are_known_no_distance_is():
     assert away(9.0, 9.0, 0.5, Envelope((0.0, 2.0), (0.5, 2.0), (0.01, 0.02), (0.0, 0.3))) == Distance()
+
+
+@pytest.mark.parametrize(
+    ("condition", "sentences"),
+    [
+        ((0.5, 1.0, 0.015), []),
+        (
+            (0.5, 2.0, 0.02),
+            ["velocity 0.251 m/s lies above the tested range (0.0628 to 0.126 m/s), 2 times the largest"],
+        ),
+        ((0.5, 1.0, 0.009), ["velocity 0.0565 m/s lies below the tested range (0.0628 to 0.126 m/s) by 10 %"]),
+        ((6.0, 1.0, 0.02), ["current 6 A lies above the tested range (0 to 2 A), 3 times the largest"]),
+    ],
+)
+def test_a_quantity_outside_is_stated_with_its_side_and_by_how_much(condition, sentences):
+    outside = TESTED.outside(Condition(*condition))
+    assert [str(beyond) for beyond in outside] == sentences
+    time = np.arange(1000) / 1000  # the same motion as samples: it passes all lower velocities
+    phase = 2 * np.pi * condition[1] * time
+    v = 2 * np.pi * condition[1] * condition[2] * np.cos(phase)
+    moved = Excitation(time, condition[2] * np.sin(phase), v, np.gradient(v, time), condition[0])
+    above = [beyond.quantity for beyond in outside if beyond.value > beyond.tested[1]]
+    assert [beyond.quantity for beyond in TESTED.outside(moved)] == above

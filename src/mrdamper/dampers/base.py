@@ -257,7 +257,10 @@ class Damper(Displayable):
         if sine.is_sine and not run.current_changes:
             flags = self.envelope.flags(sine.condition)
         else:
-            flags = (*self.envelope.motion_flags(motion), *(() if self.envelope.any_motion else (NOT_A_SINE,)))
+            flags = (
+                *(beyond.quantity for beyond in self.envelope.outside(motion)),
+                *(() if self.envelope.any_motion else (NOT_A_SINE,)),
+            )
         if (
             self.yield_length is not None
             and samples_in_yield_displacement(motion, self.yield_length) < _MIN_YIELD_SAMPLES

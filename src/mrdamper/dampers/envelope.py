@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise, product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +20,31 @@ from mrdamper.statistics.linear import nonnegative_least_squares
 SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
 COMBINATION = "combination"  # every quantity was tested, these together were not
 _SUM_WEIGHT = 10.0  # weight of the sum of shares, which is one, against distances in the hull
+_UNITS = {"current": "A", "frequency": "Hz", "velocity": "m/s"}
 SAME_CURRENT = 1e-3  # A; a current that varies less is one current
 _LOGARITHM_FLOOR = 1e-12  # frequency [Hz] and amplitude [m] that stand for zero in a logarithm
+
+
+class Beyond(NamedTuple):
+    """A quantity that lies outside its tested range."""
+
+    quantity: str
+    value: float  # SI
+    tested: tuple[float, float]
+
+    def __str__(self) -> str:
+        low, high = self.tested
+        scale, unit = (1e3, "mm") if self.quantity == "amplitude" else (1, _UNITS[self.quantity])
+        side, share = (
+            ("above", self.value / high - 1 if high else np.inf)
+            if self.value > high
+            else ("below", 1 - self.value / low)
+        )
+        by = f" by {100 * share:.0f} %" if share < 1 else f", {1 + share:.2g} times the largest" if high else ""
+        return (
+            f"{self.quantity} {scale * self.value:.3g} {unit} lies {side} the tested range "
+            f"({scale * low:.3g} to {scale * high:.3g} {unit}){by}"
+        )
 
 
 @dataclass(frozen=True)
@@ -103,16 +127,29 @@ class Envelope:
 
     def flags(self, condition: Condition) -> tuple[str, ...]:
         """List the quantities of a condition outside the tested ranges; empty inside the envelope."""
-        checks = (
-            ("current", abs(condition.current_A), self.current_A),
-            ("frequency", condition.frequency_Hz, self.frequency_Hz),
-            ("amplitude", condition.amplitude_m, self.amplitude_m),
-            ("velocity", condition.peak_velocity, self.peak_velocity_m_s),
-        )
-        outside = tuple(
-            name for name, value, (low, high) in checks if value < low - SLACK * high or value > high * (1 + SLACK)
-        )
+        outside = tuple(beyond.quantity for beyond in self.outside(condition))
         return outside or (() if self._combined(condition) else (COMBINATION,))
+
+    def outside(self, asked: Condition | Excitation) -> tuple[Beyond, ...]:
+        """Return the quantities of a condition, or of a motion that is no sine, outside the tested ranges."""
+        if isinstance(asked, Condition):
+            current, moved, velocity = (abs(asked.current_A),) * 2, asked.amplitude_m, asked.peak_velocity
+            lowest, frequencies = velocity, [("frequency", (asked.frequency_Hz,) * 2, self.frequency_Hz)]
+        else:
+            currents = np.abs(asked.current)
+            current, moved = (float(np.min(currents)), float(np.max(currents))), float(np.ptp(asked.displacement) / 2)
+            velocity, lowest, frequencies = float(np.max(np.abs(asked.velocity))), np.inf, []  # it passes all below
+        checks = (
+            ("current", current, self.current_A),
+            *frequencies,
+            ("amplitude", (moved, moved), self.amplitude_m),
+            ("velocity", (lowest, velocity), self.peak_velocity_m_s),
+        )
+        return tuple(
+            Beyond(name, most if most > high * (1 + SLACK) else least, (low, high))
+            for name, (least, most), (low, high) in checks
+            if most > high * (1 + SLACK) or least < low - SLACK * high
+        )
 
     def distance(self, condition: Condition, current: Floats) -> Distance:
         """Distance of a condition and the currents (N,) [A] along its motion; zero where only ranges are known."""
@@ -139,20 +176,6 @@ class Envelope:
     @cached_property
     def _tested(self) -> tuple[Condition, ...]:
         return tuple(Condition(*point) for point in self.conditions)
-
-    def motion_flags(self, motion: Excitation) -> tuple[str, ...]:
-        """List the quantities of a motion that is no sine outside the tested ranges."""
-        moved = float(np.ptp(motion.displacement) / 2)
-        checks = (
-            ("current", float(np.min(np.abs(motion.current))), float(np.max(np.abs(motion.current))), self.current_A),
-            ("amplitude", moved, moved, self.amplitude_m),
-            ("velocity", 0.0, float(np.max(np.abs(motion.velocity))), self.peak_velocity_m_s),
-        )
-        return tuple(
-            name
-            for name, lowest, highest, (low, high) in checks
-            if highest > high * (1 + SLACK) or (name != "velocity" and lowest < low - SLACK * high)
-        )
 
 
 @lru_cache(maxsize=4096)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from mrdamper.dampers.prediction import Prediction
 
 WARNINGS = {
+    "combination": "current, frequency and amplitude lie in their tested ranges, but not their combination",
     "not a sine": "the motion is not sinusoidal; frequency and amplitude are estimated along it",
     "sampling": "fewer than two samples within the yield displacement after a reversal; increase the sampling rate",
 }
@@ -69,8 +70,10 @@ def predict(
     require_writable(plot)
     damper = _load(model, coil_lag)
     prediction = _predict(damper, motion, current, frequency, amplitude)
+    asked = (prediction.motion, prediction.condition)
+    beyond = {b.quantity: f"{b} (extrapolation)" for one in asked for b in damper.envelope.outside(one)}
     for flag in prediction.extrapolation:
-        typer.echo(f"warning: {WARNINGS.get(flag, f'{flag} lies outside the tested range (extrapolation)')}", err=True)
+        typer.echo(f"warning: {(WARNINGS | beyond)[flag]}", err=True)
     interval = band(damper, prediction, level)
     if check_run:
         prediction, interval = _session_known(damper, prediction, check_run, data, level)
