@@ -81,6 +81,9 @@ def test_the_worst_run_tells_its_kind_of_motion_apart_from_its_range():
     fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 0.1)
     text = next(s.text for s in limitations(replace(scored(fit), validation=runs), ()) if "Largest error" in s.text)
     assert "5.3 Hz, 1.7 mm, not a sine; amplitude outside the tested range)" in text
+    crossed = replace(scored(fit), cross_validated=Validation("worst", (*runs.runs[:2], run(0.11, ("combination",)))))
+    text = next(s.text for s in limitations(crossed, ()) if "Largest error of a cross" in s.text)
+    assert "5.3 Hz, 1.7 mm; combination outside the range of the other tests)" in text  # it is a test itself
 
 
 @pytest.mark.parametrize(

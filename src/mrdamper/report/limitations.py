@@ -130,7 +130,8 @@ def _prediction(cross_validated: Validation, validation: Validation) -> list[str
         if worst.scores.nrmse_pp > 2 * scores.median():
             flags = [flag for flag in worst.extrapolation if flag != NOT_A_SINE]
             outside = ", not a sine" if NOT_A_SINE in worst.extrapolation else ""
-            outside += f"; {' and '.join(flags)} outside the tested range" if flags else ""
+            tests = "the tested range" if scores is validation else "the range of the other tests"
+            outside += f"; {' and '.join(flags)} outside {tests}" if flags else ""
             sentences.append(
                 f"Largest error of a {name}: {100 * worst.scores.nrmse_pp:.1f} % in {worst.run_id} "
                 f"({worst.condition}{outside}); median {100 * scores.median():.1f} %."
