@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import sqrtm
 
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.calibration import Calibration, PredictedRun, StandardizedErrors, model_error
@@ -335,7 +336,9 @@ def test_a_parameter_at_its_bound_is_held_and_one_the_runs_do_not_show_is_named(
 
 def test_cross_validated_errors_are_over_the_whole_error_model():
     """Parameters, gains and offsets as the folds left them, and the form: their squares add up."""
-    runs = [replace(r, force=r.force + 12 * (i % 3)) for i, r in enumerate(runs_of(sessions=3, session=0.05))]
+    conditions = [*CONDITIONS, CONDITIONS[2]]
+    drawn = runs_of(sessions=3, session=0.05, conditions=conditions)
+    runs = [replace(r, force=r.force + 12 * (i % 3)) for i, r in enumerate(drawn)]
     damper = fitted(runs)
     rng = np.random.default_rng(5)
     seen = []
@@ -352,16 +355,23 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
     # A fold that saw two of the three parts of a session's scatter leaves as much in its errors.
     assert known.run_gain == pytest.approx(np.sqrt(error.gain**2 - 2 / 3 * known.gain**2))
     assert known.run_offset == pytest.approx(np.sqrt(error.offset**2 - 2 / 3 * known.offset**2))
-    shares, scores = [], []
-    for run in runs:
-        part = RunResiduals.of(damper, run)
+    shares, scores, parts = [], [], [RunResiduals.of(damper, run) for run in runs]
+    columns = [np.column_stack([v, np.sign(v), np.ones(v.size)]) for p in parts
+               for v in [p.prediction.motion.velocity[p.picked]]]  # fmt: skip
+    normal = normal_matrix(columns, parts)
+    for part, condition in zip(parts, conditions, strict=True):
+        # Without its condition a fit has (N - N_c)⁻¹ N of the covariance.
+        left = [k for k, other in enumerate(conditions) if other != condition]
+        rest = normal_matrix([columns[k] for k in left], [parts[k] for k in left])
+        root = sqrtm(np.linalg.solve(rest, normal)).real
+        covariance = root @ known.covariance @ root.T
         every, velocity = part.prediction.motion.velocity[part.picked], part.stretches[0].velocity
         table = np.column_stack([every, np.sign(every), np.ones(every.size)])
         slopes, predicted = part.evenly(table, part.stretches[0]), part.stretches[0].predicted
         power, *lost = (np.trapezoid(f * velocity, part.stretches[0].time) for f in (predicted, *slopes.T))
         swing = (slopes[predicted.argmax()] - slopes[predicted.argmin()]) / np.ptp(predicted)
-        share = np.mean(np.sum(slopes @ known.covariance * slopes, axis=1)) / (np.ptp(predicted) / 2) ** 2
-        shares.append([share, *(d @ known.covariance @ d for d in (swing, np.array(lost) / power))])
+        share = np.mean(np.sum(slopes @ covariance * slopes, axis=1)) / (np.ptp(predicted) / 2) ** 2
+        shares.append([share, *(d @ covariance @ d for d in (swing, np.array(lost) / power))])
     shares[6] = np.median(shares, axis=0)
     for own, prediction in zip(shares, seen, strict=True):
         grown = [known.growth.variance(name, prediction.distance) for name in ("force", "peak", "energy")]

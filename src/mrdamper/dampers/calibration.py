@@ -3,8 +3,9 @@
 The error model gives the shape of an interval: a standard deviation at every sample, of the peak force and of the
 dissipated energy. How many of these standard deviations hold a stated share is read from cross-validated residuals:
 by samples pooled over independent units, each unit counting alike [Dunn, Wasserman and Ramdas 2023, J. Am. Stat.
-Assoc. 118, 2491], and by runs for the peak force and the energy [Vovk, Gammerman and Shafer 2005; with several runs a
-unit: Lee, Barber and Willett 2023, arXiv:2306.06342]. Residuals of left-out folds stand in for those of a calibration
+Assoc. 118, 2491], and by runs for the peak force and the energy [Vovk, Gammerman and Shafer 2005, between two order
+statistics: Beran and Hall 1993, J. R. Stat. Soc. B 55, 643; with several runs a unit: Lee, Barber and Willett 2023,
+arXiv:2306.06342]. Residuals of left-out folds stand in for those of a calibration
 set [Barber, Candès, Ramdas and Tibshirani 2021, Ann. Stat. 49, 486: the jackknife, whose level holds for stable fits].
 """
 
@@ -42,6 +43,7 @@ _TYPICAL_GROWTH, _TYPICAL_DOF = (0.065, 0.031, 0.026), 1.0
 _NORMAL_DOF = 1e9  # of a normal distribution
 _SHOWN = (0.01, 0.05, 0.1)  # distances of a fold from its tests from which it shows growth
 _NONE: Mapping[str, Floats] = {}  # relative variances of runs by the parameters, where none are known
+_ROUNDING = 1e-9  # of a number of units
 _NORMAL_MEDIAN = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
 
 
@@ -399,17 +401,26 @@ def _factors(units: Sequence[Sequence[StandardizedErrors]], quantity: Quantity) 
 
 
 def _quantile(units: Sequence[Sequence[StandardizedErrors]], quantity: Quantity, level: float) -> float:
-    """Quantile of the scores with equal weight of units; where runs have one value each, with room for a unit to come.
+    """Quantile of the scores with equal weight of units.
 
+    Where runs have one value each, there is room for a unit to come, and the quantile lies between two order
+    statistics: the larger one alone covers up to 1 / (n + 1) more than the level [Beran and Hall 1993].
     Samples, and peaks and energies of the loops of long records, are pooled.
     """
     scores = [scored.samples(quantity) for unit in units for scored in unit]
     weights = [np.full(s.samples(quantity).size, 1 / s.samples(quantity).size / len(u)) for u in units for s in u]
     values, weight = np.concatenate(scores), np.concatenate(weights)
     order = np.argsort(values)
-    wanted = level * (len(units) + (quantity != "force" and any(s.size == 1 for s in scores)))
-    at = index_at(np.cumsum(weight[order]), wanted * (1 - 1e-12))
-    return float(values[order[min(at, values.size - 1)]])
+    reached = np.cumsum(weight[order])
+
+    def smallest(count: float) -> float:
+        return float(values[order[min(index_at(reached, count * (1 - 1e-12)), values.size - 1)]])
+
+    if quantity == "force" or all(s.size > 1 for s in scores):
+        return smallest(level * len(units))
+    below, share = divmod(level * (len(units) + 1) + _ROUNDING, 1.0)
+    low, high = smallest(below), smallest(below + 1)
+    return low + share * (high - low) if share > 2 * _ROUNDING and low < high else low
 
 
 def _covered(

@@ -23,7 +23,7 @@ from mrdamper.dampers.refits import refitted
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
-from mrdamper.data import Floats, Run
+from mrdamper.data import Floats, Run, same_condition
 from mrdamper.identification.covariance import alike_groups, score_covariance
 from mrdamper.identification.intervals import dof_of_quantile, interval_about, relative_width, student, weaknesses
 from mrdamper.statistics.metrics import dissipated_power, peak_force
@@ -32,6 +32,7 @@ _MAX_RUN_SHARE = 0.6  # share of the information on a parameter from which one r
 _MIN_EIGENVALUE = 1e-10  # of the largest of the scaled normal matrix, below which a direction is not determined
 _REFITS = 16  # draws of gains and offsets that are fitted without linearisation
 _SEED = 20261124  # of errors within the runs that are drawn beside those of sessions
+_MIN_RETAINED = 0.05  # share of the information on a direction that a fit without a condition has at least
 _LEVEL = 0.95  # of the intervals by which a parameter is identifiable or not
 
 
@@ -297,6 +298,30 @@ def _by_parameters(part: RunResiduals, slopes: Floats, covariance: Floats) -> Fl
     return relative_variances(even, covariance, steady.predicted, steady.velocity, steady.time)
 
 
+def _without_their_condition(
+    parts: Sequence[RunResiduals], slopes: Sequence[Floats], covariance: Floats
+) -> dict[str, Floats]:
+    """Relative variances (3,) of the force, peak and energy of each run by parameters of fits without its condition.
+
+    Of N the normal matrix and N_c the share of a condition in it, these fits have (I - N⁻¹ N_c)⁻¹ of the covariance.
+    """
+    normal = normal_matrix(slopes, parts)
+    scale = np.sqrt(np.diag(normal))
+    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    root, back = vectors / np.sqrt(values) / scale[:, None], (vectors * np.sqrt(values)).T * scale
+    sines = [k for k, part in enumerate(parts) if part.stretches[0].frequency is not None]
+    folds = [[sines[i] for i in group] for group in same_condition([parts[k].prediction.condition for k in sines])]
+    folds += [[k] for k in range(len(parts)) if k not in sines]
+    variances = dict[str, Floats]()
+    for fold in folds:
+        share = root.T @ normal_matrix([slopes[k] for k in fold], [parts[k] for k in fold]) @ root
+        taken, axes = np.linalg.eigh(share)
+        without = root @ (axes / np.sqrt(np.maximum(1 - taken, _MIN_RETAINED))) @ axes.T @ back
+        for k in fold:
+            variances[parts[k].run.id] = _by_parameters(parts[k], slopes[k], without @ covariance @ without.T)
+    return variances
+
+
 def _with_model_error(
     uncertainty: Uncertainty,
     parts: Sequence[RunResiduals],
@@ -329,6 +354,7 @@ def _with_model_error(
         run_dof=max(len(cross_validated) - 1.0, 1.0),
         growth=Growth.of([*cross_validated, *away], error, own),
     )
+    own = _without_their_condition(parts, slopes, uncertainty.covariance)
     usual = np.median(list(own.values()), axis=0)
     gain, offset = (getattr(uncertainty, f"run_{name}") ** 2 + of_sessions[name] for name in ("gain", "offset"))
     scores: list[StandardizedErrors] = []
