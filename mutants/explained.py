@@ -90,7 +90,26 @@ EXPLAINED = (
     Explained("dampers.random_effects", "weight = 1 / np.maximum(", "1 → 2", _SCALE),
     Explained("dampers.calibration", "parts[0].distance", "0 → 1", "the stretches of a run have one distance"),
     Explained("dampers.calibration", "parts[0].session", "0 → 1", "the stretches of a run have one session"),
-    Explained("dampers.random_effects", "kinds.append(", "items 0 and 1", _ALIKE),
+    Explained("dampers.random_effects", "whole: Floats = noise + least", "Add → Sub", _GUARD),
+    Explained(
+        "dampers.random_effects", "(solved < 0)", "0 → 1", "without a negative one both ways of solving end at the same"
+    ),
+    Explained("dampers.random_effects", "names = sorted({run.session", "sorted backwards", _ORDER),
+    Explained(
+        "dampers.random_effects", "max(table.sum(), 1.0)", "1.0 → 10.0", "zero is below whatever it is compared with"
+    ),
+    Explained(
+        "dampers.random_effects", "if 0 in used and 2 in used", "", "gains and offsets of runs are always told apart"
+    ),
+    Explained("dampers.random_effects", "variances, dof = np.zeros(4)", "4 → 5", "a last one that nobody reads"),
+    Explained("dampers.random_effects", "fitted = np.full(", "mean → median", "another start of the same search"),
+    Explained("dampers.random_effects", "fitted = np.full(", "2 → 3", "another start of the same search"),
+    Explained(
+        "dampers.random_effects",
+        "moved, weight = np.zeros(",
+        "items 0 and 1",
+        "zeros that are replaced before they are read",
+    ),
     Explained("dampers.random_effects", "self.slopes[0].shape[1]", "0 → 1", "all runs have one number of columns"),
     Explained("dampers.bands", "student(level, 1.0)", "1.0 → 10.0", "the level alone is checked"),
     Explained("dampers.bands", "**ends, **peaks", "exchanged", _ORDER),
@@ -186,7 +205,6 @@ EXPLAINED = (
         "Div → Mult",
         "Newton's steps come from below and do not reach it",
     ),
-    Explained("identification.intervals", "- 15 * z", "Sub → Add", "a term below 1e-10 of the quantile"),
     Explained("identification.intervals", "(nodes + 1)", "Add → Sub", "a cosine has no sign"),
     Explained("identification.intervals", 'max(values["current"]) == 0', "max → min", _ALIKE),
     Explained("identification.intervals", "(i, j): float(covariance", "items", _ALIKE),

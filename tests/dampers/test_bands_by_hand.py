@@ -49,6 +49,15 @@ def damper(known=KNOWN):
 
 
 PREDICTION = Prediction(MOTION, FORCE, CONDITION, ())
+BY_PARAMETERS = bands._by_parameters
+
+
+def always(variances):
+    def by_parameters(damper, loop):
+        assert isinstance(loop, Prediction)
+        return variances
+
+    return by_parameters
 
 
 @pytest.fixture(autouse=True)
@@ -58,7 +67,7 @@ def _slopes(monkeypatch):
         return SLOPES
 
     monkeypatch.setattr(bands, "force_slopes", slopes)
-    monkeypatch.setattr(bands, "_by_parameters", lambda damper, loop: np.full(3, np.inf))
+    monkeypatch.setattr(bands, "_by_parameters", always(np.full(3, np.inf)))
 
 
 def reach(level, *parts, known=True, at=slice(None)):
@@ -75,6 +84,25 @@ def test_of_unknown_sessions_parameters_have_degrees_of_freedom_of_their_own():
     unknown = replace(KNOWN, gain=0.0, offset=0.0, session_dof=0.0, growth=Growth())
     t = reach(0.9, own.mean(), 0.0, form.mean(), known=False) / np.sqrt(np.mean(own + form))
     assert band(damper(unknown), PREDICTION).high - FORCE == pytest.approx(t * np.sqrt(own + form))
+
+
+def test_a_band_does_not_depend_on_the_unit_of_force():
+    def width(unit):
+        known = replace(KNOWN, covariance=unit**2 * COVARIANCE, gain=0.0, offset=0.0, session_dof=0.0,
+                        run_offset=2.5 * unit, growth=Growth())  # fmt: skip
+        return (band(damper(known), replace(PREDICTION, force=unit * FORCE)).high / unit) - FORCE
+
+    assert width(1e-3) == pytest.approx(width(1.0))
+
+
+def test_the_error_of_a_loop_by_its_parameters_is_relative_to_peak_and_energy():
+    half, velocity = np.ptp(FORCE) / 2, MOTION.velocity
+    swing = (SLOPES[FORCE.argmax()] - SLOPES[FORCE.argmin()]) / 2 / half
+    share = np.array([np.trapezoid(column * velocity, MOTION.time) for column in SLOPES.T])
+    share /= np.trapezoid(FORCE * velocity, MOTION.time)
+    own = np.mean([slope @ COVARIANCE @ slope for slope in SLOPES]) / half**2
+    expected = own, swing @ COVARIANCE @ swing, share @ COVARIANCE @ share
+    assert BY_PARAMETERS(damper(), PREDICTION) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("level", [0.5, 0.9, 0.99])
@@ -111,7 +139,7 @@ def test_a_band_adds_numbers_sessions_and_form(level, shown):
 def test_beyond_the_tested_motions_parameters_count_as_at_the_nearest(monkeypatch):
     """Growth holds the error of folds, that of their parameters with it; without growth nothing is limited."""
     plain, still = band(damper(), PREDICTION), band(damper(replace(KNOWN, growth=Growth())), PREDICTION)
-    monkeypatch.setattr(bands, "_by_parameters", lambda damper, loop: np.zeros(3))
+    monkeypatch.setattr(bands, "_by_parameters", always(np.zeros(3)))
     limited = band(damper(), PREDICTION)
     assert not limited.parameter.any()
     for name in ("peak", "energy"):
@@ -119,7 +147,7 @@ def test_beyond_the_tested_motions_parameters_count_as_at_the_nearest(monkeypatc
     assert np.all(limited.high < plain.high)
     unlimited = band(damper(replace(KNOWN, growth=Growth())), PREDICTION)
     assert unlimited.high == pytest.approx(still.high)
-    monkeypatch.setattr(bands, "_by_parameters", lambda damper, loop: np.full(3, 1e-4))
+    monkeypatch.setattr(bands, "_by_parameters", always(np.full(3, 1e-4)))
     half = np.ptp(FORCE) / 2
     assert np.mean(band(damper(), PREDICTION).parameter ** 2) == pytest.approx(1e-4 * half**2)
 
@@ -214,7 +242,7 @@ def test_a_portable_band_is_that_of_loops_at_three_currents(monkeypatch):
     monkeypatch.setattr(bands, "band", found)
     tested = SimpleNamespace(tested=True, middle=CONDITION, current_A=(0.0, 2.0), peak_velocity_m_s=(0.0, 0.9),
         farthest=[CONDITION, replace(CONDITION, current_A=1.5)],
-        distance=lambda condition, current: AWAY if current == [condition.current_A] else AT_TESTS)  # fmt: skip
+        distance=lambda condition, current: AWAY if list(current) == [1.5] else AT_TESTS)  # fmt: skip
     portable = portable_band(replace(made, envelope=tested), 0.8)
     t = np.mean([30.0, 60.0, 130.0]) / 13
     own = np.mean([9 * np.mean([0.04, 0.16, 5.76]) / (100 + 50 * I) ** 2 for I in widths])

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mrdamper.dampers.random_effects import Effects, GainsAndOffsets
+from mrdamper.dampers.random_effects import Effects, GainsAndOffsets, _Forms
 
 PHASE = np.linspace(0.0, 2 * np.pi, 120, endpoint=False)
 FORCE = 100 * np.sin(PHASE)
@@ -22,7 +22,7 @@ class Residuals(SimpleNamespace):
 
     @property
     def weight(self):
-        return np.full(self.picked.size, 1 / self.scale / np.sqrt(self.picked.size * self.error))
+        return np.full(self.picked.size, self.information / self.scale / np.sqrt(self.picked.size * self.error))
 
     def weighted(self, table):
         return table * self.weight[:, None]
@@ -67,16 +67,28 @@ def drawn(count, each, seed=0):
     return (shared + own).T, names.tolist()
 
 
-def test_balanced_sessions_give_the_analysis_of_variance():
-    (gains, offsets), names = drawn(8, 5)
+@pytest.mark.parametrize(("sessions", "each"), [(8, 5), (3, 40)])
+def test_balanced_sessions_give_the_analysis_of_variance(sessions, each):
+    (gains, offsets), names = drawn(sessions, each)
     found = effects_of(runs_of(gains, offsets, names)).effects()
     for values, session, run in ((gains, found.gain, found.run_gain), (offsets, found.offset, found.run_offset)):
-        table = values.reshape(8, 5)
-        within = np.sum((table - table.mean(axis=1, keepdims=True)) ** 2) / (40 - 8)
-        between = np.mean(table.mean(axis=1) ** 2) - within / 5
+        table = values.reshape(sessions, each)
+        within = np.sum((table - table.mean(axis=1, keepdims=True)) ** 2) / (each - 1) / sessions
+        between = np.mean(table.mean(axis=1) ** 2) - within / each
         assert run == pytest.approx(np.sqrt(within))
         assert session == pytest.approx(np.sqrt(between))
-    assert (found.session_dof, found.run_dof) == (pytest.approx(7.0), pytest.approx(32.0, rel=1e-3))
+    assert (found.session_dof, found.run_dof) == (
+        pytest.approx(sessions - 1.0), pytest.approx(sessions * (each - 1.0), rel=1e-3),
+    )  # fmt: skip
+
+
+def test_no_variance_is_negative():
+    """Residuals that show less than their noise, in one of the forms or in all of them."""
+    sessions = np.kron(np.eye(3), np.ones((2, 2)))
+    forms = _Forms.of(np.ones(2), [sessions, np.eye(6)], 2 * np.eye(6))
+    for shown in (np.zeros(6), np.tile([3.0, -3.0], 3), np.full(6, 3.0)):
+        assert np.all(forms.variances(shown[None]) >= 0)
+    assert not forms.variances(np.zeros((1, 6))).any()
 
 
 def test_a_truth_is_found_from_many_sessions():
@@ -158,12 +170,13 @@ def test_what_the_fit_has_absorbed_is_not_divided_by():
     assert found.session_dof == pytest.approx(5.0)
 
 
-def test_offsets_are_not_asked_of_runs_that_do_not_show_their_gain():
+@pytest.mark.parametrize("absorbed", [0.98, 0.9])
+def test_offsets_are_not_asked_of_runs_that_do_not_show_their_gain(absorbed):
     """Each run has a parameter that takes 98 % of its gain up: what is left is not scaled up by fifty."""
     (gains, offsets), _ = drawn(20, 1, seed=6)
-    runs, rows = runs_of(0.02 * gains, offsets, [None] * 20), np.eye(20)
+    runs, rows = runs_of((1 - absorbed) * gains, offsets, [None] * 20), np.eye(20)
     slopes = [np.outer(FORCE, row) for row in rows]
-    influence = [0.98 * np.outer(row, FORCE) / (FORCE @ FORCE) for row in rows]
+    influence = [absorbed * np.outer(row, FORCE) / (FORCE @ FORCE) for row in rows]
     assert GainsAndOffsets(runs, slopes, influence).effects() == Effects()
 
 
@@ -208,6 +221,7 @@ def test_one_parameter_scatters_as_the_mean_of_gains():
     expected = 0.05**2 / 5 + 0.08**2 / 20
     assert covariance_of(scatter, effects)[0, 0] == pytest.approx(expected, rel=0.2)  # 600 draws show it to 6 %
     assert not covariance_of(scatter, Effects()).any()
+    assert np.array_equal(scatter.draws(Effects()).shown, np.ones((600, 1)))
     # An offset moves a parameter of the gain nowhere.
     assert covariance_of(scatter, Effects(offset=5.0, run_offset=5.0))[0, 0] == pytest.approx(0.0, abs=1e-20)
 
@@ -233,7 +247,7 @@ def test_draws_show_a_variance_with_the_degrees_of_freedom_behind_it(unit):
 def test_gains_that_the_residuals_show_are_taken_out_with_what_they_moved():
     """Of two parameters that gains of the runs have moved, nothing is left of the residuals but their noise."""
     rng = np.random.default_rng(8)
-    gains, slope = rng.standard_normal(12) * 0.05, np.column_stack([FORCE, np.abs(FORCE) + 20.0])
+    gains, slope = rng.standard_normal(12) * 0.05, np.column_stack([FORCE**3 / 1e4, np.abs(FORCE) + FORCE + 20.0])
     influence = np.linalg.solve(12 * slope.T @ slope, slope.T)
     moved = influence @ np.outer(FORCE, gains).sum(axis=1)
     runs = runs_of(gains, np.zeros(12), [None] * 12)
@@ -254,15 +268,32 @@ def test_runs_far_off_pull_less_than_their_gain_would_say():
 
 
 def test_a_run_counts_the_less_the_noisier_it_is():
-    """Weighted by one over its error, a run of four times the noise moves a common gain a quarter as much."""
-    noises = np.tile([60.0, 240.0], 10)
+    """Weighted by one over its error, a run of a tenth of the noise moves a common gain ten times as much."""
+    noises = np.array([20.0] + [200.0] * 19)
     slope, runs = FORCE[:, None], []
     for seed, noise in enumerate(noises):
         runs += runs_of([0.0], [0.0], [None], noise=noise, seed=seed)
+    effects = Effects(run_gain=0.02, run_dof=19.0)
     scatter = effects_of(runs, slope, slope.T / (slope.T @ slope) / 20)
-    variance = covariance_of(scatter, Effects(run_gain=0.02, run_dof=19.0))[0, 0]
     share = (1 / noises) / np.sum(1 / noises)
-    assert variance == pytest.approx(0.02**2 * np.sum(share**2), rel=0.2)  # were they alike: a quarter less
+    assert covariance_of(scatter, effects)[0, 0] == pytest.approx(0.02**2 * np.sum(share**2), rel=0.2)
+    # Its own gain and offset are no noise.
+    moved = scatter.draws(effects).moved
+    for run, gain in zip(runs, np.linspace(-0.5, 0.5, 20), strict=True):
+        run.residual = run.residual + gain * (FORCE + 80.0)
+    found = effects_of(runs, slope, slope.T / (slope.T @ slope) / 20).draws(effects).moved
+    assert found == pytest.approx(moved, rel=1e-6, abs=1e-9)
+
+
+def test_a_run_counts_by_the_square_of_its_information():
+    """As in the joint fit, whose residuals it multiplies."""
+    slope, runs = FORCE[:, None], runs_of(np.zeros(20), np.zeros(20), [None] * 20, noise=60.0)
+    informations = np.array([3.0] + [1.0] * 19)
+    for run, information in zip(runs, informations.tolist(), strict=True):
+        run.information = information
+    variance = covariance_of(effects_of(runs, slope), Effects(run_gain=0.02, run_dof=19.0))[0, 0]
+    share = informations**2 / np.sum(informations**2)
+    assert variance == pytest.approx(0.02**2 * np.sum(share**2), rel=0.2)
 
 
 def test_a_run_counts_by_its_relative_error_whatever_its_force():

@@ -8,13 +8,28 @@ from scipy.special import stdtrit
 
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
-from mrdamper.identification.intervals import interval_about, student, weaknesses, written
+from mrdamper.identification.intervals import dof_of_quantile, interval_about, student, weaknesses, written
 
 
 @pytest.mark.parametrize("level", [0.5, 0.9, 0.95, 0.999])
 @pytest.mark.parametrize("dof", [1, 1.3, 2, 5.5, 40, 999.0, 1001.0, 1e6])
 def test_quantiles_are_scipys(level, dof):
     assert student(level, dof) == pytest.approx(float(stdtrit(dof, (1 + level) / 2)), rel=1e-10)
+
+
+@pytest.mark.parametrize("level", [0.5, 0.95])
+def test_where_the_series_begins_its_last_term_is_seen(level):
+    assert student(level, 1000.5) == pytest.approx(float(stdtrit(1000.5, (1 + level) / 2)), rel=1e-11)
+
+
+@pytest.mark.parametrize("level", [0.5, 0.95])
+def test_degrees_of_freedom_are_those_whose_quantile_was_given(level):
+    for dof in (1.0, 1.7, 4.0, 60.0, 2e4):
+        assert dof_of_quantile(student(level, dof), level) == pytest.approx(dof, rel=1e-6)
+    assert dof_of_quantile(2 * student(level, 1.0), level) == pytest.approx(
+        1.0
+    )  # wider than with one: one all the same
+    assert dof_of_quantile(0.9 * student(level, 1e6), level) == pytest.approx(1e6, rel=1e-9)
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0, -1.0, float("nan")])

@@ -147,7 +147,7 @@ def _degrees_of_freedom(uncertainty: Uncertainty, slopes: Floats, level: float) 
         return max(uncertainty.session_dof, 1.0), float(runs)
     shares = np.mean(slopes**2, axis=0) * np.diag(uncertainty.covariance)
     doubt = float(np.sum(shares / uncertainty.dof))
-    return max(float(np.sum(shares)) / doubt, 1.0) if doubt > 0 else 1.0, float(runs)
+    return max(float(np.sum(shares)) / doubt if doubt > 0 else 0.0, 1.0), float(runs)
 
 
 def scope(damper: Damper, level: float) -> str:
