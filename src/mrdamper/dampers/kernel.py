@@ -167,5 +167,9 @@ def _inputs(motion: Excitation) -> Floats:
 
 
 def _kernel(rows: Floats, centres: Floats) -> Floats:
-    distance = np.sum(rows**2, axis=1)[:, None] + np.sum(centres**2, axis=1) - 2 * rows @ centres.T
-    return np.exp(-np.maximum(distance, 0.0) / (2 * _WIDTH**2))
+    table = 2 * rows @ centres.T  # in place: such a table is larger than the processor's cache
+    table -= np.sum(rows**2, axis=1)[:, None]
+    table -= np.sum(centres**2, axis=1)
+    np.minimum(table, 0.0, out=table)
+    table /= 2 * _WIDTH**2
+    return np.exp(table, out=table)

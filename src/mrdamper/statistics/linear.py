@@ -7,8 +7,9 @@ in another order, which changes the last bits of a result: everything runs on on
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+import sys
+from collections.abc import Callable, Generator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property, wraps
 from importlib import import_module
@@ -231,7 +232,12 @@ def solve_with_determinant(matrix: Floats, right: Floats) -> tuple[Floats, float
 @cache
 def _lapack(name: str, dtype: str) -> Any:
     """Return a routine of LAPACK: around such small matrices SciPy's checks take ten times as long as the work."""
-    return import_module("scipy.linalg").get_lapack_funcs(name, dtype=np.dtype(dtype))
+    routine = import_module("scipy.linalg").get_lapack_funcs(name, dtype=np.dtype(dtype))
+    _limit(_holds)  # SciPy brings a library of its own, which no hold that began before knows
+    return routine
+
+
+_holds: list[ExitStack] = []  # blocks of `one_blas_thread` that are not at their end
 
 
 @contextmanager
@@ -242,12 +248,19 @@ def one_blas_thread() -> Generator[None]:
     MKL_NUM_THREADS=1) before Python starts for results that agree to the last bit between machines
     of different numbers of cores.
     """
-    controller = _controller()
-    if controller is None:
-        yield
-        return
-    with controller.limit(limits=1, user_api="blas"):
-        yield
+    with ExitStack() as hold:
+        _limit([hold])
+        _holds.append(hold)
+        try:
+            yield
+        finally:
+            _holds.remove(hold)
+
+
+def _limit(holds: Sequence[ExitStack]) -> None:
+    """Hold the libraries that are loaded now to one thread, to the ends of some blocks."""
+    if holds and (controller := _controller("scipy.linalg" in sys.modules)) is not None:
+        holds[0].enter_context(controller.limit(limits=1, user_api="blas"))
 
 
 def on_one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
@@ -262,7 +275,8 @@ def on_one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
 
 
 @cache
-def _controller() -> Any:
+def _controller(with_scipy: bool) -> Any:
+    """Return the controller of the libraries that are loaded; those of SciPy come with its import."""
     try:
         threadpoolctl: Any = import_module("threadpoolctl")
     except ModuleNotFoundError:

@@ -56,11 +56,12 @@ class _Fitted:
     @cached_property
     def errors(self) -> Mapping[str, Floats]:
         """(N,) cross-validation errors of the values, by kind of fold."""
-        rates = len(self.fit.function.rates)
-        return {
-            kind: _fold_errors(self.columns, self.target, self.weight, groups, rates)
-            for kind, groups in _folds(self.conditions).items()
-        }
+        penalty = self.target.size / (self.target.size - len(self.fit.function.rates))
+        basis = np.linalg.qr(self.columns * self.weight[:, None])[0]
+        right = self.target * self.weight
+        residual = right - basis @ (basis.T @ right)
+        folds = _folds(self.conditions).items()
+        return {kind: penalty * _fold_errors(basis, residual, groups) for kind, groups in folds}
 
 
 def fit_function(
@@ -260,24 +261,22 @@ def _folds(conditions: tuple[Condition, ...]) -> dict[str, list[list[int]]]:
     return fold_groups(conditions)
 
 
-def _fold_errors(
-    columns: Floats, target: Floats, weight: Floats, groups: Sequence[Sequence[int]], rates: int
-) -> Floats:
-    """Weighted magnitudes of errors at values left out in groups, exact for the linear part by the hat matrix."""
-    weighted = columns * weight[:, None]
-    q = np.linalg.qr(weighted)[0]
-    right = target * weight
-    residual = right - q @ (q.T @ right)
-    errors = np.full(target.size, np.inf)
+def _fold_errors(basis: Floats, residual: Floats, groups: Sequence[Sequence[int]]) -> Floats:
+    """Magnitudes of errors at values left out in groups, exact for the linear part by the hat matrix."""
+    errors = np.full(residual.size, np.inf)
     for size in {len(group) for group in groups}:  # groups of one size at a time
         rows = np.array([group for group in groups if len(group) == size])
-        own = q[rows]
+        own = basis[rows]
         spare = np.eye(size) - own @ own.transpose(0, 2, 1)
+        if size == 1:
+            share = spare[:, 0, 0]
+            apart = share > _RANK_LIMIT
+            errors[rows[apart, 0]] = np.abs(residual[rows[apart, 0]] / share[apart])
+            continue
         determined = np.linalg.eigvalsh(spare)[:, 0] > _RANK_LIMIT
         missed = np.linalg.solve(spare[determined], residual[rows[determined], None])
         errors[rows[determined]] = np.abs(missed[..., 0])
-    order = [i for group in groups for i in group]
-    return errors[order] * (target.size / (target.size - rates))
+    return errors[[i for group in groups for i in group]]
 
 
 def _weights(uncertainty: ArrayLike | None, count: int) -> Floats:

@@ -12,6 +12,7 @@ distinct motions over the motion; nor where it breaks a law of physics within th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -51,24 +52,29 @@ def smaller_wins(smaller: Errors, larger: Errors) -> bool:
     kinds = [kind for kind in smaller if kind in larger and len(smaller[kind])]
     if not kinds:
         return True
-    worst = max(kinds, key=lambda kind: float(np.mean(smaller[kind])))
-    if not np.isfinite([np.mean(larger[kind]) for kind in kinds]).all():
+    means = {kind: float(np.mean(smaller[kind])) for kind in kinds}
+    worst = max(kinds, key=means.__getitem__)
+    if not all(math.isfinite(np.mean(larger[kind])) for kind in kinds):
         return True
-    if not np.isfinite([np.mean(smaller[kind]) for kind in kinds]).all():
+    if not all(map(math.isfinite, means.values())):
         return False
-    excess = {kind: np.asarray(smaller[kind]) - np.asarray(larger[kind]) for kind in kinds}
-    variance = {kind: _variance_of_mean(values) for kind, values in excess.items()}
-    over_kinds = float(np.mean([np.mean(values) for values in excess.values()]))
-    standard_error = float(np.sqrt(np.sum(list(variance.values())))) / len(kinds)
+    excess = {kind: _mean_and_variance(np.asarray(smaller[kind]) - np.asarray(larger[kind])) for kind in kinds}
+    over_kinds = sum(mean for mean, _ in excess.values()) / len(kinds)
+    standard_error = math.sqrt(sum(variance for _, variance in excess.values())) / len(kinds)
     clearly = any(
-        np.mean(values) > _CLEAR * np.sqrt(variance[kind]) for kind, values in excess.items() if len(values) >= _SEVERAL
+        mean > _CLEAR * math.sqrt(variance)
+        for kind, (mean, variance) in excess.items()
+        if len(smaller[kind]) >= _SEVERAL
     )
-    return not clearly and over_kinds <= standard_error and float(np.mean(excess[worst])) <= np.sqrt(variance[worst])
+    mean, variance = excess[worst]
+    return not clearly and over_kinds <= standard_error and mean <= math.sqrt(variance)
 
 
-def _variance_of_mean(values: Floats) -> float:
-    """Squared standard error of a mean; of a single value there is none to tell, and zero stands for it."""
-    return float(np.var(values, ddof=1) / len(values)) if len(values) > 1 else 0.0
+def _mean_and_variance(values: Floats) -> tuple[float, float]:
+    """Mean, and its squared standard error; of a single value there is none to tell, and zero stands for it."""
+    mean = float(np.mean(values))
+    apart = values - mean
+    return mean, float(apart @ apart) / (values.size - 1) / values.size if values.size > 1 else 0.0
 
 
 def fold_groups(conditions: Sequence[Condition]) -> dict[str, list[list[int]]]:
