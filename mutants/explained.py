@@ -98,16 +98,16 @@ EXPLAINED = (
     Explained(
         "dampers.random_effects", "max(table.sum(), 1.0)", "1.0 → 10.0", "zero is below whatever it is compared with"
     ),
-    Explained(
-        "dampers.random_effects", "if 0 in used and 2 in used", "", "gains and offsets of runs are always told apart"
+    *(
+        Explained("dampers.random_effects", "if 0 in used and 2 in used", change, "runs tell gains from offsets")
+        for change in ("And → Or", "0 → 1", "2 → 3")
     ),
-    Explained("dampers.random_effects", "variances, dof = np.zeros(4)", "4 → 5", "a last one that nobody reads"),
     Explained("dampers.random_effects", "fitted = np.full(", "mean → median", "another start of the same search"),
     Explained("dampers.random_effects", "fitted = np.full(", "2 → 3", "another start of the same search"),
     Explained(
         "dampers.random_effects",
         "moved, weight = np.zeros(",
-        "items 0 and 1",
+        "items 0 and 1 exchanged: (len(shift), size)",
         "zeros that are replaced before they are read",
     ),
     Explained("dampers.random_effects", "self.slopes[0].shape[1]", "0 → 1", "all runs have one number of columns"),
@@ -185,6 +185,8 @@ EXPLAINED = (
     Explained("identification.covariance", "points = 1 <<", "Sub → Add", "a longer transform of the same samples"),
     Explained("identification.covariance", "bent = -2", "USub", "what is bent enters by its square"),
     Explained("systems.monte_carlo", "machine = len(draws)", "", _BUDGET),
+    Explained("identification.covariance", "lags = _powers(", "USub", "the size of a response has no sign"),
+    Explained("identification.covariance", "for group in (odd, ~odd)", "items", _ORDER),
     Explained("identification.covariance", "odd = orders", "Eq → NotEq", _ALIKE),
     Explained("identification.covariance", "-logs", "", "the space columns span does not depend on their signs"),
     Explained("identification.covariance", "squares / max(", "1 → 2", _GUARD),
@@ -255,7 +257,7 @@ EXPLAINED = (
     Explained("dampers.random_effects", "unit: Floats = np.sqrt(", "", _SCALE),
     *(
         Explained("dampers.random_effects", "self.unit = ", change, _SCALE)
-        for change in ("median →", "Div → Mult", "ptp → max", "2 → 3", "1.0 → 10.0")
+        for change in ("median →", "ptp → max", "2 → 3", "1.0 → 10.0")
     ),
     Explained("dampers.covariance", "error = moved + ", "Add → Sub", "a draw is as likely the other way"),
     Explained("systems.inverse", "rises = np.where(", "0 → 1", "the current next to the lowest"),

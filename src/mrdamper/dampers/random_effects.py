@@ -172,7 +172,7 @@ class GainsAndOffsets:
         """Return the four standard deviations and the degrees of freedom behind them."""
         designs, shown = self._designs, (self._turned @ self._read)[None]
         used = list(designs)
-        variances, dof = np.zeros(4), np.zeros(4)
+        variances, dof = np.zeros((2, 4))
         fitted = np.full(len(used), float(np.mean(shown**2)) if used else 0.0)
         if not fitted.any():
             return Effects()
