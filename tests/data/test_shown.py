@@ -12,6 +12,9 @@ from mrdamper import identify, plot_force, plot_loop, validate
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
+from mrdamper.study.recipe import RecipeResult, play_and_bypass
+from mrdamper.study.validation import Validation
+from mrdamper.study.workflow import RigStudy
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +42,19 @@ def test_a_line_a_table_and_data_frames(shown):
         for frame in frames:
             assert list(frame.columns) == list(one.table)
             assert len(frame) == len(next(iter(one.table.values())))
+
+
+def test_a_headline_names_neither_a_missing_rig_nor_missing_runs_nor_the_noise_of_a_current(bundled):
+    run = bundled["utf_5mm4Hz_1A"]
+    off = 0.015 * np.random.default_rng(0).standard_normal(run.time.size)
+    one = replace(run, rig="", current=off)
+    assert repr(one) == f"<run {run.id}: {run.time.size} samples, {run.time[-1] - run.time[0]:.4g} s, 0 A, {run.split}>"
+    assert repr(bundled.only([run])).endswith(": 1 run, 1 of rig utfsm; no validation runs>")
+    damper = replace(joint_damper(), rig="")
+    assert repr(damper).startswith(f"<{damper.title}: ")
+    scored = RecipeResult(play_and_bypass(), damper, None, (), 0.1, *3 * (Validation("none", ()),), 0.1)
+    study = RigStudy("", bundled.only([one]), (), (), (scored,), {}, {})
+    assert repr(study).splitlines()[0].startswith(f"<{scored.title}, no cross-validation runs, no validation runs")
 
 
 def test_names_from_files_are_text(bundled):

@@ -103,7 +103,8 @@ class Damper(Displayable):
     @property
     def headline(self) -> str:
         """Title, rig and number of identified parameters."""
-        return f"{self.title} of rig {self.rig}: {self.parameter_count} parameters from tests"
+        rig = f" of rig {self.rig}" if self.rig else ""
+        return f"{self.title}{rig}: {self.parameter_count} parameters from tests"
 
     @property
     def details(self) -> Sequence[str]:

@@ -58,8 +58,8 @@ class Dataset(Displayable):
     @property
     def headline(self) -> str:
         """Name, runs per rig and number of validation runs."""
-        rigs = ", ".join(f"{len(self.rig(name))} of rig {name}" for name in self.rigs)
-        return f"dataset {self.name}: {len(self)} runs, {rigs}; {len(self.split('validate'))} validation runs"
+        rigs = "".join(f", {len(self.rig(name))} of rig {name}" for name in self.rigs if name)
+        return f"dataset {self.name}: {len(self)} run{'s' * (len(self) > 1)}{rigs}; {len(self.split('validate')) or 'no'} validation runs"
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:

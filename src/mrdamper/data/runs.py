@@ -144,9 +144,10 @@ class Run(Displayable):
     def headline(self) -> str:
         """Id, rig, length, current and split."""
         low, high = float(np.min(self.current)), float(np.max(self.current))
-        current = f"{low:.3g}" if high - low <= 1e-3 + 0.01 * abs(high) else f"{low:.3g}–{high:.3g}"
+        current = f"{low:.3g}–{high:.3g}" if self.current_changes else f"{self.mean_current:.3g}"
         seconds = self.time[-1] - self.time[0]
-        return f"run {self.id} of rig {self.rig}: {self.time.size} samples, {seconds:.4g} s, {current} A, {self.split}"
+        rig = f" of rig {self.rig}" if self.rig else ""
+        return f"run {self.id}{rig}: {self.time.size} samples, {seconds:.4g} s, {current} A, {self.split}"
 
     @property
     def table(self) -> Mapping[str, Floats]:

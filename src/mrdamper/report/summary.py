@@ -89,8 +89,8 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
     lines = [
         f"{rig.rig or rig.dataset.name}: {chosen.title}, {chosen.damper.parameter_count} parameters, "
         f"{len(chosen.cross_validated.runs)} identification runs",
-        f"  force error (median, worst run): cross-validation {_errors(chosen.cross_validated)}; "
-        f"validation {_errors(chosen.validation)}",
+        f"  force error (median, worst run): {_errors('cross-validation', chosen.cross_validated)}; "
+        f"{_errors('validation', chosen.validation)}",
     ]
     if intervals := check_intervals(rig):
         lines.append(
@@ -103,7 +103,7 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
     for other in others if verbose else others[:1]:
         lines.append(
             f"  {'compared' if verbose else 'next best'}: {other.title}, {other.damper.parameter_count} parameters, "
-            f"cross-validation {_errors(other.cross_validated)}"
+            f"{_errors('cross-validation', other.cross_validated)}"
         )
     if verbose:
         lines += [f"  {row['name']} = {row['written']}" for row in table(rig.damper)]
@@ -116,10 +116,10 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
     return lines, len(listed)
 
 
-def _errors(scores: Validation) -> str:
+def _errors(kind: str, scores: Validation) -> str:
     if not scores.runs:
-        return "–"
-    return f"{100 * scores.median():.2f} %, {100 * scores.worst_error():.1f} %"
+        return f"no {kind} runs"
+    return f"{kind} {100 * scores.median():.2f} %, {100 * scores.worst_error():.1f} %"
 
 
 def _cut(line: str) -> str:

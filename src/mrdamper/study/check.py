@@ -42,7 +42,7 @@ class DatasetFinding:
     text: str
 
     def __str__(self) -> str:
-        return f"{self.run_id or f'rig {self.rig}'}, {self.severity}: {self.text}"
+        return f"{self.run_id or (f'rig {self.rig}' if self.rig else 'dataset')}, {self.severity}: {self.text}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

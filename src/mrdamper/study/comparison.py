@@ -148,7 +148,7 @@ def _seen(rig: Dataset) -> _Seen:
     if len(train) < 3 and not others:
         raise IdentificationError(
             "fewer than three identification runs with a steady sine",
-            where=f"rig {rig.name}",
+            where=rig.name,
             remedy="check the split column",
         )
     held_out = [run for run in trusted if run.split == "validate"]
@@ -184,7 +184,7 @@ def _ranked(
         recipe, reason = next(iter(refused.items()))
         raise IdentificationError(
             f"no model could be compared; {recipe}: {reason}",
-            where=f"rig {name or rig.dataset.name}",
+            where=f"rig {name}" if name else rig.dataset.name,
             remedy="choose other models with --models, or leave this rig out of the dataset",
         )
     entries = [replace(entry, per_run=_per_run(entry.recipe.basis, rig.sines, cache)) for entry in entries]

@@ -102,9 +102,12 @@ class RigStudy(Displayable):
     @property
     def headline(self) -> str:
         """Rig, chosen model and its errors."""
-        left, held = (100 * scores.median() for scores in (self.chosen.cross_validated, self.chosen.validation))
-        errors = f"cross-validation {left:.2f} %, validation {held:.2f} % (median nrmse_pp)"
-        return f"rig {self.rig}: {self.chosen.title}, {errors}"
+        chosen = self.chosen
+        kinds = {"cross-validation": chosen.cross_validated, "validation": chosen.validation}
+        errors = ", ".join(
+            f"{kind} {100 * s.median():.2f} %" if s.runs else f"no {kind} runs" for kind, s in kinds.items()
+        )
+        return f"{f'rig {self.rig}: ' if self.rig else ''}{chosen.title}, {errors} (median nrmse_pp)"
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
@@ -316,7 +319,7 @@ def study_rig(
     unusable |= distrusted
     refused = {name: unusable.get(name, f"{why}; the global model uses it") for name, why in refused.items()}
     refused = {one.run_id: str(one) for one in contradictions} | refused
-    _require_runs(train, everything, unusable, f"rig {rig or dataset.name}")
+    _require_runs(train, everything, unusable, f"rig {rig}" if rig else dataset.name)
     candidates, impossible = fit_and_score_all(
         _steps(train, everything, method, model if method is None else None),
         [run for run in trusted if run.split == "validate"],
@@ -329,7 +332,7 @@ def study_rig(
         name, reason = next(iter(impossible.items()))
         raise IdentificationError(
             f"no damper could be determined; {name}: {reason}",
-            where=f"rig {rig or dataset.name}",
+            where=f"rig {rig}" if rig else dataset.name,
             remedy="test more conditions, or leave this rig out of the dataset",
         )
     unphysical = {c.recipe.name: why for c in candidates if (why := gains_energy(c.damper))}
