@@ -198,3 +198,17 @@ def test_no_door_and_no_argument_is_forgotten(tmp_path):
             continue  # a model's own
         wanted = {p.name for p in parameters if p.kind is not p.VAR_KEYWORD}
         assert wanted <= set(suits), name
+
+
+def test_arguments_that_a_function_does_not_have_are_answered_with_those_it_has():
+    damper, t = joint_damper(), np.arange(100) / 100
+    for call, says in (
+        (lambda: damper.predict(t, t, t), r"Damper\.predict: too many positional .*; call predict\("),
+        (lambda: mrdamper.identify(run="r", models="bingham"), r"identify: .*'models'; call identify\(run: Run, model"),
+        (
+            lambda: Condition(current=0.5, frequency=2, amplitude=10),
+            "argument 'current'; write Condition.current_A=",
+        ),
+    ):
+        with pytest.raises(InputError, match=says):
+            call()

@@ -104,7 +104,16 @@ def validate_arguments(*but: str) -> Callable[[Function], Function]:
         def call(*given: Any, **named: Any) -> Any:
             if not kinds:  # names are known once all modules are read
                 kinds.update(get_type_hints(function))
-            for name, value in signature.bind(*given, **named).arguments.items():
+            try:
+                bound = signature.bind(*given, **named).arguments
+            except TypeError as error:
+                wanted = re.sub(r": '([^']*)'", r": \1", str(signature).replace("(self, ", "(").partition(" -> ")[0])
+                raise InputError(
+                    f"{function.__qualname__}: {error}",
+                    remedy=f"call {function.__name__}{wanted}; see help({function.__qualname__})",
+                    code="E_ARGUMENT",
+                ) from error
+            for name, value in bound.items():
                 if name in kinds and name not in but:
                     _require_fit(name, value, kinds[name])
             return function(*given, **named)

@@ -80,6 +80,17 @@ def test_truncated_and_missing_files(damper, tmp_path):
         load_model(tmp_path / "image.json")
 
 
+def test_a_folder_with_one_model_is_that_model(damper, tmp_path):
+    with pytest.raises(ModelFileError, match=r"a folder with no model\.json; give one"):
+        load_model(tmp_path)
+    save_model(damper, tmp_path / "model-a.json")
+    (tmp_path / "made.json").write_text("{}")
+    assert dump_model(load_model(tmp_path)) == dump_model(damper)
+    save_model(damper, tmp_path / "model-b.json")
+    with pytest.raises(ModelFileError, match=r"a folder with model-a\.json or model-b\.json; give one"):
+        load_model(tmp_path)
+
+
 def test_a_folder_is_no_place_for_a_model(damper, tmp_path):
     with pytest.raises(OutputError, match="is a folder"):
         save_model(damper, tmp_path)

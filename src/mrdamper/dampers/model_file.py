@@ -199,12 +199,13 @@ def load_model(path: str | Path) -> Damper:
     Parameters
     ----------
     path : path
-        A model.json of `save_model` or `mrdamper study`.
+        A model.json of `save_model` or `mrdamper study`, or a folder with one model.
 
     Raises
     ------
     ModelFileError
-        If the file is missing, damaged, of a newer major version, or has unknown fields.
+        If the file is missing, damaged, of a newer major version, or has unknown fields; if a folder has no
+        model or several.
 
     Examples
     --------
@@ -216,6 +217,12 @@ def load_model(path: str | Path) -> Damper:
     mrdamper.errors.ModelFileError: nowhere.json: No such file or directory; give a model.json ...
     """
     path = path_of(path)
+    if path.is_dir():
+        models = sorted(path.glob("model*.json"))
+        if len(models) != 1:
+            names = " or ".join(model.name for model in models) or "no model.json"
+            raise ModelFileError(f"a folder with {names}", where=str(path), remedy="give one model.json")
+        path = models[0]
     try:
         with open_regular(path) as file:
             content = file.read(_MAX_FILE_BYTES + 1)

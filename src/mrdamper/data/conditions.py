@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, wraps
 from itertools import pairwise
 from numbers import Real
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,6 +21,26 @@ _SAME = 0.03  # frequencies and amplitudes this close are one condition of the t
 _NO_NUMBERS = (type(None), str, bytes, complex, list, tuple, dict, set)
 
 
+_Class = TypeVar("_Class", bound=type)
+
+
+def _named_with_units(made: _Class) -> _Class:
+    """Answer unknown and missing names with those that state the unit: an amplitude may be meant in mm or in m."""
+    initialise = made.__init__
+
+    @wraps(initialise)
+    def init(self: object, *given: object, **named: object) -> None:
+        try:
+            initialise(self, *given, **named)
+        except TypeError as error:
+            problem = str(error).removeprefix("Condition.__init__() ")
+            raise ConditionError(problem, remedy="write Condition(current_A=, frequency_Hz=, amplitude_m=)") from error
+
+    made.__init__ = init
+    return made
+
+
+@_named_with_units
 @dataclass(frozen=True, slots=True, order=True)
 class Condition:
     """One point of the test matrix.

@@ -59,7 +59,8 @@ class Dataset(Displayable):
     def headline(self) -> str:
         """Name, runs per rig and number of validation runs."""
         rigs = "".join(f", {len(self.rig(name))} of rig {name}" for name in self.rigs if name)
-        return f"dataset {self.name}: {len(self)} run{'s' * (len(self) > 1)}{rigs}; {len(self.split('validate')) or 'no'} validation runs"
+        runs = f"{len(self)} run{'s' * (len(self) > 1)}"
+        return f"dataset {self.name}: {runs}{rigs}; {len(self.split('validate')) or 'no'} validation runs"
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
