@@ -71,7 +71,7 @@ class Models:
 
 def _peaks(damper: JointDamper, runs: Sequence[Run]) -> Floats:
     """(R,) predicted peak forces [N]."""
-    return np.array([peak_force(damper.predict_run(run).force[run.in_window]) for run in runs])
+    return np.array([peak_force(damper.predict(run).force[run.in_window]) for run in runs])
 
 
 def main() -> None:

@@ -133,7 +133,7 @@ class Rig:
         point = np.clip(fit.point, lower + _INSIDE * (upper - lower), upper - _INSIDE * (upper - lower))
         linear = {info.name: getattr(fit.damper.model, info.name) for info in problem.linear}
         truth = replace(fit.damper, model=replace(problem.without_linear(point), **linear))
-        clean = tuple(replace(r, force=truth.predict_run(r).force) for r in runs)
+        clean = tuple(replace(r, force=truth.predict(r).force) for r in runs)
         return cls(JointProblem(clean, "play-bypass"), clean, truth, point)
 
     def fit(self, runs: Sequence[Run]) -> tuple[JointProblem, JointFit]:
@@ -219,7 +219,7 @@ def _in_bands(rig: Rig, made: Damper, rng: np.random.Generator, repeat: int) -> 
     gain, offset = rng.standard_normal(2)
     noise = NOISE * np.ptp(run.force[run.in_window]) / 2 * rng.standard_normal(run.force.size)
     force = (run.force * (1 + GAIN * gain) + OFFSET * rig.size * offset + noise)[run.in_window]
-    known = band(made, made.predict_run(run), 0.9, shown=run.in_window)
+    known = band(made, made.predict(run), 0.9, shown=run.in_window)
     assert known is not None
     return np.array(
         [known.peak[0] <= np.ptp(force) / 2 <= known.peak[1], np.mean((known.low <= force) & (force <= known.high))]

@@ -49,7 +49,7 @@ def _without(fits: FoldFits, group: list[int]) -> Damper:
 
 def _error(damper: Damper, run: Run, whole: bool = False) -> float:
     inside = np.ones(run.time.size, dtype=bool) if whole else run.in_window
-    missed = (damper.predict_run(run).force - run.force)[inside]
+    missed = (damper.predict(run).force - run.force)[inside]
     return float(np.sqrt(np.mean(missed**2)) / np.ptp(run.force[inside]))
 
 

@@ -285,7 +285,7 @@ def _sweep(rig: RigStudy) -> tuple[float, float, float]:
     run = rig.dataset["utf_chirp15_0A"]
     inside = run.in_window
     measured = run.force[inside]
-    rest = measured - rig.damper.predict_run(run).force[inside]
+    rest = measured - rig.damper.predict(run).force[inside]
     offset = float(np.mean(rest))
     size = float(np.ptp(measured))
     return 100 * float(np.sqrt(np.mean(rest**2))) / size, abs(offset), 100 * float(np.std(rest)) / size

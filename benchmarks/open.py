@@ -214,7 +214,7 @@ def forecasts_of(entry: RecipeResult, rig: Dataset) -> dict[str, Forecast]:
     damper = estimate_uncertainty(entry.damper, [run for run in rig.split("train") if run.id in ids], calibrating, held)
     forecasts = {}
     for run in rig.split("validate"):
-        prediction = damper.predict_run(run)
+        prediction = damper.predict(run)
         interval = band(damper, prediction, LEVEL, np.ones(run.time.size, dtype=bool))
         ends = (None, None) if interval is None else (interval.low, interval.high)
         forecasts[run.id] = Forecast(prediction.force, *ends)

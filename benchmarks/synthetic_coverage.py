@@ -96,7 +96,7 @@ def covered(rig: tuple[str, float], seed: int = 0) -> tuple[Floats, float, float
         frequency, amplitude = rng.uniform(0.5, 2.0), rng.uniform(0.01, 0.02)
         condition = Condition(float(rng.choice(CURRENTS)), float(frequency), float(min(amplitude, 0.02 / frequency)))
         run = record(law, scale, condition, f"new{k} 0", rng.standard_normal(2), rng)
-        prediction, at = damper.predict_run(run), run.in_window
+        prediction, at = damper.predict(run), run.in_window
         around = band(damper, prediction, LEVEL, at)
         assert around is not None
         velocity, force, predicted = prediction.motion.velocity[at], run.force[at], prediction.force[at]

@@ -145,8 +145,8 @@ def doors(folder):
     }  # fmt: skip
     for kind, damper in {"joint": joint, "modified": modified_damper(), "published": conditioned_damper()}.items():
         found |= {
-            f"{kind}.predict": (damper.predict, {"condition": condition}),
-            f"{kind}.predict_run": (damper.predict_run, {"run": run}),
+            f"{kind}.predict": (damper.predict, {"at": condition}),
+            f"{kind}.predict of a run": (damper.predict, {"at": run}),
             f"{kind}.loop": (damper.loop, {"condition": condition}),
             f"{kind}.force_along": (damper.force_along, {"motion": motion, "condition": condition}),
         }

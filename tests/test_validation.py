@@ -50,7 +50,7 @@ class Memory:
     def __init__(self, runs):
         self.known = {(run.nominal.current_A, run.nominal.frequency_Hz) for run in runs}
 
-    def predict_run(self, run):
+    def predict(self, run):
         motion = sine(run.nominal, 3, 100)
         knows = (run.nominal.current_A, run.nominal.frequency_Hz) in self.known
         return Said(run.force if knows else np.zeros(run.time.size), motion, run.nominal)
@@ -100,7 +100,7 @@ class Exact:
     envelope = None
     title = "exact"
 
-    def predict_run(self, run):
+    def predict(self, run):
         motion = sine(run.nominal, 3, 100)
         return Said((100 + 50 * run.nominal.current_A) * motion.velocity, motion, run.nominal, ("current",))
 
@@ -125,8 +125,8 @@ def test_standing_still_has_an_error_of_its_own_and_the_best_gain_and_offset_are
     wrong = run.force + np.where(still, np.where(np.arange(still.size) % 2, 30.0, 40.0), 0.0)
 
     class Resting(Exact):
-        def predict_run(self, run):
-            said = super().predict_run(run)
+        def predict(self, run):
+            said = super().predict(run)
             velocity = np.where(still, 0.0, said.motion.velocity)
             return replace(said, motion=SimpleNamespace(velocity=velocity, resting=still))
 
@@ -220,7 +220,7 @@ def test_the_band_of_the_peak_is_told_beside_the_measured_peak_of_the_window(mon
 
     monkeypatch.setattr(validation, "band", said)
     half = np.ptp(run.force[100:]) / 2
-    seen = Exact().predict_run(run)
+    seen = Exact().predict(run)
     inside, of_a_cycle = run.in_window, 1 / seen.condition.frequency_Hz
     energy, expected = (
         of_a_cycle * dissipated_power(force[inside], seen.motion.velocity[inside], run.time[inside])

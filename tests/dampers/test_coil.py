@@ -132,8 +132,8 @@ def test_a_lag_delays_the_force_of_a_run():
     motion = switched()
     run = Run("switched", motion.time, motion.displacement, motion.velocity, motion.current)
     damper = joint_damper()
-    forces = [replace(damper, coil=Coil(lag, lag)).predict_run(run).force for lag in (0.0, 0.005, 0.05)]
-    assert np.array_equal(forces[0], damper.predict_run(run).force)
+    forces = [replace(damper, coil=Coil(lag, lag)).predict(run).force for lag in (0.0, 0.005, 0.05)]
+    assert np.array_equal(forces[0], damper.predict(run).force)
     assert np.std(forces[1] - forces[0]) < np.std(forces[2] - forces[0])
 
 
@@ -145,7 +145,7 @@ def test_free_motion_is_predicted_as_it_is_streamed(kind, current):
     given = motion.current if current == "switched" else np.full(len(motion), -0.4)
     run = Run("road", motion.time, motion.displacement, motion.velocity, given)
     damper = replace(KINDS[kind](), coil=Coil(0.006, 0.012))
-    prediction, stream = damper.predict_run(run), stepper(damper)
+    prediction, stream = damper.predict(run), stepper(damper)
     seen = prediction.motion
     steps = np.diff(seen.time, prepend=2 * seen.time[0] - seen.time[1])
     rows = np.column_stack([seen.displacement, seen.velocity, seen.acceleration, seen.current, steps]).tolist()

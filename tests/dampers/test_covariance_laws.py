@@ -261,7 +261,7 @@ def test_what_gains_of_other_runs_moved_is_no_error_within_a_run():
 def test_other_sessions_show_the_scatter_of_sessions_and_far_runs_the_growth():
     runs = runs_of(sessions=3, session=0.2)
     damper = fitted(runs)
-    seen = [PredictedRun.of(r, damper.predict_run(r).force, damper.predict_run(r).motion.velocity) for r in runs]
+    seen = [PredictedRun.of(r, damper.predict(r).force, damper.predict(r).motion.velocity) for r in runs]
     far = [replace(p, predicted=1.5 * p.predicted, distance=Distance(0.0, 0.5, 0.0)) for p in seen]
     plain = estimate_uncertainty(damper, runs, seen).uncertainty
     for factor in (1.4, 1.01):  # two of three parts of it are the session's own
@@ -295,7 +295,7 @@ def test_the_model_error_of_cross_validation_takes_the_place_of_the_residuals():
     rng = np.random.default_rng(4)
     seen = []
     for run in runs:
-        motion = damper.predict_run(run).motion
+        motion = damper.predict(run).motion
         beyond = 0.1 * np.ptp(run.force) * np.sin(3 * np.pi * 2 * run.time / (run.time[-1] / 6))
         seen.append(PredictedRun.of(run, (run.force + beyond) * (1 + 0.06 * rng.standard_normal()), motion.velocity))
     inside, known = estimate_uncertainty(damper, runs).uncertainty, estimate_uncertainty(damper, runs, seen).uncertainty
@@ -311,7 +311,7 @@ def test_the_model_error_of_cross_validation_takes_the_place_of_the_residuals():
     made = replace(damper, uncertainty=known)
     shares = []
     for run, prediction in zip(runs, seen, strict=True):
-        around = band(made, damper.predict_run(run), 0.8)
+        around = band(made, damper.predict(run), 0.8)
         half = np.interp(np.arange(prediction.predicted.size), [0, prediction.predicted.size], [0, run.time.size])
         width = (around.high - around.low)[half.astype(int)] / 2
         shares.append(np.mean(np.abs(prediction.measured - prediction.predicted) <= width))
@@ -344,7 +344,7 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
     seen = []
     for run in runs:
         shifted = run.force * (1 + 0.08 * rng.standard_normal()) + 40 * rng.standard_normal()
-        seen.append(PredictedRun.of(run, shifted, damper.predict_run(run).motion.velocity))
+        seen.append(PredictedRun.of(run, shifted, damper.predict(run).motion.velocity))
     seen[1] = replace(seen[1], peak=1.3 * seen[1].peak, energy=0.7 * seen[1].energy)
     seen[3] = replace(seen[3], distance=Distance(0.05, 0.2, 0.3))
     seen[6] = replace(seen[6], run_id="recorded later")  # the parameters move it as they move the median run

@@ -379,7 +379,7 @@ def test_a_fit_begins_where_another_problem_ended(problem, fit):
 
 
 def test_predictions_of_a_run_share_its_motion(runs, fit):
-    one, other = (fit.damper.predict_run(runs[2]).motion for _ in range(2))
+    one, other = (fit.damper.predict(runs[2]).motion for _ in range(2))
     assert one is other  # cut into strokes once
 
 
@@ -387,7 +387,7 @@ def test_errors_of_left_out_runs_are_those_of_a_prediction(runs, problem, fit):
     found = problem.errors(fit, [2, 7])
     for error, i in zip(found, (2, 7), strict=True):
         run = runs[i]
-        missed = (fit.damper.predict_run(run).force - run.force)[run.in_window]
+        missed = (fit.damper.predict(run).force - run.force)[run.in_window]
         # On the samples that enter, a few hundred of the window.
         assert error == pytest.approx(np.sqrt(np.mean(missed**2)) / np.ptp(run.force[run.in_window]), rel=0.1)
     assert fit.error == pytest.approx(sum(fit.nrmse_pp) / len(runs))
@@ -415,7 +415,7 @@ def test_the_coil_follows_a_changed_current_late(fit):
     motion = sine(Condition(0.0, 1.0, 0.01), 4, 500)
     current = np.where(motion.time < 2, 0.0, 1.0)
     run = Run("step", motion.time, motion.displacement, motion.velocity, current)
-    late, prompt = (replace(fit.damper, coil=coil).predict_run(run).force for coil in (Coil(0.05, 0.05), None))
+    late, prompt = (replace(fit.damper, coil=coil).predict(run).force for coil in (Coil(0.05, 0.05), None))
     before, after, later = motion.time < 2, (motion.time > 2) & (motion.time < 2.05), motion.time > 2.6
     np.testing.assert_allclose(late[before], prompt[before])
     assert np.abs(late[after]).mean() < 0.9 * np.abs(prompt[after]).mean()

@@ -173,7 +173,7 @@ def test_other_motion_gets_running_estimates_and_is_flagged(runs, identification
     damper = fit_modified_jointly(runs, identifications)[0].damper
     motion = sweep(0.6, 1.9, 30.0, 0.03, 1.0, 400.0)
     run = Run("sweep", motion.time, motion.displacement, motion.velocity, 1.0, rig="s", excitation="chirp")
-    prediction = damper.predict_run(run)
+    prediction = damper.predict(run)
     assert "not a sine" in prediction.extrapolation
     expected = simulate(truth(Condition(1.0, 1.0, 0.03)), motion).force
     assert np.sqrt(np.mean((prediction.force - expected) ** 2)) < 0.04 * np.ptp(expected)

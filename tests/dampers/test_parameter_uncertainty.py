@@ -100,7 +100,7 @@ def test_the_band_of_the_peak_holds_new_sessions():
     made = estimate_uncertainty(truth, named(session_runs(truth, seed=5, repeats=2)))
     inside = []
     for run in session_runs(truth, seed=6, repeats=3):
-        prediction = made.predict_run(run)
+        prediction = made.predict(run)
         low, high = band(made, prediction, 0.9).peak
         inside.append(low <= np.ptp(run.force) / 2 <= high)
     assert np.mean(inside) >= 0.75  # 27 of 90 %: three standard errors are 17 points

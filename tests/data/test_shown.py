@@ -68,7 +68,7 @@ def test_loops_are_drawn_into_given_axes(bundled):
     axes = Figure().subplots()
     run = bundled["utf_5mm4Hz_1A"]
     assert plot_loop(run, axes, over="velocity", color="black") is axes
-    assert plot_loop(joint_damper().predict_run(run), axes, over="velocity") is axes
+    assert plot_loop(joint_damper().predict(run), axes, over="velocity") is axes
     measured, predicted = axes.lines
     assert measured.get_color() == "black"
     assert np.array_equal(measured.get_ydata(), 1e-3 * run.steady().force)

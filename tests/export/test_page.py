@@ -192,7 +192,7 @@ def test_a_motion_of_ones_own_is_predicted_as_on_the_command_line(opened, no_com
     t = np.arange(2000) * 2e-3
     x = 0.03 + 0.008 * np.sin(2 * np.pi * t) + 0.003 * np.sin(2 * np.pi * 2.5 * t) + 1e-5 * np.cos(37 * t)
     current = 0.2 + 0.1 * t
-    predicted = damper.predict_run(Run("motion", t, x, np.zeros(t.size), current))
+    predicted = damper.predict(Run("motion", t, x, np.zeros(t.size), current))
     page = opened(damper)
     said = give(page, csv_of(time_s=t, displacement_m=x, current_A=current, force_N=predicted.force + 10))
     assert "2000 samples" in said

@@ -25,7 +25,7 @@ def test_a_stored_model_gives_its_forces(path):
     time = np.linspace(0, 2, 801)
     along = known.pop("run")
     motion = Run("sine", time, 0.008 * np.sin(2 * np.pi * 1.5 * time), np.zeros(time.size), np.array(0.25))
-    np.testing.assert_allclose(damper.predict_run(motion).force[::40], along, atol=1e-9 * np.ptp(along))
+    np.testing.assert_allclose(damper.predict(motion).force[::40], along, atol=1e-9 * np.ptp(along))
     for text, force in known.items():
         found = damper.predict(Condition(*map(float, text.split()))).force[::50]
         np.testing.assert_allclose(found, force, atol=1e-9 * np.ptp(force))

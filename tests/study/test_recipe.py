@@ -56,7 +56,7 @@ class Memory:
     def __init__(self, runs):
         self.known = {run.id for run in runs}
 
-    def predict_run(self, run):
+    def predict(self, run):
         motion = sine(run.nominal, 3, 100)
         return Said(run.force if run.id in self.known else np.zeros(run.time.size), motion, run.nominal)
 
@@ -220,7 +220,7 @@ class Zero:
     envelope = None
     title, one_model = "zero", None
 
-    def predict_run(self, run):
+    def predict(self, run):
         return Said(np.zeros(run.time.size), measured_motion(run), Condition(0.0, 1.0, 0.01))
 
 

@@ -20,5 +20,5 @@ def test_they_are_those_that_a_study_selects(bundled):
     for damper, rig in zip(bundled_dampers(), run_study(bundled).rigs, strict=True):
         assert damper.title == rig.damper.title
         run = rig.dataset.split("validate")[0]
-        forces = [d.predict_run(run).force for d in (damper, rig.damper)]
+        forces = [d.predict(run).force for d in (damper, rig.damper)]
         np.testing.assert_allclose(*forces, atol=0.01 * np.ptp(forces[0]))

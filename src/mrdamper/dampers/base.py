@@ -240,22 +240,31 @@ class Damper(Displayable):
         return motion.with_current(self.coil.along(motion.time, motion.current))
 
     @validate_arguments()
-    def predict(self, condition: Condition) -> Prediction:
-        """Steady loop at a condition, with its flags."""
-        response = self.loop(condition)
-        return Prediction(response.excitation, response.force, condition, self.envelope.flags(condition), steady=True)
+    def predict(self, at: Condition | Run) -> Prediction:
+        """Predict the force at a condition, one steady loop, or along the motion and current of a run.
 
-    @validate_arguments()
-    def predict_run(self, run: Run) -> Prediction:
-        """Force along the measured motion of a run, with its flags. The measured force is not looked at.
+        The measured force of a run is not used. Parameters that depend on frequency and amplitude get
+        those of the run where it is a sine of one current. Otherwise they follow the sine that the motion
+        has resembled so far: an approximation, flagged as such, and the force that a stream of the damper gives.
 
-        Parameters that ask for a frequency and an amplitude get those of the run where it is a sine
-        of one current. Otherwise they follow the sine that the motion has resembled so far: an
-        approximation, flagged as such, and the force that a stream of the damper gives.
+        Parameters
+        ----------
+        at : Condition or Run
+            A motion of one's own is a run: ``Run("mine", time, displacement, np.zeros(time.size), current)``
+            in s, m, N and A.
+
+        Returns
+        -------
+        Prediction
+            Of a condition, one closed cycle; of a run, a force at each of its samples. `extrapolation` lists
+            what lies outside the tested ranges.
         """
-        sine = equivalent_sine(run)
-        motion = centred_motion(run)
-        if sine.is_sine and not run.current_changes:
+        if isinstance(at, Condition):
+            loop = self.loop(at)
+            return Prediction(loop.excitation, loop.force, at, self.envelope.flags(at), steady=True)
+        sine = equivalent_sine(at)
+        motion = centred_motion(at)
+        if sine.is_sine and not at.current_changes:
             flags = self.envelope.flags(sine.condition)
         else:
             flags = (

@@ -68,12 +68,8 @@ class DamperLike(Protocol):
         """Return the motion with the current whose field is there."""
         ...
 
-    def predict(self, condition: Condition) -> Any:
-        """Predict the steady loop at a condition."""
-        ...
-
-    def predict_run(self, run: Run) -> Any:
-        """Predict the force along a run."""
+    def predict(self, at: Condition | Run) -> Any:
+        """Predict the steady loop at a condition, or the force along a run."""
         ...
 
 

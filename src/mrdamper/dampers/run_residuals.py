@@ -91,7 +91,7 @@ class RunResiduals:
     @classmethod
     def of(cls, damper: Damper, run: Run) -> RunResiduals:
         """Residuals of a run against a damper; raises E_CLOCK as `session_of`."""
-        whole = damper.predict_run(run)
+        whole = damper.predict(run)
         frequency = whole.condition.frequency_Hz if whole.is_sine else None
         window = np.flatnonzero(run.in_window)
         first, last = int(window[0]), int(window[-1])

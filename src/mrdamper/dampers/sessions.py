@@ -316,7 +316,7 @@ def sessions_known(damper: Damper, runs: Iterable[Run] = (), own: bool = False) 
 def gain_offset_of(damper: Damper, run: Run) -> GainOffset:
     """Gain and offset of a run against a damper, inside the steady window."""
     inside = run.in_window
-    return GainOffset.of(run.force[inside], damper.predict_run(run).force[inside])
+    return GainOffset.of(run.force[inside], damper.predict(run).force[inside])
 
 
 def known_errors(runs: Sequence[Run], left_out: Sequence[GainOffset]) -> Floats:

@@ -24,9 +24,9 @@ _NO_NUMBERS = (type(None), str, bytes, complex, list, tuple, dict, set)
 _Class = TypeVar("_Class", bound=type)
 
 
-def _named_with_units(made: _Class) -> _Class:
+def _named_with_units(owner: _Class) -> _Class:
     """Answer unknown and missing names with those that state the unit: an amplitude may be meant in mm or in m."""
-    initialise = made.__init__
+    initialise = owner.__init__
 
     @wraps(initialise)
     def init(self: object, *given: object, **named: object) -> None:
@@ -36,8 +36,8 @@ def _named_with_units(made: _Class) -> _Class:
             problem = str(error).removeprefix("Condition.__init__() ")
             raise ConditionError(problem, remedy="write Condition(current_A=, frequency_Hz=, amplitude_m=)") from error
 
-    made.__init__ = init
-    return made
+    owner.__init__ = init
+    return owner
 
 
 @_named_with_units

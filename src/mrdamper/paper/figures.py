@@ -137,7 +137,7 @@ def _predicted(title: str, study: Reproduction, axes: Texts) -> Drawing:
     runs = [run for run in study.held_out if run.id in scored]
     if method is None or not runs:
         return "nothing predicts a validation run"
-    return _tested_and_model(axes, runs, [method.damper.predict_run(run).force for run in runs])
+    return _tested_and_model(axes, runs, [method.damper.predict(run).force for run in runs])
 
 
 def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]) -> FigureLayout:

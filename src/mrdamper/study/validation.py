@@ -155,7 +155,7 @@ def validate(
     >>> bool(scores.median("nrmse_pp") < 0.2)  # RMS error over the peak-to-peak force
     True
     """
-    if not hasattr(damper, "predict_run"):
+    if not hasattr(damper, "predict"):
         require(damper, Damper, "a damper", "load_model(file) gives one")
     scored, refused = list[RunScore](), dict[str, str]()
     for run in runs:
@@ -179,7 +179,7 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> Run
     if not _MIN_SWING_N < swing < 1 / _MIN_SWING_N:
         text = f"the force changes by {swing:.3g} N" if swing else "the force does not change"
         raise RunError(text, where=f"run {run.id}", remedy="check the channel")
-    prediction = damper.predict_run(run)
+    prediction = damper.predict(run)
     inside = run.in_window
     reading = GainOffset.of(run.force[inside], prediction.force[inside])
     away = prediction.distance(damper.envelope)
@@ -215,7 +215,7 @@ def peak_band(
 
     The ends are missing where the damper does not know how sure it is.
     """
-    prediction, inside = damper.predict_run(run), run.in_window
+    prediction, inside = damper.predict(run), run.in_window
     if expected is None:
         interval = band(damper, prediction, level, inside)
     else:
@@ -283,7 +283,7 @@ def session_drift(damper: Damper, runs: Iterable[Run]) -> SessionDrift:
     gains, offsets, errors = list[float](), list[float](), list[float]()
     for run in runs:
         inside = run.in_window
-        measured, predicted = run.force[inside], damper.predict_run(run).force[inside]
+        measured, predicted = run.force[inside], damper.predict(run).force[inside]
         gain, offset = np.polynomial.polynomial.polyfit(predicted, measured, 1)[::-1]
         gains.append(gain)
         offsets.append(offset)

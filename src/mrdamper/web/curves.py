@@ -67,7 +67,7 @@ def modelled_cycle(model: Model, run: Run, delay: float = 0.0) -> dict[str, Floa
 
 def predicted_on_run(damper: Damper, run: Run) -> tuple[dict[str, Floats], tuple[str, ...]]:
     """Return the force a damper predicts along the measured motion: last cycle of a sine, or the whole window."""
-    prediction = damper.predict_run(run)
+    prediction = damper.predict(run)
     if equivalent_sine(run).is_sine:
         return on_screen(prediction.motion, prediction.force, *_last_cycle(run)), prediction.extrapolation
     window = np.flatnonzero(run.in_window)

@@ -111,7 +111,7 @@ def _predict(
 
         if frequency is not None or amplitude is not None:
             raise InputError("--motion together with --frequency or --amplitude", remedy="give one of them")
-        return damper.predict_run(load_motion(motion, current))
+        return damper.predict(load_motion(motion, current))
     if current is None or frequency is None or amplitude is None:
         raise InputError("no condition", remedy="give --current A --frequency Hz --amplitude mm, or --motion FILE")
     return damper.predict(Condition(current, frequency, 1e-3 * amplitude))

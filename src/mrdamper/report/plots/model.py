@@ -50,7 +50,7 @@ def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
     for number, run in enumerate(runs):
         row, column = divmod(number, columns)
         over_x, over_v = axes[2 * row * columns + column], axes[(2 * row + 1) * columns + column]
-        prediction = damper.predict_run(run)
+        prediction = damper.predict(run)
         period = 1 / prediction.condition.frequency_Hz
         end = run.window[1] if run.window else float(run.time[-1])
         last = (run.time <= end) & (run.time >= end - 1.02 * period)
@@ -142,7 +142,7 @@ def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
         sine = equivalent_sine(run)
         if not sine.is_sine:
             continue
-        prediction = damper.predict_run(run)
+        prediction = damper.predict(run)
         inside = run.in_window
         motion = prediction.motion.part(inside)
         error = 100 * (prediction.force - run.force)[inside] / np.ptp(run.force[inside])

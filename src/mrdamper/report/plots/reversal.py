@@ -43,7 +43,7 @@ def force_since_reversal(runs: Sequence[Run], damper: Damper) -> Figure:
 
 def _means(run: Run, damper: Damper, bins: Floats) -> Floats:
     """Rows: measured, predicted; mean in each bin, NaN where no sample fell."""
-    prediction = damper.predict_run(run)
+    prediction = damper.predict(run)
     path, inside = prediction.motion.path, run.in_window
     direction, distance = path.direction[inside], path.distance[inside]
     peak = np.ptp(run.force[inside]) / 2
