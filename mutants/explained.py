@@ -90,6 +90,9 @@ EXPLAINED = (
     Explained("dampers.random_effects", "weight = 1 / np.maximum(", "1 → 2", _SCALE),
     Explained("dampers.calibration", "parts[0].distance", "0 → 1", "the stretches of a run have one distance"),
     Explained("dampers.calibration", "parts[0].session", "0 → 1", "the stretches of a run have one session"),
+    Explained("dampers.calibration", "size[size == 0] = 1.0", "1.0 → 10.0", "zero, whatever divides it"),
+    Explained("dampers.calibration", "+ _ROUNDING, 1.0)", "Add → Sub: level * (len(units) + 1) + _ROUNDING", _GUARD),
+    Explained("dampers.calibration", "share > 2 * _ROUNDING", "2 → 3", _GUARD),
     Explained("dampers.random_effects", "whole: Floats = noise + least", "Add → Sub", _GUARD),
     Explained(
         "dampers.random_effects", "(solved < 0)", "0 → 1", "without a negative one both ways of solving end at the same"

@@ -13,6 +13,7 @@ from mrdamper.dampers.calibration import (
     ModelError,
     PredictedRun,
     StandardizedErrors,
+    _squared_errors,
     measured_peak,
     model_error,
     scatter_between_sessions,
@@ -67,6 +68,33 @@ def test_a_run_is_compared_inside_its_window_with_what_it_takes_out_of_the_motio
     still = replace(found, predicted=np.full(5, 7.0), measured=np.full(5, 9.0))
     assert still.gain_and_offset == pytest.approx((1.0, 2.0))  # a constant shows no gain
     assert still.half == 1.0  # nor a swing: errors are then in N
+
+
+def test_peaks_do_not_depend_on_the_place_of_the_piston_nor_on_the_time_of_a_cycle():
+    """Two cycles of changing current have a loop each; less than a cycle has its own peak."""
+    turns = np.linspace(0.0, 2.05, 412)
+    force = 100 * np.sin(2 * np.pi * turns)
+    force[:200] *= 1.3
+    for frequency in (0.25, 1.0, 4.0):
+        time, size = turns / frequency, np.where(turns < 1, 0.01, 0.002)
+        for place in (0.0, 1.0):
+            path = place + 0.01 * np.sin(2 * np.pi * turns)
+            record = Run("r", time, path, force, np.where(turns < 1, 0.0, 1.0))
+            found = PredictedRun.of(record, 100 * np.sin(2 * np.pi * turns), np.gradient(path, time))
+            assert found.peak == pytest.approx([1.3, 1.0], abs=0.15)
+            less = record.part(20, 160)  # a rise, a fall and half a rise: its halves have smaller peaks
+            assert measured_peak(less) == pytest.approx(np.ptp(less.force) / 2)
+            uneven = replace(record, displacement=place + size * np.sin(2 * np.pi * turns))
+            assert PredictedRun.of(uneven, force, np.gradient(path, time)).peak.size == 1  # the second hardly moves
+
+
+def test_squared_errors_are_means_and_count_as_one_where_there_is_no_number():
+    uneven = np.concatenate([np.zeros(150), np.linspace(0.0, 30.0, 51)])
+    peak, energy = np.array([1.0, 1.1, np.nan, 1.3]), np.array([np.inf, 0.5, 1.0, 1.0])
+    found = _squared_errors(run("r", uneven, peak=peak, energy=energy))
+    half = np.ptp(SWING) / 2
+    assert found == pytest.approx([np.mean(uneven**2) / half**2, (0.01 + 1 + 0.09) / 4, (1 + 0.25) / 4])
+    assert _squared_errors(run("r", np.inf))[0] == 1.0
 
 
 def test_the_peak_of_several_cycles_is_that_of_most_of_them():
@@ -217,6 +245,17 @@ def test_peaks_of_many_loops_are_pooled_as_samples_are():
     assert found.peak == pytest.approx([1.0] * len(found.peak), rel=0.1)
 
 
+@pytest.mark.parametrize("loops", [2, 3])
+def test_runs_of_several_loops_are_pooled_and_one_of_a_single_loop_makes_room_for_a_run_to_come(loops):
+    values = np.arange(1.0, 20 * loops + 1).reshape(loops, 20).T
+    pooled = calibrated([scored(1.0, peak=row) for row in values])
+    for level, factor in zip(LEVELS, pooled.peak, strict=False):
+        smallest = np.sort(values.ravel())[int(np.ceil(level * values.size - 1e-9)) - 1]
+        assert factor == pytest.approx(smallest / norm.ppf((1 + level) / 2))
+    single = calibrated([scored(1.0, peak=values[0].mean()), *(scored(1.0, peak=row) for row in values[1:])])
+    assert all(a > b for a, b in zip(single.peak[-2:], pooled.peak[-2:], strict=True))
+
+
 def test_what_a_unit_is_called_and_how_long_a_run_is_changes_nothing():
     rng = np.random.default_rng(2)
     scores = [scored(np.abs(rng.standard_normal(50)), *np.abs(rng.standard_normal(2))) for _ in range(20)]
@@ -331,6 +370,17 @@ def test_the_scatter_at_the_tests_is_no_growth():
 
 
 TYPICAL = np.array([0.065, 0.031, 0.026])
+
+
+def test_the_error_that_the_parameters_account_for_is_no_growth():
+    way, error = Distance(0.0, 0.0, 0.5), 0.3
+    runs = [replace(run("r", error * np.ptp(SWING) / 2, peak=1 + error, energy=1 - error), distance=way)] * 4
+    nothing = ModelError(force=0.0, peak=0.0, energy=0.0, gain=0.0, offset=0.0)
+    for share in (0.0, 0.75, 1.0):
+        found = Growth.of(runs, nothing, {"r": np.full(3, share * error**2)})
+        motion = np.sqrt(((1 - share) * error**2 / 0.5**2 + TYPICAL[2] ** 2) / 2)
+        for quantity in ("force", "peak", "energy"):
+            assert getattr(found, quantity)[2] == pytest.approx(motion)
 
 
 def beside_typical(growth):

@@ -73,6 +73,31 @@ def test_columns_that_no_run_shows_are_unseen_and_the_unit_of_a_parameter_change
     assert (len(keep), unseen, [sorted(group) for group in alike]) == (2, [], [[0, 1]])
 
 
+class OfFunctions(JointDamper):
+    """Damper without one model for all conditions."""
+
+    one_model = None
+
+
+@pytest.mark.parametrize("window", [None, (1.0, 11.5)])
+def test_of_a_run_beside_parameter_functions_the_last_four_cycles_enter_evenly(window):
+    (run,) = runs_of(conditions=CONDITIONS[:1])
+    run = replace(run, window=window, force=run.force + 40.0)
+    part = RunResiduals.of(OfFunctions("bench", TRUTH.model, TRUTH.free, UNTESTED), run)
+    time, end = part.prediction.motion.time, window[1] if window else run.time[-1]
+    at = np.searchsorted(run.time, time[part.picked])
+    assert part.measured == pytest.approx(run.force[at])
+    assert part.predicted == pytest.approx(TRUTH.predict_run(run).force[at])
+    assert (time[part.picked[0]], time[part.picked[-1]]) == pytest.approx((end - 4 / 0.5, end), abs=0.03)
+    assert time[[0, -1]] == pytest.approx([max(0.0, end - 5.5 / 0.5), end], abs=0.02)  # it has forgotten its start
+    assert 400 <= part.picked.size < 800
+    assert np.ptp(np.diff(part.picked)) == 0
+    inside = (run.time >= end - 4 / 0.5 - 0.02) & (run.time <= end)
+    assert (part.scale, part.information) == (pytest.approx(np.ptp(run.force[inside]), rel=1e-3), 1.0)
+    assert part.error == pytest.approx(np.sqrt(np.mean(part.residual**2)) / part.scale)
+    assert part.weight == pytest.approx(1 / part.scale / np.sqrt(part.error * part.picked.size))
+
+
 def test_what_enters_of_a_run_is_what_entered_its_fit():
     (run,) = runs_of(conditions=CONDITIONS[:1])
     part, joint = RunResiduals.of(TRUTH, run), JointProblem([run], "bingham")
