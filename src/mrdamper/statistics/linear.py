@@ -43,8 +43,8 @@ def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None
     (L,) array
     """
     gram = columns.T @ columns
-    scale = np.sqrt(np.diag(gram))
-    scale = np.where(scale > 0, scale, 1.0)
+    scale = np.sqrt(gram.diagonal())
+    scale[~(scale > 0)] = 1.0
     normal = gram / scale / scale[:, None]
     if _pivots(normal).min(initial=1.0) > _WELL_APART:
         # Normal equations, then once more for what they left: as good as a factorisation of N rows.
@@ -84,7 +84,10 @@ def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) 
     solution = np.zeros(held.size)
     for _ in range(held.size + 1):
         free = ~held
-        solution[free] = solve_linear(columns[:, free], right - columns[:, held] @ solution[held])
+        if held.any():
+            solution[free] = solve_linear(columns[:, free], right - columns[:, held] @ solution[held])
+        else:
+            solution = solve_linear(columns, right)
         outside = free & ((solution < lower) | (solution > upper))
         if not outside.any():
             break
@@ -108,7 +111,7 @@ def robust_weights(errors: Floats, best: float) -> Floats:
 
 def _pivots(normal: Floats) -> Floats:
     try:
-        return np.asarray(np.diag(np.linalg.cholesky(normal)), dtype=float)
+        return np.asarray(np.linalg.cholesky(normal).diagonal(), dtype=float)
     except np.linalg.LinAlgError:
         return np.zeros(1)
 
