@@ -71,7 +71,7 @@ class Elimination:
         if self.projector is None or shape is None:
             return None
         state, by_kappa = follow_with_slope(*shape, self.problem.motion.path, self.problem.scored)
-        return self.projector.residual_and_slope(state, -by_kappa)
+        return self.projector.residual_and_slope(state, np.negative(by_kappa, out=by_kappa))
 
     def solved(self, point: Mapping[str, float]) -> Model | None:
         """Model at a point of the search; None where it takes the general way."""
@@ -191,7 +191,12 @@ class FixedColumnSolver:
         moved = basis @ (change @ basis)
         np.subtract(change, moved, out=moved)
         growth = (float(moved @ rest) - 2 * size * float(moved @ beside)) / float(beside @ beside)
-        return size * beside - rest, size * moved + growth * beside
+        residual = size * beside
+        residual -= rest
+        moved *= size  # in place: these may be channels of a long record
+        beside *= growth
+        moved += beside
+        return residual, moved
 
     def solve(self, state: Floats) -> tuple[float, list[float]] | None:
         """Best coefficients of the state and of the columns; None as `residual`."""
