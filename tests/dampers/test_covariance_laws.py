@@ -87,7 +87,7 @@ def test_of_a_run_beside_parameter_functions_the_last_four_cycles_enter_evenly(w
     time, end = part.prediction.motion.time, window[1] if window else run.time[-1]
     at = np.searchsorted(run.time, time[part.picked])
     assert part.measured == pytest.approx(run.force[at])
-    assert part.predicted == pytest.approx(TRUTH.predict_run(run).force[at])
+    assert part.predicted == pytest.approx(TRUTH.predict(run).force[at])
     assert (time[part.picked[0]], time[part.picked[-1]]) == pytest.approx((end - 4 / 0.5, end), abs=0.03)
     assert time[[0, -1]] == pytest.approx([max(0.0, end - 5.5 / 0.5), end], abs=0.02)  # it has forgotten its start
     assert 400 <= part.picked.size < 800
