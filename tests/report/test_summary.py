@@ -1,5 +1,7 @@
 """A study on the terminal: at most 20 lines, at most five limitations."""
 
+from dataclasses import replace
+
 from mrdamper.report.page import plain
 from mrdamper.report.summary import study_lines
 
@@ -16,6 +18,18 @@ def test_a_study_fits_a_terminal_and_its_details_follow_with_verbose(bundled_stu
         assert any(median in line for line in short)
         for name in rig.damper.fitted_parameters:
             assert any(line.startswith(f"  {name} = ") for line in full)
+
+
+def test_a_model_with_a_smaller_error_than_the_chosen_one_has_a_reason(bundled_study):
+    rig = bundled_study.rigs[0]
+    worst = max(rig.candidates, key=lambda candidate: candidate.cross_validated.median())
+    swapped = replace(rig, candidates=(worst, *(one for one in rig.candidates if one is not worst)))
+    lines = study_lines(replace(bundled_study, rigs=(swapped,)), [], verbose=True)
+    compared = [line for line in lines if line.startswith("  compared: ")]
+    assert all("by a standard error" in line or "not eligible" in line for line in compared)
+    assert len(compared) == len(rig.candidates) - 1
+    for study in (bundled_study, replace(bundled_study, rigs=(replace(swapped, asked_for=True),))):
+        assert not any("by a standard error" in line for line in study_lines(study, [], verbose=True))
 
 
 def test_conditions_are_written_as_in_a_test_plan():

@@ -18,7 +18,7 @@ from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.comparison import overlaid_loops, ranking
 from mrdamper.report.plots.style import save_figure
 from mrdamper.report.tables import score_row
-from mrdamper.study.comparison import Comparison, RigComparison
+from mrdamper.study.comparison import RANKING, Comparison, RigComparison
 from mrdamper.study.recipe import Progress, RecipeResult
 
 _LOOPS, _OVERLAID = 3, 5
@@ -45,7 +45,7 @@ def write_comparison(
                 save_model(entry.damper, work / "models" / f"{entry.recipe.name.replace(':', '-')}{suffix}.json")
         footer = f"{made_from(comparison.dataset)}."
         title = f"MR damper models compared: {', '.join(r.rig for r in comparison.rigs) or comparison.dataset.name}"
-        page = render_page("comparison.html.j2", title, footer, chapters=chapters)
+        page = render_page("comparison.html.j2", title, footer, chapters=chapters, ranking=RANKING)
         (work / "comparison.html").write_text(page, encoding="utf-8")
         rows = [{k: v for k, v in row.items() if k != "seconds"} for row in summary_rows(comparison)]
         (work / "comparison.csv").write_text(csv_text(rows), encoding="utf-8")

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrdamper.dampers.uncertainty import table
 from mrdamper.report.limitations import limitations
+from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import Validation, peak_band
 from mrdamper.study.workflow import RigStudy, Study
 
@@ -103,7 +104,7 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
     for other in others if verbose else others[:1]:
         lines.append(
             f"  {'compared' if verbose else 'next best'}: {other.title}, {other.damper.parameter_count} parameters, "
-            f"{_errors('cross-validation', other.cross_validated)}"
+            f"{_errors('cross-validation', other.cross_validated)}{_why_not(rig, other)}"
         )
     if verbose:
         lines += [f"  {row['name']} = {row['written']}" for row in table(rig.damper)]
@@ -114,6 +115,18 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
         lines.append(f"  limitations{f' ({more} more with --verbose)' if more else ''}:")
         lines += [f"  - {one.text}" for one in listed]
     return lines, len(listed)
+
+
+def _why_not(rig: RigStudy, other: RecipeResult) -> str:
+    """Reason why a model with a smaller cross-validation error over conditions is not the chosen one."""
+    chosen = rig.chosen
+    if rig.asked_for or not other.cross_validated.median() < chosen.cross_validated.median():
+        return ""
+    if other.recipe.name in rig.refused:
+        return f"; not eligible: {rig.refused[other.recipe.name]}"
+    if other.damper.parameter_count > chosen.damper.parameter_count:
+        return "; in cross-validation over all kinds not better by a standard error"
+    return "; in cross-validation over all kinds worse by a standard error"
 
 
 def _errors(kind: str, scores: Validation) -> str:

@@ -29,6 +29,11 @@ from mrdamper.study.workflow import (
     without_contradictions,
 )
 
+RANKING = (
+    "ranked by cross-validation over conditions; mrdamper study chooses the smallest model within one standard error "
+    "of the best over conditions, currents, motions and sessions and in its worst kind of these, which may be another"
+)
+
 
 @dataclass(frozen=True, eq=False)
 class RigComparison:

@@ -75,15 +75,17 @@ def compare(
 
 def _print(result: Comparison, rows: list[dict[str, Any]], name: str, verbose: bool) -> None:
     from mrdamper.cli.output import shortened
+    from mrdamper.study import comparison as comparing
 
     notes = [f"not identified: {run}: {why}" for rig in result.rigs for run, why in rig.not_identified.items()]
     notes += [f"not determined: {model}: {why}" for rig in result.rigs for model, why in rig.refused.items()]
     for note in shortened(notes, _NOTES, verbose):
         typer.echo(note, err=True)
     for rig in result.rigs:
-        print(f"{rig.rig or name}: nrmse_pp [%], median and largest; ranked by cross-validation error")
+        print(f"{rig.rig or name}: nrmse_pp [%], median and largest")
         head, *models = _ranking([row for row in rows if row["rig"] == rig.rig])
         print("\n".join([head, *shortened(models, _ROWS // len(result.rigs), verbose)]))
+    print(comparing.RANKING)
 
 
 def _ranking(rows: list[dict[str, Any]]) -> list[str]:
