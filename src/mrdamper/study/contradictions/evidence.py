@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 
@@ -27,11 +27,7 @@ _LEADS = (0.1, 0.4)  # displacements that count as velocity in friction, relativ
 _ELEMENTS = 7 + len(_VELOCITIES) + len(_LEADS) + len(_YIELDS)
 _MAX_ELEMENT = 20.0  # size of an element relative to its usual one
 _MAX_NODES = 7  # currents at which coefficients are estimated
-_COMMON_DEVIATION, _SLOPE_DEVIATION, _BEND_DEVIATION = (
-    1.5,
-    1.5,
-    0.8,
-)  # standard deviations of a coefficient, relative to the median force
+_COMMON_DEVIATION, _SLOPE_DEVIATION = 1.5, 1.5  # standard deviations of a coefficient, relative to the median force
 _CORRELATION_LENGTH = 0.5  # correlation length of a coefficient over the current, relative to the highest current
 _MISFIT = 0.05  # standard deviation of the model error, relative to the run's force
 _MIN_MISFIT = 0.03  # the same, relative to the median force
@@ -50,11 +46,18 @@ class AssumedScatter:
         Standard deviation of a run's gain.
     offset : float
         Standard deviation of a run's offset, relative to the median force.
+    saturation : float
+        Current at which the course that all coefficients have over the current saturates, relative to the highest.
+    bend : float
+        Standard deviation of a coefficient about the course that all have over the current, relative to the
+        median force.
     """
 
     misfit: float = 1.0
     gain: float = 0.06
     offset: float = 0.04
+    saturation: float = 4.0
+    bend: float = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,25 +214,31 @@ class Evidence:
         self._acceleration = float(np.median([np.max(np.abs(t.acceleration)) for t in tracks])) or 1.0
         self.nodes = _nodes(tracks)
         self._shares: dict[float, Floats] = {}
-        self._root = _outer(_root_covariance(self.nodes), np.eye(_ELEMENTS))
+        self._priors: dict[tuple[float, float], Posterior] = {}
 
-    @cached_property
+    @property
     def prior(self) -> Posterior:
         """Coefficients before any run."""
-        return Posterior(np.zeros(len(self._root)), self._root, self)
+        course = self.spread.saturation, self.spread.bend
+        if course not in self._priors:
+            root = _outer(_root_covariance(self.nodes, *course), np.eye(_ELEMENTS))
+            self._priors[course] = Posterior(np.zeros(len(root)), root, self)
+        return self._priors[course]
 
     def posterior(self, members: Iterable[Moments]) -> Posterior:
         """Coefficients determined by runs."""
         gram, moment = self.total(members)
-        factor = np.linalg.cholesky(self._root.T @ gram @ self._root + _identity(len(moment)))
-        root = solve_lower_triangle(factor, self._root.T).T
+        prior = self.prior.root
+        factor = np.linalg.cholesky(prior.T @ gram @ prior + _identity(len(moment)))
+        root = solve_lower_triangle(factor, prior.T).T
         return Posterior(root @ (root.T @ moment), root, self)
 
     def log_evidence(self, members: Sequence[Moments]) -> float:
         """Logarithm of the evidence that runs follow one model."""
         gram, moment = self.total(members)
-        factor = np.linalg.cholesky(self._root.T @ gram @ self._root + _identity(len(moment)))
-        half = solve_lower_triangle(factor, self._root.T @ moment)
+        prior = self.prior.root
+        factor = np.linalg.cholesky(prior.T @ gram @ prior + _identity(len(moment)))
+        half = solve_lower_triangle(factor, prior.T @ moment)
         power = sum(member.power for member in members)
         return float(0.5 * (half @ half) - np.sum(np.log(np.diag(factor))) - 0.5 * power)
 
@@ -299,7 +308,8 @@ class Evidence:
 
     def total(self, members: Iterable[Moments]) -> tuple[Floats, Floats]:
         """Return sums of the moments of runs over all nodes."""
-        gram, moment = np.zeros(self._root.shape), np.zeros(len(self._root))
+        size = self.nodes.size * _ELEMENTS
+        gram, moment = np.zeros((size, size)), np.zeros(size)
         blocks = gram.reshape(self.nodes.size, _ELEMENTS, self.nodes.size, _ELEMENTS)
         for member in members:
             if member.over is None:
@@ -353,9 +363,10 @@ def _nodes(tracks: Sequence[Track]) -> Floats:
     return values
 
 
-def _root_covariance(nodes: Floats) -> Floats:
+def _root_covariance(nodes: Floats, saturation: float, bend: float) -> Floats:
     """(K, K) root of the covariance of a coefficient at the nodes."""
     share = nodes / (nodes.max() or 1.0)
     near = np.exp(-0.5 * ((share[:, None] - share) / _CORRELATION_LENGTH) ** 2)
-    covariance = _COMMON_DEVIATION**2 + _SLOPE_DEVIATION**2 * share[:, None] * share + _BEND_DEVIATION**2 * near
+    rise = np.tanh(share / saturation) / np.tanh(1 / saturation)
+    covariance = _COMMON_DEVIATION**2 + _SLOPE_DEVIATION**2 * rise[:, None] * rise + bend**2 * near
     return np.asarray(np.linalg.cholesky(covariance + 1e-6 * np.eye(nodes.size)), dtype=float)

@@ -25,8 +25,9 @@ _SAME_FACTOR = 0.03  # difference of the logarithms of factors that are one
 _TRIED_CURRENTS = 31  # currents that are tried
 
 # Logarithms of prior odds against an explanation: one that names a unit, a tested level or a tested motion is simpler.
-_UNIT_ODDS, _LEVEL_ODDS, _FREE_ODDS, _SIGN_ODDS, _ODD_MOTION_ODDS, _ALONE_ODDS = 4.0, 4.0, 7.0, 4.0, 12.0, 10.0
+_UNIT_ODDS, _LEVEL_ODDS, _FREE_ODDS, _SIGN_ODDS, _ODD_MOTION_ODDS, _ALONE_ODDS = 4.0, 4.0, 7.0, 4.0, 16.0, 10.0
 _TESTED_MOTION_ODDS = 5.0  # what a motion of other runs lowers them by, and losing such a motion raises them by
+_LOST_MOTION_ODDS = 30.0  # what leaving the motion of other runs for one that none has raises those of no unit by
 EMPTY_CELL_ODDS = 6.0  # what an empty cell of the matrix of tests that is filled lowers them by, down to its inverse
 MAX_IRREGULARITY = 0.5  # repeated and missing tests of a matrix that is nearly complete, over its tests
 _EDGE_ODDS = 14.0  # what the only run at the lowest or highest current raises those of a factor or another current by
@@ -207,7 +208,7 @@ class ExplanationCandidate:
         yield Trial("sign", -1.0, "", _SIGN_ODDS)
         kinds: tuple[tuple[Cause, dict[str, float]], ...] = (("displacement", LENGTH_UNITS), ("time", TIME_UNITS))
         for cause, units in kinds:
-            named = [(unit, factor) for unit, factor in _both_ways(units) if cause == "time" or self._is_nearer(factor)]
+            named = [(unit, factor) for unit, factor in _both_ways(units) if self._is_nearer(cause, factor)]
             factors = [
                 *((f, u, _UNIT_ODDS) for u, f in named),
                 *((f, "", _ODD_MOTION_ODDS) for f in (*_FACTORS, *self._ratios(cause))),
@@ -217,8 +218,10 @@ class ExplanationCandidate:
                     continue
                 trial = Trial(cause, factor, unit, odds)
                 tested = self._tested(trial)
+                if not unit and tested < 0 and not any(self.moved(trial).is_at_motion(t) for t in self._others):
+                    odds += _LOST_MOTION_ODDS
                 odds -= _TESTED_MOTION_ODDS * tested + _USUAL_STEP * (cause == "time") * self._is_usual(factor)
-                if tested > 0:
+                if tested != 0:
                     odds = completed_matrix_odds(odds, [*self._others, self.track], {-1: self.moved(trial)})
                 yield replace(trial, odds=odds)
 
@@ -262,14 +265,19 @@ class ExplanationCandidate:
             return _rms(products, change) > MIN_CURRENT_EFFECT * size
         return True
 
-    def _is_nearer(self, factor: float) -> bool:
-        """Tell whether a factor brings the stroke nearer to the usual one, as the right unit does."""
-        stroke = float(np.ptp(self.track.displacement)) / 2 / self.evidence.amplitude
-        return abs(np.log(stroke * factor)) < abs(np.log(stroke))
+    def _is_nearer(self, cause: Cause, factor: float) -> bool:
+        """Tell whether a factor brings the stroke or the time between samples nearer to the usual one, as units do."""
+        if cause == "time":
+            size = self.track.step / float(np.median([track.step for track in self._others]))
+        else:
+            size = float(np.ptp(self.track.displacement)) / 2 / self.evidence.amplitude
+        return abs(np.log(size * factor)) < abs(np.log(size))
 
 
 def completed_matrix_odds(odds: float, tracks: Sequence[Track], moved: Mapping[int, Track]) -> float:
     """Return prior odds against other motions of some runs, lower where these fill empty cells of the matrix of tests.
+
+    They are higher where cells become empty.
 
     Parameters
     ----------
@@ -287,10 +295,10 @@ def completed_matrix_odds(odds: float, tracks: Sequence[Track], moved: Mapping[i
     kept = [k for k, track in enumerate(before) if not track.current_changes]
     currents = [float(before[k].current[0]) for k in kept]
     missing = irregularity([after[k] for k in kept], currents)
-    filled = irregularity([before[k] for k in kept], currents) - missing
-    if filled <= 0 or missing > MAX_IRREGULARITY * len(kept):
+    present = irregularity([before[k] for k in kept], currents)
+    if min(present, missing) > MAX_IRREGULARITY * len(kept):
         return odds
-    return min(odds, max(odds - EMPTY_CELL_ODDS * filled, -EMPTY_CELL_ODDS))
+    return max(odds - EMPTY_CELL_ODDS * (present - missing), min(odds, -EMPTY_CELL_ODDS))
 
 
 def _rms(products: RowProducts, coefficients: Floats) -> float:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -29,23 +29,26 @@ from mrdamper.study.contradictions.explanations import (
     completed_matrix_odds,
 )
 from mrdamper.study.contradictions.gains import gain_differences
-from mrdamper.study.contradictions.tracks import Track, irregularity
+from mrdamper.study.contradictions.tracks import SAME_CURRENT, Track, irregularity
 
-_ODDS, _FEW_ODDS = 12.0, 36.0  # logarithm of the odds from which an explanation is far better: always, over the runs
+_ODDS, _FEW_ODDS = 6.0, 36.0  # logarithm of the odds from which an explanation is far better: always, over the runs
+_GAIN_ODDS = 12.0  # the same for gains of their own, instead of the former
 _ALONE_ODDS = 10.0  # more of them for a run that nothing explains
 _MISFITS = (4.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35)  # factors of the usual model error that are tried
-_DRIFTS = ((0.06, 0.04), (0.04, 0.04), (0.06, 0.01), (0.04, 0.01))  # gains and offsets that are tried
+_SATURATIONS = (4.0, 1.0, 0.5, 0.25)  # saturation of the course over the current that is tried
+_BENDS = (0.8, 0.3, 0.1)  # deviations from the common course over the current that are tried
+# Deviations of gains and offsets between runs that are tried.
+_GAINS = ((0.06, 0.04), (0.04, 0.04), (0.06, 0.01), (0.04, 0.01), (0.025, 0.01), (0.015, 0.01))
 _SHARED_EXPLANATIONS = 3  # explanations of a run that others may have in common with it
 _RUNS_PER_ROUND = 16  # runs whose explanations are tried in a round, at least
 _KEEP_ODDS = 3.0  # logarithm of the odds from which an accepted explanation stays
-_SHIFT_ODDS = 12.0  # logarithm of the prior odds against shifted rows
+_SHIFT_ODDS = 9.0  # logarithm of the prior odds against shifted rows
 _EXCHANGE_ODDS = 6.0  # the same against two exchanged rows
 _SPARSE_ODDS = 20.0  # the same where the tests are no matrix of currents and motions
-_MIN_SHIFT_ODDS = 0.0  # prior odds of shifted rows at least
+_MIN_SHIFT_ODDS = -EMPTY_CELL_ODDS  # prior odds of shifted rows at least, where these complete the matrix of tests
 _MEMBER_ODDS = 4.0  # the same against a further run with the same cause
 _MAJORITY_ODDS = 6.0  # the same against another current of most runs at a current
 _MIN_SHIFTED_RUNS = 2  # runs whose current a shift has to change
-_SAME_CURRENT = 0.01  # difference of two currents that are one [A]
 _TIE_ODDS = 6.0  # odds up to which a run nothing explains better takes the best explanation
 _SHARED_CAUSES = ("force", "offset", "displacement", "time", "sign")  # causes that several runs have with one value
 _COMPARED_EXPLANATIONS = 6  # explanations of a run that are compared with those of other runs
@@ -55,8 +58,8 @@ _MIN_MISFIT = 0.5  # factor of the usual model error for groups at least
 _ERROR_FACTORS = (1.0, 0.7, 0.45, 0.3)  # factors of the model error that explained runs leave
 _REFINED_EXPLANATIONS = 4  # single explanations whose model error is adapted
 _GROUP_GAIN_DIFFERENCE = 0.3  # difference of the logarithms of the gains of two groups of runs at one current
-_MIN_AT_MOTION = 3  # other runs at a motion that show how well the model describes it
-_MAX_AT_MOTION = 3.0  # factor of the usual model error at a motion at most; beyond, runs there do not agree
+_MIN_BESIDE = 3  # other runs at a motion or a current that show how well the model describes it
+_MAX_BESIDE = 3.0  # factor of the usual model error there at most; beyond, runs there do not agree
 _ROUNDS = 4  # assignments of runs to two groups
 
 
@@ -102,7 +105,7 @@ class Search:
         """Explain runs until the others agree, or more than `most` are explained."""
         while len(self.found) <= most:
             best = max(self._proposals(), key=self._rank, default=_NO_PROPOSAL)
-            if not best.explanations or best.gain < self._threshold(best.explanations.values()):
+            if not best.explanations or best.gain < self._threshold(best.explanations):
                 best = self._further()
                 best = best if best.explanations else self._of_gains(-np.inf)
             elif not self._is_shared(best.explanations.values()):
@@ -122,14 +125,20 @@ class Search:
             len(self.tracks), [*self.tracks, track], self.evidence, *self.evidence.products([track])
         )
         best = next(iter(candidate.explanations(self.posterior())), None)
-        return best if best is not None and best.gain >= self._threshold([best]) else None
+        return best if best is not None and best.gain >= self._threshold({len(self.tracks): best}) else None
 
-    def _threshold(self, explanations: Iterable[Explanation]) -> float:
-        """Logarithm of the odds from which explanations are far better than none."""
-        explanations = list(explanations)
-        if self._is_shared(explanations):
+    def _threshold(self, explanations: Mapping[int, Explanation]) -> float:
+        """Logarithm of the odds from which explanations are far better than none.
+
+        A cause that other runs have, and runs at the motion of one that is explained, need less: tests of one motion
+        are made one after the other.
+        """
+        beside = [self.tracks[k] for k in self.found]
+        if self._is_shared(explanations.values()) or all(
+            k < len(self.tracks) and any(self.tracks[k].is_at_motion(one) for one in beside) for k in explanations
+        ):
             return _TIE_ODDS
-        alone = any(e.cause == "damper" for e in explanations)
+        alone = any(e.cause == "damper" for e in explanations.values())
         return _ODDS + _FEW_ODDS / len(self.tracks) + (_ALONE_ODDS if alone else 0.0)
 
     def _rank(self, proposal: JointExplanation) -> float:
@@ -176,11 +185,17 @@ class Search:
             posterior = self.evidence.posterior(members)
             return float(np.median([posterior.log_probability_by_others(member) for member in members]))
 
-        for misfit in _MISFITS:
-            scores[AssumedScatter(misfit)] = score(AssumedScatter(misfit))
-        best = max(scores, key=scores.__getitem__)
-        for gain, offset in _DRIFTS[1:]:
-            scores[AssumedScatter(best.misfit, gain, offset)] = score(AssumedScatter(best.misfit, gain, offset))
+        def choose(variants: Iterable[dict[str, float]]) -> None:
+            best = max(scores, key=scores.__getitem__, default=AssumedScatter())
+            for variant in variants:
+                spread = replace(best, **variant)
+                if spread not in scores:
+                    scores[spread] = score(spread)
+
+        for _ in range(2):
+            choose({"saturation": saturation, "bend": bend} for saturation, bend in product(_SATURATIONS, _BENDS))
+            choose({"misfit": misfit} for misfit in _MISFITS)
+        choose({"gain": gain, "offset": offset} for gain, offset in _GAINS)
         self.evidence.spread = max(scores, key=scores.__getitem__)
         expected = self.evidence.posterior([expected.weigh(self._products[k]) for k in agreeing])
         self._products = [replace(products, misfit=1.0) for products in self._products]
@@ -191,9 +206,10 @@ class Search:
             candidate.own = replace(candidate.own, misfit=products.misfit)
 
     def _widened(self) -> list[RowProducts]:
-        """Return the runs with a wider model error at the motions that the linear model describes worse than others.
+        """Return the runs with a wider model error at motions and currents that the linear model describes worse.
 
-        It fails there in every run alike: the others at a motion say how much, and not the run itself.
+        It fails there in every run alike: the others there say how much, and not the run itself. At a current several
+        runs may be wrong together, so that the best of the others counts.
         """
         posterior = self.posterior()
         ratios: dict[int, float] = {}
@@ -202,11 +218,12 @@ class Search:
             ratios[k] = error / (self.evidence.spread.misfit * model_error(self._products[k]))
         widened: list[RowProducts] = []
         for i, (track, products) in enumerate(zip(self.tracks, self._products, strict=True)):
-            beside = [ratio for k, ratio in ratios.items() if k != i and self.tracks[k].is_at_motion(track)]
-            misfit = 1.0
-            if len(beside) >= _MIN_AT_MOTION:
-                misfit = float(np.clip(np.quantile(beside, 0.75), 1.0, _MAX_AT_MOTION))
-            widened.append(replace(products, misfit=misfit))
+            others = [(ratio, self.tracks[k]) for k, ratio in ratios.items() if k != i]
+            at_motion = [ratio for ratio, other in others if other.is_at_motion(track)]
+            at_current = [ratio for ratio, other in others if other.is_at_current(track)]
+            beside = [np.quantile(at_motion, 0.75)] if len(at_motion) >= _MIN_BESIDE else []
+            beside += [min(at_current)] if len(at_current) >= _MIN_BESIDE else []
+            widened.append(replace(products, misfit=float(np.clip(max(beside, default=1.0), 1.0, _MAX_BESIDE))))
         return widened
 
     def _proposals(self) -> Iterator[JointExplanation]:
@@ -252,12 +269,12 @@ class Search:
 
         Too many do where this is more probable than the best explanation of some runs, whose gain is given.
         """
-        left, least = self._agreeing(), _ODDS + _FEW_ODDS / len(self.tracks)
+        left, least = self._agreeing(), _GAIN_ODDS + _FEW_ODDS / len(self.tracks)
         differences = gain_differences(self.evidence, [self._products[k] for k in left])
         if differences.everywhere >= max(least, gain):
             posterior = self.posterior()
             self.differing = {k: self._gain(k, posterior) for k in left}
-        elif differences.odds >= _ODDS:
+        elif differences.odds >= least:
             trial, odds = Trial("damper", 1.0, "", 0.0), differences.odds
             alone = {left[k]: Explanation(trial, odds, self._products[left[k]]) for k in differences.members}
             return JointExplanation(alone, odds)
@@ -431,7 +448,7 @@ class Search:
         levels = current_levels([float(self.tracks[k].current[0]) for k in constant])
         inside = {level for k, level in zip(constant, levels, strict=True) if k in group}
         outside = {level for k, level in zip(constant, levels, strict=True) if k not in group}
-        return inside <= outside and (len(inside) == 1 or current <= _SAME_CURRENT)
+        return inside <= outside and (len(inside) == 1 or current <= SAME_CURRENT)
 
     def _outnumbers(self, group: tuple[int, ...]) -> bool:
         """Tell whether a group is most of the runs at one of its currents: the few others may be the wrong ones."""
@@ -442,7 +459,7 @@ class Search:
 
     def _smaller(self, proposal: JointExplanation) -> JointExplanation:
         """Return a proposal for a group without the runs that need no explanation once the others are explained."""
-        while len(proposal.explanations) > 2 and proposal.gain >= self._threshold(proposal.explanations.values()):
+        while len(proposal.explanations) > 2 and proposal.gain >= self._threshold(proposal.explanations):
             members = tuple(proposal.explanations)
             subsets = [tuple(k for k in members if k != left) for left in members]
             best = max(map(self._of_group, subsets), key=lambda subset: subset.gain)
@@ -459,13 +476,13 @@ class Search:
         rigid = [self.tracks[k] for k in order]
         empty = irregularity(rigid, written)
         for i, j in combinations(rows, 2):
-            if (order[i] in suspects or order[j] in suspects) and abs(written[i] - written[j]) > _SAME_CURRENT:
+            if (order[i] in suspects or order[j] in suspects) and abs(written[i] - written[j]) > SAME_CURRENT:
                 odds = _EXCHANGE_ODDS if empty <= MAX_IRREGULARITY * len(rows) else _SPARSE_ODDS
                 yield self._of_currents({order[i]: written[j], order[j]: written[i]}, "current", odds)
         for step in (-1, 1):
             for first in range(last):
                 moved = [written[k if k < first else min(max(k + step, first), last)] for k in rows]
-                changed = {order[k]: moved[k] for k in rows if abs(moved[k] - written[k]) > _SAME_CURRENT}
+                changed = {order[k]: moved[k] for k in rows if abs(moved[k] - written[k]) > SAME_CURRENT}
                 if len(changed) >= _MIN_SHIFTED_RUNS:
                     filled = empty - irregularity(rigid, moved) if set(moved) == set(written) else 0
                     odds = _SHIFT_ODDS - EMPTY_CELL_ODDS * filled * (empty <= MAX_IRREGULARITY * len(rows))

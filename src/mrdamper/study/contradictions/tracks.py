@@ -21,6 +21,7 @@ _CYCLES = 3  # cycles of a sine that are compared
 _SAMPLES_PER_CYCLE = 96  # samples of the motion
 _MAX_SAMPLES = 1500  # samples of a motion that is no sine
 _ROWS = 144  # rows of the regression per run
+SAME_CURRENT = 0.01  # difference of two currents that are one [A]
 _SAME_MOTION = 0.04  # relative difference of frequencies and amplitudes that are one
 
 
@@ -77,6 +78,12 @@ class Track:
         """Tell whether two runs are sines of one frequency and amplitude."""
         pairs = ((self.frequency, other.frequency), (self.amplitude, other.amplitude))
         return self.frequency > 0 and all(abs(a - b) <= _SAME_MOTION * b for a, b in pairs)
+
+    def is_at_current(self, other: Track) -> bool:
+        """Tell whether two runs have one constant current."""
+        if self.current_changes or other.current_changes:
+            return False
+        return abs(float(self.current[0]) - float(other.current[0])) <= SAME_CURRENT
 
 
 def tracks_of(runs: Sequence[Run]) -> list[Track]:
