@@ -232,6 +232,14 @@ def test_a_copy_is_found_and_its_original_kept(cases, name):
     assert (found.run_id, found.code) == ("t12", "E_TWICE")
 
 
+@pytest.mark.parametrize(("pasted", "source"), [(1, 10), (10, 1)])
+def test_of_a_force_pasted_into_another_test_the_test_is_kept(sound, pasted, source):
+    """Either may come first: not the order tells which force is a copy, but the other runs."""
+    force = np.resize(sound[source].force, sound[pasted].force.size)
+    (found,) = find_contradictions(changed(sound, pasted, force=force, displacement=sound[source].displacement))
+    assert found.run_id == sound[pasted].id
+
+
 def test_a_repeated_test_is_no_copy(sound):
     damper, rng = DAMPERS[0], np.random.default_rng(2)
     again = make_run(damper, "again", damper.currents[1], *motions(damper)[1], rng)

@@ -52,8 +52,9 @@ def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list
         If more than a third of the identification runs contradict the others, or their forces differ by
         factors that currents, motions and sessions do not explain.
     """
-    copies = [describe_copy(copy, _split(runs, copy.run_id) == "validate") for copy in find_copies(runs)]
-    contradictions = {one.run_id: one for one in copies if one.run_id not in keep}
+    copies = find_copies(runs)
+    described = [describe_copy(copy, _split(runs, copy.run_id) == "validate") for copy in copies]
+    contradictions = {one.run_id: one for one in described if one.run_id not in keep}
     tracks = [t for t in tracks_of([run for run in runs if run.id not in contradictions])]
     tracks, milliamperes = _in_amperes(tracks, keep)
     contradictions |= milliamperes
@@ -64,7 +65,13 @@ def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list
         validation = [
             t for t in tracks if t.run.split != "train" and t.run.id not in keep and t.run.id not in contradictions
         ]
-        contradictions |= _of_validation(validation, trusted)
+        contradictions |= _beside(validation, trusted)
+        # A force may have been pasted from one test into another: the copy is the test if the original is not.
+        of_wrong = {copy.run_id for copy in copies if copy.original in contradictions}
+        doubted = tracks_of([run for run in runs if run.id in of_wrong and run.split == "train"])
+        if len(trusted) >= MIN_RUNS:
+            agreeing = {track.run.id for track in doubted} - set(_beside(doubted, trusted))
+            contradictions = {name: one for name, one in contradictions.items() if name not in agreeing}
     return [contradictions[run.id] for run in runs if run.id in contradictions]
 
 
@@ -93,7 +100,8 @@ def _opposed(contradictions: Sequence[Contradiction]) -> bool:
     return any(abs(np.log(a * b)) < _INVERSE_TOLERANCE for a, b in combinations(factors, 2))
 
 
-def _of_validation(validation: Sequence[Track], trusted: Sequence[Track]) -> dict[str, Contradiction]:
+def _beside(validation: Sequence[Track], trusted: Sequence[Track]) -> dict[str, Contradiction]:
+    """Compare further runs with those that are trusted."""
     if not validation or len(trusted) < MIN_RUNS:
         return {}
     search = Search(trusted)
