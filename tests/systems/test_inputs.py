@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
 from scipy.signal import welch
 from typer.testing import CliRunner
 
@@ -34,19 +33,6 @@ def test_the_rate_of_a_road_is_the_slope_of_its_height(name):
     slope = (road.value(time + 1e-6) - road.value(time - 1e-6)) / 2e-6
     assert road.rate(time) == pytest.approx(slope, abs=2e-4 * np.abs(slope).max())
     assert abs(road.value(np.zeros(1))[0]) < 1e-12
-
-
-def test_a_road_is_the_periodic_spline_through_its_samples():
-    profile = load_input("iso8608-d", {"length_s": 3}).profile
-    period = profile.step * profile.heights.size
-    known = CubicSpline(
-        np.linspace(0, period, profile.heights.size + 1), np.append(profile.heights, profile.heights[0]),
-        bc_type="periodic",
-    )  # fmt: skip
-    distance = np.linspace(0, 1.5 * period, 10_007)
-    for derivative in (0, 1):
-        wanted = known(distance, derivative)
-        assert profile(distance, derivative) == pytest.approx(wanted, abs=1e-9 * np.abs(wanted).max())
 
 
 def test_one_seed_one_road():

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import welch
 
 from mrdamper.dampers.envelope import UNTESTED
 from mrdamper.dampers.joint import JointDamper
@@ -12,14 +11,7 @@ from mrdamper.models.bingham import Bingham
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inputs.record import record
-from mrdamper.systems.measures import (
-    benchmark_ratios,
-    comfort,
-    cost,
-    measures,
-    power_spectral_density,
-    tyre_load,
-)
+from mrdamper.systems.measures import benchmark_ratios, comfort, cost, measures, tyre_load
 from mrdamper.systems.simulate import SystemLoop
 from mrdamper.systems.structure import Link, quarter_car, shear_building
 from mrdamper.systems.weighting import WEIGHTINGS
@@ -131,12 +123,3 @@ def test_ratios_of_a_structure_are_of_peaks_and_root_mean_squares(shaken):
     turned = benchmark_ratios(replace(done, x=-done.x, a=-done.a, force=-done.force), bare)
     assert turned == pytest.approx(found)
     assert "floor1.a_w_m_s2" not in measures(done)  # nobody sits on the ground's building
-
-
-@pytest.mark.parametrize("size", [64, 65, 300])
-def test_a_spectral_density_is_welchs(size):
-    values = np.random.default_rng(1).standard_normal(300) + 3.0
-    frequency, density = power_spectral_density(values, 0.01, size)
-    known = welch(values, 100.0, nperseg=size)
-    assert frequency == pytest.approx(known[0])
-    assert density == pytest.approx(known[1], rel=1e-9, abs=1e-15)

@@ -117,16 +117,3 @@ def _running_mean(values: Floats, keep: float) -> Floats:
 
 def _rms(series: Floats) -> float:
     return float(np.sqrt(np.mean(series**2)))
-
-
-def power_spectral_density(values: Floats, step: float, size: int) -> tuple[Floats, Floats]:
-    """One-sided density over frequency [Hz], the mean of Hann windows of `size` samples that overlap by half.
-
-    [Welch 1967, IEEE Trans. Audio and Electroacoustics 15, 70–73]; scipy.signal is slow to import.
-    """
-    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(size) / size)
-    parts = np.lib.stride_tricks.sliding_window_view(values, size)[:: max(1, size - size // 2)]
-    waves = np.fft.rfft((parts - parts.mean(axis=1, keepdims=True)) * window)
-    density = np.mean(np.abs(waves) ** 2, axis=0) * step / np.sum(window**2)
-    density[1 : (size + 1) // 2] *= 2
-    return np.asarray(np.fft.rfftfreq(size, step), dtype=float), density

@@ -8,7 +8,6 @@ import numpy as np
 
 from mrdamper.report.plots.figure import Figure
 from mrdamper.report.plots.style import MM, PALETTE
-from mrdamper.systems.measures import power_spectral_density
 from mrdamper.systems.result import Simulation
 
 _POINTS = 4000  # of a history that are drawn
@@ -39,6 +38,8 @@ def histories(runs: Mapping[str, Simulation]) -> Figure:
 
 def spectra(runs: Mapping[str, Simulation]) -> Figure:
     """Power spectral density of the accelerations that are aimed at."""
+    from scipy.signal import welch
+
     first = next(iter(runs.values()))
     point = int(np.argmax(first.peaks["acceleration_m_s2"])) if first.system.ground is not None else 0
     figure = Figure(1, 2, 3.0)
@@ -46,7 +47,7 @@ def spectra(runs: Mapping[str, Simulation]) -> Figure:
     left.x.log = left.y.log = True
     for colour, (title, run) in zip(PALETTE, runs.items(), strict=False):
         size = min(run.time.size, int(4 / run.step))
-        f, density = power_spectral_density(run.a[:, point], run.step, size)
+        f, density = welch(run.a[:, point], 1 / run.step, nperseg=size)
         inside = (f > 0) & (f < 60)
         left.plot(f[inside], density[inside], color=colour, lw=0.9, label=title)
         every = slice(None, None, -(-run.time.size // _LOOP_POINTS))

@@ -50,8 +50,10 @@ class Road(Input):
         return 1 / (_POINTS_A_WAVE * HIGHEST * self.speed_m_s)
 
     @cached_property
-    def profile(self) -> _PeriodicSpline:
-        """Height [m] over distance [m]."""
+    def profile(self) -> Any:
+        """Height [m] over distance [m], a spline."""
+        from scipy.interpolate import CubicSpline
+
         length = self.speed_m_s * self.length_s
         points = 2 * math.ceil(length * HIGHEST * _POINTS_A_WAVE / 2)
         n = np.arange(points // 2 + 1) / length
@@ -60,7 +62,8 @@ class Road(Input):
         amplitude[inside] = np.sqrt(2 * self.roughness_m3 * (n[inside] / REFERENCE) ** -2.0 / length)
         phase = np.random.default_rng(int(self.seed)).uniform(0, 2 * np.pi, n.size)
         height = np.fft.irfft(amplitude * np.exp(1j * phase) * points / 2, points)
-        return _PeriodicSpline.through(height, length / points)
+        distance = np.linspace(0, length, points + 1)
+        return CubicSpline(distance, np.append(height, height[0]), bc_type="periodic")
 
     def value(self, time: Floats) -> Floats:
         distance = np.maximum(time, 0.0) * self.speed_m_s
@@ -70,34 +73,6 @@ class Road(Input):
         distance = np.maximum(time, 0.0) * self.speed_m_s
         share, slope = _fade(time)
         return share * self.speed_m_s * self.profile(distance, 1) + slope * self.profile(distance)
-
-
-@dataclass(frozen=True, eq=False)
-class _PeriodicSpline:
-    """Cubic spline through even samples of a period; scipy.interpolate takes a third of a second to import."""
-
-    heights: Floats  # (N,) [m]
-    slopes: Floats  # (N,) times the step [m]
-    step: float  # [m]
-
-    @classmethod
-    def through(cls, heights: Floats, step: float) -> _PeriodicSpline:
-        """Determine the slopes from even curvature: a circulant system, which a Fourier transform solves."""
-        right = 3 * (np.roll(heights, -1) - np.roll(heights, 1))
-        waves = 4 + 2 * np.cos(2 * np.pi * np.arange(heights.size // 2 + 1) / heights.size)
-        return cls(heights, np.fft.irfft(np.fft.rfft(right) / waves, heights.size), step)
-
-    def __call__(self, distance: Floats, derivative: int = 0) -> Floats:
-        """Height [m] or slope [-] at distances [m]."""
-        place = np.mod(distance / self.step, self.heights.size)
-        begin = np.minimum(place.astype(int), self.heights.size - 1)
-        end, share = (begin + 1) % self.heights.size, place - begin
-        height, slope, later = self.heights[begin], self.slopes[begin], self.slopes[end]
-        rise = self.heights[end] - height
-        square, cube = 3 * rise - 2 * slope - later, slope + later - 2 * rise
-        if derivative:
-            return (slope + share * (2 * square + 3 * share * cube)) / self.step
-        return height + share * (slope + share * (square + share * cube))
 
 
 def _fade(time: Floats, over: float = 0.5) -> tuple[Floats, Floats]:
