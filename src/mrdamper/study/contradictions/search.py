@@ -32,7 +32,7 @@ from mrdamper.study.contradictions.gains import gain_differences
 from mrdamper.study.contradictions.tracks import SAME_CURRENT, Track, irregularity
 
 _ODDS, _FEW_ODDS = 6.0, 36.0  # logarithm of the odds from which an explanation is far better: always, over the runs
-_GAIN_ODDS = 12.0  # the same for gains of their own, instead of the former
+_GAIN_ODDS = 12.0  # the first of these for runs with gains of their own
 _ALONE_ODDS = 10.0  # more of them for a run that nothing explains
 _MISFITS = (4.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35)  # factors of the usual model error that are tried
 _SATURATIONS = (4.0, 1.0, 0.5, 0.25)  # saturation of the course over the current that is tried
