@@ -37,7 +37,7 @@ GROUPS = (
 )
 
 
-HOOKS = {"mrdamper.commands": "register", "mrdamper.checks": "check"}  # groups of modules: the function each defines
+HOOKS = {"mrdamper.commands": "app", "mrdamper.checks": "check"}  # groups of modules: the name each defines
 
 
 class PluginWarning(UserWarning):
@@ -263,12 +263,12 @@ def register(cls: type[T]) -> type[T]:
     return cls
 
 
-def modules_with(group: str, function: str) -> tuple[tuple[ExtensionPart, ModuleType], ...]:
-    """List the modules of a group that define a function of that name, as commands and checks do."""
+def modules_with(group: str, hook: str) -> tuple[tuple[ExtensionPart, ModuleType], ...]:
+    """List the modules of a group that define something of that name, as commands and checks do."""
     modules: list[tuple[ExtensionPart, ModuleType]] = []
     for point, target in provided_modules(group):
         for module in target if isinstance(target, tuple) else ():
-            if callable(getattr(module, function, None)):
+            if callable(getattr(module, hook, None)):
                 name = module.__name__.rpartition(".")[2]
                 part = ExtensionPart(group, name, package_of(point.dist), module.__name__, own=_is_own(point))
                 modules.append((part, module))
@@ -279,6 +279,6 @@ def all_parts() -> tuple[ExtensionPart, ...]:
     """Everything that installed packages provide, used and skipped, by group and name."""
     for group in GROUPS:  # importing the module that holds a group's registry creates it
         provided_modules(group)
-    modules = [part for group, function in HOOKS.items() for part, _ in modules_with(group, function)]
+    modules = [part for group, hook in HOOKS.items() for part, _ in modules_with(group, hook)]
     parts = [part for registry in _registries.values() for part in registry.parts()]
     return tuple(sorted((*parts, *modules, *_skipped), key=lambda part: (GROUPS.index(part.group), part.name)))

@@ -75,7 +75,8 @@ def site(tmp_path_factory):
 @pytest.fixture(scope="module")
 def call(site):
     def called(*arguments, installed=True, code=0):
-        environment = {**os.environ, "PYTHONPATH": str(site) if installed else ""}
+        folders = [str(site)] * installed + [os.environ.get("PYTHONPATH", "")]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))}
         command = [sys.executable, "-m", "mrdamper.cli", *map(str, arguments)]
         done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
         assert done.returncode == code, done.stdout + done.stderr

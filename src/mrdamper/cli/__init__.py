@@ -113,7 +113,7 @@ def _say(text: str) -> None:
 
 
 def application() -> typer.Typer:
-    """Build the application; every module of the entry points `mrdamper.commands` registers its command."""
+    """Build the application; with the commands of every module of the entry points `mrdamper.commands`."""
     app = typer.Typer(
         name="mrdamper",
         cls=CommandGroups,
@@ -125,13 +125,11 @@ def application() -> typer.Typer:
         rich_markup_mode=None,
     )
     app.callback()(_root)
-    for part, module in modules_with("mrdamper.commands", "register"):
-        try:
-            module.register(app)
-        except Exception as error:  # whatever a package's function raises
-            if part.own:
-                raise
-            skip(part, error)
+    for part, module in modules_with("mrdamper.commands", "app"):
+        if isinstance(module.app, typer.Typer):
+            app.registered_commands += module.app.registered_commands
+        else:
+            skip(part, "app is not a typer.Typer")
     for command in app.registered_commands:
         command.cls = OptionGroups
     return app

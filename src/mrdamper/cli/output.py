@@ -8,7 +8,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mrdamper.data.atomic import write_file
 from mrdamper.errors import InputError, OutputError
 
 if TYPE_CHECKING:
@@ -28,6 +27,9 @@ def put(rows: Rows, out: Path | None, as_json: bool, as_csv: Callable[[Rows], st
     if out is None:
         print(text, end="")
         return
+
+    from mrdamper.data.atomic import write_file
+
     with write_file(out) as target:
         target.write_text(text, encoding="utf-8")
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
+
+from mrdamper.cli.output import aligned, figure_kind, put
+from mrdamper.cli.progress import watched
+from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,15 +33,13 @@ _HEADINGS = {
     "findings": "findings",
 }
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper check rig/ --figure loops.png")(check)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper check rig/ --figure loops.png")
 def check(
     data: Path | None = typer.Argument(None, help="Dataset folder, or an .fmu; default: the bundled tests."),
-    figure: Path | None = typer.Option(None, "--figure", help="Draw the loops with flagged samples: PNG, SVG or PDF."),
+    figure: Path | None = typer.Option(None, help="Draw the loops with flagged samples: PNG, SVG or PDF."),
     as_json: bool = typer.Option(False, "--json", help="Print JSON instead of a table."),
 ) -> None:
     """Check the quality of every run of a dataset.
@@ -45,10 +48,7 @@ def check(
 
     An exported FMU is loaded and compared with its reference force.
     """
-    from mrdamper.cli.output import figure_kind, put
-    from mrdamper.cli.progress import watched
     from mrdamper.data.atomic import require_writable
-    from mrdamper.errors import InputError
     from mrdamper.rig_files.dataset_folder import load_dataset
     from mrdamper.rig_files.quality.table import quality_table, record_of, row
 
@@ -74,9 +74,7 @@ def check(
 
 
 def _check_fmu(path: Path, as_json: bool) -> None:
-    from dataclasses import asdict
 
-    from mrdamper.cli.output import put
     from mrdamper.export.fmu_check import check_fmu
 
     findings = check_fmu(path)
@@ -88,15 +86,12 @@ def _check_fmu(path: Path, as_json: bool) -> None:
 
 def _text_table(rows: Rows) -> str:
     """Columns of a width, the first and the last two to the left."""
-    from mrdamper.cli.output import aligned
-
     cells = [["–" if row[name] is None else str(row[name]) for name in _HEADINGS] for row in rows]
     lines = aligned([list(_HEADINGS.values()), *cells], (0, len(_HEADINGS) - 2, len(_HEADINGS) - 1))
     return "".join(f"{line}\n" for line in lines)
 
 
 def _draw(verdicts: Sequence[Quality], path: Path) -> None:
-    from mrdamper.cli.output import figure_kind
     from mrdamper.data.atomic import write_file
     from mrdamper.report.plots.quality import LoopPanel, quality_figure
     from mrdamper.rig_files.quality.flat import flagged_samples

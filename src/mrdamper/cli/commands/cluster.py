@@ -29,15 +29,13 @@ The journal is written where mrdamper fleet runs, on a local disk. If a worker, 
 command stops, run the same command again. On Slurm, PBS or Kubernetes, dask-jobqueue and dask-kubernetes start
 the same scheduler and workers."""
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper cluster --host 10.0.0.5")(cluster)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper cluster --host 10.0.0.5")
 def cluster(
-    host: str = typer.Option("127.0.0.1", "--host", help="Address of the machine the scheduler will run on."),
-    port: int = typer.Option(8786, "--port", min=1, max=65535, help="Its port."),
+    host: str = typer.Option("127.0.0.1", help="Address of the machine the scheduler will run on."),
+    port: int = typer.Option(8786, min=1, max=65535, help="Its port."),
 ) -> None:
     """Show how to start a computing cluster for fleet."""
     print(_TEXT.format(host=host, port=port))

@@ -8,32 +8,33 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from mrdamper.cli.output import aligned, parse_gas, parse_pairs, shortened
+from mrdamper.cli.progress import progress_on_stderr
+
 if TYPE_CHECKING:
     from mrdamper.study.comparison import Comparison
 
 _ERRORS = ("per_run", "train", "cv", "cv_worst", "validation", "validation_worst")
 _NOTES, _ROWS = 3, 12  # lines of notes, and of the tables of all rigs together, without --verbose
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper compare rig/ --out comparison/ --models bouc-wen --models kwok")(compare)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper compare rig/ --out comparison/ --models bouc-wen --models kwok")
 def compare(
     data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
-    out: Path = typer.Option(..., "--out", help="Folder for comparison.html, tables and figures."),
-    models: list[str] = typer.Option([], "--models", help="Only this model; may be repeated. Default: all."),
+    out: Path = typer.Option(..., help="Folder for comparison.html, tables and figures."),
+    models: list[str] = typer.Option([], help="Only this model; may be repeated. Default: all."),
     genetic: bool = typer.Option(
         False, "--genetic", help="Also identify by genetic algorithm, 60 generations (minutes)."
     ),
     gas: str | None = typer.Option(
-        None, "--gas", help="Known gas spring, for the model paper: pressure MPa, volume cm3, rod area mm2 as P,V,A."
+        None, help="Known gas spring, for the model paper: pressure MPa, volume cm3, rod area mm2 as P,V,A."
     ),
     setting: list[str] = typer.Option(
         [], "--set", help="OPTION=VALUE of the model paper, as for study --model paper; may be repeated."
     ),
-    jobs: int | None = typer.Option(None, "--jobs", min=1, help="Number of processes; default: one per core."),
+    jobs: int | None = typer.Option(None, min=1, help="Number of processes; default: one per core."),
     png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
     verbose: bool = typer.Option(False, "--verbose", help="Print every model, and why one was not determined."),
     as_json: bool = typer.Option(False, "--json", help="Print the table as JSON."),
@@ -43,8 +44,6 @@ def compare(
     Reported per model: cross-validated and validation error, number of parameters, number of
     runs needed, computing time.
     """
-    from mrdamper.cli.output import parse_gas, parse_pairs
-    from mrdamper.cli.progress import progress_on_stderr
     from mrdamper.data.atomic import require_writable
     from mrdamper.report.comparison import summary_rows, write_comparison
     from mrdamper.rig_files.dataset_folder import load_dataset
@@ -74,7 +73,6 @@ def compare(
 
 
 def _print(result: Comparison, rows: list[dict[str, Any]], name: str, verbose: bool) -> None:
-    from mrdamper.cli.output import shortened
     from mrdamper.study import comparison as comparing
 
     notes = [f"not identified: {run}: {why}" for rig in result.rigs for run, why in rig.not_identified.items()]
@@ -90,8 +88,6 @@ def _print(result: Comparison, rows: list[dict[str, Any]], name: str, verbose: b
 
 def _ranking(rows: list[dict[str, Any]]) -> list[str]:
     """Return the lines of the ranking, best first."""
-    from mrdamper.cli.output import aligned
-
     cells: list[tuple[str, ...]] = [
         ("", "model", "per run", "ident.", "CV", "worst", "valid.", "worst", "parameters", "s")
     ]

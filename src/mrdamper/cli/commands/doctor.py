@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import json
+import platform
+import time
+import warnings
+from importlib.metadata import version
 from typing import Any
 
 import typer
 
-
-def register(app: typer.Typer) -> None:
-    """Add the commands."""
-    app.command(epilog="Example: mrdamper doctor")(doctor)
-    app.command(epilog="Example: mrdamper cache --clear")(cache)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper doctor")
 def doctor(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
     """Show versions, the C compiler in use and what it gains.
 
@@ -33,6 +34,7 @@ def doctor(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) ->
         )
 
 
+@app.command(epilog="Example: mrdamper cache --clear")
 def cache(
     clear: bool = typer.Option(False, "--clear", help="Remove all compiled programs."),
     as_json: bool = typer.Option(False, "--json", help="Print JSON."),
@@ -51,9 +53,6 @@ def cache(
 
 
 def _facts() -> dict[str, Any]:
-    import platform
-    import warnings
-    from importlib.metadata import version
 
     from mrdamper.tracing.compiled.cache import cache_folder, cache_size, private, unusable_reason
     from mrdamper.tracing.compiled.compilers import find_compiler
@@ -80,8 +79,6 @@ def _facts() -> dict[str, Any]:
 
 def _gain() -> float | None:
     """Measure how many times faster an integrated model runs compiled; None without a usable compiler."""
-    import time
-
     import numpy as np
 
     from mrdamper.dampers.causal import trace

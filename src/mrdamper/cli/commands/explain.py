@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import tomllib
+from difflib import get_close_matches
+from importlib.resources import files
+
 import typer
 
+from mrdamper.errors import UnknownNameError
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper explain E_LIMITS")(explain)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper explain E_LIMITS")
 def explain(
     code: str | None = typer.Argument(None, help="Code in the brackets of a message; omit it to list all codes."),
 ) -> None:
     """Explain an error or warning code, such as E_LIMITS or W_CLIPPED."""
-    from difflib import get_close_matches
-
-    from mrdamper.errors import UnknownNameError
-
     codes = load_codes()
     if code is None:
         width = max(map(len, codes))
@@ -34,9 +34,6 @@ def explain(
 
 def load_codes() -> dict[str, dict[str, str]]:
     """Return meaning, example and remedy by code, errors (E_) first."""
-    import tomllib
-    from importlib.resources import files
-
     return tomllib.loads(files("mrdamper").joinpath("codes.toml").read_text(encoding="utf-8"))
 
 

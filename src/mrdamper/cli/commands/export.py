@@ -7,31 +7,30 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from mrdamper.cli.progress import progress_soon
+from mrdamper.errors import InputError
+
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
     from mrdamper.export.base import Exporter
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper export model.json --to fmu --out damper.fmu")(export)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper export model.json --to fmu --out damper.fmu")
 def export(
     model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
-    to: str = typer.Option(..., "--to", help="c, fmu, page, latex, markdown, table, adams, tydex, dyna4."),
-    out: Path = typer.Option(..., "--out", help="Folder; for fmu, page, latex and markdown a file."),
-    name: str | None = typer.Option(None, "--name", help="Name of files and symbols; default: the rig."),
+    to: str = typer.Option(..., help="c, fmu, page, latex, markdown, table, adams, tydex, dyna4."),
+    out: Path = typer.Option(..., help="Folder; for fmu, page, latex and markdown a file."),
+    name: str | None = typer.Option(None, help="Name of files and symbols; default: the rig."),
     inverse: bool = typer.Option(
         False, "--inverse", help="For c and fmu: the inverse model, current from demanded force."
     ),
-    fmi: int | None = typer.Option(None, "--fmi", help="For fmu: FMI version, 2 (default) or 3."),
+    fmi: int | None = typer.Option(None, help="For fmu: FMI version, 2 (default) or 3."),
 ) -> None:
     """Export a model as C, FMU, web page, equations or tables."""
-    from mrdamper.cli.progress import progress_soon
     from mrdamper.dampers.model_file import load_model
     from mrdamper.data.atomic import require_writable
-    from mrdamper.errors import InputError
     from mrdamper.export import exporter
     from mrdamper.export.base import identifier, write_export
 
@@ -57,7 +56,6 @@ def export(
 
 def _inverse(damper: Damper, name: str, to: str, exporter: Exporter, out: Path) -> tuple[list[Path], tuple[str, ...]]:
     """Return the current for a wanted force: files written, and what to know about them."""
-    from mrdamper.errors import InputError
     from mrdamper.export.c import write_program
     from mrdamper.export.fmu import FMUExporter
     from mrdamper.export.fmu_program import write_program_fmu

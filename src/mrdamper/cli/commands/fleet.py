@@ -4,39 +4,37 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from mrdamper.cli.output import shortened
+from mrdamper.cli.progress import progress_on_stderr
+
 if TYPE_CHECKING:
     from mrdamper.fleet.run import Fleet
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper fleet records/ --out line/ --workers 8")(fleet)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper fleet records/ --out line/ --workers 8")
 def fleet(
     source: Path = typer.Argument(
         ..., metavar="SRC", help="Folder of datasets or rig files, one per damper, or of Parquet files."
     ),
-    out: Path = typer.Option(..., "--out", help="Folder for dampers.parquet and the journal."),
-    workers: int | None = typer.Option(None, "--workers", min=1, help="Number of processes; default: one per core."),
-    scheduler: str | None = typer.Option(
-        None, "--scheduler", help="Address of a Dask scheduler (see mrdamper cluster)."
-    ),
-    tls: Path | None = typer.Option(
-        None, "--tls", help="Folder with ca.pem, cert.pem and key.pem, for a tls:// scheduler."
-    ),
+    out: Path = typer.Option(..., help="Folder for dampers.parquet and the journal."),
+    workers: int | None = typer.Option(None, min=1, help="Number of processes; default: one per core."),
+    scheduler: str | None = typer.Option(None, help="Address of a Dask scheduler (see mrdamper cluster)."),
+    tls: Path | None = typer.Option(None, help="Folder with ca.pem, cert.pem and key.pem, for a tls:// scheduler."),
     profile: Path | None = typer.Option(
-        None, "--profile", help="Fleet profile (TOML): serial numbers, master dampers, rig profile."
+        None, help="Fleet profile (TOML): serial numbers, master dampers, rig profile."
     ),
     limits: Path | None = typer.Option(
-        None, "--limits", help="TOML file with limits of the result columns (mrdamper init limits)."
+        None, help="TOML file with limits of the result columns (mrdamper init limits)."
     ),
-    model: str = typer.Option("play-bypass", "--model", help="Model fitted to all runs of each damper."),
+    model: str = typer.Option("play-bypass", help="Model fitted to all runs of each damper."),
     cold: bool = typer.Option(
         False, "--cold", help="Start every search without a previous result (slower, for checking)."
     ),
@@ -47,9 +45,6 @@ def fleet(
 
     An interrupted run continues when the same command is given again.
     """
-    import signal
-
-    from mrdamper.cli.progress import progress_on_stderr
     from mrdamper.fleet.profile import load_fleet_profile, load_limits
     from mrdamper.fleet.run import run_fleet
 
@@ -82,7 +77,6 @@ def fleet(
 
 
 def _print(outcome: Fleet, page: Path, messages: list[str], verbose: bool, as_json: bool) -> None:
-    from mrdamper.cli.output import shortened
 
     for line in shortened([f"{status}: {name}: {reason}" for name, status, reason in outcome.troubled], 8, verbose):
         typer.echo(line, err=True)

@@ -6,34 +6,31 @@ from pathlib import Path
 
 import typer
 
+from mrdamper.cli.output import parse_fixed, parse_gas, parse_pairs, put
+from mrdamper.cli.progress import progress_on_stderr
+
 _MAX_WARNINGS = 10  # number of lines on the terminal
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper identify rig/ --model bouc-wen --free n --out identifications.csv")(identify)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper identify rig/ --model bouc-wen --free n --out identifications.csv")
 def identify(
     data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
-    model: str = typer.Option("bouc-wen", "--model", help="Name of the model."),
-    method: str = typer.Option("projection", "--method", help="Name of the identification method."),
-    free: list[str] = typer.Option([], "--free", help="Also identify this preset parameter; may be repeated."),
-    fix: list[str] = typer.Option([], "--fix", help="NAME=VALUE [SI]: fix a parameter; may be repeated."),
+    model: str = typer.Option("bouc-wen", help="Name of the model."),
+    method: str = typer.Option("projection", help="Name of the identification method."),
+    free: list[str] = typer.Option([], help="Also identify this preset parameter; may be repeated."),
+    fix: list[str] = typer.Option([], help="NAME=VALUE [SI]: fix a parameter; may be repeated."),
     setting: list[str] = typer.Option([], "--set", help="SETTING=VALUE of the method; may be repeated."),
-    gas: str | None = typer.Option(
-        None, "--gas", help="Gas spring as P,V,A: pressure [MPa], volume [cm3], rod area [mm2]."
-    ),
+    gas: str | None = typer.Option(None, help="Gas spring as P,V,A: pressure [MPa], volume [cm3], rod area [mm2]."),
     delay: bool = typer.Option(False, "--delay", help="Also identify a delay of the force up to 3 ms."),
     clipped: bool = typer.Option(False, "--clipped", help="Also use runs with a clipped channel."),
-    run: list[str] = typer.Option([], "--run", help="Identify only this run; may be repeated."),
-    out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
+    run: list[str] = typer.Option([], help="Identify only this run; may be repeated."),
+    out: Path | None = typer.Option(None, help="CSV to write; default: standard output."),
     as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
 ) -> None:
     """Identify one model from every sine run, one run at a time."""
     from mrdamper import identification
-    from mrdamper.cli.output import parse_fixed, parse_gas, parse_pairs, put
-    from mrdamper.cli.progress import progress_on_stderr
     from mrdamper.data.atomic import require_writable
     from mrdamper.data.encoding import csv_text
     from mrdamper.identification.methods import method_named

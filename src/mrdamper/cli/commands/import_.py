@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
+import sys
+from collections import Counter
+from dataclasses import replace
+from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
+
+from mrdamper.cli.output import shortened
+from mrdamper.cli.progress import progress_on_stderr
+from mrdamper.errors import InputError, OutputError
 
 if TYPE_CHECKING:
     from mrdamper.data import Dataset
@@ -19,31 +28,27 @@ if TYPE_CHECKING:
 _OF_FORM = ("W_NO_EOL", "W_FOOTER", "W_ENCODING")  # codes of notes that change nothing
 _MOST_QUESTIONS = 12  # of one import
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(
-        "import",
-        epilog="Example: mrdamper import tests/*.csv --profile rig.toml --out DATASET; "
-        "mrdamper import tests/a.csv --write-profile rig.toml; mrdamper import tests --write-tests tests/tests.csv",
-    )(import_)
+app = typer.Typer()
 
 
+@app.command(
+    "import",
+    epilog="Example: mrdamper import tests/*.csv --profile rig.toml --out DATASET; "
+    "mrdamper import tests/a.csv --write-profile rig.toml; mrdamper import tests --write-tests tests/tests.csv",
+)
 def import_(
     files: list[Path] = typer.Argument(..., help="Test-rig files, or folders of them."),
-    out: Path | None = typer.Option(None, "--out", help="Dataset folder to write."),
+    out: Path | None = typer.Option(None, help="Dataset folder to write."),
     add: bool = typer.Option(False, "--add", help="Add to the dataset there instead of writing a new one."),
-    profile: Path | None = typer.Option(
-        None, "--profile", help="Rig profile (TOML): columns and units (mrdamper init profile)."
-    ),
+    profile: Path | None = typer.Option(None, help="Rig profile (TOML): columns and units (mrdamper init profile)."),
     tests: Path | None = typer.Option(
-        None, "--tests", help="Table of tests: current, split, session of each; default: tests.csv of the folder."
+        None, help="Table of tests: current, split, session of each; default: tests.csv of the folder."
     ),
     write_profile: Path | None = typer.Option(
-        None, "--write-profile", help="Write how the first file was read as a profile; - for standard output."
+        None, help="Write how the first file was read as a profile; - for standard output."
     ),
     write_tests: Path | None = typer.Option(
-        None, "--write-tests", help="Write the tests found as a table to be completed; - for standard output."
+        None, help="Write the tests found as a table to be completed; - for standard output."
     ),
     skip_refused: bool = typer.Option(False, "--skip-refused", help="Write the accepted files, list the refused ones."),
     ask: bool | None = typer.Option(
@@ -57,7 +62,6 @@ def import_(
 
     Without --skip-refused nothing is written if one test is refused.
     """
-    from mrdamper.cli.progress import progress_on_stderr
     from mrdamper.rig_files.profile import Profile, load_profile
     from mrdamper.rig_files.rig_import import import_files
 
@@ -80,8 +84,6 @@ def import_(
     written = bool(result.records) and not wrong and out is not None
     total = _write_dataset(result, settings, out, add) if written and out is not None else 0
     if as_json:
-        import json
-
         print(json.dumps(_summary(result, out if written else None), indent=1, ensure_ascii=False))
     else:
         _print(result, out if written else None, total, dry=dry, verbose=verbose)
@@ -91,7 +93,6 @@ def import_(
 
 def _refuse_taken(out: Path | None, add: bool) -> None:
     from mrdamper.data.atomic import require_writable
-    from mrdamper.errors import OutputError
 
     if out is None:
         return
@@ -108,7 +109,6 @@ def _refuse_taken(out: Path | None, add: bool) -> None:
 def _write_tests(files: list[Path], settings: Profile, target: Path) -> None:
     """Every test that can be read, also those whose current is not known yet."""
     from mrdamper.data.atomic import write_file
-    from mrdamper.errors import InputError
     from mrdamper.rig_files.rig_import import found_tests
     from mrdamper.rig_files.tests_table import tests_text
 
@@ -127,7 +127,6 @@ def _write_tests(files: list[Path], settings: Profile, target: Path) -> None:
 
 def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
     from mrdamper.data.atomic import write_file
-    from mrdamper.errors import InputError
     from mrdamper.rig_files.preview import columns_of, guess_profile
     from mrdamper.rig_files.profile import profile_text
     from mrdamper.rig_files.rig_import import first_file, read_runs
@@ -149,10 +148,6 @@ def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
 
 def _missing_currents(files: list[Path], guess: Profile, columns: tuple[str, ...]) -> str:
     """List what a person fills in for tests without a current, as comments: their currents, or a column's scale."""
-    import json
-    from collections import Counter
-    from glob import escape
-
     from mrdamper.rig_files.rig_import import import_files
 
     refusals = import_files(files, guess).refusals if guess.current is None else ()
@@ -174,8 +169,6 @@ def _missing_currents(files: list[Path], guess: Profile, columns: tuple[str, ...
 
 def _alternatives(columns: tuple[str, ...]) -> str:
     """List the columns and the most used keys of a profile as comments."""
-    import json
-
     named = [f"#   {number}  {json.dumps(name, ensure_ascii=False)}" for number, name in enumerate(columns, 1) if name]
     return "\n".join(
         [
@@ -205,10 +198,7 @@ def _write_dataset(result: ImportResult, profile: Profile, out: Path, add: bool)
 
 def _joined(old: Dataset, new: Dataset) -> Dataset:
     """Both datasets' runs, told apart by their names; a file that was imported before is refused."""
-    from dataclasses import replace
-
     from mrdamper.data import Dataset
-    from mrdamper.errors import OutputError
     from mrdamper.rig_files.record import unique_names
 
     stored = {(run.notes.get("sha256"), run.id) for run in old if run.notes.get("sha256")}
@@ -224,7 +214,6 @@ def _joined(old: Dataset, new: Dataset) -> Dataset:
 
 
 def _on_terminal() -> bool:
-    import sys
 
     return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
 
@@ -266,7 +255,6 @@ def _asked(
 
 
 def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = False, verbose: bool = False) -> None:
-    from mrdamper.cli.output import shortened
 
     columns = {record.provenance["columns"] for record in result.records}
     if dry and result.records:

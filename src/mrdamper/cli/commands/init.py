@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
 from pathlib import Path
 
 import typer
 
+from mrdamper.errors import OutputError, UnknownNameError
+
 _FILES = {"about": "about.toml", "limits": "limits.toml", "profile": "profile.toml", "tests": "tests.csv"}
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper init limits --out limits.toml")(init)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper init limits --out limits.toml")
 def init(
     kind: str = typer.Argument(..., help=f"Kind of file: {', '.join(_FILES)}."),
-    out: Path | None = typer.Option(None, "--out", help="File to write; default: standard output."),
+    out: Path | None = typer.Option(None, help="File to write; default: standard output."),
 ) -> None:
     """Write a commented template: about, limits, profile or tests.
 
@@ -24,7 +25,6 @@ def init(
     profile: columns and units of rig files. tests: table of tests with their currents.
     """
     from mrdamper.data.atomic import write_file
-    from mrdamper.errors import OutputError
 
     text = template(kind)
     if out is None:
@@ -42,10 +42,6 @@ def template(kind: str) -> str:
 
     Raises `UnknownNameError` if there is no template of that name.
     """
-    from importlib.resources import files
-
-    from mrdamper.errors import UnknownNameError
-
     if kind not in _FILES:
         raise UnknownNameError.of("template", kind, _FILES)
     return files("mrdamper.cli").joinpath("templates", _FILES[kind]).read_text(encoding="utf-8")

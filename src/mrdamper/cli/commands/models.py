@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import json
+import math
 
 import typer
 
+from mrdamper.cli.output import aligned
+from mrdamper.errors import UnknownNameError
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper models spencer")(models)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper models spencer")
 def models(
     name: str | None = typer.Argument(None, help="Show this model in full; default: list all."),
     as_json: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
     """List the models, or show equation, parameters and source of one."""
     from mrdamper.dampers.published import all_published
-    from mrdamper.errors import UnknownNameError
     from mrdamper.models import all_models
 
     types = {**all_models(), **all_published()}
@@ -55,7 +56,6 @@ def _page(model) -> str:
         equation = model.__dict__.get("equation", "")
         lines = [f"{model.name}: {model.heading}", "", notes, "", *facts]
         return "\n".join([*lines, "", f"LaTeX: {equation}"] if equation else lines)
-    from mrdamper.cli.output import aligned
 
     rows = [("parameter", "unit", "bounds", "determined", "meaning")]
     for info in model.parameters():
@@ -72,7 +72,6 @@ def _page(model) -> str:
 
 
 def _entry(model) -> dict:
-    import math
 
     def plain(value):
         return value if value is not None and math.isfinite(value) else None

@@ -7,24 +7,23 @@ from pathlib import Path
 
 import typer
 
+from mrdamper.cli.progress import progress_soon
+from mrdamper.errors import ConditionError, InputError
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper plan model.json --limits limits.toml --hours 2 --out next")(plan)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper plan model.json --limits limits.toml --hours 2 --out next")
 def plan(
     model: Path | None = typer.Argument(
         None, help="model.json written by mrdamper study; omit for a first test matrix."
     ),
-    limits: Path | None = typer.Option(
-        None, "--limits", help="TOML file with limits of the test rig (mrdamper init limits)."
-    ),
-    hours: float = typer.Option(..., "--hours", help="Rig time [h], including setting up."),
+    limits: Path | None = typer.Option(None, help="TOML file with limits of the test rig (mrdamper init limits)."),
+    hours: float = typer.Option(..., help="Rig time [h], including setting up."),
     about: str | None = typer.Option(
-        None, "--about", help="Parameter, or condition A,Hz,mm, to be determined best; default: all conditions."
+        None, help="Parameter, or condition A,Hz,mm, to be determined best; default: all conditions."
     ),
-    out: Path = typer.Option(..., "--out", help="Folder for plan.csv and one motion file per test."),
+    out: Path = typer.Option(..., help="Folder for plan.csv and one motion file per test."),
 ) -> None:
     """Propose the tests that reduce the uncertainty most.
 
@@ -32,11 +31,9 @@ def plan(
     """
     import numpy as np
 
-    from mrdamper.cli.progress import progress_soon
     from mrdamper.dampers.model_file import load_model
     from mrdamper.data.atomic import require_writable, write_result
     from mrdamper.data.encoding import csv_text
-    from mrdamper.errors import InputError
     from mrdamper.study.first_matrix import first_matrix
     from mrdamper.study.limits import Limits
     from mrdamper.study.plan import least_informative_runs, plan_tests
@@ -82,7 +79,6 @@ def plan(
 def _doubt(about: str | None):
     """Return a condition where three numbers stand, else the name of a number."""
     from mrdamper.data import Condition
-    from mrdamper.errors import ConditionError
 
     if about is None or "," not in about:
         return about

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import json
+import warnings
+from dataclasses import asdict
+from itertools import groupby
 
 import typer
 
+from mrdamper.discovery import PluginWarning, all_parts
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper plugins")(plugins)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper plugins")
 def plugins(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
     """List models, readers and other parts by their package."""
-    import warnings
-    from dataclasses import asdict
-    from itertools import groupby
-
-    from mrdamper.discovery import PluginWarning, all_parts
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PluginWarning)  # the list names what is skipped
         parts = all_parts()

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
+
+from mrdamper.cli.output import figure_kind, put
+from mrdamper.errors import ConditionError, InputError
 
 if TYPE_CHECKING:
     from mrdamper.dampers.bands import Band
@@ -19,32 +23,22 @@ WARNINGS = {
     "sampling": "fewer than two samples within the yield displacement after a reversal; increase the sampling rate",
 }
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(
-        epilog="Example: mrdamper predict model.json --current 0.5 --frequency 2 --amplitude 10 --out force.csv"
-    )(predict)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper predict model.json --current 0.5 --frequency 2 --amplitude 10 --out force.csv")
 def predict(
     model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
-    current: float | None = typer.Option(None, "--current", help="Coil current [A]."),
-    frequency: float | None = typer.Option(None, "--frequency", help="Frequency of a sine [Hz]."),
-    amplitude: float | None = typer.Option(None, "--amplitude", help="Amplitude of a sine [mm]."),
-    motion: Path | None = typer.Option(
-        None, "--motion", help="CSV with time_s, displacement_m and optionally current_A."
-    ),
-    coil_lag: float | None = typer.Option(
-        None, "--coil-lag", help="Time constant of the coil [ms]; default: the model's value."
-    ),
-    check_run: list[str] = typer.Option(
-        [], "--check-run", help="Check run of --data: correct gain and offset for its test session."
-    ),
-    data: Path | None = typer.Option(None, "--data", help="Dataset with the check runs; default: bundled tests."),
-    level: float = typer.Option(0.9, "--level", help="Coverage of the prediction interval."),
-    out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
-    plot: Path | None = typer.Option(None, "--plot", help="Figure of the force to write (.png, .svg or .pdf)."),
+    current: float | None = typer.Option(None, help="Coil current [A]."),
+    frequency: float | None = typer.Option(None, help="Frequency of a sine [Hz]."),
+    amplitude: float | None = typer.Option(None, help="Amplitude of a sine [mm]."),
+    motion: Path | None = typer.Option(None, help="CSV with time_s, displacement_m and optionally current_A."),
+    coil_lag: float | None = typer.Option(None, help="Time constant of the coil [ms]; default: the model's value."),
+    check_run: list[str] = typer.Option([], help="Check run of --data: correct gain and offset for its test session."),
+    data: Path | None = typer.Option(None, help="Dataset with the check runs; default: bundled tests."),
+    level: float = typer.Option(0.9, help="Coverage of the prediction interval."),
+    out: Path | None = typer.Option(None, help="CSV to write; default: standard output."),
+    plot: Path | None = typer.Option(None, help="Figure of the force to write (.png, .svg or .pdf)."),
     as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
 ) -> None:
     """Predict the force at a test condition or along a motion.
@@ -52,11 +46,9 @@ def predict(
     The prediction interval of the peak force, the dissipated energy and the equivalent damping
     are printed on standard error.
     """
-    from mrdamper.cli.output import put
     from mrdamper.dampers.bands import band, no_band, scope
     from mrdamper.data.atomic import require_writable
     from mrdamper.data.encoding import csv_text
-    from mrdamper.errors import ConditionError
     from mrdamper.identification.intervals import student
     from mrdamper.report.tables import prediction_rows
 
@@ -87,8 +79,6 @@ def predict(
 
 def _load(model: Path, coil_lag: float | None) -> Damper:
     """Load the model; a coil lag [ms] replaces its own."""
-    from dataclasses import replace
-
     from mrdamper.dampers.coil import Coil
     from mrdamper.dampers.model_file import load_model
 
@@ -104,7 +94,6 @@ def _predict(
 ) -> Prediction:
     """Predict along the motion of a file, or at a condition [A, Hz, mm]."""
     from mrdamper.data import Condition
-    from mrdamper.errors import InputError
 
     if motion is not None:
         from mrdamper.rig_files.motion_file import load_motion
@@ -139,7 +128,6 @@ def _session_known(
 
 def _write_figure(path: Path, prediction: Prediction, interval: Band | None, level: float) -> None:
     """Write a figure of the predicted force; the file appears whole or not at all."""
-    from mrdamper.cli.output import figure_kind
     from mrdamper.data.atomic import write_file
     from mrdamper.report.plots.loops import predicted_force
 

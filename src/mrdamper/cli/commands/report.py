@@ -7,26 +7,22 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from mrdamper.cli.progress import progress_on_stderr
+
 if TYPE_CHECKING:
     from mrdamper.data import Dataset
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper report before/ after/ --about about.toml --out report/")(report)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper report before/ after/ --about about.toml --out report/")
 def report(
     specimens: list[str] = typer.Argument(help="Dataset folders, one per damper; FOLDER:RIG if it holds several."),
-    out: Path = typer.Option(..., "--out", help="Folder for report.html, report.pdf, tables and figures."),
-    about: Path | None = typer.Option(
-        None, "--about", help="TOML file with customer, type, serial, logo (mrdamper init about)."
-    ),
-    limits: Path | None = typer.Option(None, "--limits", help="TOML file with force limits (mrdamper init limits)."),
-    velocities: str = typer.Option(
-        "", "--velocities", help="Velocities of the force table [m/s], such as 0.05,0.1,0.2."
-    ),
-    paper: str = typer.Option("a4", "--paper", help="Page size of report.pdf: a4 or letter."),
+    out: Path = typer.Option(..., help="Folder for report.html, report.pdf, tables and figures."),
+    about: Path | None = typer.Option(None, help="TOML file with customer, type, serial, logo (mrdamper init about)."),
+    limits: Path | None = typer.Option(None, help="TOML file with force limits (mrdamper init limits)."),
+    velocities: str = typer.Option("", help="Velocities of the force table [m/s], such as 0.05,0.1,0.2."),
+    paper: str = typer.Option("a4", help="Page size of report.pdf: a4 or letter."),
     png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
 ) -> None:
     """Write a test report of one or several dampers.
@@ -34,7 +30,6 @@ def report(
     It holds forces at set velocities, peak force over velocity, cycles, friction and gas force.
     No model is identified.
     """
-    from mrdamper.cli.progress import progress_on_stderr
     from mrdamper.data.atomic import require_writable
     from mrdamper.report.about import load_about, load_limits, parse_ladder
     from mrdamper.report.damper_tests import write_test_report

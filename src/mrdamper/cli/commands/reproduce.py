@@ -4,54 +4,47 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from mrdamper.cli.output import aligned, parse_gas, parse_pairs, percent
+from mrdamper.cli.progress import in_two, progress_on_stderr
+from mrdamper.errors import InputError
+
 if TYPE_CHECKING:
     from mrdamper.data import Dataset
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(
-        epilog="Example: mrdamper reproduce --out result/",
-        help="Reproduce the study of Qian et al. (2024).\n\nOn the virtual rig (synthetic data) or on a dataset.",
-    )(reproduce)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper reproduce --out result/")
 def reproduce(
-    out: Path = typer.Option(..., "--out", help="Folder for reproduction.html, tables and figures."),
-    data: Path | None = typer.Option(None, "--data", help="Dataset folder; default: the virtual rig, synthetic."),
-    rig: str | None = typer.Option(None, "--rig", help="Rig of the dataset; required if it has several."),
+    out: Path = typer.Option(..., help="Folder for reproduction.html, tables and figures."),
+    data: Path | None = typer.Option(None, help="Dataset folder; default: the virtual rig, synthetic."),
+    rig: str | None = typer.Option(None, help="Rig of the dataset; required if it has several."),
     comparators: bool = typer.Option(
         True, "--comparators/--no-comparators", help="The direct genetic search and Ali's model (half the time)."
     ),
     with_models: bool = typer.Option(False, "--with-models", help="Also the other models of the literature."),
-    seeds: int = typer.Option(
-        0, "--seeds", min=0, help="Noise seeds of the virtual rig; about 2 processor seconds each."
-    ),
+    seeds: int = typer.Option(0, min=0, help="Noise seeds of the virtual rig; about 2 processor seconds each."),
     gas: str | None = typer.Option(
-        None, "--gas", help="Known gas spring of the data: pressure MPa, volume cm3, rod area mm2, as P,V,A."
+        None, help="Known gas spring of the data: pressure MPa, volume cm3, rod area mm2, as P,V,A."
     ),
     setting: list[str] = typer.Option(
         [], "--set", help="OPTION=VALUE of the method, as for study --model paper; may be repeated."
     ),
-    jobs: int | None = typer.Option(None, "--jobs", min=1, help="Number of processes; default: one per core."),
+    jobs: int | None = typer.Option(None, min=1, help="Number of processes; default: one per core."),
     png: bool = typer.Option(False, "--png", help="Also write the figures as PNG."),
     as_json: bool = typer.Option(False, "--json", help="Print the verdicts and claims for a program."),
 ) -> None:
     """Reproduce the study of Qian et al. (2024).
 
-    Example: mrdamper reproduce --out result/
+    On the virtual rig (synthetic data) or on a dataset.
     """
-    import os
-
-    from mrdamper.cli.output import parse_gas, parse_pairs
-    from mrdamper.cli.progress import in_two, progress_on_stderr
     from mrdamper.data.atomic import require_writable
-    from mrdamper.errors import InputError
     from mrdamper.paper.options import PaperOptions
     from mrdamper.paper.output import summary, write_reproduction
     from mrdamper.paper.study import reproduce as run_reproduction
@@ -88,7 +81,6 @@ def reproduce(
 
 def _one_rig(data: Path | None, rig: str | None) -> Dataset | None:
     """Load the one rig of a dataset; none for the virtual rig."""
-    from mrdamper.errors import InputError
     from mrdamper.rig_files.dataset_folder import load_dataset
 
     if data is None:
@@ -104,8 +96,6 @@ def _one_rig(data: Path | None, rig: str | None) -> Dataset | None:
 
 def _print(text: dict[str, Any]) -> None:
     """Print errors and times of the methods, and what became of the paper's claims."""
-    from mrdamper.cli.output import aligned, percent
-
     rows: list[tuple[str, ...]] = [("validation runs, nrmse_pp", "median", "worst", "s")]
     for row, took in zip(text["verdicts"], text["times"], strict=False):
         errors = (math.nan if row[name] is None else row[name] for name in ("nrmse_pp", "worst_nrmse_pp"))

@@ -3,49 +3,51 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
+from pkgutil import resolve_name
+from typing import Any
 
 import typer
 
+from mrdamper.errors import UnknownNameError
+
 _FORMATS = ("model", "profile", "limits", "about", "fleet", "system", "plan", "results")
+_TYPES = {
+    "profile": "rig_files.profile:Profile",
+    "fleet": "fleet.profile:FleetProfile",
+    "system": "systems.system_file:SystemDocument",
+    "plan": "study.proposal:PlanRow",
+    "results": "data.atomic:ResultRecord",
+}
+_WRITTEN = ("plan", "results")  # by mrdamper; the others are read
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper schema model > model.schema.json")(schema)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper schema model > model.schema.json")
 def schema(name: str = typer.Argument(..., help=f"File format: {', '.join(_FORMATS)}.")) -> None:
     """Print the JSON Schema of a file format."""
-    from mrdamper.errors import UnknownNameError
-
     if name not in _FORMATS:
         raise UnknownNameError.of("file format", name, _FORMATS)
     print(json.dumps(_schema(name), indent=1, ensure_ascii=False))
 
 
 def _schema(name: str) -> dict:
+    from pydantic import TypeAdapter
+
     if name == "model":
         from mrdamper.dampers.model_file import model_schema
 
         return model_schema()
-    if name == "profile":
-        from mrdamper.rig_files.profile import Profile
-
-        document = Profile.model_json_schema()
-    elif name == "limits":
+    if name == "limits":
         document = _limits()
     elif name == "about":
         document = _about()
-    elif name == "fleet":
-        from mrdamper.fleet.profile import FleetProfile
-
-        document = FleetProfile.model_json_schema()
-    elif name in ("plan", "results"):
-        document = _written(name)
     else:
-        from mrdamper.systems.system_file import SystemDocument
-
-        document = SystemDocument.model_json_schema()
+        kind: Any = resolve_name(f"mrdamper.{_TYPES[name]}")
+        adapter = TypeAdapter(list[kind] if name == "plan" else kind)  # pyright: ignore[reportInvalidTypeForm]
+        document = adapter.json_schema(mode="serialization" if name in _WRITTEN else "validation")
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **document}
 
 
@@ -70,20 +72,7 @@ def _limits() -> dict:
 
 def _about() -> dict:
     """Fields of the head of a report: text or numbers."""
-    from dataclasses import fields
-
     from mrdamper.report.about import About
 
     properties = {field.name: {"type": ["string", "number"]} for field in fields(About)}
     return {"title": "About", "type": "object", "properties": properties, "additionalProperties": False}
-
-
-def _written(name: str) -> dict:
-    """Return schema of the rows of plan.csv, or of made.json in the folder of a result."""
-    from pydantic import TypeAdapter
-
-    from mrdamper.data.atomic import ResultRecord
-    from mrdamper.study.proposal import PlanRow
-
-    adapter = TypeAdapter(list[PlanRow]) if name == "plan" else TypeAdapter(ResultRecord)
-    return adapter.json_schema(mode="serialization")

@@ -9,21 +9,19 @@ import sys
 
 import typer
 
+from mrdamper.errors import MissingExtraError
+
 _NEEDS = ("fastapi", "uvicorn", "plotly")
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper serve --port 8765")(serve)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper serve --port 8765")
 def serve(
-    port: int = typer.Option(8765, "--port", min=0, max=65535, help="Port on this machine; 0: any free port."),
+    port: int = typer.Option(8765, min=0, max=65535, help="Port on this machine; 0: any free port."),
     browser: bool = typer.Option(True, "--browser/--no-browser", help="Open the page in the browser."),
 ) -> None:
     """Open the app: import files, identify, explore and export."""
-    from mrdamper.errors import MissingExtraError
-
     missing = [name for name in _NEEDS if importlib.util.find_spec(name) is None]
     if missing:
         raise MissingExtraError(f"the app needs {', '.join(missing)}", remedy="pip install 'mrdamper[web]'")

@@ -11,6 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from mrdamper.cli.output import parse_named, shortened
+from mrdamper.cli.progress import progress_soon
+from mrdamper.errors import InputError
+
 if TYPE_CHECKING:
     from mrdamper.cli.progress import Progress
     from mrdamper.dampers.base import Damper
@@ -21,44 +25,33 @@ if TYPE_CHECKING:
     from mrdamper.systems.simulate import SystemLoop
     from mrdamper.systems.system_file import SystemFile
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper simulate dyke1996 --input elcentro --time-scale 5 --volts 2.25 --json")(
-        simulate
-    )
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper simulate dyke1996 --input elcentro --time-scale 5 --volts 2.25 --json")
 def simulate(
     system: str = typer.Argument(..., help="dyke1996, quarter-car, half-car, or a TOML file of the system."),
     source: str = typer.Option(
         ..., "--input", help="CSV with time_s and acceleration_m_s2, acceleration_g or height_m; or NAME[:KEY=VALUE,…]."
     ),
-    damper: Path | None = typer.Option(None, "--damper", help="model.json for every damper."),
-    control: str = typer.Option("passive", "--control", help="Controller, NAME[:KEY=VALUE,…]."),
-    current: float | None = typer.Option(
-        None, "--current", help="Constant current [A]; the largest with a controller."
-    ),
-    volts: float | None = typer.Option(
-        None, "--volts", help="Voltage of the current driver [V], instead of --current."
-    ),
+    damper: Path | None = typer.Option(None, help="model.json for every damper."),
+    control: str = typer.Option("passive", help="Controller, NAME[:KEY=VALUE,…]."),
+    current: float | None = typer.Option(None, help="Constant current [A]; the largest with a controller."),
+    volts: float | None = typer.Option(None, help="Voltage of the current driver [V], instead of --current."),
     without: bool = typer.Option(False, "--without-damper", help="Simulate the system without dampers."),
-    time_scale: float = typer.Option(1.0, "--time-scale", help="Factor by which the input record is played faster."),
-    step: float | None = typer.Option(None, "--step", help="Time step [s]; default: halved until peaks converge."),
-    compare: list[str] | None = typer.Option(None, "--compare", help="Controller to compare, or all; may be repeated."),
-    draws: int | None = typer.Option(None, "--draws", help="Monte Carlo runs over the uncertainty: 5 to 95 % ranges."),
-    seed: int = typer.Option(1, "--seed", help="Random seed of --draws."),
-    out: Path | None = typer.Option(None, "--out", help="Folder for simulation.html, time histories and results."),
+    time_scale: float = typer.Option(1.0, help="Factor by which the input record is played faster."),
+    step: float | None = typer.Option(None, help="Time step [s]; default: halved until peaks converge."),
+    compare: list[str] | None = typer.Option(None, help="Controller to compare, or all; may be repeated."),
+    draws: int | None = typer.Option(None, help="Monte Carlo runs over the uncertainty: 5 to 95 % ranges."),
+    seed: int = typer.Option(1, help="Random seed of --draws."),
+    out: Path | None = typer.Option(None, help="Folder for simulation.html, time histories and results."),
     law_out: Path | None = typer.Option(None, "--c", help="Folder for the controller as C99 source."),
     law_fmu: Path | None = typer.Option(None, "--fmu", help="File for the controller as FMU."),
     verbose: bool = typer.Option(False, "--verbose", help="Print every file written."),
     as_json: bool = typer.Option(False, "--json", help="Print JSON, SI units."),
 ) -> None:
     """Simulate a vehicle or building with dampers and a controller."""
-    from mrdamper.cli.output import parse_named, shortened
-    from mrdamper.cli.progress import progress_soon
     from mrdamper.data.atomic import require_writable
-    from mrdamper.errors import InputError
     from mrdamper.systems.controller_comparison import compare_controllers
     from mrdamper.systems.inputs import load_input
     from mrdamper.systems.monte_carlo import draw, monte_carlo
@@ -94,7 +87,6 @@ def simulate(
 def _dampers(loaded: SystemFile, model: Path | None, where: str) -> dict[str, Damper]:
     """Return the damper of every link: the model given, or the system's own."""
     from mrdamper.dampers.model_file import load_model
-    from mrdamper.errors import InputError
 
     links = [link.name for link in loaded.system.dampers]
     dampers = dict(loaded.dampers) if model is None else dict.fromkeys(links, load_model(model))
@@ -119,7 +111,6 @@ def _write(
 
 def _export_law(loop: SystemLoop, folder: Path | None, fmu: Path | None) -> None:
     """Return the law of a loop as C99 in a folder, and as an FMU."""
-    from mrdamper.errors import InputError
     from mrdamper.export.c import write_program
     from mrdamper.export.fmu_program import write_program_fmu
 
@@ -144,7 +135,6 @@ def _all_of(names: list[str]) -> list[str]:
 
 def _controller(text: str, current: float | None = None) -> Controller:
     """Return a controller by name; the current, where one is given, is the constant one's [A]."""
-    from mrdamper.cli.output import parse_named
     from mrdamper.data.parameters import with_values
     from mrdamper.systems.controllers import controller_type
 
@@ -156,8 +146,6 @@ def _controller(text: str, current: float | None = None) -> Controller:
 
 def _amperes(current: float | None, volts: float | None, dampers: dict[str, Damper]) -> float | None:
     """Return the current asked for, straight or through the driver of the dampers [A]."""
-    from mrdamper.errors import InputError
-
     if current is not None and volts is not None:
         raise InputError("--current beside --volts", remedy="give one")
     if volts is None or not dampers:

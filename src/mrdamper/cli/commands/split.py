@@ -6,20 +6,16 @@ from pathlib import Path
 
 import typer
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper split rig; mrdamper split rig --current 0.5; mrdamper split rig --every 4")(
-        split
-    )
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper split rig; mrdamper split rig --current 0.5; mrdamper split rig --every 4")
 def split(
     data: Path = typer.Argument(..., help="Dataset folder."),
-    run: list[str] = typer.Option([], "--run", help="Use this run for validation; may be repeated."),
-    current: list[float] = typer.Option([], "--current", help="Use every run at this current for validation [A]."),
-    condition: list[str] = typer.Option([], "--condition", help="Use this condition for validation: A,Hz,mm."),
-    every: int | None = typer.Option(None, "--every", min=2, help="Use every n-th run for validation."),
+    run: list[str] = typer.Option([], help="Use this run for validation; may be repeated."),
+    current: list[float] = typer.Option([], help="Use every run at this current for validation [A]."),
+    condition: list[str] = typer.Option([], help="Use this condition for validation: A,Hz,mm."),
+    every: int | None = typer.Option(None, min=2, help="Use every n-th run for validation."),
     none: bool = typer.Option(False, "--none", help="Use all runs for identification."),
     replace: bool = typer.Option(False, "--replace", help="Replace the present split of the dataset."),
 ) -> None:

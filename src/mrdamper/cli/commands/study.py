@@ -9,40 +9,38 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from mrdamper.cli.output import parse_gas, parse_pairs
+from mrdamper.cli.progress import in_two, progress_on_stderr
+from mrdamper.errors import IdentificationError, InputError, UnknownNameError
+
 if TYPE_CHECKING:
     from mrdamper.data import Dataset
     from mrdamper.study.recipe import StudyMethod
     from mrdamper.study.workflow import Study
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper study rig/ --out result/")(study)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper study rig/ --out result/")
 def study(
     data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests of two dampers."),
-    out: Path = typer.Option(..., "--out", help="Folder for report.html, model.json, tables and figures."),
+    out: Path = typer.Option(..., help="Folder for report.html, model.json, tables and figures."),
     model: str | None = typer.Option(
-        None, "--model", help="Save this model instead of the best one; paper: the method of Qian et al. 2024."
+        None, help="Save this model instead of the best one; paper: the method of Qian et al. 2024."
     ),
     gas: str | None = typer.Option(
-        None, "--gas", help="Known gas spring for --model paper: pressure MPa, volume cm3, rod area mm2, as P,V,A."
+        None, help="Known gas spring for --model paper: pressure MPa, volume cm3, rod area mm2, as P,V,A."
     ),
     setting: list[str] = typer.Option(
         [], "--set", help="OPTION=VALUE of --model paper (n, gamma, mass_law, search, ...); may be repeated."
     ),
-    about: Path | None = typer.Option(
-        None, "--about", help="TOML file with customer, type, serial, logo (mrdamper init about)."
-    ),
-    limits: Path | None = typer.Option(None, "--limits", help="TOML file with force limits (mrdamper init limits)."),
+    about: Path | None = typer.Option(None, help="TOML file with customer, type, serial, logo (mrdamper init about)."),
+    limits: Path | None = typer.Option(None, help="TOML file with force limits (mrdamper init limits)."),
     pdf: bool = typer.Option(False, "--pdf", help="Also write report.pdf and every figure as PDF."),
-    paper: str = typer.Option("a4", "--paper", help="Page size of report.pdf: a4 or letter."),
+    paper: str = typer.Option("a4", help="Page size of report.pdf: a4 or letter."),
     png: bool = typer.Option(False, "--png", help="Also write every figure as PNG."),
     lag: bool = typer.Option(False, "--lag", help="Require tests from which the coil lag can be identified."),
-    keep: list[str] = typer.Option(
-        [], "--keep", help="Use this run although it contradicts the others; may be repeated."
-    ),
+    keep: list[str] = typer.Option([], help="Use this run although it contradicts the others; may be repeated."),
     verbose: bool = typer.Option(False, "--verbose", help="Print every model, parameter and limitation."),
     as_json: bool = typer.Option(False, "--json", help="Print the summary as JSON."),
 ) -> None:
@@ -51,7 +49,6 @@ def study(
     Every run is identified, models of the whole damper are fitted and cross-validated, and the
     best is saved with a report.
     """
-    from mrdamper.cli.progress import in_two, progress_on_stderr
     from mrdamper.data.atomic import require_writable
     from mrdamper.report.about import load_about, load_limits
     from mrdamper.report.study import study_and_draw, write_study
@@ -89,8 +86,6 @@ def study(
 
 def _model(name: str | None, gas: str | None, setting: list[str]) -> str | StudyMethod | None:
     """Return the model asked for; a published method with its options."""
-    from mrdamper.cli.output import parse_gas, parse_pairs
-    from mrdamper.errors import InputError
     from mrdamper.study.recipe import study_method, study_methods
 
     if name in study_methods():
@@ -101,7 +96,6 @@ def _model(name: str | None, gas: str | None, setting: list[str]) -> str | Study
 
 
 def _require_switched_current(dataset: Dataset) -> None:
-    from mrdamper.errors import IdentificationError
 
     if not any(run.current_changes for run in dataset.split("train")):
         raise IdentificationError(
@@ -112,7 +106,6 @@ def _require_switched_current(dataset: Dataset) -> None:
 
 
 def _paper_size(name: str) -> str:
-    from mrdamper.errors import UnknownNameError
     from mrdamper.report.page import PAPERS
 
     if name.lower() not in PAPERS:

@@ -7,28 +7,26 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from mrdamper.errors import InputError
+
 if TYPE_CHECKING:
     from mrdamper.cli.output import Rows
     from mrdamper.dampers.likelihood import LikelihoodProfile
     from mrdamper.dampers.posterior import Samples
     from mrdamper.data import Run
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper uncertainty model.json rig/ --profile c1 --out uncertainty/")(uncertainty)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper uncertainty model.json rig/ --profile c1 --out uncertainty/")
 def uncertainty(
     model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
     data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
-    level: float = typer.Option(0.95, "--level", help="Confidence level of the intervals."),
-    profile: list[str] = typer.Option(
-        [], "--profile", help="Parameter whose profile likelihood is computed; may be repeated."
-    ),
+    level: float = typer.Option(0.95, help="Confidence level of the intervals."),
+    profile: list[str] = typer.Option([], help="Parameter whose profile likelihood is computed; may be repeated."),
     samples: bool = typer.Option(False, "--samples", help="Sample the posterior by Markov chains; needs mrdamper[uq]."),
-    steps: int = typer.Option(4000, "--steps", help="Steps of each Markov chain."),
-    out: Path | None = typer.Option(None, "--out", help="Folder for parameters.csv, profile.svg, corner.svg."),
+    steps: int = typer.Option(4000, help="Steps of each Markov chain."),
+    out: Path | None = typer.Option(None, help="Folder for parameters.csv, profile.svg, corner.svg."),
 ) -> None:
     """Print confidence intervals and limitations of a model.
 
@@ -38,7 +36,6 @@ def uncertainty(
     from mrdamper.dampers.model_file import load_model
     from mrdamper.dampers.uncertainty import table, uncertainty_warnings
     from mrdamper.data.atomic import require_writable
-    from mrdamper.errors import InputError
     from mrdamper.identification.intervals import student
 
     student(level, 1.0)  # refuses a level that is none
@@ -93,7 +90,6 @@ def _write(out: Path, rows: Rows, curves: list[LikelihoodProfile], drawn: Sample
 
 def _used(data: Path | None, rig: str) -> list[Run]:
     """Select the runs of the rig that a study identifies from: identification runs with a steady sine."""
-    from mrdamper.errors import InputError
     from mrdamper.rig_files.dataset_folder import load_dataset
     from mrdamper.study.workflow import usable_sines
 

@@ -8,45 +8,40 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from mrdamper.cli.output import put
+from mrdamper.cli.progress import watched
+from mrdamper.errors import InputError, UnknownNameError
+
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
     from mrdamper.data import Dataset
     from mrdamper.study.validation import Validation
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command(epilog="Example: mrdamper validate model.json rig/ --out scores.csv")(validate)
+app = typer.Typer()
 
 
+@app.command(epilog="Example: mrdamper validate model.json rig/ --out scores.csv")
 def validate(
     model: Path = typer.Argument(..., help="model.json written by mrdamper study."),
     data: Path | None = typer.Argument(None, help="Dataset folder; default: the bundled tests."),
-    rig: str | None = typer.Option(None, "--rig", help="Use the runs of this rig instead."),
-    split: str | None = typer.Option(
-        None, "--split", help="Only identification (train) or only validation (validate) runs."
-    ),
-    check_run: list[str] = typer.Option(
-        [], "--check-run", help="Check run that corrects its session; may be repeated."
-    ),
+    rig: str | None = typer.Option(None, help="Use the runs of this rig instead."),
+    split: str | None = typer.Option(None, help="Only identification (train) or only validation (validate) runs."),
+    check_run: list[str] = typer.Option([], help="Check run that corrects its session; may be repeated."),
     own_sessions: bool = typer.Option(
         False, "--own-sessions", help="Correct for the sessions of the identification runs."
     ),
-    level: float = typer.Option(0.9, "--level", help="Coverage of the prediction interval of the peak force."),
-    out: Path | None = typer.Option(None, "--out", help="CSV to write; default: standard output."),
+    level: float = typer.Option(0.9, help="Coverage of the prediction interval of the peak force."),
+    out: Path | None = typer.Option(None, help="CSV to write; default: standard output."),
     as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
 ) -> None:
     """Calculate the errors of a saved model on measured runs.
 
     Per run: nrmse_pp, nrmse_std, wape, errors of peak force and dissipated energy.
     """
-    from mrdamper.cli.output import put
-    from mrdamper.cli.progress import watched
     from mrdamper.dampers.model_file import load_model
     from mrdamper.dampers.sessions import RecordingTime, sessions_known
     from mrdamper.data.atomic import require_writable
     from mrdamper.data.encoding import csv_text
-    from mrdamper.errors import InputError, UnknownNameError
     from mrdamper.identification.intervals import student
     from mrdamper.report.tables import score_row
     from mrdamper.rig_files.dataset_folder import load_dataset
@@ -59,18 +54,18 @@ def validate(
     require_writable(out)
     damper = load_model(model)
     whole = _rig(load_dataset(data), rig, damper.rig)
-    wanted = whole.rigs[0]
+    name = whole.rigs[0] or whole.name
     runs = [run for run in whole if split in (None, run.split)]
     if not runs:
-        raise InputError(f"no {split} runs", where=f"rig {wanted}", remedy="leave out --split")
+        raise InputError(f"no {split} runs", where=f"rig {name}", remedy="leave out --split")
     sessions = (
         sessions_known(damper, [whole[n] for n in check_run], own_sessions) if check_run or own_sessions else None
     )
     validation = score(damper, watched([run for run in runs if run.id not in check_run], "run"), sessions=sessions)
-    for name, why in validation.refused.items():
-        typer.echo(f"not scored: {name}: {why}", err=True)
+    for run_id, why in validation.refused.items():
+        typer.echo(f"not scored: {run_id}: {why}", err=True)
     if not validation.runs:
-        raise InputError("no run could be scored", where=f"rig {wanted}", remedy="see the lines above")
+        raise InputError("no run could be scored", where=f"rig {name}", remedy="see the lines above")
     by_id = {run.id: run for run in runs}
     peaks = {
         run.run_id: peak_band(
@@ -82,14 +77,15 @@ def validate(
         for run in validation.runs
     }
     put([{**score_row(run), **peaks[run.run_id]} for run in validation.runs], out, as_json, csv_text)
-    _print_summary(damper, validation, wanted or whole.name, peaks.values(), level)
+    _print_summary(damper, validation, name, peaks.values(), level)
 
 
 def _rig(dataset: Dataset, asked: str | None, of_model: str) -> Dataset:
     """Return the runs of the rig asked for, of the model's rig, or of the only one."""
     if asked is None and of_model not in dataset.rigs and len(dataset.rigs) == 1:
         asked = dataset.rigs[0]
-        typer.echo(f"the model is of rig {of_model!r}; scoring the dataset's one rig {asked!r}", err=True)
+        names = [f"rig {rig!r}" if rig else "a rig without a name" for rig in (of_model, asked)]
+        typer.echo(f"the model is of {names[0]}; scoring the dataset's only rig, {names[1]}", err=True)
     return dataset.rig(of_model if asked is None else asked)
 
 
