@@ -194,6 +194,17 @@ def test_a_known_delay_is_taken_off(tmp_path, delay_ms):
     assert len(record.lines) == record.time.size
 
 
+@pytest.mark.parametrize("heads", [("t,disp [mm],F\ns,,N",), ("t,disp_mm,F\ns,,N",), ("t,disp,F\ns,mm,N",)])
+def test_a_name_with_its_unit_is_that_column_however_the_file_writes_the_unit(tmp_path, heads):
+    path = write(tmp_path, "a.csv", text(rows(), heads))
+    plain = read_run(path)
+    for name in ("disp [mm]", "disp (mm)", "Disp_mm"):
+        record = read_run(path, parse_profile(f'[channels.displacement]\ncolumn = "{name}"\n'))
+        np.testing.assert_array_equal(record.displacement, plain.displacement)
+    with pytest.raises(InputError, match=r"no column 'disp \[m\]'"):  # another unit is another column
+        read_run(path, parse_profile('[channels.displacement]\ncolumn = "disp [m]"\n'))
+
+
 def test_a_rate_stands_in_for_time_stamps(tmp_path):
     path = write(tmp_path, "a.csv", text(rows()[:, 1:], ("displacement_mm,force_N",)))
     record = read_run(path, parse_profile("[file]\nsample_rate_Hz = 200\n"))

@@ -209,10 +209,18 @@ def column_called(table: RawTable, column: str | int, what: str, key: str = "") 
         if not 1 <= column <= len(table.names):
             raise _refusal(ColumnError, table, f"no column {column}: there are {len(table.names)}", remedy)
         return column - 1
-    wanted = column.strip()
-    for names in (table.names, [header.name for header in table.headers]):
-        matches = [i for i, name in enumerate(names) if name == wanted]
-        matches = matches or [i for i, name in enumerate(names) if name.casefold() == wanted.casefold()]
+    wanted, named = column.strip(), split_name(column)
+    with_unit = [f"{header.name} {header.known}" if header.unit else "" for header in table.headers]
+    for names, name in (
+        (table.names, wanted),
+        ([header.name for header in table.headers], wanted),
+        (
+            with_unit,
+            f"{named.name} {named.known}",
+        ),  # disp [mm], where the file has disp (mm), disp_mm or a row of units
+    ):
+        matches = [i for i, own in enumerate(names) if own == name]
+        matches = matches or [i for i, own in enumerate(names) if own.casefold() == name.casefold()]
         if matches:
             return matches[0]
     problem = f"no column {column!r} for {what} (found {', '.join(filter(None, table.names))})"

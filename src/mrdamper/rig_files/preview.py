@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from typing import Any
 from mrdamper.errors import InputError
 from mrdamper.rig_files.coil_current import held_current_of
 from mrdamper.rig_files.column_names import Header, names_compression
-from mrdamper.rig_files.columns import assign, propose, rate_of
+from mrdamper.rig_files.columns import assign, column_called, propose, rate_of
 from mrdamper.rig_files.file_records import tables_of_tests, test_tables
 from mrdamper.rig_files.folder import files_in, unpacked
 from mrdamper.rig_files.profile import Channel, Profile, current_pattern, profile_of
@@ -103,9 +104,8 @@ def _first_cells(table: RawTable, column: int) -> list[str]:
 
 
 def _place(table: RawTable, column: str | int | None) -> int | None:
-    if isinstance(column, str):
-        return table.names.index(column) if column in table.names else None
-    return None if column is None else column - 1
+    with contextlib.suppress(InputError):
+        return None if column is None else column_called(table, column, "a channel")
 
 
 def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable, dict[str, Channel]]:
