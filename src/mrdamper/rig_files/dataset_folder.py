@@ -277,26 +277,30 @@ def _write_samples(dataset: Dataset, folder: Path) -> None:
     """All samples in one table; those of long records pass piece by piece, so that memory stays small."""
     import polars as pl
 
-    path, tables = folder / "samples.parquet", _samples(dataset)
+    path, tables, parts = folder / "samples.parquet", _samples(dataset), list[Path]()
     if sum(run.time.size for run in dataset) <= 8 * _SAMPLES_PER_CHUNK:
-        whole = [table.select(pl.lit(run_id).alias("run_id"), pl.all()) for run_id, table in tables]
-        pl.concat(whole, how="diagonal").write_parquet(path, compression="zstd", statistics=False)
+        pl.concat(tables, how="diagonal").write_parquet(path, compression="zstd", statistics=False)
         return
-    parts: list[Path] = []
-    named: list[pl.LazyFrame] = []
-    for run_id, table in tables:
+    while batch := _first_samples(tables, _SAMPLES_PER_CHUNK):
         parts.append(folder / f".part{len(parts)}.ipc")
-        table.write_ipc(parts[-1], compression="uncompressed")
-        named.append(pl.scan_ipc(parts[-1]).select(pl.lit(run_id).alias("run_id"), pl.all()))
-    pl.concat(named, how="diagonal").sink_parquet(
+        pl.concat(batch, how="diagonal").write_ipc(parts[-1], compression="uncompressed")
+    pl.concat([pl.scan_ipc(part) for part in parts], how="diagonal").sink_parquet(
         path, compression="zstd", compression_level=2, statistics=False, row_group_size=_SAMPLES_PER_CHUNK
     )
     for part in parts:
         part.unlink()
 
 
-def _samples(dataset: Dataset) -> Iterator[tuple[str, pl.DataFrame]]:
-    """Tables of some hundred thousand samples, in order, each with the run they are of."""
+def _first_samples(tables: Iterator[pl.DataFrame], fewest: int) -> list[pl.DataFrame]:
+    """Take the next tables that together have at least so many samples, or all that are left."""
+    taken: list[pl.DataFrame] = []
+    while sum(table.height for table in taken) < fewest and (table := next(tables, None)) is not None:
+        taken.append(table)
+    return taken
+
+
+def _samples(dataset: Dataset) -> Iterator[pl.DataFrame]:
+    """Tables of at most some hundred thousand samples, in order, each of one run."""
     import polars as pl
 
     varying = any(_varies(run.current) for run in dataset)
@@ -309,7 +313,8 @@ def _samples(dataset: Dataset) -> Iterator[tuple[str, pl.DataFrame]]:
         channels |= run.further
         for start in range(0, run.time.size, _SAMPLES_PER_CHUNK):
             inside = slice(start, start + _SAMPLES_PER_CHUNK)
-            yield run.id, pl.DataFrame({name: np.array(values[inside]) for name, values in channels.items()})
+            table = pl.DataFrame({name: np.array(values[inside]) for name, values in channels.items()})
+            yield table.select(pl.lit(run.id).alias("run_id"), pl.all())
             for values in channels.values():
                 drop_pages(values)
 

@@ -423,10 +423,10 @@ def _rows(lines: Sequence[str], separator: str, width: int, trailing: bool) -> l
 
 
 def _decimal(rows: Sequence[Sequence[str]], source: Source, first: int) -> str:
-    cells = [c for row in rows for c in row if c and not _DATE.fullmatch(c)]
-    numbers = [c for c in cells if looks_numeric(c) and stamp(c) is None]
-    dots = [c for c in numbers if "." in c and "," not in c]
-    commas = [c for c in numbers if "," in c and "." not in c]
+    cells = [c for row in rows for c in row if ("," in c) != ("." in c)]
+    cells = cells if any("," in c for c in cells) else []
+    numbers = [c for c in cells if looks_numeric(c) and stamp(c) is None and not _DATE.fullmatch(c)]
+    dots, commas = ([c for c in numbers if mark in c] for mark in ".,")
     few = _STRAY * (len(dots) + len(commas))
     if len(commas) <= few:
         return "."  # the strict reader refuses the few others, with their place
