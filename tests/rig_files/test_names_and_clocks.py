@@ -85,3 +85,33 @@ def test_a_second_clock_that_no_channel_follows_is_stated_with_its_distance(tmp_
     found = [finding.text for finding in record.findings if finding.code == "W_RASTER"]
     assert len(found) == (stated is not None)
     assert all(stated in text for text in found)
+
+
+@pytest.mark.parametrize(("pause", "accepted"), [(0.0, True), (0.5, False)])
+def test_a_time_of_day_goes_on_past_midnight_where_it_falls_back_by_a_day(tmp_path, pause, accepted):
+    """A clock that falls back by another time than a day less one step was set, or the recording was off."""
+    clock = 86_400 - 4.002 + TIME + pause * (TIME > 4)
+    stamps = [f"{int(t // 3600):02}:{int(t % 3600 // 60):02}:{t % 60:06.3f}" for t in (clock % 86_400).tolist()]
+    rows = zip(stamps, 20 * np.sin(PHASE), force(PHASE), strict=True)
+    body = "\n".join(f"{t},{x:.7g},{f:.7g}" for t, x, f in rows)
+    (tmp_path / "test_0.5A.csv").write_text(f"clock,displacement [mm],force [N]\n{body}\n")
+    result = import_files([tmp_path])
+    assert bool(result.records) is accepted
+    if accepted:
+        np.testing.assert_allclose(np.diff(result.records[0].time), 0.005, rtol=1e-6)
+    else:
+        assert [refusal.error.code for refusal in result.refusals] == ["E_TIME_ORDER"]
+
+
+def test_nanoseconds_since_1970_need_no_unit_and_smaller_counts_do(tmp_path):
+    columns = (20 * np.sin(PHASE), force(PHASE))
+    for name, begin, step in (("a_0.5A", 1_714_644_732_000_700_000, 5_000_000), ("b_0.5A", 1_714_644_732_001, 5)):
+        rows = zip((begin + step * np.arange(TIME.size)).tolist(), *columns, strict=True)
+        body = "\n".join(f"{t},{x:.7g},{f:.7g}" for t, x, f in rows)
+        (tmp_path / f"{name}.csv").write_text(f"%time,displacement [mm],force [N]\n{body}\n")
+    result = import_files([tmp_path])
+    (record,) = result.records
+    np.testing.assert_allclose(record.time - record.time[0], TIME, atol=1e-6)
+    assert [(refusal.file[-10:], refusal.error.code) for refusal in result.refusals] == [
+        ("b_0.5A.csv", "E_UNITS_MISSING")
+    ]

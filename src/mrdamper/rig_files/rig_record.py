@@ -15,7 +15,7 @@ from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, constant, curre
 from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
 from mrdamper.rig_files.conditions import stated_motion, stated_quantities
-from mrdamper.rig_files.mapping.clocks import refuse_two_rates
+from mrdamper.rig_files.mapping.clocks import past_midnight, refuse_two_rates
 from mrdamper.rig_files.mapping.session import stretches_of_session
 from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.profile import Correction, Profile
@@ -49,6 +49,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     if "time" not in channels:
         channels["time"], rate = _counted_time(table, profile, size)
     else:
+        channels["time"] = past_midnight(channels["time"])
         refuse_two_rates(table, profile, channels["time"], channels["displacement"])
     if profile.channel("displacement").integrate:
         channels["displacement"] = _integrated(channels["time"], channels["displacement"])

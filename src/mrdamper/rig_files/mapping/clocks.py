@@ -26,6 +26,9 @@ _AXIS_UNIT = re.compile(
 )
 _LONGEST_LINE = 300
 _DAY_S = 86_400.0
+_EPOCH_NS = 9.4e17, 4.2e18  # the years 2000 to 2100 [ns since 1970]
+_LARGEST = 64 * 2**20  # bytes of a file whose clock without a unit is looked at
+_LONGEST = 5_000_000  # samples; a longer record lies in a file and is not read as a whole
 _SAME_RATE, _SAME_FREQUENCY = 0.2, 0.1  # relative differences of what is stated from what is measured
 _SAMPLES = 100_000  # looked at
 
@@ -46,6 +49,22 @@ def with_axis_as_time(table: RawTable) -> RawTable:
         return table
     names[-2:], units[-2:] = ["time", named.role], [clocks.pop(), others.pop()]
     return replace(table, names=tuple(names), units=tuple(units))
+
+
+def with_nanoseconds(table: RawTable) -> RawTable:
+    """Return the table with a time without a unit in ns, where its numbers are nanoseconds of this century since 1970.
+
+    No other clock counts so far: thousandths of those numbers may also be the nanoseconds since a start.
+    """
+    clocks = table.columns("time")
+    bare = len(clocks) == 1 and not table.headers[clocks[0]].unit and table.source.size <= _LARGEST
+    values = table.try_read(clocks[0]) if bare else None
+    if values is None or not (
+        _EPOCH_NS[0] < np.nanmin(values[clocks[0]]) and np.nanmax(values[clocks[0]]) < _EPOCH_NS[1]
+    ):
+        return table
+    note = Finding("W_UNITS", f"the unit of {table.names[clocks[0]]!r} is ns: its numbers count from the year 1970")
+    return table.named({clocks[0]: (table.names[clocks[0]], "ns")}).noted(note)
 
 
 def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displacement: Floats) -> None:
@@ -75,6 +94,15 @@ def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displaceme
         if not near
         else "set [file] sample_rate_Hz = ... in a profile, or correct the line that is wrong",
     )
+
+
+def past_midnight(time: Floats) -> Floats:
+    """Return a time of day [s] that goes on past midnight, where it falls back by a day less one or two steps."""
+    steps = np.diff(time) if time.size <= _LONGEST else np.empty(0)
+    falls = steps < -_DAY_S / 2
+    if not falls.any() or not np.all(np.abs(steps[falls] + _DAY_S) <= 2 * np.nanmedian(steps)):
+        return time
+    return time + _DAY_S * np.concatenate([[0], np.cumsum(falls)])
 
 
 def with_time_stated(table: RawTable) -> RawTable:

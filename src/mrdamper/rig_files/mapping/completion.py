@@ -20,7 +20,7 @@ from mrdamper.rig_files.column_names import (
     words_of,
 )
 from mrdamper.rig_files.conditions import currents_in, without_currents
-from mrdamper.rig_files.mapping.clocks import with_axis_as_time
+from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_nanoseconds
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.layout import LISTED, X_VALUE, cells_of
@@ -86,7 +86,7 @@ def completed(table: RawTable) -> RawTable:
     table = _with_numbered_channels(_without_shared_path(table))
     table = _with_titles(_with_keyed_lines(table))
     table = _with_listed_units(with_axis_as_time(table))
-    table = _with_stated_signs(_with_clocks_and_weights(table))
+    table = _with_stated_signs(with_nanoseconds(_with_clocks_and_weights(table)))
     return _with_sense(_with_scales(_with_counts(table)))
 
 
