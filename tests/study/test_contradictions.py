@@ -178,7 +178,7 @@ def test_a_gain_of_a_run_multiplies_the_expected_force(sound):
         evidence.spread = AssumedScatter(misfit)
         expected = evidence.prior
         for _ in range(3):
-            expected = evidence.posterior([expected.weigh(run) for run in evidence.products(tracks)])
+            expected = evidence.posterior(expected.weigh(evidence.products(tracks)))
         run = evidence.products(tracks)[4]
         means.append(float(np.sqrt(expected.at(run.over)[0] @ run.gram @ expected.at(run.over)[0])))
     assert means[0] == pytest.approx(means[1], rel=0.02)

@@ -224,14 +224,6 @@ def solve_lower_triangle(triangle: NDArray[np.floating[Any]], right: Floats) -> 
     return solution
 
 
-def solve_with_determinant(matrix: Floats, right: Floats) -> tuple[Floats, float]:
-    """Solution of a linear system, and the logarithm of the magnitude of its determinant, of one factorisation."""
-    factors, _, solution, failed = _lapack("gesv", "d")(matrix, right)
-    if failed:
-        raise np.linalg.LinAlgError("the matrix is singular")
-    return solution, float(np.sum(np.log(np.abs(np.diagonal(factors)))))
-
-
 @cache
 def _lapack(name: str, dtype: str) -> Any:
     """Return a routine of LAPACK: around such small matrices SciPy's checks take ten times as long as the work."""

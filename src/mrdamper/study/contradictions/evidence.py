@@ -11,19 +11,22 @@ leaving out a run or changing it costs one factorisation.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import TypeVar
 
 import numpy as np
 
 from mrdamper.data import Floats, current_levels
-from mrdamper.statistics.linear import solve_lower_triangle, solve_with_determinant
+from mrdamper.statistics.linear import solve_lower_triangle
 from mrdamper.study.contradictions.tracks import Track
 
 _YIELDS = (0.015, 0.06, 0.2, 0.6)  # yield displacements of the stop operators, relative to the median amplitude
 _VELOCITIES = (0.03, 0.1, 0.3)  # velocities at which friction saturates, relative to the median peak velocity
 _LEADS = (0.1, 0.4)  # displacements that count as velocity in friction, relative to the median amplitude
+R = TypeVar("R", "Moments", "RowProducts")
+T = TypeVar("T")
 _ELEMENTS = 7 + len(_VELOCITIES) + len(_LEADS) + len(_YIELDS)
 _MAX_ELEMENT = 20.0  # size of an element relative to its usual one
 _MAX_NODES = 7  # currents at which coefficients are estimated
@@ -76,6 +79,8 @@ class RowProducts:
         Shares of the nodes at the run's constant current.
     misfit : float
         Factor of the model error that is usual at the run's motion, over that of all runs.
+    gain : float, optional
+        Standard deviation of the run's gain, where it is not that of sessions.
     """
 
     gram: Floats
@@ -85,6 +90,7 @@ class RowProducts:
     size: float
     over: Floats | None
     misfit: float = 1.0
+    gain: float | None = None
 
     def unexplained(self, expected: Floats, most_gain: float) -> float:
         """RMS error of an expected force, at the best gain up to `most_gain` and the best offset."""
@@ -158,34 +164,61 @@ class Posterior:
             self.known[key] = mean, root @ root.T
         return self.known[key]
 
-    def weigh(self, run: RowProducts) -> Moments:
-        """Weighted products of a run that is compared with these coefficients."""
-        return self.evidence.weigh(run, self.at(run.over)[0])
+    def weigh(self, runs: Sequence[RowProducts]) -> list[Moments]:
+        """Weighted products of runs that are compared with these coefficients."""
+        return self.evidence.weigh(runs, self)
 
-    def log_probability(self, run: Moments) -> float:
-        """Logarithm of the probability density of a run's force."""
-        return _log_probability(run, *self.at(run.over))
+    def log_probabilities(self, runs: Sequence[Moments]) -> list[float]:
+        """Logarithm of the probability density of each run's force."""
+        return _of_each_size(runs, lambda alike: _log_probabilities(_stacked(alike), *self._stacked_at(alike)))
 
     def without(self, run: Moments) -> tuple[Floats, Floats]:
         """Mean and covariance of the coefficients at a run's current, without that run."""
-        mean, covariance = self.at(run.over)
-        left = _identity(mean.size) - covariance @ run.gram
-        moments: Floats = np.asarray(
-            np.linalg.solve(left, np.column_stack([mean - covariance @ run.moment, covariance])), dtype=float
-        )
-        return moments[:, 0], moments[:, 1:]
+        mean, covariance = self._without([run])
+        return mean[0], covariance[0]
 
-    def log_probability_by_others(self, run: Moments) -> float:
-        """Logarithm of the probability density of a run's force, by the other runs alone."""
-        return _log_probability(run, *self.without(run))
+    def log_probabilities_by_others(self, runs: Sequence[Moments]) -> list[float]:
+        """Logarithm of the probability density of each run's force, by the other runs alone."""
+        return _of_each_size(runs, lambda alike: _log_probabilities(_stacked(alike), *self._without(alike)))
+
+    def _stacked_at(self, runs: Sequence[Moments] | Sequence[RowProducts]) -> tuple[Floats, Floats]:
+        """(M, E) means and (M, E, E) covariances of the coefficients at the currents of runs of one size."""
+        means, covariances = zip(*(self.at(run.over) for run in runs), strict=True)
+        return np.array(means), np.array(covariances)
+
+    def _without(self, runs: Sequence[Moments]) -> tuple[Floats, Floats]:
+        """Means and covariances at the currents of runs of one size, each without that run."""
+        gram, moment, _ = _stacked(runs)
+        mean, covariance = self._stacked_at(runs)
+        left = _identity(mean.shape[1]) - covariance @ gram
+        kept = mean - (covariance @ moment[:, :, None])[:, :, 0]
+        moments: Floats = np.linalg.solve(left, np.concatenate([kept[:, :, None], covariance], axis=2)).astype(float)
+        return moments[:, :, 0], moments[:, :, 1:]
 
 
-def _log_probability(run: Moments, mean: Floats, covariance: Floats) -> float:
-    left = run.gram @ mean
-    power = run.power + float(mean @ left) - 2 * float(mean @ run.moment)
-    rest = run.moment - left
-    solved, log_determinant = solve_with_determinant(_identity(mean.size) + run.gram @ covariance, rest)
-    return 0.5 * (float(rest @ covariance @ solved) - power - log_determinant)
+def _of_each_size(runs: Sequence[R], function: Callable[[list[R]], Iterable[T]]) -> list[T]:
+    """Results of a function of runs of one size, for runs of several; in their order."""
+    results: dict[int, T] = {}
+    for size in {len(run.gram) for run in runs}:
+        places = [k for k, run in enumerate(runs) if len(run.gram) == size]
+        results |= zip(places, function([runs[k] for k in places]), strict=True)
+    return [results[k] for k in range(len(runs))]
+
+
+def _stacked(runs: Sequence[Moments] | Sequence[RowProducts]) -> tuple[Floats, Floats, Floats]:
+    """(M, E, E), (M, E) and (M,) products of runs of one size."""
+    return np.array([r.gram for r in runs]), np.array([r.moment for r in runs]), np.array([r.power for r in runs])
+
+
+def _log_probabilities(runs: tuple[Floats, Floats, Floats], mean: Floats, covariance: Floats) -> list[float]:
+    gram, moment, power = runs
+    left = (gram @ mean[:, :, None])[:, :, 0]
+    rest = moment - left
+    matrix = _identity(mean.shape[1]) + gram @ covariance
+    solved = (covariance @ np.linalg.solve(matrix, rest[:, :, None]))[:, :, 0]
+    log_determinant = np.linalg.slogdet(matrix)[1]
+    explained = np.sum(rest * solved - mean * (left - 2 * moment), axis=1)
+    return (0.5 * (explained - power - log_determinant)).tolist()
 
 
 @cache
@@ -225,7 +258,7 @@ class Evidence:
             self._priors[course] = Posterior(np.zeros(len(root)), root, self)
         return self._priors[course]
 
-    def posterior(self, members: Iterable[Moments]) -> Posterior:
+    def posterior(self, members: Sequence[Moments]) -> Posterior:
         """Coefficients determined by runs."""
         gram, moment = self.total(members)
         prior = self.prior.root
@@ -242,36 +275,35 @@ class Evidence:
         power = sum(member.power for member in members)
         return float(0.5 * (half @ half) - np.sum(np.log(np.diag(factor))) - 0.5 * power)
 
-    def weigh(self, run: RowProducts, expected: Floats, gain: float | None = None) -> Moments:
-        """Weighted products of a run; its gain multiplies the force of the coefficients expected of it.
+    def weigh(self, runs: Sequence[RowProducts], expected: Posterior) -> list[Moments]:
+        """Weighted products of runs; the gain of a run multiplies the force that is expected of it."""
+        return _of_each_size(runs, lambda alike: self._weigh_alike(alike, expected))
 
-        Parameters
-        ----------
-        run : RowProducts
-        expected : (E,) or (P,) array
-        gain : float, optional
-            Standard deviation of the run's gain, if not that of sessions.
-        """
-        spread, size = self.spread, run.size
-        level = model_error(run) ** 2
-        weight = _INDEPENDENT_SAMPLES / (run.rows * spread.misfit**2 * level)
-        one, gram, moment = run.constant, weight * run.gram, weight * run.moment
-        mean = float(one @ run.gram @ expected) / run.rows
-        varied = (spread.gain if gain is None else gain) * (expected - mean * one)
-        shared = np.array([varied, spread.offset * math.sqrt(max(size, 0.1)) * one])
-        along = shared @ gram
-        (a, b), (_, d) = (shared @ along.T).tolist()
-        a, d = 1 + a, 1 + d
+    def _weigh_alike(self, runs: Sequence[RowProducts], expected: Posterior) -> Iterable[Moments]:
+        spread, one = self.spread, runs[0].constant
+        gram, moment, power = _stacked(runs)
+        mean = np.array([expected.at(run.over)[0] for run in runs])
+        rows, size, level, gain = np.array(
+            [
+                (r.rows, r.size, (spread.misfit * model_error(r)) ** 2, spread.gain if r.gain is None else r.gain)
+                for r in runs
+            ]
+        ).T
+        varied = gain[:, None] * (mean - (((one @ gram) * mean).sum(axis=1) / rows)[:, None] * one)
+        shared = np.stack([varied, (spread.offset * np.sqrt(np.maximum(size, 0.1)))[:, None] * one], axis=1)
+        weight = _INDEPENDENT_SAMPLES / (rows * level)
+        gram, moment = weight[:, None, None] * gram, weight[:, None] * moment
+        along = shared @ np.concatenate([gram, moment[:, :, None]], axis=2)
+        inside = along[:, :, :-1] @ shared.transpose(0, 2, 1)
+        a, b, d = 1 + inside[:, 0, 0], inside[:, 0, 1], 1 + inside[:, 1, 1]
         determinant = a * d - b * b
-        with_force = shared @ moment
-        weighted = np.array([[d, -b], [-b, a]]) @ np.column_stack([along, with_force]) / determinant
-        normalisation = _INDEPENDENT_SAMPLES * math.log(spread.misfit**2 * level / size**2) + math.log(determinant)
-        return Moments(
-            gram - along.T @ weighted[:, :-1],
-            moment - along.T @ weighted[:, -1],
-            weight * run.power - float(with_force @ weighted[:, -1]) + normalisation,
-            run.over,
-        )
+        inverse = np.array([[d, -b], [-b, a]] / determinant).transpose(2, 0, 1)
+        weighted = inverse @ along
+        explained = along[:, :, :-1].transpose(0, 2, 1) @ weighted
+        power = weight * power - (along[:, :, -1] * weighted[:, :, -1]).sum(axis=1)
+        power += _INDEPENDENT_SAMPLES * np.log(level / size**2) + np.log(determinant)
+        grams, moments = gram - explained[:, :, :-1], moment - explained[:, :, -1]
+        return map(Moments, grams, moments, power.tolist(), (run.over for run in runs))
 
     def products(self, tracks: Sequence[Track]) -> list[RowProducts]:
         """Products of the rows of runs."""
@@ -306,7 +338,7 @@ class Evidence:
         """(N, K) shares of the nodes at currents [A]."""
         return np.column_stack([np.interp(current, self.nodes, hat) for hat in np.eye(self.nodes.size)])
 
-    def total(self, members: Iterable[Moments]) -> tuple[Floats, Floats]:
+    def total(self, members: Sequence[Moments]) -> tuple[Floats, Floats]:
         """Return sums of the moments of runs over all nodes."""
         size = self.nodes.size * _ELEMENTS
         gram, moment = np.zeros((size, size)), np.zeros(size)
@@ -315,12 +347,14 @@ class Evidence:
             if member.over is None:
                 gram += member.gram
                 moment += member.moment
-                continue
-            at = np.flatnonzero(member.over)
-            for i in at:
-                moment[i * _ELEMENTS : (i + 1) * _ELEMENTS] += member.over[i] * member.moment
-                for j in at:
-                    blocks[i, :, j, :] += member.over[i] * member.over[j] * member.gram
+        constant = [(member.over, member) for member in members if member.over is not None]
+        if constant:
+            over = np.array([shares for shares, _ in constant])
+            grams, moments, _ = _stacked([member for _, member in constant])
+            pairs = (over[:, :, None] * over[:, None, :]).reshape(len(over), -1)
+            summed = (pairs.T @ grams.reshape(len(grams), -1)).reshape(*blocks.shape[::2], *blocks.shape[1::2])
+            blocks += summed.transpose(0, 2, 1, 3)
+            moment += (over.T @ moments).ravel()
         return gram, moment
 
 

@@ -128,21 +128,20 @@ class ExplanationCandidate:
         like : sequence of Trial
             Look only at explanations like one of these, if there are any.
         """
-        least = others.log_probability(others.weigh(self.own))
+        changes = [change for change in self._trials(others, like) if self._is_large(*change, others)]
+        least, *odds = others.log_probabilities(others.weigh([self.own, *(products for _, products in changes)]))
         candidates: list[Explanation] = []
-        for trial, products in self._trials(others, like):
-            if self._is_large(trial, products, others):
-                if trial.cause in ("force", "current") and self._is_edge:
-                    trial = replace(trial, odds=trial.odds + _EDGE_ODDS)
-                gain = others.log_probability(others.weigh(products)) - trial.odds - least
-                candidates.append(Explanation(trial, gain, products))
+        for (trial, products), logarithm in zip(changes, odds, strict=True):
+            if trial.cause in ("force", "current") and self._is_edge:
+                trial = replace(trial, odds=trial.odds + _EDGE_ODDS)
+            candidates.append(Explanation(trial, logarithm - trial.odds - least, products))
         return sorted(candidates, key=lambda e: -e.gain)
 
     def alone(self, others: Posterior) -> Explanation:
         """Return the last resort: the run is of another damper."""
         prior = self.evidence.prior
-        own = others.weigh(self.own)
-        gain = prior.log_probability(own) - _ALONE_ODDS - others.log_probability(own)
+        own = others.weigh([self.own])
+        gain = prior.log_probabilities(own)[0] - _ALONE_ODDS - others.log_probabilities(own)[0]
         if self.own.unexplained(others.at(self.own.over)[0], MAX_SESSION_GAIN) < MIN_UNEXPLAINED * self.own.size:
             gain = -np.inf
         return Explanation(Trial("damper", 1.0, "", _ALONE_ODDS), gain, self.own)
@@ -217,12 +216,13 @@ class ExplanationCandidate:
                 if any(abs(np.log(factor / f)) < _SAME_FACTOR for f, *_ in factors[:k]):
                     continue
                 trial = Trial(cause, factor, unit, odds)
-                tested = self._tested(trial)
-                if not unit and tested < 0 and not any(self.moved(trial).is_at_motion(t) for t in self._others):
+                moved = self.moved(trial)
+                tested = self._tested(moved)
+                if not unit and tested < 0 and not any(moved.is_at_motion(t) for t in self._others):
                     odds += _LOST_MOTION_ODDS
                 odds -= _TESTED_MOTION_ODDS * tested + _USUAL_STEP * (cause == "time") * self._is_usual(factor)
                 if tested != 0:
-                    odds = completed_matrix_odds(odds, [*self._others, self.track], {-1: self.moved(trial)})
+                    odds = completed_matrix_odds(odds, [*self._others, self.track], {-1: moved})
                 yield replace(trial, odds=odds)
 
     def _ratios(self, cause: Cause) -> list[float]:
@@ -234,11 +234,10 @@ class ExplanationCandidate:
         ratios = [1 / r if cause == "time" else r for r in ratios]
         return [r for r in ratios if MIN_FACTOR < max(r, 1 / r) < _MAX_FACTOR]
 
-    def _tested(self, trial: Trial) -> int:
-        """1 if the change brings the motion to one that more of the other runs have, −1 if to one that fewer have."""
+    def _tested(self, moved: Track) -> int:
+        """1 if a change brings the motion to one that more of the other runs have, −1 if to one that fewer have."""
         if not self.track.frequency:
             return 0
-        moved = self.moved(trial)
         return int(np.sign(sum(moved.is_at_motion(t) - self.track.is_at_motion(t) for t in self._others)))
 
     def _is_usual(self, factor: float) -> int:

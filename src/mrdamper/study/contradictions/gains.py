@@ -93,12 +93,9 @@ def _weighed(
 ) -> list[Moments]:
     """Weighted products at the coefficients that follow if a group has gains of its own; wide gains of some runs."""
     expected = evidence.prior
+    of_group, of_wide = (
+        [replace(run, gain=_GAIN if k in runs else None) for k, run in enumerate(products)] for runs in (group, wide)
+    )
     for _ in range(_REFITS + 1):
-        members = [
-            evidence.weigh(run, expected.at(run.over)[0], _GAIN if k in group else None)
-            for k, run in enumerate(products)
-        ]
-        expected = evidence.posterior(members)
-    return [
-        evidence.weigh(run, expected.at(run.over)[0], _GAIN if k in wide else None) for k, run in enumerate(products)
-    ]
+        expected = evidence.posterior(expected.weigh(of_group))
+    return expected.weigh(of_wide)

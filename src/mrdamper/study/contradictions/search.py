@@ -176,14 +176,14 @@ class Search:
         expected = self.evidence.prior
         self.evidence.spread = AssumedScatter(2.0)
         for _ in range(2):
-            expected = self.evidence.posterior([expected.weigh(self._products[k]) for k in agreeing])
+            expected = self.evidence.posterior(expected.weigh([self._products[k] for k in agreeing]))
         scores: dict[AssumedScatter, float] = {}
 
         def score(spread: AssumedScatter) -> float:
             self.evidence.spread = spread
-            members = [expected.weigh(self._products[k]) for k in agreeing]
+            members = expected.weigh([self._products[k] for k in agreeing])
             posterior = self.evidence.posterior(members)
-            return float(np.median([posterior.log_probability_by_others(member) for member in members]))
+            return float(np.median(posterior.log_probabilities_by_others(members)))
 
         def choose(variants: Iterable[dict[str, float]]) -> None:
             best = max(scores, key=scores.__getitem__, default=AssumedScatter())
@@ -197,11 +197,11 @@ class Search:
             choose({"misfit": misfit} for misfit in _MISFITS)
         choose({"gain": gain, "offset": offset} for gain, offset in _GAINS)
         self.evidence.spread = max(scores, key=scores.__getitem__)
-        expected = self.evidence.posterior([expected.weigh(self._products[k]) for k in agreeing])
+        expected = self.evidence.posterior(expected.weigh([self._products[k] for k in agreeing]))
         self._products = [replace(products, misfit=1.0) for products in self._products]
-        self._members = [expected.weigh(products) for products in self._products]
+        self._members = expected.weigh(self._products)
         self._products = self._widened()
-        self._members = [expected.weigh(products) for products in self._products]
+        self._members = expected.weigh(self._products)
         for candidate, products in zip(self._candidates, self._products, strict=True):
             candidate.own = replace(candidate.own, misfit=products.misfit)
 
@@ -230,17 +230,16 @@ class Search:
         posterior, prior = self.posterior(), self.evidence.prior
         self._base = self._adapted([self._products[k] for k in self._agreeing()], posterior)
         left = [k for k in range(len(self.tracks)) if k not in self.found]
-        odds = {
-            k: prior.log_probability(self._members[k]) - posterior.log_probability_by_others(self._members[k])
-            for k in left
-        }
+        members = [self._members[k] for k in left]
+        by_others = dict(zip(left, posterior.log_probabilities_by_others(members), strict=True))
+        odds = {k: p - by_others[k] for k, p in zip(left, prior.log_probabilities(members), strict=True)}
         order = sorted(left, key=lambda k: -odds[k])
         self._own = self.evidence.log_evidence([self._members[k] for k in self._agreeing()])
         self._options: dict[int, list[Explanation]] = {}
         most = max(_RUNS_PER_ROUND, len(order) // 4)
         # A record of many currents is improbable before any run, too: what the others leave of it counts as well.
-        by_others = sorted(left, key=lambda k: posterior.log_probability_by_others(self._members[k]))
-        singles = [self._of_one(i) for i in dict.fromkeys([*order[:most], *by_others[: most // 3]])]
+        improbable = sorted(left, key=by_others.__getitem__)
+        singles = [self._of_one(i) for i in dict.fromkeys([*order[:most], *improbable[: most // 3]])]
         yield from map(self._refined, sorted(singles, key=lambda proposal: -proposal.gain)[:_REFINED_EXPLANATIONS])
         groups = dict.fromkeys([*self._groups(order, posterior), *self._alike()])
         ranked = sorted(map(self._of_group, groups), key=lambda proposal: -proposal.gain)
@@ -309,11 +308,11 @@ class Search:
         spread, best = self.evidence.spread, -np.inf
         for factor in _ERROR_FACTORS:
             self.evidence.spread = replace(spread, misfit=max(factor * spread.misfit, _MISFITS[-1]))
-            members = [expected.weigh(p) for p in products]
+            members = expected.weigh(products)
             total = self.evidence.log_evidence(members) - self._falling(members)
             for group in apart:
-                own = self.evidence.posterior([expected.weigh(p) for p in group])
-                total += self.evidence.log_evidence([own.weigh(p) for p in group])
+                own = self.evidence.posterior(expected.weigh(group))
+                total += self.evidence.log_evidence(own.weigh(group))
             best = max(best, total)
         self.evidence.spread = spread
         return best
@@ -384,7 +383,8 @@ class Search:
         every = [k for k in self._agreeing() if k not in self.found]
         spread = self.evidence.spread
         self.evidence.spread = replace(spread, misfit=max(spread.misfit / _GROUP_ERROR_RATIO, _MIN_MISFIT))
-        members = {k: posterior.weigh(self._products[k]) for k in self._agreeing()}
+        agreeing = self._agreeing()
+        members = dict(zip(agreeing, posterior.weigh([self._products[k] for k in agreeing]), strict=True))
         group = set(seeds)
         for _ in range(_ROUNDS):
             if not 0 < len(group) < len(members):
@@ -392,12 +392,11 @@ class Search:
             own = self.evidence.posterior([members[k] for k in group])
             rest = self.evidence.posterior([members[k] for k in members if k not in group])
             moved: set[int] = set()
-            for k in every:
-                run, inside = members[k], k in group
-                by_own = own.log_probability_by_others(run) if inside else own.log_probability(run)
-                by_rest = rest.log_probability(run) if inside else rest.log_probability_by_others(run)
-                if by_own > by_rest:
-                    moved.add(k)
+            for part, its, others in ((group, own, rest), (set(members) - group, rest, own)):
+                of = [k for k in every if k in part]
+                runs = [members[k] for k in of]
+                pairs = zip(of, its.log_probabilities_by_others(runs), others.log_probabilities(runs), strict=True)
+                moved |= {k for k, inside, outside in pairs if (inside > outside) == (part is group)}
             if moved == group:
                 break
             group = moved
@@ -427,7 +426,7 @@ class Search:
                     odds = completed_matrix_odds(odds, self.tracks, moved)
                 if explanation.cause == "current" and self._outnumbers(group):
                     odds += _MAJORITY_ODDS
-                moments = [others.weigh(e.products) for e in members.values()]
+                moments = others.weigh([e.products for e in members.values()])
                 score = self.evidence.log_evidence([*(self._members[k] for k in rest), *moments]) - odds
                 if score > joint:
                     joint, best = score, JointExplanation(members, odds)
@@ -522,4 +521,4 @@ class Search:
             else:
                 del self.found[i]
                 self._products[i] = self._candidates[i].own
-            self._members[i] = others.weigh(self._products[i])
+            self._members[i] = others.weigh([self._products[i]])[0]

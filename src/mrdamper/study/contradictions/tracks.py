@@ -76,8 +76,11 @@ class Track:
 
     def is_at_motion(self, other: Track) -> bool:
         """Tell whether two runs are sines of one frequency and amplitude."""
-        pairs = ((self.frequency, other.frequency), (self.amplitude, other.amplitude))
-        return self.frequency > 0 and all(abs(a - b) <= _SAME_MOTION * b for a, b in pairs)
+        return (
+            self.frequency > 0
+            and abs(self.frequency - other.frequency) <= _SAME_MOTION * other.frequency
+            and abs(self.amplitude - other.amplitude) <= _SAME_MOTION * other.amplitude
+        )
 
     def is_at_current(self, other: Track) -> bool:
         """Tell whether two runs have one constant current."""
@@ -107,7 +110,11 @@ def irregularity(tracks: Sequence[Track], currents: Sequence[float]) -> int:
     currents : sequence of float
         Of each test [A].
     """
-    motions = [next(j for j, t in enumerate(tracks) if t is track or t.is_at_motion(track)) for track in tracks]
+    frequency, amplitude = (np.array([getattr(t, name) for t in tracks]) for name in ("frequency", "amplitude"))
+    alike = (frequency > 0)[:, None] & np.logical_and(
+        *(np.abs(size[:, None] - size) <= _SAME_MOTION * size for size in (frequency, amplitude))
+    )
+    motions = np.argmax(alike | np.eye(len(tracks), dtype=bool), axis=0).tolist()  # the first run at each motion
     cells = set(zip(currents, motions, strict=True))
     return len(tracks) - len(cells) + len(set(currents)) * len(set(motions)) - len(cells)
 
