@@ -218,6 +218,16 @@ def test_strokes_of_a_folded_force_are_over_half_of_its_largest(size):
     assert not loop._is_folded(seen, size * force, size, 0.95 * size)
 
 
+@pytest.mark.parametrize("centre", [-3.0, 0.0, 3.0])  # wherever the displacement counts from
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_folded_force_is_near_zero_on_both_sides_of_the_middle(centre, side):
+    phase = 2 * np.pi * np.arange(800) / 200
+    seen = SimpleNamespace(run=SimpleNamespace(displacement=centre + side * np.sin(phase)))
+    force = folded()(phase, 0, 0)
+    assert loop._is_folded(seen, force, 1.0, 0.95)
+    assert not loop._is_folded(seen, np.where(np.sin(phase) > 0, 1.0, force), 1.0, 0.95)
+
+
 @pytest.mark.parametrize(
     ("times", "told"),
     [
