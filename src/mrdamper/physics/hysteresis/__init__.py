@@ -22,26 +22,19 @@ random vibration of hysteretic systems", J. Eng. Mech. Div. 102; Ikhouane and Ro
 "derived" was derived for this package.
 """
 
-from mrdamper.physics.hysteresis.response import follow, step, stroke
+from mrdamper.physics.hysteresis.response import follow, step
 from mrdamper.physics.hysteresis.shape import Shape, dissipates, z_max
 from mrdamper.physics.hysteresis.steady import (
-    loop_area,
     loop_harmonics,
-    saturated_area_deficit,
     steady_loop,
-    steady_peak,
 )
 
 __all__ = [
     "Shape",
     "dissipates",
     "follow",
-    "loop_area",
     "loop_harmonics",
-    "saturated_area_deficit",
     "steady_loop",
-    "steady_peak",
     "step",
-    "stroke",
     "z_max",
 ]

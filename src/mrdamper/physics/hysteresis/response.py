@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.data.arrays import Floats
-from mrdamper.errors import ExcitationError, ParameterError
+from mrdamper.errors import ParameterError
 from mrdamper.physics.hysteresis.master_curve import CEILING, STEEPEST, MasterCurve, master_curve
 from mrdamper.physics.hysteresis.shape import Shape
 from mrdamper.physics.motion.path import Path
@@ -81,35 +81,6 @@ def step(shape: Shape, zeta: Any, dx: Any) -> Any:
     w = choose(back, lambda: -zeta, lambda: zeta)
     reached = advance(curve, shape.rho, w, shape.kappa * abs(dx), xp)
     return choose(back, lambda: -reached, lambda: reached)
-
-
-def stroke(shape: Shape, zeta0: ArrayLike, distance: ArrayLike) -> Floats:
-    """State after a monotone stroke, both counted in the direction of motion.
-
-    Raises `ParameterError` if zeta0 lies where the state would run away. Raises `ExcitationError` if a distance is
-    negative.
-
-    Parameters
-    ----------
-    shape : Shape
-        One shape, or P of them.
-    zeta0, distance : arrays that broadcast
-        State before [z_max], positive if it has the sign of the velocity; distance [m], >= 0.
-
-    Returns
-    -------
-    array, with P in front for P shapes
-        State after [z_max].
-    """
-    if shape.is_many:
-        return np.stack([stroke(one, zeta0, distance) for one in shape])
-    _check_start(shape, zeta0)
-    start, travelled = np.broadcast_arrays(np.asarray(zeta0, dtype=float), np.asarray(distance, dtype=float))
-    if np.any(travelled < 0):
-        raise ExcitationError("a stroke has negative length", remedy="give the distance and state zeta0 · sgn v")
-    phi = float(shape.kappa) * travelled.ravel()
-    states = state_at(master_curve(shape.n), float(shape.rho), start.ravel(), slice(None), phi)
-    return states.reshape(start.shape)[()]
 
 
 def _follow_one(curve: MasterCurve, kappa: float, rho: float, path: Path, zeta0: float) -> Floats:

@@ -1,4 +1,4 @@
-"""The steady loop of a sine: its peak, its curve, its harmonics and its area."""
+"""The steady loop of a sine: its curve and its harmonics."""
 
 from __future__ import annotations
 
@@ -13,30 +13,10 @@ from numpy.typing import ArrayLike
 
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError
-from mrdamper.physics.hysteresis.master_curve import SATURATED, MasterCurve, approach_rate, gauss_legendre, master_curve
+from mrdamper.physics.hysteresis.master_curve import SATURATED, MasterCurve, gauss_legendre, master_curve
 from mrdamper.physics.hysteresis.response import on_curve
 from mrdamper.physics.hysteresis.shape import Shape
 from mrdamper.physics.motion.path import memoize_per_path
-
-
-def steady_peak(shape: Shape, amplitude: ArrayLike) -> float | Floats:
-    """Peak of zeta on the steady loop between −amplitude and +amplitude.
-
-    Parameters
-    ----------
-    shape : Shape
-        One shape, or P of them.
-    amplitude : float or array
-        Displacement amplitude [m]; broadcasts with the shapes.
-
-    Returns
-    -------
-    float or array
-        Z/z_max [-]: kappa · amplitude far below yield, 1 far beyond. Derived: the distances from −Z to 0
-        and from 0 to Z add up to the stroke.
-    """
-    peaks = [-math.expm1(-loop.saturation) for loop in _loops(shape, amplitude)]
-    return _like_pairs(peaks, shape, amplitude)
 
 
 def steady_loop(shape: Shape, amplitude: float, theta: ArrayLike) -> Floats:
@@ -73,43 +53,11 @@ def loop_harmonics(shape: Shape, amplitude: ArrayLike, orders: Sequence[int] = (
     Returns
     -------
     sine, cosine : (K,) arrays, or (P, K)
-        [-], to 1e-13 for n = 1 and 2. The first cosine is loop_area/(π · amplitude).
+        [-], to 1e-13 for n = 1 and 2. The first cosine is the area ∮ zeta dx over π · amplitude.
     """
     pairs = [loop.harmonics(np.asarray(orders)) for loop in _loops(shape, amplitude)]
     sine, cosine = (np.array(side) for side in zip(*pairs, strict=True))
     return (sine, cosine) if len(_pair_shape(shape, amplitude)) else (sine[0], cosine[0])
-
-
-def loop_area(shape: Shape, amplitude: ArrayLike) -> float | Floats:
-    """Area ∮ zeta dx of the steady loop; times alpha · z_max the energy dissipated in a cycle.
-
-    Parameters
-    ----------
-    shape : Shape
-        One shape, or P of them.
-    amplitude : float or array
-        Displacement amplitude [m]; broadcasts with the shapes.
-
-    Returns
-    -------
-    float or array
-        [m]. Derived: 2 (1 − rho)/kappa · ∫_0^Z y^(n+1)/((1 − y^n)(1 − rho y^n)) dy. Every term is
-        positive, so the digits stay both in tiny and in saturated loops.
-    """
-    areas = [loop.area() / loop.kappa for loop in _loops(shape, amplitude)]
-    return _like_pairs(areas, shape, amplitude)
-
-
-def saturated_area_deficit(rho: float, n: float) -> float:
-    """C [-] in ∮ zeta dx → 4 X − 2 C/kappa for X ≫ 1/kappa: what the loop lacks to a rectangle.
-
-    Derived: C = ∫_0^1 (1 + t)/(1 − rho t^n) + (1 − t)/(1 − t^n) dt. Infinite for rho = 1.
-    """
-    if rho == 1:
-        return math.inf
-    r, weight = _gauss_points(_R_PIECES)
-    gap, rate = np.exp(-r), approach_rate(r, n)
-    return float(weight @ (gap * ((2 - gap) / ((1 - rho) + rho * gap * rate) + 1 / rate)))
 
 
 @dataclass(frozen=True)
@@ -170,16 +118,6 @@ class _SteadyLoop:
         odd = np.where(orders % 2, 2 / np.pi, 0.0)
         return odd * (np.sin(angle) @ (weight * loading)), odd * (np.cos(angle) @ (weight * loading))
 
-    def area(self) -> float:
-        """∮ zeta dphi over both halves [yield displacements]."""
-        if self.rho == 1:
-            return 0.0
-        r, weight = _gauss_points(np.minimum(_R_PIECES, self.saturation))
-        gap, rate = np.exp(-r), approach_rate(r, self.n)
-        loss = (-np.expm1(-r)) ** (self.n + 1) / (rate * ((1 - self.rho) + self.rho * gap * rate))
-        saturated = max(self.saturation - SATURATED, 0.0) / self.n
-        return 2 * ((1 - self.rho) * float(weight @ loss) + saturated)
-
 
 @memoize_per_path
 def _half_cycles(theta: Floats) -> Floats:
@@ -199,8 +137,7 @@ def _to_zero(curve: MasterCurve, rho: float, r: float) -> float:
 
 
 # Ends of the pieces that Gauss points are put on. Each is short against the distance to the
-# nearest singularity of what is integrated: in r the poles stay pi off the real axis.
-_R_PIECES = np.array([0, 1e-4, 1e-3, 0.01, 0.03, 0.1, 0.25, 0.5, 1, 2, *range(4, 38, 3), SATURATED])
+# nearest singularity of what is integrated.
 _RELEASE_PIECES = np.array([0, 1e-3, 0.01, 0.03, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99, 0.9999, 1])
 _CLIMB_PIECES = np.array([1e-4, 0.01, 0.1, 0.25, 0.5, 1, 1.5, 2, 4, 8, 16, 40])
 
@@ -219,7 +156,3 @@ def _pair_shape(shape: Shape, amplitude: ArrayLike) -> tuple[int, ...]:
 def _loops(shape: Shape, amplitude: ArrayLike) -> Iterator[_SteadyLoop]:
     for kappa, rho, x in np.broadcast(shape.kappa, shape.rho, np.asarray(amplitude)):
         yield _SteadyLoop.of(float(kappa), float(rho), shape.n, float(x))
-
-
-def _like_pairs(values: list[float], shape: Shape, amplitude: ArrayLike) -> float | Floats:
-    return np.array(values).reshape(_pair_shape(shape, amplitude))[()]

@@ -12,7 +12,6 @@ from mrdamper.physics.motion.sines import (
     analyse_motion,
     centred_motion,
     equivalent_sine,
-    running_sine,
 )
 
 __all__ = [
@@ -27,7 +26,6 @@ __all__ = [
     "equivalent_sine",
     "measured_motion",
     "random_motion",
-    "running_sine",
     "sine",
     "smooth",
     "sweep",

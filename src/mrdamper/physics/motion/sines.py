@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrdamper.data.arrays import Floats
 from mrdamper.data.conditions import Condition
 from mrdamper.data.runs import Run, once_per_run
 from mrdamper.errors import ExcitationError
@@ -116,31 +115,3 @@ def centred_motion(run: Run) -> Excitation:
     motion = measured_motion(run).about(equivalent_sine(run).centre)
     motion.path  # noqa: B018
     return motion
-
-
-def running_sine(motion: Excitation) -> tuple[Floats, Floats]:
-    """Frequency [Hz] and amplitude [m] of the sine a motion resembles, at every sample.
-
-    From the analytic signal of displacement and velocity, averaged over about a cycle. For
-    motion of one slowly changing frequency; for broad-band motion it is a rough description
-    and no more. It looks ahead as far as it looks back.
-    """
-    x = motion.displacement - np.mean(motion.displacement)
-    v = motion.velocity
-    x_turned, v_turned = _quarter_turn(x), _quarter_turn(v)
-    spin, size = x * v_turned - x_turned * v, x**2 + x_turned**2
-    moving = float(np.sqrt(np.mean(v**2) / np.mean(x**2)))
-    width = max(3, round(2 * np.pi / moving / float(np.median(np.diff(motion.time)))))
-    mean = np.ones(width) / width
-    scale = np.convolve(np.ones(x.size), mean, "same")
-    size = np.maximum(np.convolve(size, mean, "same") / scale, np.finfo(float).tiny)
-    omega = np.convolve(spin, mean, "same") / scale / size
-    return np.maximum(omega, 1e-3 * moving) / (2 * np.pi), np.sqrt(size)
-
-
-def _quarter_turn(signal: Floats) -> Floats:
-    """Hilbert transform; the record is mirrored at both ends so that they do not leak into each other."""
-    mirrored = np.concatenate([signal, signal[::-1]])
-    spectrum = np.fft.rfft(mirrored)
-    turned = np.fft.irfft(-1j * spectrum, mirrored.size)
-    return turned[: signal.size]
