@@ -200,7 +200,7 @@ def test_many_shapes_are_one_by_one(n):
 def test_steady_loop_closes_on_itself(shape, reach):
     amplitude = reach / shape.kappa
     peak = peak_of(shape, amplitude)
-    assert 0 < peak <= 1 + ROUNDING
+    assert 0 < peak <= 1 + LEAVING
     theta = np.linspace(-np.pi / 2, np.pi / 2, 101)
     np.testing.assert_allclose(
         steady_loop(shape, amplitude, theta + np.pi), -steady_loop(shape, amplitude, theta), atol=1e-7
