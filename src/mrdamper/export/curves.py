@@ -1,4 +1,9 @@
-"""Force over velocity, one curve for each current: as tables, and in the block format that Adams reads."""
+"""Force over velocity, one curve for each current: as CSV tables, and in the layouts of vehicle tools.
+
+No vehicle tool was tried. The blocks of Adams are recalled from public examples. The layout of TYDEX is that of
+release 1.3 (Unrau and Zamow, 1997), which defines channels of tyres only, so that the names of these channels are this
+program's. DYNA4 takes vectors and matrices of MATLAB, under names that differ from model to model.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +16,7 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Condition, Floats
-from mrdamper.data.encoding import csv_text
+from mrdamper.data.encoding import c_comment, csv_text
 from mrdamper.errors import InputError
 from mrdamper.export.base import Exporter, Written
 from mrdamper.export.templates import render
@@ -30,11 +35,7 @@ class TableExporter(Exporter):
 
     def export(self, damper: Damper | Model, name: str) -> Written:
         curves = force_velocity(damper)
-        rows = [
-            (c.current_A, c.amplitude_m, *map(float, forces), int(tested))
-            for c in curves
-            for *forces, tested in zip(c.velocity, c.force, c.peak_force, c.tested, strict=True)
-        ]
+        rows = [row for curve in curves for row in curve.rows]
         heads = ["velocity_m_s", *(f"force_N_at_{c.current_A:g}_A" for c in curves)]
         grid = [[float(v), *(float(c.force[i]) for c in curves)] for i, v in enumerate(curves[0].velocity)]
         note = f"sines of {1e3 * curves[0].amplitude_m:.3g} mm, force at mid-stroke; no hysteresis in such a table"
@@ -43,10 +44,7 @@ class TableExporter(Exporter):
 
 
 class AdamsExporter(Exporter):
-    """Damper property files: mm/s and N, velocity and force positive in extension.
-
-    The layout of the blocks is recalled from public examples, not tried in Adams.
-    """
+    """Damper property files: mm/s and N, velocity and force positive in extension."""
 
     name: ClassVar[str] = "adams"
     title: ClassVar[str] = "Adams-style damper property files"
@@ -69,6 +67,35 @@ class AdamsExporter(Exporter):
         return Written(files, ("such a curve knows no hysteresis; c and fmu do",))
 
 
+class TydexExporter(Exporter):
+    """One TYDEX-style file with the curves of all currents."""
+
+    name: ClassVar[str] = "tydex"
+    title: ClassVar[str] = "TYDEX-style table of force over velocity"
+    suffix: ClassVar[str] = ".tdx"
+
+    def export(self, damper: Damper | Model, name: str) -> Written:
+        rows = [row for curve in force_velocity(damper) for row in curve.rows]
+        text = render("damper.tdx.j2", rig=c_comment(damper_of(damper).rig or name), rows=rows)
+        note = "channel names are not part of the TYDEX standard; such a table has no hysteresis"
+        return Written({f"{name}.tdx": text.encode("ascii", "replace")}, (note,))
+
+
+class Dyna4Exporter(Exporter):
+    """One MATLAB script that defines a struct with two axes and a matrix of forces."""
+
+    name: ClassVar[str] = "dyna4"
+    title: ClassVar[str] = "DYNA4-style lookup table of force (MATLAB script)"
+    suffix: ClassVar[str] = ".m"
+
+    def export(self, damper: Damper | Model, name: str) -> Written:
+        curves, rig = force_velocity(damper), c_comment(damper_of(damper).rig or name)
+        matrix = np.transpose([curve.force for curve in curves])
+        text = render("damper.m.j2", rig=rig, name=name, curves=curves, matrix=matrix)
+        note = "assign the vectors to the parameters of your vehicle model; such a table has no hysteresis"
+        return Written({f"{name}.m": text.encode("ascii", "replace")}, (note,))
+
+
 @dataclass(frozen=True, eq=False)
 class ForceVelocity:
     """Forces at mid-stroke of sines of one amplitude and rising frequency."""
@@ -80,35 +107,28 @@ class ForceVelocity:
     peak_force: Floats  # (K,), largest force of the loop in the direction of that velocity [N]
     tested: np.ndarray  # (K,), whether the sine lies inside the tested ranges
 
+    @property
+    def rows(self) -> list[tuple[float, ...]]:
+        """The curve as rows of `COLUMNS`."""
+        points = zip(self.velocity, self.force, self.peak_force, self.tested, strict=True)
+        return [(self.current_A, self.amplitude_m, *map(float, forces), int(tested)) for *forces, tested in points]
 
-def force_velocity(
-    damper: Damper | Model, currents: Sequence[float] | None = None, speeds: Sequence[float] | None = None
-) -> list[ForceVelocity]:
+
+def force_velocity(given: Damper | Model) -> list[ForceVelocity]:
     """Force over velocity at mid-stroke, as a damper dynamometer gives it.
 
-    Raises `InputError` (E_EXPORT) if the damper does not know where it was tested.
-
-    Parameters
-    ----------
-    currents : sequence of float, optional
-        [A]; default six over the tested range.
-    speeds : sequence of float, optional
-        Peak velocities [m/s]; default twelve up to the highest tested, from a fiftieth of it, evenly
-        in the logarithm.
+    Six currents over the tested range; twelve peak velocities up to the highest tested, from a fiftieth of it,
+    evenly in the logarithm. Raises `InputError` (E_EXPORT) if the damper does not know where it was tested.
     """
-    damper = damper_of(damper)
+    damper = damper_of(given)
     if not damper.envelope.tested:
         raise InputError("a model without tested ranges", remedy="export a saved damper", code="E_EXPORT")
     envelope = damper.envelope
     amplitude = float(np.sqrt(np.prod(envelope.amplitude_m)))
     highest = envelope.peak_velocity_m_s[1]
-    chosen = (
-        np.geomspace(_MIN_VELOCITY_SHARE * highest, highest, _SPEEDS)
-        if speeds is None
-        else np.sort(np.asarray(speeds, float))
-    )
-    levels = np.unique(np.linspace(*envelope.current_A, _CURRENTS)) if currents is None else currents
-    return [_curve(damper, float(current), amplitude, chosen) for current in levels]
+    speeds = np.geomspace(_MIN_VELOCITY_SHARE * highest, highest, _SPEEDS)
+    currents = np.unique(np.linspace(*envelope.current_A, _CURRENTS))
+    return [_curve(damper, float(current), amplitude, speeds) for current in currents]
 
 
 def _curve(damper: Damper, current: float, amplitude: float, speeds: Floats) -> ForceVelocity:
