@@ -12,6 +12,7 @@ from mrdamper.errors import InputError, OutputError
 
 if TYPE_CHECKING:
     from mrdamper.physics.gas_spring import GasSpring
+    from mrdamper.report.plots.figure import Figure
     from mrdamper.study.validation import Validation
 
 Rows = Sequence[Mapping[str, Any]]
@@ -24,10 +25,14 @@ def put(rows: Rows, out: Path | None, as_json: bool, as_csv: Callable[[Rows], st
         if as_json
         else as_csv(rows)
     )
-    if out is None:
+    put_text(text, out)
+
+
+def put_text(text: str, out: Path | None) -> None:
+    """Print a text where no file or "-" is given; else write the file, whole or not at all."""
+    if out is None or str(out) == "-":
         print(text, end="")
         return
-
     from mrdamper.data.atomic import write_file
 
     with write_file(out) as target:
@@ -43,6 +48,15 @@ def figure_kind(path: Path) -> str:
         remedy = f"end the name in {', '.join(f'.{name}' for name in KINDS)}"
         raise OutputError(f"{path.suffix or 'no suffix'}", where=str(path), remedy=remedy)
     return kind
+
+
+def put_figure(figure: Figure, out: Path) -> None:
+    """Write a figure of the kind that its file's name states, whole or not at all."""
+    from mrdamper.data.atomic import write_file
+
+    kind = figure_kind(out)
+    with write_file(out) as target:
+        target.write_bytes(figure.drawn().file(kind))
 
 
 def shortened(lines: Sequence[str], most: int, verbose: bool = False) -> list[str]:

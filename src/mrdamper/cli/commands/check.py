@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mrdamper.cli.output import aligned, figure_kind, put
+from mrdamper.cli.output import aligned, figure_kind, put, put_figure
 from mrdamper.cli.progress import watched
 from mrdamper.errors import InputError
 
@@ -92,7 +92,6 @@ def _text_table(rows: Rows) -> str:
 
 
 def _draw(verdicts: Sequence[Quality], path: Path) -> None:
-    from mrdamper.data.atomic import write_file
     from mrdamper.report.plots.quality import LoopPanel, quality_figure
     from mrdamper.rig_files.quality.flat import flagged_samples
     from mrdamper.rig_files.quality.view import View
@@ -108,5 +107,4 @@ def _draw(verdicts: Sequence[Quality], path: Path) -> None:
         )
         for verdict in verdicts
     ]
-    with write_file(path) as target:
-        target.write_bytes(quality_figure(panels).drawn().file(figure_kind(path)))
+    put_figure(quality_figure(panels), path)

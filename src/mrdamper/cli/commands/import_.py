@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mrdamper.cli.output import shortened
+from mrdamper.cli.output import put_text, shortened
 from mrdamper.cli.progress import progress_on_stderr
 from mrdamper.errors import InputError, OutputError
 
@@ -108,7 +108,6 @@ def _refuse_taken(out: Path | None, add: bool) -> None:
 
 def _write_tests(files: list[Path], settings: Profile, target: Path) -> None:
     """Every test that can be read, also those whose current is not known yet."""
-    from mrdamper.data.atomic import write_file
     from mrdamper.rig_files.rig_import import found_tests
     from mrdamper.rig_files.tests_table import tests_text
 
@@ -117,16 +116,12 @@ def _write_tests(files: list[Path], settings: Profile, target: Path) -> None:
         typer.echo(f"not in the table: {refusal.error}", err=True)
     if not records:
         raise InputError("no test can be read", remedy="correct the files listed above, or give a profile")
-    if str(target) == "-":
-        print(tests_text(records), end="")
-        return
-    with write_file(target) as path:
-        path.write_text(tests_text(records), encoding="utf-8")
-    print(f"table of {len(records)} tests: {target}; complete it, then import with it")
+    put_text(tests_text(records), target)
+    if str(target) != "-":
+        print(f"table of {len(records)} tests: {target}; complete it, then import with it")
 
 
 def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
-    from mrdamper.data.atomic import write_file
     from mrdamper.rig_files.preview import columns_of, guess_profile
     from mrdamper.rig_files.profile import profile_text
     from mrdamper.rig_files.rig_import import first_file, read_runs
@@ -139,11 +134,7 @@ def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
             read_runs(first, guess)
         except InputError as error:
             typer.echo(f"the profile does not suffice yet: {error}", err=True)
-    if str(target) == "-":
-        print(text, end="")
-        return
-    with write_file(target) as path:
-        path.write_text(text, encoding="utf-8")
+    put_text(text, target)
 
 
 def _missing_currents(files: list[Path], guess: Profile, columns: tuple[str, ...]) -> str:

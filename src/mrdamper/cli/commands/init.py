@@ -7,6 +7,7 @@ from pathlib import Path
 
 import typer
 
+from mrdamper.cli.output import put_text
 from mrdamper.errors import OutputError, UnknownNameError
 
 _FILES = {"about": "about.toml", "limits": "limits.toml", "profile": "profile.toml", "tests": "tests.csv"}
@@ -24,17 +25,12 @@ def init(
     about: head of a report. limits: force limits, limits of the test rig, limits of fleet columns.
     profile: columns and units of rig files. tests: table of tests with their currents.
     """
-    from mrdamper.data.atomic import write_file
-
     text = template(kind)
-    if out is None:
-        print(text, end="")
-        return
-    if out.exists():
+    if out is not None and out.exists():
         raise OutputError("this file exists", where=str(out), remedy="choose another name, or delete it first")
-    with write_file(out) as target:
-        target.write_text(text, encoding="utf-8")
-    typer.echo(f"template: {out}")
+    put_text(text, out)
+    if out is not None:
+        typer.echo(f"template: {out}")
 
 
 def template(kind: str) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mrdamper.cli.output import figure_kind, put
+from mrdamper.cli.output import put, put_figure
 from mrdamper.errors import ConditionError, InputError
 
 if TYPE_CHECKING:
@@ -73,7 +73,9 @@ def predict(
         _said(prediction, interval, level, scope(damper, level)) if interval else f"note: {no_band(damper)}", err=True
     )
     if plot is not None:
-        _write_figure(plot, prediction, interval, level)
+        from mrdamper.report.plots.loops import predicted_force
+
+        put_figure(predicted_force(prediction, interval, level), plot)
     put(prediction_rows(prediction, interval), out, as_json, csv_text)
 
 
@@ -124,16 +126,6 @@ def _session_known(
         err=True,
     )
     return prediction.corrected(expected.gain, expected.offset), session_band(expected, damper, prediction, level)
-
-
-def _write_figure(path: Path, prediction: Prediction, interval: Band | None, level: float) -> None:
-    """Write a figure of the predicted force; the file appears whole or not at all."""
-    from mrdamper.data.atomic import write_file
-    from mrdamper.report.plots.loops import predicted_force
-
-    kind = figure_kind(path)
-    with write_file(path) as target:
-        target.write_bytes(predicted_force(prediction, interval, level).drawn().file(kind))
 
 
 def _said(prediction: Prediction, interval: Band, level: float, where: str) -> str:

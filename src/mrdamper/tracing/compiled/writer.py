@@ -4,96 +4,15 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 
 from mrdamper.tracing import Expression, Program
 from mrdamper.tracing.c_writer import CWriter
 from mrdamper.tracing.expression import SAMPLE
 from mrdamper.tracing.program import Branch, Let, Statement, postorder
 
-PREAMBLE = """\
-#include <math.h>
-#include <string.h>
-
-#if defined(_MSC_VER)
-#define EXPORT __declspec(dllexport)
-#define restrict __restrict
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-#define R(x) x
-#define M(function) function
-typedef double real;
-typedef long long whole;
-
-static inline real signum(real x)
-{
-    return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0);
-}
-
-static inline real lesser(real a, real b)
-{
-    return b < a ? b : a;
-}
-
-static inline real greater(real a, real b)
-{
-    return b > a ? b : a;
-}
-
-/* Value at x of polynomials of degree five between nodes; constant beyond the ends. */
-static inline real read_table(const real *nodes, const real (*cells)[7], int count, real x)
-{
-    int low = 0, high = count - 1;
-    real t;
-    while (high - low > 1) {
-        const int middle = (low + high) / 2;
-        if (nodes[middle] <= x) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    x = lesser(greater(x, nodes[0]), nodes[count - 1]);
-    t = (x - nodes[low]) * cells[low][6];
-    return cells[low][0] + t * (cells[low][1] + t * (cells[low][2] + t * (cells[low][3]
-        + t * (cells[low][4] + t * cells[low][5]))));
-}
-"""
-
-_RECORD = """
-/* Outputs at every sample, or at the `count` samples whose ascending indices are picked; the memory starts anew at
-   `begins`, which ends with the number of samples. */
-EXPORT whole along(const real *p, const real *d, real *memory, whole samples, const real *const *inputs,
-    const whole *strides, const whole *picked, whole count, const whole *begins, real *outputs)
-{{
-    real s[{memory}], u[{inputs}], out[{outputs}], m[{kept}];
-    whole i, k, at = 0;
-    memcpy(s, memory, sizeof s);
-    for (k = 0; k < {kept}; k++) {{
-        m[k] = NAN;
-    }}
-    for (i = 0; i < samples; i++) {{
-        if (begins && i == *begins) {{
-            memcpy(s, memory, sizeof s);
-            begins++;
-        }}
-        for (k = 0; k < {inputs}; k++) {{
-            u[k] = inputs[k][i * strides[k]];
-        }}
-        if (!step_0(p, d, s, u, out, m)) {{
-            break;
-        }}
-        if (at < count && i == (picked ? picked[at] : i)) {{
-            for (k = 0; k < {outputs}; k++) {{
-                outputs[k * count + at] = out[k];
-            }}
-            at++;
-        }}
-    }}
-    memcpy(memory, s, sizeof s);
-    return i < samples ? i : -1;
-}}
-"""
+_HERE = Path(__file__)
+PREAMBLE = _HERE.with_name("preamble.c").read_text(encoding="utf-8")
 
 
 class ArrayWriter(CWriter):
@@ -241,8 +160,8 @@ def functions(program: Program, index: int = 0, keep: bool = False) -> str:
 def record_source(program: Program) -> str:
     """C of a library that prepares a program and runs it along a record."""
     tape = program.tape
-    sizes = {"memory": len(tape.memory), "inputs": len(tape.inputs), "outputs": len(program.outputs)}
-    sizes["kept"] = ArrayWriter(program, keep=True).kept
-    prepare = "\nEXPORT int prepare(const real *p, real *d)\n{\n    return prepare_0(p, d);\n}\n"
-    along = _RECORD.format(**{name: max(1, size) for name, size in sizes.items()})
-    return PREAMBLE + functions(program, keep=True) + prepare + along
+    sizes = {"MEMORY": len(tape.memory), "INPUTS": len(tape.inputs), "OUTPUTS": len(program.outputs)}
+    sizes["KEPT"] = ArrayWriter(program, keep=True).kept
+    defined = "".join(f"#define {name} {max(1, size)}\n" for name, size in sizes.items())
+    along = _HERE.with_name("record.c").read_text(encoding="utf-8")
+    return f"{PREAMBLE}{functions(program, keep=True)}\n{defined}\n{along}"
