@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from mrdamper.tracing import Expression, Program
 from mrdamper.tracing.expression import PARAMETER, SAMPLE
-from mrdamper.tracing.program import FUNCTIONS, Branch, Let, Repeat, Statement, Writer
+from mrdamper.tracing.program import FUNCTIONS, Branch, Repeat, Statement, Writer
 
 
 class CWriter(Writer):
@@ -48,17 +48,13 @@ class CWriter(Writer):
             owner = "d"
         return f"{owner}{self.member}{name}" if owner else name
 
-    def block(self, statements: list[Statement], indent: int = 1) -> str:
-        """Text of a block."""
-        return "".join(f"{line}\n" for line in self._lines(statements, indent))
-
     def setup(self) -> str:
         """Write the statements computed once, and the conditions on parameters."""
-        return self.block(self.program.setup) + self._guards(PARAMETER)
+        return self._block(self.program.setup) + self._guards(PARAMETER)
 
     def sample(self) -> str:
         """Write the statements computed at a sample, and the conditions checked there."""
-        return self.block(self.program.step) + self._guards(SAMPLE)
+        return self._block(self.program.step) + self._guards(SAMPLE)
 
     def results(self) -> str:
         """Write outputs, then the new memory: all of it is computed before any of it is stored."""
@@ -75,52 +71,37 @@ class CWriter(Writer):
             lines.append(f"    if ({'!' if answer else ''}{text}) {{\n        return 0;\n    }}\n")
         return "".join(lines)
 
-    def _lines(self, statements: list[Statement], indent: int) -> list[str]:
-        pad, lines = "    " * indent, list[str]()
-        for statement in statements:
-            if isinstance(statement, Let):
-                lines.append(f"{pad}{self._declared(statement.expression)} = {self.formula(statement.expression)};")
-            elif isinstance(statement, Branch):
-                lines += self._branch(statement, indent)
-            else:
-                lines += self._repeat(statement, indent)
-        return lines
+    def _block(self, statements: list[Statement]) -> str:
+        return "".join(f"{line}\n" for line in self.lines(statements, 1))
 
-    def _declared(self, expression: Expression) -> str:
+    def let(self, expression: Expression) -> str:
         name = self.name(expression)
-        if self.member in name:
-            return name
-        return f"{self.answer if expression.logical else self.constant} {name}"
+        kind = "" if self.member in name else f"{self.answer if expression.logical else self.constant} "
+        return f"{kind}{name} = {self.formula(expression)};"
 
-    def _branch(self, statement: Branch, indent: int) -> list[str]:
-        pad, text = "    " * indent, self.text
+    def branch(self, statement: Branch) -> list[str]:
+        text, name = self.text, self.name(statement.select)
         condition, then, otherwise = statement.select.args
-        name = self.name(statement.select)
         local = self.member not in name
         if not (statement.then or statement.otherwise):
             kind = f"{self.constant} " if local else ""
-            return [f"{pad}{kind}{name} = {text(condition)} ? {text(then)} : {text(otherwise)};"]
-        lines = [f"{pad}{self.variable} {name};"] if local else []
-        lines.append(f"{pad}if ({text(condition)}) {{")
-        lines += [*self._lines(statement.then, indent + 1), f"{pad}    {name} = {text(then)};", f"{pad}}} else {{"]
-        lines += [*self._lines(statement.otherwise, indent + 1), f"{pad}    {name} = {text(otherwise)};"]
-        return [*lines, f"{pad}}}"]
+            return [f"{kind}{name} = {text(condition)} ? {text(then)} : {text(otherwise)};"]
+        lines = [f"{self.variable} {name};"] if local else []
+        lines += [f"if ({text(condition)}) {{", *self.lines(statement.then, 1), f"    {name} = {text(then)};"]
+        return [*lines, "} else {", *self.lines(statement.otherwise, 1), f"    {name} = {text(otherwise)};", "}"]
 
-    def _repeat(self, statement: Repeat, indent: int) -> list[str]:
-        pad, loop = "    " * indent, statement.loop
+    def repeat(self, statement: Repeat) -> list[str]:
+        loop = statement.loop
         carried = [self.carry(loop, i) for i in range(len(loop.start))]
         counter = f"{carried[0]}_count"
-        lines = [f"{pad}{self.counter} {counter};"]
-        lines += [
-            f"{pad}{self.variable} {n} = {self.text(value)};" for n, value in zip(carried, loop.start, strict=True)
-        ]
-        lines.append(f"{pad}for ({counter} = 0; {counter} < {loop.most}; {counter}++) {{")
-        lines += self._lines(statement.body, indent + 1)
+        starts = zip(carried, loop.start, strict=True)
+        lines = [f"{self.counter} {counter};", *(f"{self.variable} {n} = {self.text(value)};" for n, value in starts)]
+        lines.append(f"for ({counter} = 0; {counter} < {loop.most}; {counter}++) {{")
         inside = [f"{self.answer} going = {self.text(loop.going)};"]
         inside += [f"{self.constant} next_{n} = {self.text(v)};" for n, v in zip(carried, loop.updates, strict=True)]
         inside += [f"{name} = next_{name};" for name in carried]
         inside += ["if (!going) {", "    break;", "}"]
-        return [*lines, *(f"{pad}    {line}" for line in inside), f"{pad}}}"]
+        return [*lines, *self.lines(statement.body, 1), *(f"    {line}" for line in inside), "}"]
 
 
 class JavaScriptWriter(CWriter):

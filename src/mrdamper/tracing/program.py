@@ -223,6 +223,28 @@ class Writer(ABC):
         """Name of a value that a loop carries."""
         return f"loop{self._loops.setdefault(id(loop), len(self._loops))}_{index}"
 
+    def lines(self, block: list[Statement], indent: int) -> list[str]:
+        """Write the lines of a block."""
+        lines: list[str] = []
+        for statement in block:
+            if isinstance(statement, Let):
+                lines.append(self.let(statement.expression))
+            else:
+                lines += self.branch(statement) if isinstance(statement, Branch) else self.repeat(statement)
+        return [f"{'    ' * indent}{line}" for line in lines]
+
+    @abstractmethod
+    def let(self, expression: Expression) -> str:
+        """Give an expression its name."""
+
+    @abstractmethod
+    def branch(self, statement: Branch) -> list[str]:
+        """Write a choice between two blocks."""
+
+    @abstractmethod
+    def repeat(self, statement: Repeat) -> list[str]:
+        """Write a loop."""
+
     def text(self, value: Any) -> str:
         """Write an expression where it is used: its name, or its formula."""
         if not isinstance(value, Expression):

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-from mrdamper.tracing.expression import PARAMETER, SAMPLE, sign
-from mrdamper.tracing.program import FUNCTIONS, Branch, Let, Program, Repeat, Statement, Writer
+from mrdamper.tracing.expression import PARAMETER, SAMPLE, Expression, sign
+from mrdamper.tracing.program import FUNCTIONS, Branch, Program, Repeat, Writer
 
 DONE, OUTSIDE = 0, 1  # outside: a question the trace settled has another answer here
 
@@ -26,33 +26,23 @@ class PythonWriter(Writer):
     def number(self, value: float) -> str:
         return repr(float(value))
 
-    def statements(self, block: list[Statement], indent: int) -> list[str]:
-        """Lines of a block."""
-        pad, lines = "    " * indent, list[str]()
-        for statement in block:
-            if isinstance(statement, Let):
-                lines.append(f"{pad}{self.name(statement.expression)} = {self.formula(statement.expression)}")
-            elif isinstance(statement, Branch):
-                condition, then, otherwise = statement.select.args
-                target = self.name(statement.select)
-                lines.append(f"{pad}if {self.text(condition)}:")
-                lines += [*self.statements(statement.then, indent + 1), f"{pad}    {target} = {self.text(then)}"]
-                lines.append(f"{pad}else:")
-                lines += self.statements(statement.otherwise, indent + 1)
-                lines.append(f"{pad}    {target} = {self.text(otherwise)}")
-            else:
-                lines += self._repeat(statement, indent)
-        return lines
+    def let(self, expression: Expression) -> str:
+        return f"{self.name(expression)} = {self.formula(expression)}"
 
-    def _repeat(self, statement: Repeat, indent: int) -> list[str]:
-        pad, loop = "    " * indent, statement.loop
+    def branch(self, statement: Branch) -> list[str]:
+        condition, then, otherwise = statement.select.args
+        target = self.name(statement.select)
+        lines = [f"if {self.text(condition)}:", *self.lines(statement.then, 1), f"    {target} = {self.text(then)}"]
+        return [*lines, "else:", *self.lines(statement.otherwise, 1), f"    {target} = {self.text(otherwise)}"]
+
+    def repeat(self, statement: Repeat) -> list[str]:
+        loop = statement.loop
         carried = [self.carry(loop, i) for i in range(len(loop.start))]
-        lines = [f"{pad}{name} = {self.text(value)}" for name, value in zip(carried, loop.start, strict=True)]
-        lines += [f"{pad}for _ in range({loop.most}):", *self.statements(statement.body, indent + 1)]
-        lines.append(f"{pad}    going = {self.text(loop.going)}")
-        lines.append(f"{pad}    {', '.join(carried)} = {', '.join(self.text(value) for value in loop.updates)}")
-        lines += [f"{pad}    if not going:", f"{pad}        break"]
-        return lines
+        lines = [f"{name} = {self.text(value)}" for name, value in zip(carried, loop.start, strict=True)]
+        lines += [f"for _ in range({loop.most}):", *self.lines(statement.body, 1)]
+        lines.append(f"    going = {self.text(loop.going)}")
+        lines.append(f"    {', '.join(carried)} = {', '.join(self.text(value) for value in loop.updates)}")
+        return [*lines, "    if not going:", "        break"]
 
 
 def python_source(program: Program) -> str:
@@ -64,7 +54,7 @@ def python_source(program: Program) -> str:
     derived = [writer.name(node) for node in program.derived]
     updates = [tape.updates.get(name, memory) for name, memory in tape.memory.items()]
     lines = ["def prepare(_p):", *_unpack("_p", list(tape.parameters))]
-    lines += writer.statements(program.setup, 1)
+    lines += writer.lines(program.setup, 1)
     lines += _guards(writer, program, PARAMETER, f"(0.0,){f' * {len(derived)}' if derived else '[:0]'}")
     lines.append(f"    return 0, {_tuple(derived)}")
     lines += ["", "", "def step(_p, _d, _s, _u):"]
@@ -75,7 +65,7 @@ def python_source(program: Program) -> str:
         ("_u", list(tape.inputs)),
     ):
         lines += _unpack(name, members)
-    lines += writer.statements(program.step, 1)
+    lines += writer.lines(program.step, 1)
     lines += _guards(writer, program, SAMPLE, f"(0.0,) * {len(program.outputs)}, _s")
     outputs = [writer.text(value) for value in program.outputs.values()]
     lines.append(f"    return 0, {_tuple(outputs)}, {_tuple([writer.text(value) for value in updates])}")

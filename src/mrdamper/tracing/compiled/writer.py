@@ -62,10 +62,10 @@ class ArrayWriter(CWriter):
             self._kept |= fresh.keys()
         return text
 
-    def _lines(self, statements: list[Statement], indent: int) -> list[str]:
+    def lines(self, block: list[Statement], indent: int) -> list[str]:
         """Write statements but those of kept numbers, which `refresh` computes."""
-        own = [s.expression if isinstance(s, Let) else s.select if isinstance(s, Branch) else None for s in statements]
-        return super()._lines([s for s, e in zip(statements, own, strict=True) if id(e) not in self._kept], indent)
+        own = [s.expression if isinstance(s, Let) else s.select if isinstance(s, Branch) else None for s in block]
+        return super().lines([s for s, e in zip(block, own, strict=True) if id(e) not in self._kept], indent)
 
     def _expanded(self, value: object) -> str:
         """Expand an expression down to what is available before any statement."""
