@@ -14,7 +14,8 @@ from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.kwok import Kwok
 from mrdamper.models.spencer import Spencer
 from mrdamper.physics.hysteresis import Shape, follow
-from mrdamper.physics.hysteresis.batch import batch_cost, follow_alike, follow_quickly, follow_with_slope
+from mrdamper.physics.hysteresis.batch import batch_cost, follow_alike, follow_with_slope
+from mrdamper.physics.hysteresis.response import follow_one
 from mrdamper.physics.motion import Path, sine
 from mrdamper.statistics import linear
 from mrdamper.statistics.levenberg_marquardt import least_squares
@@ -56,7 +57,7 @@ def test_shapes_at_once_and_the_quick_way_are_the_same_states(name, n):
     for rho in (-0.6, 0.0, 0.4):
         expected = follow(Shape(kappa, rho, n), PATHS[name])
         np.testing.assert_allclose(follow_alike(n, rho, kappa, PATHS[name]), expected, atol=1e-13)
-        quick = [follow_quickly(float(k), rho, n, PATHS[name]) for k in kappa]
+        quick = [follow_one(float(k), rho, n, PATHS[name]) for k in kappa]
         np.testing.assert_allclose(quick, expected, atol=1e-13)
 
 
@@ -66,7 +67,7 @@ def test_slope_is_the_derivative_by_the_length(n, rho):
     for name in ("sine", "random walk"):
         for kappa in (2 / X, 20 / X, 200 / X):
             state, slope = follow_with_slope(kappa, rho, n, PATHS[name], slice(50, None))
-            np.testing.assert_array_equal(state, follow_quickly(kappa, rho, n, PATHS[name], slice(50, None)))
+            np.testing.assert_array_equal(state, follow_one(kappa, rho, n, PATHS[name], slice(50, None)))
             up, down = (follow(Shape(kappa * np.exp(h), rho, n), PATHS[name])[50:] for h in (1e-6, -1e-6))
             # A central difference is good to 1e-9; at the few samples within its step of a kink it is not.
             assert np.quantile(np.abs((up - down) / 2e-6 - slope), 0.99) < 1e-7

@@ -23,7 +23,7 @@ from mrdamper.export.base import Exporter, Written, identifier
 from mrdamper.export.c import c_facts, c_sources, reference_motion
 from mrdamper.export.fmu_description import c_bounds, description_facts, parameters_of_stream, serial_fields
 from mrdamper.export.templates import render
-from mrdamper.export.toolchain import PLATFORMS, Platform, build_library
+from mrdamper.export.toolchain import PLATFORMS, build_library
 from mrdamper.models import Model
 
 _SAMPLES_PER_CYCLE = 200
@@ -73,7 +73,9 @@ class FMUExporter(Exporter):
         sources = {path.removeprefix("sources/"): text for path, text in files.items() if path.startswith("sources/")}
         binaries: dict[str, bytes] = {}
         left_out: dict[str, list[str]] = {}
-        for platform in self._wanted():
+        for platform in (p for p in PLATFORMS if self.fmi == 3 or p.fmi2):
+            if self.platforms is not None and platform.name not in self.platforms:
+                continue
             built = build_library(sources, platform)
             if built.library is None:
                 left_out.setdefault(built.reason, []).append(platform.name)
@@ -84,10 +86,6 @@ class FMUExporter(Exporter):
         if not binaries:
             notes.append("the FMU holds sources alone; the importer has to compile them")
         return binaries, notes
-
-    def _wanted(self) -> list[Platform]:
-        platforms = [p for p in PLATFORMS if self.fmi == 3 or p.fmi2]
-        return [p for p in platforms if self.platforms is None or p.name in self.platforms]
 
 
 @dataclass(frozen=True, eq=False)

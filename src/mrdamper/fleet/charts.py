@@ -55,9 +55,9 @@ def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, w
     Target and deviation are the mean and standard deviation of the process in control, `weight` is λ of the newest
     value, and the limits lie `width` standard deviations of the average away.
     """
-    averages, last = np.empty(values.size), target
-    for i, value in enumerate(values.tolist()):
-        averages[i] = last = weight * value + (1 - weight) * last
+    from scipy.signal import lfilter
+
+    averages = np.asarray(lfilter([weight], [1, weight - 1], values, zi=[(1 - weight) * target])[0])
     age = np.arange(1, values.size + 1)
     half = width * deviation * np.sqrt(weight / (2 - weight) * (1 - (1 - weight) ** (2 * age)))
     return ControlChart(averages, target - half, target + half, target)

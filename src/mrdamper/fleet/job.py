@@ -36,12 +36,8 @@ VERSION = version("mrdamper")  # asked once: the answer takes a millisecond
 OTHER_RIG = "W_OTHER_RIG"  # tested on another rig than most of the line: compared with them all the same
 _KILLED, _READER_TRIES = "E_READER_KILLED", 8  # of a job whose reading process somebody killed
 _PASSING = ("E_EXTRA", "E_FLEET_CHANGED", "E_CLUSTER_VERSION", _KILLED)
-_ROUNDS, _MAX_STEPS, _COST_TOLERANCE = (
-    1,
-    40,
-    1e-8,
-)  # one least squares without reweighting, searched to its end: the optimum
-# is then the same to 1e-6 whatever near start it was found from
+# One least squares without reweighting, searched to its end: the optimum is the same to 1e-6 from any near start.
+_ROUNDS, _MAX_STEPS, _COST_TOLERANCE = 1, 40, 1e-8
 _AVERAGED_SAMPLES = 4  # samples that are averaged for the standard errors
 _DIFFERENCE_STEP = 1e-4  # of a search axis's coordinate, for slopes of parameters
 _OUTLIER_DEVIATIONS = 6.0  # robust standard deviations from the line at which a damper is studied in full
@@ -234,9 +230,8 @@ def _standard_errors(problem: JointProblem, fit: JointFit) -> dict[str, float]:
             slopes[:, i] = [(moved[name] - values[name]) / step for name in values]
     for i, info in enumerate(problem.linear):
         slopes[list(values).index(info.name), len(problem.axes) + i] = 1.0
-    kept = (
-        residual.size // _AVERAGED_SAMPLES * _AVERAGED_SAMPLES
-    )  # what is slower than a few samples is what makes errors large
+    # What is slower than a few samples is what makes errors large.
+    kept = residual.size // _AVERAGED_SAMPLES * _AVERAGED_SAMPLES
     means = (a[:kept].reshape(-1, _AVERAGED_SAMPLES, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))
     covariance = spread(*means).covariance
     errors = {}

@@ -21,7 +21,8 @@ from mrdamper.errors import ParameterError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.problem import DELAY, Problem
 from mrdamper.models import Model, Scale, SearchAxis
-from mrdamper.physics.hysteresis.batch import follow_quickly, follow_with_slope
+from mrdamper.physics.hysteresis.batch import follow_with_slope
+from mrdamper.physics.hysteresis.response import follow_one
 from mrdamper.statistics.linear import FixedColumns
 
 _MIN_UNEXPLAINED_SHARE = 1e-10  # share of a squared column below which the others explain all of it
@@ -88,7 +89,7 @@ class Elimination:
         shape = self.kind.shape(point)
         if shape is None:
             return self._bare(point).state(self.problem.motion)[self.problem.scored]
-        return follow_quickly(*shape, self.problem.motion.path, self.problem.scored)
+        return follow_one(*shape, self.problem.motion.path, self.problem.scored)
 
     def _bare(self, point: Mapping[str, float]) -> Model:
         zero = {i.name: 0.0 for i in (*self.kind.others, self.kind.state)}

@@ -20,9 +20,12 @@ def comfort(acceleration: Floats, step: float, weighting: str = "Wk") -> dict[st
     `acceleration` (N,) [m/s²]; `step` [s]; `weighting`: "Wk" (seat, vertical), "Wd" (seat, horizontal), "Wf" (motion
     sickness). Returns dict: a_w [m/s²], mtvv [m/s²], vdv [m/s^1.75], crest factor [-].
     """
+    from scipy.signal import lfilter
+
     weighted = frequency_weighted(acceleration, step, weighting)
     squares = weighted**2
-    running = _running_mean(squares, float(np.exp(-step / _WINDOW)))
+    keep = float(np.exp(-step / _WINDOW))
+    running = np.asarray(lfilter([1 - keep], [1, -keep], squares))
     a_w = float(np.sqrt(squares.mean()))
     return {
         "a_w_m_s2": a_w,
@@ -103,16 +106,6 @@ def benchmark_ratios(done: Simulation, uncontrolled: Simulation) -> dict[str, fl
         ratios["J7"] = np.abs(done.force[:, dampers]).max() / weight
         ratios["J8"] = np.abs(done.stroke[:, dampers]).max() / np.abs(theirs["drift"]).max()
     return {name: float(value) for name, value in ratios.items()}
-
-
-def _running_mean(values: Floats, keep: float) -> Floats:
-    """Solve y[k] − keep y[k − 1] = (1 − keep) values[k], a banded triangle; scipy.signal is slow to import."""
-    from scipy.linalg import get_lapack_funcs
-
-    bands = np.empty((2, values.size), order="F")
-    bands[0], bands[1] = 1.0, -keep
-    (solve,) = get_lapack_funcs(("tbtrs",), (bands,))
-    return solve(bands, (1 - keep) * values[:, None], uplo="L")[0][:, 0]
 
 
 def _rms(series: Floats) -> float:

@@ -84,11 +84,7 @@ class Simulation:
         """Share of the time each damper spent outside its tests, by quantity; contact of stops, lift-off of wheels."""
         shares_by_link: dict[str, dict[str, float]] = {}
         for i, link in enumerate(self.links):
-            words = (
-                FLAGS
-                if link.role == "damper"
-                else ({"stop": "bump-stop contact", "tyre": "wheel lift-off"}[link.role],)
-            )
+            words = {"damper": FLAGS, "stop": ("bump-stop contact",), "tyre": ("wheel lift-off",)}[link.role]
             shares = {word: float(np.mean(self.flags[:, i] >> bit & 1)) for bit, word in enumerate(words)}
             if kept := {word: share for word, share in shares.items() if share > 0}:
                 shares_by_link[link.name] = kept

@@ -88,9 +88,8 @@ def simulate_system(
         fine = loop.run(dt / 2)
         change = changed(peaks, fine.peaks)
         first = change if first is None else first
-        lost = (
-            dt <= first_step / 4 and change > _MAX_CHANGE_RATIO * last
-        )  # sensitive to the smallest change: no step will do
+        # Sensitive to the smallest change: no step will do.
+        lost = dt <= first_step / 4 and change > _MAX_CHANGE_RATIO * last
         if change <= HALVING or dt / 2 <= _MIN_STEP_S or fine.time.size > _MAX_HALVED_SAMPLES or lost:
             break
         peaks, dt, last = fine.peaks, dt / 2, change

@@ -53,7 +53,6 @@ def cache(
 
 
 def _facts() -> dict[str, Any]:
-
     from mrdamper.tracing.compiled.cache import cache_folder, cache_size, private, unusable_reason
     from mrdamper.tracing.compiled.compilers import find_compiler
 

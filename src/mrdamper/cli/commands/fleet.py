@@ -77,7 +77,6 @@ def fleet(
 
 
 def _print(outcome: Fleet, page: Path, messages: list[str], verbose: bool, as_json: bool) -> None:
-
     for line in shortened([f"{status}: {name}: {reason}" for name, status, reason in outcome.troubled], 8, verbose):
         typer.echo(line, err=True)
     if as_json:

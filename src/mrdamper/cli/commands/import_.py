@@ -78,7 +78,8 @@ def import_(
         _print_tree(files, settings)
     with progress_on_stderr(quiet or as_json) as progress:
         result = import_files(files, settings, tests=tests, progress=progress)
-        if (_on_terminal() if ask is None else ask) and not as_json:
+        on_terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
+        if (on_terminal if ask is None else ask) and not as_json:
             settings, result = _asked(files, settings, result, tests)
     wrong = bool(result.refusals) and not skip_refused
     written = bool(result.records) and not wrong and out is not None
@@ -204,11 +205,6 @@ def _joined(old: Dataset, new: Dataset) -> Dataset:
     return Dataset((*old.runs, *added), old.name)
 
 
-def _on_terminal() -> bool:
-
-    return sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
-
-
 def _print_tree(files: list[Path], settings: Profile) -> None:
     from mrdamper.rig_files.preview import scan, tree_lines
 
@@ -246,7 +242,6 @@ def _asked(
 
 
 def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = False, verbose: bool = False) -> None:
-
     columns = {record.provenance["columns"] for record in result.records}
     if dry and result.records:
         print("Taken for tests:")

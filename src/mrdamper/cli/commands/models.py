@@ -72,7 +72,6 @@ def _page(model) -> str:
 
 
 def _entry(model) -> dict:
-
     def plain(value):
         return value if value is not None and math.isfinite(value) else None
 

@@ -240,7 +240,6 @@ def _print(done: Simulation, bands: Bands | None, dampers: Mapping[str, Damper],
 
 
 def _print_peaks(done: Simulation) -> None:
-
     peaks = done.peaks
     typer.echo(f"{done.system.title}, {type(done.controller).title}")
     for i, name in enumerate(done.system.coordinates):

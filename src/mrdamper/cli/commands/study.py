@@ -96,7 +96,6 @@ def _model(name: str | None, gas: str | None, setting: list[str]) -> str | Study
 
 
 def _require_switched_current(dataset: Dataset) -> None:
-
     if not any(run.current_changes for run in dataset.split("train")):
         raise IdentificationError(
             "the current is constant in every identification run, so the coil lag cannot be identified",

@@ -15,7 +15,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.physics.hysteresis.master_curve import master_curve
-from mrdamper.physics.hysteresis.response import advance, on_curve, starts_of_strokes, state_at
+from mrdamper.physics.hysteresis.response import advance, on_curve, state_at
 from mrdamper.physics.hysteresis.shape import Shape
 from mrdamper.physics.motion.path import Path
 from mrdamper.statistics.linear import FixedColumns
@@ -72,15 +72,8 @@ def products(path: Path, fixed: FixedColumns, shapes: Shape) -> Products:
     return Products(sums[:, :-2], sums[:, -2], sums[:, -1])
 
 
-def follow_quickly(kappa: float, rho: float, n: float, path: Path, part: slice = slice(None)) -> Floats:
-    """States of one shape at a part of the samples, from zero, nothing checked: for inner loops."""
-    curve = master_curve(n)
-    starts = starts_of_strokes(curve, kappa, rho, path, 0.0)
-    return path.direction[part] * state_at(curve, rho, np.array(starts), path.stroke[part], kappa * path.distance[part])
-
-
 def follow_with_slope(kappa: float, rho: float, n: float, path: Path, part: slice) -> tuple[Floats, Floats]:
-    """States as `follow_quickly`, and their derivative with respect to ln kappa.
+    """States as `follow_one`, and their derivative with respect to ln kappa.
 
     Along a stroke the state is a function of kappa times the distance, shifted by where the stroke
     began; so its derivative is the rate there times that distance and the derivative of the shift.

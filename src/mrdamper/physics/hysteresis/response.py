@@ -51,9 +51,8 @@ def follow(shape: Shape, path: Path, zeta0: ArrayLike = 0.0) -> Floats:
         zeta = z/z_max [-] at the samples.
     """
     _check_start(shape, zeta0)
-    curve = master_curve(shape.n)
     rows = [
-        _follow_one(curve, float(kappa), float(rho), path, float(start))
+        follow_one(float(kappa), float(rho), shape.n, path, zeta0=float(start))
         for kappa, rho, start in np.broadcast(shape.kappa, shape.rho, zeta0)
     ]
     return np.stack(rows) if shape.is_many else rows[0]
@@ -83,10 +82,14 @@ def step(shape: Shape, zeta: Any, dx: Any) -> Any:
     return choose(back, lambda: -reached, lambda: reached)
 
 
-def _follow_one(curve: MasterCurve, kappa: float, rho: float, path: Path, zeta0: float) -> Floats:
-    """One state follows from the other at the reversals only: plain floats there, arrays for the samples."""
-    starts = starts_of_strokes(curve, kappa, rho, path, path.first_direction * zeta0)
-    return path.direction * state_at(curve, rho, np.array(starts), path.stroke, kappa * path.distance)
+def follow_one(kappa: float, rho: float, n: float, path: Path, part: slice = slice(None), zeta0: float = 0.0) -> Floats:
+    """States of one shape at a part of the samples, nothing checked: for inner loops.
+
+    One state follows from the other at the reversals only: plain floats there, arrays for the samples.
+    """
+    curve = master_curve(n)
+    starts = np.array(starts_of_strokes(curve, kappa, rho, path, path.first_direction * zeta0))
+    return path.direction[part] * state_at(curve, rho, starts, path.stroke[part], kappa * path.distance[part])
 
 
 def starts_of_strokes(curve: MasterCurve, kappa: float, rho: float, path: Path, w: float) -> list[float]:

@@ -57,7 +57,7 @@ def loop_harmonics(shape: Shape, amplitude: ArrayLike, orders: Sequence[int] = (
     """
     pairs = [loop.harmonics(np.asarray(orders)) for loop in _loops(shape, amplitude)]
     sine, cosine = (np.array(side) for side in zip(*pairs, strict=True))
-    return (sine, cosine) if len(_pair_shape(shape, amplitude)) else (sine[0], cosine[0])
+    return (sine, cosine) if np.broadcast(shape.kappa, shape.rho, amplitude).nd else (sine[0], cosine[0])
 
 
 @dataclass(frozen=True)
@@ -147,10 +147,6 @@ def _gauss_points(ends: Floats, points: int = 16) -> tuple[Floats, Floats]:
     node, weight = gauss_legendre(points)
     half = 0.5 * np.diff(ends)[:, None]
     return (ends[:-1, None] + half * (1 + node)).ravel(), (half * weight).ravel()
-
-
-def _pair_shape(shape: Shape, amplitude: ArrayLike) -> tuple[int, ...]:
-    return np.broadcast(shape.kappa, shape.rho, np.asarray(amplitude)).shape
 
 
 def _loops(shape: Shape, amplitude: ArrayLike) -> Iterator[_SteadyLoop]:

@@ -17,9 +17,7 @@ from mrdamper.statistics.linear import solve_linear
 
 _FEW = 250  # samples on which a frequency is found to begin with
 _SAMPLES_PER_BLOCK = 50_000  # samples whose waves are held at a time
-_SAMPLES_PER_HALF_PERIOD = (
-    16  # samples between two changes of sign that the strongest line of a long record is found with
-)
+_SAMPLES_PER_HALF_PERIOD = 16  # between two changes of sign, with which the strongest line of a long record is found
 _MAX_SPECTRUM_SAMPLES = 2**20  # samples of a spectrum, at most, for the sake of finer lines
 
 

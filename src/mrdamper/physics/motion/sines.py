@@ -52,17 +52,13 @@ def analyse_motion(run: Run) -> MotionAnalysis:
         frequency = fundamental_frequency(run.time, run.displacement)
     except np.linalg.LinAlgError as error:
         raise ExcitationError("too few samples for a sine", where=where, remedy="record a full cycle") from error
-    orders = (
-        _MEASURED_HARMONICS if np.ptp(run.time) * frequency > 2 else 3
-    )  # harmonics of a short record overlap its drift
+    # Harmonics of a short record overlap its drift.
+    orders = _MEASURED_HARMONICS if np.ptp(run.time) * frequency > 2 else 3
     series = fit_harmonics(run.time, run.displacement, orders, frequency=frequency)
     cycles = float(np.ptp(run.time) * series.frequency)
     if cycles < 0.95:
-        raise ExcitationError(
-            f"the steady window holds {cycles:.2f} cycles",
-            where=where,
-            remedy="record at least one full cycle",
-        )
+        found = f"the steady window holds {cycles:.2f} cycles"
+        raise ExcitationError(found, where=where, remedy="record at least one full cycle")
     power = series.sine**2 + series.cosine**2
     residual = float(np.std(run.displacement - series(run.time)))
     return MotionAnalysis(

@@ -77,7 +77,7 @@ def unusable_reason() -> str:
 
 def clear_cache() -> int:
     """Remove all compiled libraries; how many there were."""
-    files = [*_libraries(cache_folder()), *_notes(cache_folder())]
+    files = [*_libraries(cache_folder()), *cache_folder().glob("failed-*.txt")]
     for path in files:
         with suppress(OSError):
             path.unlink()
@@ -109,10 +109,6 @@ def private(folder: Path) -> bool:
 
 def _libraries(folder: Path) -> list[Path]:
     return sorted(folder.glob(f"*-*{_SUFFIX}"))
-
-
-def _notes(folder: Path) -> list[Path]:
-    return sorted(folder.glob("failed-*.txt"))
 
 
 def _kept(key: str) -> ctypes.CDLL | None:
