@@ -29,7 +29,7 @@ def follow_step(tape: Tape, shape: Shape, path: Any, zeta0: ArrayLike = 0.0) -> 
 
 
 @streamed(follow_step)
-def follow(shape: Shape, path: Path, zeta0: ArrayLike = 0.0) -> Floats:
+def follow(shape: Shape, path: Path, zeta0: float = 0.0) -> Floats:
     """Hysteretic state along a motion.
 
     Exact for any motion that is monotone between its samples and reversals; the distance of samples does not matter.
@@ -39,23 +39,19 @@ def follow(shape: Shape, path: Path, zeta0: ArrayLike = 0.0) -> Floats:
     Parameters
     ----------
     shape : Shape
-        One shape, or P of them.
+        One shape.
     path : Path
         The motion, N samples.
-    zeta0 : float or (P,) array
+    zeta0 : float
         State before the first sample [z_max].
 
     Returns
     -------
-    (N,) array, or (P, N) for P shapes
+    (N,) array
         zeta = z/z_max [-] at the samples.
     """
-    _check_start(shape, zeta0)
-    rows = [
-        follow_one(float(kappa), float(rho), shape.n, path, zeta0=float(start))
-        for kappa, rho, start in np.broadcast(shape.kappa, shape.rho, zeta0)
-    ]
-    return np.stack(rows) if shape.is_many else rows[0]
+    _check_start(float(shape.rho), shape.n, float(zeta0))
+    return follow_one(float(shape.kappa), float(shape.rho), shape.n, path, zeta0=float(zeta0))
 
 
 def step(shape: Shape, zeta: Any, dx: Any) -> Any:
@@ -143,17 +139,13 @@ def advance(curve: MasterCurve, rho: Any, w: Any, phi: Any, xp: ModuleType = mat
     return choose(w < 0, released, lambda: curve.climb(w, phi, xp))
 
 
-def _check_start(shape: Shape, zeta0: ArrayLike) -> None:
-    size = float(np.max(np.abs(zeta0), initial=0.0))
+def _check_start(rho: float, n: float, zeta0: float) -> None:
+    size = abs(zeta0)
     if not size <= CEILING:
         raise ParameterError(f"the state starts at {size:g} z_max", remedy=f"start within ±{CEILING:g} z_max")
-    pull = np.asarray(shape.rho) * max(size, 1.0) ** shape.n
-    if np.max(pull) > 1 + 1e-12:
-        raise ParameterError(
-            f"from {size:g} z_max the state runs away for rho = {np.max(shape.rho):g}", remedy="start within ±z_max"
-        )
-    if np.min(pull) < -STEEPEST:
-        raise ParameterError(
-            f"the release from {size:g} z_max is too steep for rho = {np.min(shape.rho):g}",
-            remedy="start within ±z_max",
-        )
+    pull = rho * max(size, 1.0) ** n
+    if pull > 1 + 1e-12:
+        raise ParameterError(f"from {size:g} z_max the state runs away for rho = {rho:g}", remedy="start within ±z_max")
+    if pull < -STEEPEST:
+        found = f"the release from {size:g} z_max is too steep for rho = {rho:g}"
+        raise ParameterError(found, remedy="start within ±z_max")

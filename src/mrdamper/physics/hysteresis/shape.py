@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Self
 
@@ -86,10 +85,6 @@ class Shape:
     def is_many(self) -> bool:
         """True if this holds P shapes rather than one."""
         return np.ndim(self.kappa) > 0 or np.ndim(self.rho) > 0
-
-    def __iter__(self) -> Iterator[Shape]:
-        for kappa, rho in np.broadcast(self.kappa, self.rho):
-            yield Shape(float(kappa), float(rho), self.n)
 
 
 def z_max(beta: float | Floats, gamma: float | Floats, n: float = 2.0, A: float = 1.0) -> float | Floats:

@@ -38,39 +38,33 @@ def steady_loop(shape: Shape, amplitude: float, theta: ArrayLike) -> Floats:
     return sign * forces
 
 
-def loop_harmonics(shape: Shape, amplitude: ArrayLike, orders: Sequence[int] = (1, 3, 5, 7)) -> tuple[Floats, Floats]:
+def loop_harmonics(shape: Shape, amplitude: float, orders: Sequence[int] = (1, 3, 5, 7)) -> tuple[Floats, Floats]:
     """Fourier coefficients of the steady loop, zeta = Σ_k sine_k sin(k theta) + cosine_k cos(k theta).
 
     Parameters
     ----------
     shape : Shape
-        One shape, or P of them.
-    amplitude : float or array
-        Of x = amplitude · sin(theta) [m]; broadcasts with the shapes.
+        One shape.
+    amplitude : float
+        Of x = amplitude · sin(theta) [m].
     orders : sequence of K int
         Orders k >= 1. Even ones are zero.
 
     Returns
     -------
-    sine, cosine : (K,) arrays, or (P, K)
+    sine, cosine : (K,) arrays
         [-], to 1e-13 for n = 1 and 2. The first cosine is the area ∮ zeta dx over π · amplitude.
     """
-    pairs = [loop.harmonics(np.asarray(orders)) for loop in _loops(shape, amplitude)]
-    sine, cosine = (np.array(side) for side in zip(*pairs, strict=True))
-    return (sine, cosine) if np.broadcast(shape.kappa, shape.rho, amplitude).nd else (sine[0], cosine[0])
+    return next(_loops(shape, amplitude)).harmonics(np.asarray(orders))
 
 
 @dataclass(frozen=True)
 class _SteadyLoop:
     """The loading half of the loop of one shape, from −Z to Z."""
 
-    # curve, n, rho: of the shape
     curve: MasterCurve
-    n: float
     rho: float
-    # kappa, reach: kappa · amplitude: amplitude in yield displacements
-    kappa: float
-    reach: float
+    reach: float  # kappa · amplitude: amplitude in yield displacements
     saturation: float  # r = −ln(1 − Z), which keeps its digits where Z is 1 to rounding
 
     @classmethod
@@ -92,7 +86,7 @@ class _SteadyLoop:
             r += max(step, 0.0)
             if step <= 4e-16 * r:
                 break
-        return cls(curve, n, rho, kappa, reach, r)
+        return cls(curve, rho, reach, r)
 
     @cached_property
     def to_zero(self) -> float:
@@ -149,6 +143,6 @@ def _gauss_points(ends: Floats, points: int = 16) -> tuple[Floats, Floats]:
     return (ends[:-1, None] + half * (1 + node)).ravel(), (half * weight).ravel()
 
 
-def _loops(shape: Shape, amplitude: ArrayLike) -> Iterator[_SteadyLoop]:
-    for kappa, rho, x in np.broadcast(shape.kappa, shape.rho, np.asarray(amplitude)):
-        yield _SteadyLoop.of(float(kappa), float(rho), shape.n, float(x))
+def _loops(shape: Shape, amplitude: float) -> Iterator[_SteadyLoop]:
+    for kappa, rho in np.broadcast(shape.kappa, shape.rho):
+        yield _SteadyLoop.of(float(kappa), float(rho), shape.n, float(amplitude))
