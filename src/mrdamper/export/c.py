@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -57,26 +58,11 @@ def program_sources(traced: Program, name: str, title: str) -> dict[str, str]:
 
     dt is among its inputs; its parameters are written as constants. The title is for the comment at the top.
     """
-    word = identifier(name)
-    writer = _ConstantsWriter(traced)
-    setup = writer.setup()
-    derived = [("int" if e.logical else f"{word}_real", writer.name(e).removeprefix("d->")) for e in traced.derived]
-    arguments = [(f"const {word}_derived *d", "d")] if derived else []
+    word, writer = identifier(name), _ConstantsWriter(traced)
+    arguments = [(f"const {word}_derived *d", "d")] if traced.derived else []
     described = _program("model", writer, traced, [*arguments, (f"{word}_state *s", "s")])
-    text = setup + described["body"] + described["results"]
-    facts = {
-        "name": word,
-        "upper": word.upper(),
-        "title": c_comment(title),
-        "version": package_version(),
-        "derived": derived,
-        "members": list(traced.tape.starts),
-        "starts": [(member, repr(start)) for member, start in traced.tape.starts.items()],
-        "main": described,
-        "setup": setup,
-        "helpers": {call: f"{call}(" in text for call in ("signum", "lesser", "greater")},
-        **_tables(traced.tape.tables, writer.number),
-    }
+    starts = [(member, repr(start)) for member, start in traced.tape.starts.items()]
+    facts = _facts(word, title, writer, [described], starts)
     return {f"{word}.h": render("program.h.j2", **facts), f"{word}.c": render("program.c.j2", **facts)}
 
 
@@ -110,15 +96,10 @@ def reference_motion(stepping: Stream, samples: int = _TEST_SAMPLES) -> tuple[np
 
 def c_facts(stepping: Stream, name: str, rig: str, language: type[CWriter] = CWriter) -> dict[str, Any]:
     """Collect the template values of a damper, for C or a language that shares its grammar."""
-    main = language(stepping.step)
+    main, infos = language(stepping.step), stepping.model.parameters() if stepping.model else ()
     drives = {quantity: language(drive, f"from_{quantity}_") for quantity, drive in stepping.drives.items()}
-    setup, infos = main.setup(), stepping.model.parameters() if stepping.model else ()
-    derived = [
-        ("int" if e.logical else f"{name}_real", main.name(e).removeprefix(f"d{main.member}"))
-        for e in stepping.step.derived
-    ]
     arguments = [(f"const {name}_parameters *p", "&m->p")] if infos else []
-    arguments += [(f"const {name}_derived *d", "&m->d")] if derived else []
+    arguments += [(f"const {name}_derived *d", "&m->d")] if stepping.step.derived else []
     described = _program("model", main, stepping.step, [*arguments, (f"{name}_state *s", "next")])
     described_drives = [
         {
@@ -133,29 +114,39 @@ def c_facts(stepping: Stream, name: str, rig: str, language: type[CWriter] = CWr
         for writer in (main, *drives.values())
         for member, start in writer.program.tape.starts.items()
     ]
-    text = setup + "".join(d["body"] + d["results"] for d in (described, *described_drives))
-    return {
-        "name": name,
-        "upper": name.upper(),
+    equation = c_comment((type(stepping.model).__doc__ or "").split("\n\n")[0]) if stepping.model else ""
+    return _facts(name, stepping.title, main, [described, *described_drives], starts) | {
         "rig": c_comment(rig),
-        "title": c_comment(stepping.title),
-        "version": package_version(),
-        "equation": textwrap.wrap(c_comment((type(stepping.model).__doc__ or "").split("\n\n")[0]), 96)
-        if stepping.model
-        else [],
+        "equation": textwrap.wrap(equation, 96),
         "flags": FLAGS,
         "envelope": _envelope(stepping),
         "band": stepping.band,
         "parameters": [_parameter(info, getattr(stepping.model, info.name)) for info in infos],
-        "derived": derived,
+        "drives": described_drives,
+    }
+
+
+def _facts(
+    name: str, title: str, writer: CWriter, described: list[dict[str, Any]], starts: list[tuple[str, str]]
+) -> dict[str, Any]:
+    """Collect the template values of any program, from the descriptions of it and of what goes with it."""
+    setup, program = writer.setup(), writer.program
+    text = setup + "".join(part["body"] + part["results"] for part in described)
+    return {
+        "name": name,
+        "upper": name.upper(),
+        "title": c_comment(title),
+        "version": version("mrdamper"),
+        "derived": [
+            ("int" if e.logical else f"{name}_real", writer.name(e).removeprefix(f"d{writer.member}"))
+            for e in program.derived
+        ],
         "members": [member for member, _ in starts],
         "starts": starts,
-        "main": described,
-        "drives": described_drives,
+        "main": described[0],
         "setup": setup,
-        "has_setup": bool(setup),
-        "helpers": {word: f"{word}(" in text for word in ("signum", "lesser", "greater")},
-        **_tables(stepping.step.tape.tables, main.number),
+        "helpers": {call: f"{call}(" in text for call in ("signum", "lesser", "greater")},
+        **_tables(program.tape.tables, writer.number),
     }
 
 
@@ -218,10 +209,3 @@ def _envelope(stepping: Stream) -> list[tuple[str, str, str]]:
             for name in ("current_A", "frequency_Hz", "amplitude_m", "peak_velocity_m_s")
         )
     ]
-
-
-def package_version() -> str:
-    """Of mrdamper."""
-    from importlib.metadata import version
-
-    return version("mrdamper")

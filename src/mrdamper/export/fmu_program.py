@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,7 +13,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.data.encoding import c_comment
 from mrdamper.export.base import Written, identifier, write_export
-from mrdamper.export.c import package_version, program_sources
+from mrdamper.export.c import program_sources
 from mrdamper.export.fmu import MOST_STEPS, FMUExporter, all_texts, with_token
 from mrdamper.export.fmu_description import units_of, variable
 from mrdamper.tracing import Program
@@ -85,7 +86,7 @@ def _facts(
         "upper": word.upper(),
         "title": c_comment(title),
         "about": f"{title}, written by mrdamper.",
-        "version": package_version(),
+        "version": version("mrdamper"),
         "fmi": fmi,
         "variables": variables,
         "units": units_of(v.unit for v in variables),
