@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.systems.structure import Link, System
+from mrdamper.systems.structure import GRAVITY, Link, System
 
 _TRAVEL, _TYRE = 0.5, 0.5  # weight of a car's travel and tyre deflection beside its acceleration
 
@@ -34,7 +34,7 @@ def aims(system: System) -> tuple[Aim, ...]:
     if system.ground is not None:
         quantities = [Aim("acceleration", name, 1.0) for name in system.coordinates]
         return (*quantities, *(Aim("span", name, lowest**2) for name in system.spans))
-    tyres = {(link.above, link.below): 9.81 / link.gap for link in system.links if link.role == "tyre"}
+    tyres = {(link.above, link.below): GRAVITY / link.gap for link in system.links if link.role == "tyre"}
     quantities = [Aim("acceleration", link.above, 1.0) for link in system.dampers]
     for name, ends in system.spans.items():
         quantities.append(Aim("span", name, _TYRE * tyres[ends] if ends in tyres else _TRAVEL * lowest**2))

@@ -9,6 +9,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.systems.linear import aims
 from mrdamper.systems.result import Simulation
+from mrdamper.systems.structure import GRAVITY
 from mrdamper.systems.weighting import frequency_weighted
 
 _WINDOW = 1.0  # s, of the running mean square behind MTVV
@@ -102,7 +103,7 @@ def benchmark_ratios(done: Simulation, uncontrolled: Simulation) -> dict[str, fl
     }
     dampers = [i for i, link in enumerate(done.links) if link.role == "damper"]
     if dampers:
-        weight = 9.81 * float(np.trace(done.system.M))
+        weight = GRAVITY * float(np.trace(done.system.M))
         ratios["J7"] = np.abs(done.force[:, dampers]).max() / weight
         ratios["J8"] = np.abs(done.stroke[:, dampers]).max() / np.abs(theirs["drift"]).max()
     return {name: float(value) for name, value in ratios.items()}

@@ -16,6 +16,7 @@ from mrdamper.data import Floats
 from mrdamper.errors import StructureError, UnknownNameError, check_fields, validate_arguments
 
 _MAX_FREQUENCY_HZ = 2e3  # natural frequency [Hz]: beyond, a unit is wrong, and a second takes over 80,000 steps
+GRAVITY = 9.81  # acceleration of gravity [m/s²]
 _SYMMETRY = 1e-9  # relative difference of K and K' that rounding may leave
 
 
@@ -160,7 +161,6 @@ def quarter_car(
     tyre_damping: float = 0.0,
     damping: float = 0.0,
     stop: tuple[float, float] | None = None,
-    gravity: float = 9.81,
     title: str = "",
 ) -> System:
     """Make a quarter of a car: body on spring and damper, wheel on a tyre that lifts off.
@@ -170,7 +170,7 @@ def quarter_car(
     """
     axle = _Axle("", "body", "wheel", "road", wheel, spring, damping, tyre, body)
     M = np.diag([body, wheel])
-    return _car(name, title or "quarter car", M, ("body", "wheel"), {}, [axle], tyre_damping, stop, gravity)
+    return _car(name, title or "quarter car", M, ("body", "wheel"), {}, [axle], tyre_damping, stop)
 
 
 def half_car(
@@ -184,7 +184,6 @@ def half_car(
     tyres: tuple[float, float],
     tyre_damping: float = 0.0,
     stop: tuple[float, float] | None = None,
-    gravity: float = 9.81,
     title: str = "",
 ) -> System:
     """Half a car seen from the side: heave and pitch on two axles.
@@ -201,7 +200,7 @@ def half_car(
               front_arm / length * body, behind=length),
     ]  # fmt: skip
     coordinates, M = ("body", "pitch", "wheel_front", "wheel_rear"), np.diag([body, inertia, *wheels])
-    return _car(name, title or "half car", M, coordinates, corners, axles, tyre_damping, stop, gravity)
+    return _car(name, title or "half car", M, coordinates, corners, axles, tyre_damping, stop)
 
 
 @dataclass(frozen=True)
@@ -221,16 +220,9 @@ class _Axle:
 
 
 def _car(
-    name: str,
-    title: str,
-    M: Floats,
-    coordinates: tuple[str, ...],
-    corners: Mapping[str, Floats],
-    axles: Sequence[_Axle],
-    tyre_damping: float,
-    stop: tuple[float, float] | None,
-    gravity: float,
-) -> System:
+    name: str, title: str, M: Floats, coordinates: tuple[str, ...], corners: Mapping[str, Floats],
+    axles: Sequence[_Axle], tyre_damping: float, stop: tuple[float, float] | None,
+) -> System:  # fmt: skip
     n, q = len(coordinates), len(axles)
     C, K, push = np.zeros((n, n)), np.zeros((n, n)), (np.zeros((n, q)), np.zeros((n, q)))
     links, spans = [], {}
@@ -244,7 +236,7 @@ def _car(
         links.append(Link(f"damper{axle.suffix}", *ends))
         if stop is not None:
             links.append(Link(f"stop{axle.suffix}", *ends, "stop", stop[1], 0.0, stop[0]))
-        sunk = (axle.load + axle.mass) * gravity / axle.tyre
+        sunk = (axle.load + axle.mass) * GRAVITY / axle.tyre
         links.append(Link(f"tyre{axle.suffix}", *ground, "tyre", axle.tyre, tyre_damping, sunk))
         spans |= {f"travel{axle.suffix}": ends, f"tyre{axle.suffix}": ground}
     channels, behind = tuple(axle.road for axle in axles), tuple(axle.behind for axle in axles)

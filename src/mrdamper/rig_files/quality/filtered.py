@@ -16,7 +16,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.rig_files.quality.cycles import steady_cycles
 from mrdamper.rig_files.quality.effects import effect_on, percent_of
-from mrdamper.rig_files.quality.view import View, beside
+from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
 _FALLS, _FALLS_ON_AVERAGE = 3.0, 5.0  # [dB] from octave to octave; a first-order filter has 6, white noise 0
@@ -77,6 +77,8 @@ def noise_by_octave(view: View, name: str) -> tuple[Floats, float]:
     highest : float
         Upper end of the first octave [Hz].
     """
+    from scipy.ndimage import binary_dilation
+
     motion, values = view.motion, _at_every_step(view, name)
     assert motion is not None
     nyquist = 0.5 * (values.size - 1) / float(np.ptp(view.steady.time))
@@ -88,7 +90,8 @@ def noise_by_octave(view: View, name: str) -> tuple[Floats, float]:
     place = np.arange(lag, values.size, dtype=np.float64) - period
     changes = np.diff(values[lag:] - _between(values, place))
     third = np.abs(values[3:] - values[:-3] - 3 * (values[2:-1] - values[1:-2]))
-    bends = beside(np.concatenate([[False], third > _CORNER_BENDS * np.median(third), [False, False]]), _BESIDE)
+    corners = np.concatenate([[False], third > _CORNER_BENDS * np.median(third), [False, False]])
+    bends = np.asarray(binary_dilation(corners, iterations=_BESIDE), dtype=bool)
     bends = bends[lag:] | bends[place.astype(int)] | bends[place.astype(int) + 1]
     window = np.hanning(changes.size + 2)[1:-1] * ~(bends[1:] | bends[:-1])
     weight = 4 * float(np.sum(window**2)) * float(np.ptp(values)) ** 2

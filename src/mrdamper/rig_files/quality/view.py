@@ -192,10 +192,3 @@ def runs_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     bounds = np.concatenate([[0], edges, [mask.size]])
     first = 0 if mask.size and mask[0] else 1
     return bounds[:-1][first::2], bounds[1:][first::2]
-
-
-def beside(mask: np.ndarray, reach: int) -> np.ndarray:
-    """(N,) mask of the samples up to a number of samples from a true one."""
-    count = np.cumsum(np.concatenate([np.zeros(reach + 1, dtype=int), mask, np.zeros(reach, dtype=int)]))
-    count[reach + mask.size + 1 :] = count[reach + mask.size]
-    return count[2 * reach + 1 :] > count[: mask.size]
