@@ -147,5 +147,5 @@ def _check_start(rho: float, n: float, zeta0: float) -> None:
     if pull > 1 + 1e-12:
         raise ParameterError(f"from {size:g} z_max the state runs away for rho = {rho:g}", remedy="start within ±z_max")
     if pull < -STEEPEST:
-        found = f"the release from {size:g} z_max is too steep for rho = {rho:g}"
-        raise ParameterError(found, remedy="start within ±z_max")
+        problem = f"the release from {size:g} z_max is too steep for rho = {rho:g}"
+        raise ParameterError(problem, remedy="start within ±z_max")

@@ -57,8 +57,8 @@ def analyse_motion(run: Run) -> MotionAnalysis:
     series = fit_harmonics(run.time, run.displacement, orders, frequency=frequency)
     cycles = float(np.ptp(run.time) * series.frequency)
     if cycles < 0.95:
-        found = f"the steady window holds {cycles:.2f} cycles"
-        raise ExcitationError(found, where=where, remedy="record at least one full cycle")
+        problem = f"the steady window holds {cycles:.2f} cycles"
+        raise ExcitationError(problem, where=where, remedy="record at least one full cycle")
     power = series.sine**2 + series.cosine**2
     residual = float(np.std(run.displacement - series(run.time)))
     return MotionAnalysis(
