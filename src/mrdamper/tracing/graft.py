@@ -14,20 +14,10 @@ from mrdamper.tracing.tape import Tape, TracedLoop
 
 
 class ProgramCopy:
-    """A program on another tape.
+    """A program on another tape, its parameters as they were traced.
 
-    Parameters
-    ----------
-    source : Program
-        Its parameters stay as they were traced.
-    tape : Tape
-        To write on.
-    prefix : str
-        Of the names of its memory there.
-    varying : str
-        The input that differs from answer to answer.
-    inputs : expressions
-        All other inputs.
+    The names of its memory there begin with `prefix`; the input `varying` differs from answer to answer, all others are
+    given as expressions.
     """
 
     def __init__(self, source: Program, tape: Tape, prefix: str, varying: str, **inputs: Any):

@@ -34,21 +34,10 @@ class Products:
 
 
 def batch_cost(path: Path, fixed: FixedColumns, shapes: Shape) -> Floats:
-    """Sum of squared force errors for many shapes; nothing of shapes × samples is kept.
+    """(P,) sums of squared force errors [N²] of P shapes, by their best coefficients, that of zeta not below zero.
 
-    Parameters
-    ----------
-    path : Path
-        N samples.
-    fixed : FixedColumns
-        At the last M samples of the path; the ones before only set the state.
-    shapes : Shape
-        P of them.
-
-    Returns
-    -------
-    (P,) array
-        Of the best coefficients, that of zeta not below zero [N²].
+    Nothing of shapes × samples is kept. The columns are fixed at the last M samples of the path; the ones before only
+    set the state.
     """
     sums = products(path, fixed, shapes)
     left = sums.square - np.sum(sums.along**2, axis=1)  # squared zeta that no column explains

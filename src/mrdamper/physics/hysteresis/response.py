@@ -30,46 +30,20 @@ def follow_step(tape: Tape, shape: Shape, path: Any, zeta0: ArrayLike = 0.0) -> 
 
 @streamed(follow_step)
 def follow(shape: Shape, path: Path, zeta0: float = 0.0) -> Floats:
-    """Hysteretic state along a motion.
+    """(N,) hysteretic state z/z_max [-] of one shape along a motion, from the state zeta0 before its first sample.
 
     Exact for any motion that is monotone between its samples and reversals; the distance of samples does not matter.
     Accurate to 1e-12 for n = 1 and 2, to 1e-8 for other n. Raises `ParameterError` if zeta0 lies where the state
     would run away.
-
-    Parameters
-    ----------
-    shape : Shape
-        One shape.
-    path : Path
-        The motion, N samples.
-    zeta0 : float
-        State before the first sample [z_max].
-
-    Returns
-    -------
-    (N,) array
-        zeta = z/z_max [-] at the samples.
     """
     _check_start(float(shape.rho), shape.n, float(zeta0))
     return follow_one(float(shape.kappa), float(shape.rho), shape.n, path, zeta0=float(zeta0))
 
 
 def step(shape: Shape, zeta: Any, dx: Any) -> Any:
-    """State after a displacement dx: `follow` for one number, plain or traced.
+    """State [z_max] after a monotone displacement dx [m] from the state zeta [z_max]: `follow` for one number.
 
-    Parameters
-    ----------
-    shape : Shape
-        One shape.
-    zeta : float
-        State before [z_max].
-    dx : float
-        Displacement, monotone [m].
-
-    Returns
-    -------
-    float
-        State after [z_max]. The caller vouches for the start: nothing is checked here.
+    Plain or traced. The caller vouches for the start: nothing is checked here.
     """
     curve, back = master_curve(shape.n), dx < 0
     xp = math if isinstance(back, bool) else functions

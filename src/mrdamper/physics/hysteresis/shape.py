@@ -40,16 +40,9 @@ class Shape:
 
     @classmethod
     def from_bouc_wen(cls, beta: float | Floats, gamma: float | Floats, n: float = 2.0, A: float = 1.0) -> Self:
-        """Shape of dz/dt = A v − beta |v| |z|^(n−1) z − gamma v |z|^n.
+        """Shape of dz/dt = A v − beta |v| |z|^(n−1) z − gamma v |z|^n, beta and gamma (P,) in m^−n for z in m.
 
         Raises `ParameterError` if energy would be created (beta < 0) or z has no bound (beta + gamma <= 0 or A <= 0).
-
-        Parameters
-        ----------
-        beta, gamma : float or (P,) array
-            Coefficients of |v| and of v [m^−n for z in m].
-        n, A : float
-            [-]
         """
         if not (np.all(dissipates(beta, gamma)) and A > 0):
             raise ParameterError(

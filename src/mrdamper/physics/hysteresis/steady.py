@@ -39,21 +39,10 @@ def steady_loop(shape: Shape, amplitude: float, theta: ArrayLike) -> Floats:
 
 
 def loop_harmonics(shape: Shape, amplitude: float, orders: Sequence[int] = (1, 3, 5, 7)) -> tuple[Floats, Floats]:
-    """Fourier coefficients of the steady loop, zeta = Σ_k sine_k sin(k theta) + cosine_k cos(k theta).
+    """Fourier coefficients of the steady loop of one shape, zeta = Σ_k sine_k sin(k theta) + cosine_k cos(k theta).
 
-    Parameters
-    ----------
-    shape : Shape
-        One shape.
-    amplitude : float
-        Of x = amplitude · sin(theta) [m].
-    orders : sequence of K int
-        Orders k >= 1. Even ones are zero.
-
-    Returns
-    -------
-    sine, cosine : (K,) arrays
-        [-], to 1e-13 for n = 1 and 2. The first cosine is the area ∮ zeta dx over π · amplitude.
+    `amplitude` of x = amplitude · sin(theta) [m]; `orders` k >= 1 (K,), even ones are zero. Returns sine and cosine
+    (K,) [-], to 1e-13 for n = 1 and 2. The first cosine is the area ∮ zeta dx over π · amplitude.
     """
     return next(_loops(shape, amplitude)).harmonics(np.asarray(orders))
 

@@ -63,17 +63,9 @@ class HarmonicSeries:
 
 
 def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float, drift: bool = True) -> HarmonicSeries:
-    """Least-squares harmonic series at a known fundamental.
+    """Least-squares harmonic series of a signal (N,) at a known fundamental frequency [Hz], maybe with a linear drift.
 
-    Parameters
-    ----------
-    time, signal : (N,) arrays
-    orders : int
-        Number of harmonics; lowered where the record cannot resolve them.
-    frequency : float
-        Fundamental [Hz].
-    drift : bool
-        Fit a linear drift of the mean.
+    The number of harmonics is lowered where the record cannot resolve them.
     """
     origin = float(time[0])
     nyquist = 0.5 * (time.size - 1) / float(time[-1] - time[0])

@@ -35,14 +35,8 @@ def lag_step(tape: Tape, time: Any, signal: Any, time_constant: Any) -> Any:
 def first_order_lag(time: Floats, signal: Floats, time_constant: float) -> Floats:
     """Y with T dy/dt + y = signal, from y = 0 at the first sample.
 
-    y_i = p_i y_(i−1) + g_i with p = exp(−Δt/T). No loop over samples: a few passes over the array.
-
-    Parameters
-    ----------
-    time, signal : (N,) arrays
-        [s]; the signal counts as straight between samples.
-    time_constant : float
-        T [s]; 0 passes the signal on.
+    y_i = p_i y_(i−1) + g_i with p = exp(−Δt/T). No loop over samples: a few passes over the array. The signal counts as
+    straight between the times (N,) [s]; a time constant T [s] of 0 passes it on.
     """
     if time_constant <= 0:
         return signal.copy()
@@ -105,16 +99,8 @@ def load_step(tape: Tape, time: Any, path: Any, length: Any, leak: Any) -> Any:
 def leaking_load(time: Floats, path: Path, length: float, leak: float) -> Floats:
     """G with dG/dt = (|v|/length)(1 − G) − leak G, from G = 1: a load built up by motion that leaks away at rest.
 
-    Parameters
-    ----------
-    time : (N,) array
-        [s]
-    path : Path
-        N samples; the speed counts as constant between two.
-    length : float
-        Motion in which the load builds up [m].
-    leak : float
-        Share of the load lost in a second [1/s]; 0 keeps it for ever.
+    The speed counts as constant between two times (N,) [s] of the path. `length` is the motion in which the load builds
+    up [m], `leak` the share of it lost in a second [1/s]; 0 keeps it for ever.
     """
     return np.ones(time.size) if leak <= 0 else _loaded(path, time, length, leak)
 

@@ -35,19 +35,10 @@ def measured_motion(run: Run) -> Excitation:
 
 
 def smooth(time: Floats, signal: Floats, span: float | None = None) -> tuple[Floats, Floats, Floats]:
-    """Value, slope and curvature of local quadratics through a sampled signal.
+    """Value, slope and curvature (N,) of local quadratics through a sampled signal (N,); sampling need not be uniform.
 
-    Parameters
-    ----------
-    time, signal : (N,) arrays
-        Sampling need not be uniform.
-    span : float, optional
-        Width of the fit [s]; default a fortieth of the signal's characteristic period
-        2π rms(signal)/rms(slope). Never under five samples.
-
-    Returns
-    -------
-    value, slope, curvature : (N,) arrays
+    `span` is the width of the fit [s]; default a fortieth of the signal's characteristic period 2π
+    rms(signal)/rms(slope). Never under five samples.
     """
     size, time = time.size, whole_clock(time)
     if span is None:

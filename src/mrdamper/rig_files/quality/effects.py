@@ -12,20 +12,10 @@ _YIELD = np.geomspace(0.004, 1.0, 14)  # yield displacements tried, of half the 
 
 
 def elastic_plastic(x: Floats, rising: np.ndarray, yields: Floats) -> Floats:
-    """Steady states, in -1...1, of elastic–plastic elements over one cycle of two strokes.
+    """(P, Y) steady states, in -1...1, of elastic–plastic elements over one cycle of two strokes.
 
-    Parameters
-    ----------
-    x : (P,) array
-        Displacement [m].
-    rising : (P,) mask
-        Where the velocity is positive.
-    yields : (Y,) array
-        Yield displacements [m]; at most half the stroke acts.
-
-    Returns
-    -------
-    (P, Y) array
+    Of displacements x (P,) [m], rising where the velocity is positive, and yield displacements (Y,) [m], of which at
+    most half the stroke acts.
     """
     low, high = float(np.min(x)), float(np.max(x))
     bend = np.minimum(yields, 0.5 * (high - low))
@@ -34,17 +24,9 @@ def elastic_plastic(x: Floats, rising: np.ndarray, yields: Floats) -> Floats:
 
 
 def damping(x: Floats, v: Floats, force: Floats) -> float:
-    """Fit F = f0 + k x + c v + an elastic–plastic force of free yield displacement to one cycle.
+    """Fit F = f0 + k x + c v + an elastic–plastic force of free yield displacement to one cycle of equal phases (P,).
 
-    Parameters
-    ----------
-    x, v, force : (P,) arrays
-        At equal phases of a cycle; in any units.
-
-    Returns
-    -------
-    float
-        c; NaN where the motion determines none.
+    Returns c, in the units given; NaN where the motion determines none.
     """
     half, fastest = 0.5 * float(np.ptp(x)), float(np.max(np.abs(v)))
     if half == 0 or fastest == 0:

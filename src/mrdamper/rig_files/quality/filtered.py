@@ -68,14 +68,10 @@ def channels_are_unfiltered(view: View) -> Iterator[Finding]:
 
 
 def noise_by_octave(view: View, name: str) -> tuple[Floats, float]:
-    """Median power of a channel's noise in octaves from the highest on down.
+    """Median power of a channel's noise in octaves from the highest on down, and the upper end of the first [Hz].
 
-    Returns
-    -------
-    levels : (K,) array
-        RMS, if it were white, over the channel's peak-to-peak value [dB]; empty where it is no noise, or too short.
-    highest : float
-        Upper end of the first octave [Hz].
+    As (K,) levels of the RMS, if it were white, over the channel's peak-to-peak value [dB]; empty where it is no noise,
+    or too short.
     """
     from scipy.ndimage import binary_dilation
 

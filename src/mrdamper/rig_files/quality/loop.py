@@ -196,11 +196,8 @@ def repeats(view: View) -> Iterator[Finding]:
 def repeatability(view: View) -> tuple[float, float] | None:
     """Cycle-to-cycle scatter of the force and its sample noise, over the peak-to-peak force.
 
-    Returns
-    -------
-    (float, float) or None
-        RMS deviation of the cycles from their mean, without the first of three or more; part
-        of it that is noise from sample to sample. None under two cycles of a periodic motion.
+    RMS deviation of the cycles from their mean, without the first of three or more, and the part of it that is noise
+    from sample to sample. None under two cycles of a periodic motion.
     """
     cycles = steady_cycles(view)
     if cycles is None or len(cycles.starts) < 2 or cycles.force.span == 0.0:

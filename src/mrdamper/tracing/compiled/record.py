@@ -51,16 +51,10 @@ class RecordProgram:
     def along(
         self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], channels: Sequence[ArrayLike]
     ) -> Along:
-        """Run along a record.
+        """Run along a record: channels (N,) are the inputs in the program's order.
 
-        Parameters
-        ----------
-        given, derived : sequences of float
-            Parameters, and what `prepare` made of them.
-        memory : sequence of float
-            Before the first sample; `starts` for a damper at rest.
-        channels : sequence of (N,) arrays
-            The inputs in the program's order.
+        Parameters are given, with what `prepare` made of them, and the memory before the first sample: `starts` for a
+        damper at rest.
         """
         arrays = [np.asarray(channel, dtype=float) for channel in channels]
         size = arrays[0].size
