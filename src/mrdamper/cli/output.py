@@ -13,7 +13,6 @@ from mrdamper.errors import InputError, OutputError
 if TYPE_CHECKING:
     from mrdamper.physics.gas_spring import GasSpring
     from mrdamper.report.plots.figure import Figure
-    from mrdamper.study.validation import Validation
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -83,16 +82,6 @@ def percent(share: float) -> str:
     return f"{100 * share:.2f} %" if math.isfinite(share) else "–"
 
 
-def spread(scores: Validation) -> str:
-    """Median error of some runs and, in brackets, the worst."""
-    return f"{percent(scores.median())} ({percent(scores.worst_error())})" if scores.runs else percent(math.nan)
-
-
-def parse_fixed(pairs: Sequence[str]) -> dict[str, float]:
-    """NAME=VALUE arguments as a mapping; raises `InputError` if one is not of that form."""
-    return _numbers(pairs, "--fix", "write --fix NAME=VALUE with a number in SI units")
-
-
 def parse_pairs(pairs: Sequence[str], option: str) -> dict[str, str]:
     """NAME=VALUE arguments as text; raises `InputError` if one is not of that form."""
     values = {}
@@ -109,10 +98,11 @@ def parse_named(text: str, option: str) -> tuple[str, dict[str, float]]:
     name, colon, rest = text.partition(":")
     if not colon or "=" not in rest:
         return text, {}
-    return name, _numbers(rest.split(","), option, "give a number in SI units")
+    return name, parse_numbers(rest.split(","), option)
 
 
-def _numbers(pairs: Sequence[str], option: str, remedy: str) -> dict[str, float]:
+def parse_numbers(pairs: Sequence[str], option: str, remedy: str = "give a number in SI units") -> dict[str, float]:
+    """NAME=VALUE arguments as numbers; raises `InputError` if one is not of that form."""
     values = {}
     for name, text in parse_pairs(pairs, option).items():
         try:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from mrdamper.cli.output import parse_fixed, parse_gas, parse_pairs, put
+from mrdamper.cli.output import parse_gas, parse_numbers, parse_pairs, put
 from mrdamper.cli.progress import progress_on_stderr
 
 _MAX_WARNINGS = 10  # number of lines on the terminal
@@ -40,7 +40,8 @@ def identify(
     from mrdamper.study import workflow
 
     chosen_model, chosen_method = model_type(model), method_named(method, parse_pairs(setting, "--set"))
-    fixed, spring = parse_fixed(fix), parse_gas(gas)
+    spring = parse_gas(gas)
+    fixed = parse_numbers(fix, "--fix", "write --fix NAME=VALUE with a number in SI units")
     require_writable(out)
     dataset = load_dataset(data)
     if run:

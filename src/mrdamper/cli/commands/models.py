@@ -48,54 +48,40 @@ def _line(model) -> str:
 
 
 def _page(model) -> str:
-    if not hasattr(model, "parameters"):
-        notes = (model.__doc__ or "").strip().replace("\n    ", "\n")
+    notes = (model.__doc__ or "").strip().replace("\n    ", "\n")
+    if hasattr(model, "parameters"):
+        title, equation = model.title, model.equation
+        rows = [("parameter", "unit", "bounds", "determined", "meaning")]
+        for info in model.parameters():
+            low, high = info.bounds
+            way = "preset" if info.preset else "solved" if info.linear else "searched"
+            if info.preset and info.default is not None:
+                way += f" {info.default:g}"
+            rows.append((info.name, info.unit, f"{low:g} ... {high:g}", way, info.meaning))
+        facts = aligned(rows, range(len(rows[0])))
+    else:
+        title, equation = model.heading, model.__dict__.get("equation", "")
         facts = [f"limits: {model.limits}", f"source: {model.source}"]
         if unverified := getattr(model, "unverified", ""):
             facts.append(f"not verified against the publication: {unverified}")
-        equation = model.__dict__.get("equation", "")
-        lines = [f"{model.name}: {model.heading}", "", notes, "", *facts]
-        return "\n".join([*lines, "", f"LaTeX: {equation}"] if equation else lines)
-
-    rows = [("parameter", "unit", "bounds", "determined", "meaning")]
-    for info in model.parameters():
-        low, high = info.bounds
-        way = "preset" if info.preset else "solved" if info.linear else "searched"
-        if info.preset and info.default is not None:
-            way += f" {info.default:g}"
-        rows.append((info.name, info.unit, f"{low:g} ... {high:g}", way, info.meaning))
-    table = aligned(rows, range(len(rows[0])))
-    notes = (model.__doc__ or "").strip()
-    return "\n".join(
-        [f"{model.name}: {model.title}", "", notes.replace("\n    ", "\n"), "", *table, "", f"LaTeX: {model.equation}"]
-    )
+    lines = [f"{model.name}: {title}", "", notes, "", *facts]
+    return "\n".join([*lines, "", f"LaTeX: {equation}"] if equation else lines)
 
 
 def _entry(model) -> dict:
     def plain(value):
         return value if value is not None and math.isfinite(value) else None
 
-    own = hasattr(model, "parameters")
-    head = {
-        "name": model.name,
-        "title": model.title if own else model.heading,
-        "equation": model.equation if own else model.__dict__.get("equation", ""),
-        "source": model.source,
-    }
-    if not own:
+    if not hasattr(model, "parameters"):
+        head = {"name": model.name, "title": model.heading, "equation": model.__dict__.get("equation", "")}
         unverified = getattr(model, "unverified", "") or None
         further = {"limits": model.limits, "unverified": unverified, "basis": model.basis or None}
-        return head | further | {"parameters": []}
+        return head | {"source": model.source} | further | {"parameters": []}
+    facts = ("name", "unit", "meaning", "bounds", "linear", "preset", "default")
     parameters = [
-        {
-            "name": info.name,
-            "unit": info.unit,
-            "meaning": info.meaning,
-            "bounds": [plain(bound) for bound in info.bounds],
-            "linear": info.linear,
-            "preset": info.preset,
-            "default": plain(info.default),
-        }
+        {fact: getattr(info, fact) for fact in facts}
+        | {"bounds": [plain(bound) for bound in info.bounds], "default": plain(info.default)}
         for info in model.parameters()
     ]
+    head = {fact: getattr(model, fact) for fact in ("name", "title", "equation", "source")}
     return head | {"parameters": parameters}
