@@ -109,9 +109,25 @@ def _models() -> None:
 
 def _codes() -> None:
     """One page with every error and warning code."""
-    from mrdamper.cli.commands.explain import codes_page
-
     (HERE / "reference" / "codes.md").write_text(codes_page(), encoding="utf-8")
+
+
+def codes_page() -> str:
+    """Return the page of all codes in Markdown."""
+    from mrdamper.cli.commands.explain import load_codes
+
+    parts = [
+        "# Error and warning codes\n",
+        "Every message ends with a code in brackets. `mrdamper explain E_LIMITS` prints one of the entries below. "
+        "An error (E_) ends the command or excludes a file or run; a warning (W_) is reported with the result.\n",
+    ]
+    for title, prefix in (("Errors", "E_"), ("Warnings", "W_")):
+        parts.append(f"## {title}\n")
+        for name, entry in load_codes().items():
+            if name.startswith(prefix):
+                parts.append(f"### {name}\n\n{entry['meaning']}\n")
+                parts.append(f"Example: `` {entry['example']} ``\n\nWhat to do: {entry['remedy']}\n")
+    return "\n".join(parts)
 
 
 def _plain_bars(app, what, name, thing, options, lines: list[str]) -> None:

@@ -11,7 +11,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from benchmarks import open as benchmark
-from mrdamper.cli.commands.explain import codes_page
+from mrdamper.cli.commands.explain import load_codes
 from mrdamper.errors import InputError
 from mrdamper.statistics.metrics import nrmse_pp
 
@@ -95,7 +95,7 @@ def test_a_bad_submission_is_named(submit, kind):
     with pytest.raises(InputError, match=words) as refused:
         submit(change)
     assert refused.value.code == code
-    assert code in codes_page()
+    assert code in load_codes()
 
 
 @pytest.mark.parametrize(("about", "words"), [("nmae = 'x'\n" + ABOUT, "nmae"), ('name = "Mine"\n', "parameters")])

@@ -138,14 +138,6 @@ def test_without_beta_it_is_an_elastic_spring(n):
         assert np.all(np.isfinite(loop_harmonics(shape, amplitude)))
 
 
-def test_time_does_not_matter():
-    x = 0.02 * np.sin(np.linspace(0, 20, 500))
-    shape = Shape(632.0, -0.5)
-    fast, slow = (Path.of(x, np.linspace(0, duration, 500)) for duration in (0.1, 100.0))
-    # The time axis is rounded differently; nothing else differs.
-    np.testing.assert_allclose(follow(shape, fast), follow(shape, slow), atol=ROUNDING)
-
-
 @given(exponents, asymmetries)
 def test_far_below_yield_it_is_a_spring(n, rho):
     x = 0.01 * np.sin(np.linspace(0, 12, 300))
@@ -249,16 +241,6 @@ def test_parabola_finds_the_missed_peak(phase):
         assert error("samples") > 1e-6
 
 
-def test_parabola_knows_uneven_sampling():
-    rng = np.random.default_rng(3)
-    theta = np.sort(rng.uniform(0, 8 * np.pi, 8000))
-    shape, amplitude = Shape(1 / 0.002, 0.0, 2), 0.02
-    half = theta > 4 * np.pi
-    zeta = follow(shape, Path.of(amplitude * np.sin(theta), theta))
-    # Gaps reach 9 mean steps: 0.03 rad, whose fourth power is 1e-6.
-    assert np.max(np.abs(zeta - steady_loop(shape, amplitude, theta))[half]) < 1e-5
-
-
 def test_equal_samples_that_straddle_the_peak_are_no_rest():
     x = np.array([0.0, 0.8, 1.0, 1.0, 0.8, 0.0])
     path = Path.of(x)
@@ -274,11 +256,6 @@ def test_an_inserted_peak_stays_near_its_sample(x):
     # Uniform sampling: each end of a stroke moves by at most an eighth of the neighbouring move.
     assert np.all(np.abs(np.subtract(path.lengths, plain.lengths)) <= moves / 4 + 1e-15)
     assert np.all(path.distance >= 0)
-
-
-def test_a_gap_in_time_does_not_throw_the_peak():
-    path = Path.of(np.array([0.0, 1.0, 1.0 - 1e-9, 0.0]), np.array([0.0, 1.0, 1000.0, 1001.0]))
-    assert path.lengths[0] <= 2.0
 
 
 def test_triangle_wave_turns_at_its_corner():
@@ -434,12 +411,6 @@ def test_only_energy_sources_are_refused(beta, gamma, fine):
 def test_impossible_motions_are_refused(x):
     with pytest.raises(ExcitationError):
         Path.of(x)
-
-
-@pytest.mark.parametrize("time", [[0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 2.0, 1.0]])
-def test_time_that_does_not_fit_is_refused(time):
-    with pytest.raises(ExcitationError):
-        Path.of([0.0, 1.0, 0.5], time)
 
 
 def test_starts_that_run_away_are_refused():

@@ -35,19 +35,3 @@ def explain(
 def load_codes() -> dict[str, dict[str, str]]:
     """Return meaning, example and remedy by code, errors (E_) first."""
     return tomllib.loads(files("mrdamper").joinpath("codes.toml").read_text(encoding="utf-8"))
-
-
-def codes_page() -> str:
-    """Return the page of all codes in Markdown."""
-    parts = [
-        "# Error and warning codes\n",
-        "Every message ends with a code in brackets. `mrdamper explain E_LIMITS` prints one of the entries below. "
-        "An error (E_) ends the command or excludes a file or run; a warning (W_) is reported with the result.\n",
-    ]
-    for title, prefix in (("Errors", "E_"), ("Warnings", "W_")):
-        parts.append(f"## {title}\n")
-        for name, entry in load_codes().items():
-            if name.startswith(prefix):
-                parts.append(f"### {name}\n\n{entry['meaning']}\n")
-                parts.append(f"Example: `` {entry['example']} ``\n\nWhat to do: {entry['remedy']}\n")
-    return "\n".join(parts)

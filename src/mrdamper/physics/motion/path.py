@@ -28,33 +28,22 @@ class Path:
     first_direction: float  # direction of the first stroke
 
     @classmethod
-    def of(
-        cls,
-        displacement: ArrayLike,
-        time: ArrayLike | None = None,
-        *,
-        peaks: Literal["parabola", "samples"] = "parabola",
-    ) -> Self:
-        """Cut a motion at its reversals.
+    def of(cls, displacement: ArrayLike, *, peaks: Literal["parabola", "samples"] = "parabola") -> Self:
+        """Cut a motion of displacements (N,) [m] at its reversals, about which the samples count as even in time.
 
-        Raises `ExcitationError` if the arrays do not fit together or hold anything but finite numbers.
-
-        Parameters
-        ----------
-        displacement : (N,) array
-            [m]
-        time : (N,) array, optional
-            [s], increasing. Needed only if the sampling is not uniform.
-        peaks : {"parabola", "samples"}
-            A smooth motion turns between two samples, beyond both. "parabola" puts the peak where
-            the parabola through the three samples at the reversal has its vertex, "samples" at the
-            outermost sample. At 1000 samples a cycle that is an error of zeta of 1e-9 against 1e-4.
+        A smooth motion turns between two samples, beyond both. "parabola" puts the peak where the parabola through the
+        three samples at the reversal has its vertex, "samples" at the outermost sample. At 1000 samples a cycle that is
+        an error of zeta of 1e-9 against 1e-4. Raises `ExcitationError` if the array is no channel of finite numbers.
         """
-        x, t = _checked_motion(displacement, time)
+        x = np.asarray(displacement, dtype=float)
+        if x.ndim != 1 or x.size == 0:
+            raise ExcitationError(f"displacement has shape {x.shape}", remedy="give one channel, samples in a row")
+        if not np.isfinite(x).all():
+            raise ExcitationError("displacement holds NaN or infinity", remedy="cut or repair the record")
         arrival, departure, first = _reversals(x)
         peak, begin = x[arrival], departure + 1  # a rest belongs to the stroke it ends
         if peaks == "parabola":
-            beyond, is_early = _vertex(x, t, arrival, departure)
+            beyond, is_early = _vertex(x, arrival, departure)
             peak, begin = peak + beyond, np.where(beyond == 0, begin, arrival + 1 - is_early)
 
         counts = np.diff(np.concatenate([[0], begin, [x.size]]))
@@ -124,22 +113,6 @@ def memoize_per_path(function: Callable[..., Floats]) -> Callable[..., Floats]:
     return remembered
 
 
-def _checked_motion(displacement: ArrayLike, time: ArrayLike | None) -> tuple[Floats, Floats | None]:
-    x = np.asarray(displacement, dtype=float)
-    if x.ndim != 1 or x.size == 0:
-        raise ExcitationError(f"displacement has shape {x.shape}", remedy="give one channel, samples in a row")
-    if not np.isfinite(x).all():
-        raise ExcitationError("displacement holds NaN or infinity", remedy="cut or repair the record")
-    if time is None:
-        return x, None
-    t = np.asarray(time, dtype=float)
-    if t.shape != x.shape:
-        raise ExcitationError(f"displacement has shape {x.shape}, time {t.shape}", remedy="trim or resample the run")
-    if not (t[1:] > t[:-1]).all():
-        raise ExcitationError("time does not increase", remedy="sort the samples and drop the repeated ones")
-    return x, t
-
-
 def _reversals(x: Floats) -> tuple[np.ndarray, np.ndarray, float]:
     """Find the samples where the motion arrives at its turning points and departs from them, and its first direction.
 
@@ -155,26 +128,17 @@ def _reversals(x: Floats) -> tuple[np.ndarray, np.ndarray, float]:
     return (turn + 1, turn + 1, first) if moving is None else (moving[turn] + 1, moving[turn + 1], first)
 
 
-def _vertex(x: Floats, t: Floats | None, arrival: np.ndarray, departure: np.ndarray) -> tuple[Floats, np.ndarray]:
+def _vertex(x: Floats, arrival: np.ndarray, departure: np.ndarray) -> tuple[Floats, np.ndarray]:
     """Calculate how far beyond the outermost sample the motion turned (signed), and if before that sample.
 
-    The vertex of the parabola through the sample and its neighbours. Two equal outermost
-    samples straddle the peak, and the parabola knows; three or more are a rest or the
-    resolution of the sensor, and the motion turned there. The vertex lies beyond the sample by
-    at most an eighth of the larger neighbouring move if sampling is uniform; next to a gap
-    the parabola could shoot further, so that move is the bound.
+    The vertex of the parabola through the sample and its neighbours, at most an eighth of the larger
+    neighbouring move beyond the sample. Two equal outermost samples straddle the peak, and the parabola
+    knows; three or more are a rest or the resolution of the sensor, and the motion turned there.
     """
     before, here, after = x[arrival - 1], x[arrival], x[arrival + 1]
     came, leaves = here - before, here - after  # of one sign; `leaves` may be 0
-    if t is None:
-        lead, lag = np.ones_like(here), np.ones_like(here)
-    else:
-        lead, lag = t[arrival] - t[arrival - 1], t[arrival + 1] - t[arrival]
-    slope = came * lag / lead - leaves * lead / lag  # velocity at the sample times lead + lag
-    bend = came / lead + leaves / lag  # half the deceleration times lead + lag
-    beyond = slope**2 / (4 * bend * (lead + lag))
-    bound = np.maximum(np.abs(came), np.abs(leaves))
-    beyond = np.clip(beyond, -bound, bound)
+    slope = came - leaves  # twice the velocity at the sample, in moves a sample
+    beyond = slope**2 / (8 * (came + leaves))
     beyond[departure > arrival + 1] = 0.0
     # Still slower on the far side means the motion turned after the sample.
     is_early = (slope * came < 0) & (beyond != 0)
