@@ -13,11 +13,13 @@ import pytest
 from support.command import mrdamper
 
 from mrdamper.cli import application
+from mrdamper.cli.commands import validate
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.models.bingham import Bingham
+from mrdamper.rig_files.dataset_folder import load_dataset
 from mrdamper.statistics.functions.forms import ParameterFunction
 
 
@@ -237,3 +239,11 @@ def test_a_prediction_is_drawn_and_another_kind_of_file_is_refused(model, tmp_pa
     assert refused.returncode == 2
     assert "[E_OUTPUT]" in refused.stderr
     assert not other.exists()
+
+
+def test_a_rig_without_a_name_is_called_so(capsys):
+    dataset = load_dataset().rig("utfsm")
+    assert tuple(validate._rig(dataset, None, "").rigs) == ("utfsm",)
+    assert capsys.readouterr().err.startswith("the model is of a rig without a name; scoring the dataset's only rig, ")
+    assert tuple(validate._rig(dataset, "utfsm", "").rigs) == ("utfsm",)
+    assert capsys.readouterr().err == ""

@@ -24,15 +24,13 @@ class RiseTimes:
     fall_90: float
 
 
-def rise_times(damper: Damper, current: float | None = None, velocity: float | None = None) -> RiseTimes:
+def rise_times(damper: Damper) -> RiseTimes:
     """Measure the times of the force at constant velocity after steps of current, up and down.
 
-    The current is switched on and off [A]; default: the highest tested. The velocity is half the highest tested [m/s]
-    unless given. Without a coil the answer is the model's own. Raises `ParameterError` if the force does not change
-    with the current.
+    The highest tested current is switched on and off at half the highest tested velocity. Without a coil the answer is
+    the model's own. Raises `ParameterError` if the force does not change with the current.
     """
-    current = damper.envelope.current_A[1] if current is None else current
-    velocity = 0.5 * damper.envelope.peak_velocity_m_s[1] if velocity is None else velocity
+    current, velocity = damper.envelope.current_A[1], 0.5 * damper.envelope.peak_velocity_m_s[1]
     lag = max(damper.coil.rise_s, damper.coil.fall_s, 1e-3) if damper.coil else 1e-3
     dt = 2 * _SETTLE * lag / _STEP_SAMPLES
     half = _STEP_SAMPLES // 2

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from mrdamper.data.arrays import Floats
 from mrdamper.statistics.linear import solve_linear
 
+_HARMONICS = 3  # by which a frequency is found, from three cycles on
 _FEW = 250  # samples on which a frequency is found to begin with
 _SAMPLES_PER_BLOCK = 50_000  # samples whose waves are held at a time
 _SAMPLES_PER_HALF_PERIOD = 16  # between two changes of sign, with which the strongest line of a long record is found
@@ -82,7 +83,7 @@ def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float
     )
 
 
-def fundamental_frequency(time: Floats, signal: Floats, orders: int = 3) -> float:
+def fundamental_frequency(time: Floats, signal: Floats) -> float:
     """Fundamental frequency [Hz] of a record of about one cycle or more.
 
     The strongest spectral line is where a search of the best single sine begins; Gauss–Newton
@@ -95,7 +96,7 @@ def fundamental_frequency(time: Floats, signal: Floats, orders: int = 3) -> floa
     if guess * t[-1] < 4:
         ladder = guess * np.geomspace(0.4, 2.5, 45)
         guess = ladder[int(np.argmin(_single_sine_costs(t[few], signal[few], ladder)))]
-    orders = orders if guess * t[-1] >= 3 else 1
+    orders = _HARMONICS if guess * t[-1] >= 3 else 1
     # Most steps on few samples: the last ones, on all, decide.
     near, coefficients = float(guess), None
     if t.size > 4 * _FEW:
