@@ -91,12 +91,22 @@ def __getattr__(name: str) -> Any:
         return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
     if name == "__version__":
         return importlib.import_module("importlib.metadata").version(__name__)
-    if name[:1].isupper():  # the class of a model: from mrdamper import BoucWen
-        models = importlib.import_module(f"{__name__}.models")
-        if name in dir(models):
-            return getattr(models, name)
-    near = " or ".join(public for public in _HOME if name.lower() in public.lower() or public in name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}" + (f"; did you mean {near}?" if near else ""))
+    models = importlib.import_module(f"{__name__}.models") if name[:1].isupper() else None
+    if models and name in dir(models):  # the class of a model: from mrdamper import BoucWen
+        return getattr(models, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}{_near(name, dir(models) if models else [])}")
+
+
+def _near(name: str, classes: list[str]) -> str:
+    """Return the public names that begin so, or whose spelling is near, as the end of an error message."""
+    spelled = {public.lower(): public for public in (*_HOME, *(c for c in classes if c[:1].isupper()))}
+    close = importlib.import_module("difflib").get_close_matches(name.lower(), spelled, n=2, cutoff=0.85)
+    near = [
+        public
+        for lower, public in spelled.items()
+        if lower in close or (len(name) > 3 and lower.startswith(name.lower()))
+    ]
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def __dir__() -> list[str]:
