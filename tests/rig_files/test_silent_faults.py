@@ -154,25 +154,43 @@ def test_packed_numbers_are_unpacked(tmp_path):
     np.testing.assert_allclose(np.delete(record.force, 50), np.delete(F, 50), atol=0.26)
 
 
-@pytest.mark.parametrize(
-    ("properties", "expected"),
-    [
-        ([{"wf_increment": 0.005}, {"wf_increment": 0.005, "wf_start_offset": 0.1}], "E_RASTER"),
-        ([{"wf_increment": 0.005}, {"wf_increment": 0.006}], "E_RASTER"),
-        ([{"wf_increment": 1.0}] * 2, "E_COLUMN"),
-    ],
-)
-def test_waveforms_of_different_clocks_are_refused(properties, expected, tmp_path):
+def tdms_of_two_clocks(path, moved, force, *, force_values):
     from nptdms import ChannelObject, RootObject, TdmsWriter
 
-    path = tmp_path / "a_0.5A.tdms"
+    of_channels = (("disp", "mm", X, moved), ("force", "N", force_values, force))
     with TdmsWriter(path) as writer:
         channels_of = [
-            ChannelObject("T", name, values, properties={"unit_string": unit, "wf_start_offset": 0.0, **more})
-            for (name, unit, values), more in zip((("disp", "mm", X), ("force", "N", F)), properties, strict=True)
+            ChannelObject("T", name, values, properties={"unit_string": unit, "wf_start_offset": 0.0, **clock})
+            for name, unit, values, clock in of_channels
         ]
         writer.write_segment([RootObject(), *channels_of])
-    assert code(path) == expected
+    return path
+
+
+@pytest.mark.parametrize(
+    "clock",
+    [
+        {"wf_increment": 0.005, "wf_start_offset": 0.1},
+        {"wf_increment": 0.006},
+        {"wf_increment": 0.005, "wf_start_time": np.datetime64("2024-05-02T10:00:00.100")},
+    ],
+)
+def test_waveforms_of_different_clocks_are_put_on_that_of_the_force(clock, tmp_path):
+    moved = {"wf_increment": 0.005, "wf_start_time": np.datetime64("2024-05-02T10:00:00")}
+    begin = 0.1 if len(clock) > 1 else 0.0
+    own = np.arange(begin, T[-1], clock["wf_increment"])
+    if "wf_start_time" not in clock:
+        moved.pop("wf_start_time")
+    path = tdms_of_two_clocks(tmp_path / "a_0.5A.tdms", moved, clock, force_values=np.interp(own, T, F))
+    record = read_run(path)
+    assert [finding.code for finding in record.findings] == ["W_RASTER"]
+    np.testing.assert_allclose(record.displacement, np.interp(record.time, T, 1e-3 * X), atol=1e-6)
+    np.testing.assert_allclose(record.force, np.interp(record.time, T, F), atol=1e-6)
+
+
+def test_waveforms_without_a_clock_are_refused(tmp_path):
+    unset = {"wf_increment": 1.0}
+    assert code(tdms_of_two_clocks(tmp_path / "a_0.5A.tdms", unset, unset, force_values=F)) == "E_COLUMN"
     good = write(tmp_path, "b_0.5A.tdms", tdms_bytes({"disp": X, "force": F}, {"disp": "mm", "force": "N"}, wave=True))
     assert read_run(good).force.size == F.size
 

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, damaged, load, refusing_damage
+from mrdamper.rig_files.readers.arrays import Stored, check_unpacked, damaged, load, refusing_damage
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
+from mrdamper.rig_files.readers.nested import nested_tables
 
 # pyright: reportMissingImports=false
 
 _UNIT_NAMES = ("unit_string", "NI_UnitDescription", "unit", "units", "Unit", "Units")
-_WAVE_TIME = "Time"
 
 
 class Tdms(Reader):
@@ -39,56 +39,41 @@ class Tdms(Reader):
             file = nptdms.TdmsFile.read(source.file)
             if getattr(file, "file_status", None) is not None and file.file_status.incomplete_final_segment:
                 raise damaged(source, self.title, "the last segment is incomplete")
-        tables = [
-            _table(source, group, {**file.properties, **group.properties}, self.title)
-            for group in file.groups()
-            if group.channels()
-        ]
-        if not tables:
-            raise source.refuse("E_NO_DATA", "no channels", "export the file again")
-        return tables
+        tree = {group.name: _group(group, {**file.properties, **group.properties}) for group in file.groups()}
+        return nested_tables(source, {name: node for name, node in tree.items() if node["channels"]}, self.title)
 
 
-def _table(source: Source, group: Any, properties: dict[str, Any], title: str) -> RawTable:
-    channels = list(group.channels())
-    names = [channel.name for channel in channels]
-    units = [_unit(channel) for channel in channels]
-    steps = {_step(channel) for channel in channels} - {None}
-    begins = {
-        (float(channel.properties.get("wf_start_offset") or 0.0), str(channel.properties.get("wf_start_time", "")))
-        for channel in channels
-        if _step(channel)
-    }
-    sizes = {len(channel) for channel in channels if len(channel)}
-    timed = any(name.casefold().startswith(("time", "zeit")) for name in names)
-    if not timed and (len(steps) > 1 or len(begins) > 1):
-        what = "steps" if len(steps) > 1 else "starts"
-        problem = f"the channels of group {group.name!r} have different {what} of time"
-        raise source.refuse("E_RASTER", problem, "export them with one clock")
-    step = next(iter(steps), None)
-    wave = step is not None and len(sizes) == 1 and not timed
-    if wave:
-        names, units = [*names, _WAVE_TIME], [*units, "s"]
+def _group(group: Any, properties: dict[str, Any]) -> dict[str, Any]:
+    """Return the channels of a group, waveforms with their clock if no channel is one, and the texts beside them."""
+    channels = [channel for channel in group.channels() if len(channel) > 1]
+    timed = any(channel.name.casefold().startswith(("time", "zeit")) for channel in channels)
+    starts = {c.properties["wf_start_time"] for c in channels if "wf_start_time" in c.properties}
+    begin = min(starts, default=None)
+    says = {name: f"{value}" for name, value in properties.items() if isinstance(value, (str, int, float))}
+    return {**says, "channels": [_channel(channel, {} if timed else _clock(channel, begin)) for channel in channels]}
 
-    def column_of(column: int) -> np.ndarray:
-        if column == len(channels):
-            return np.arange(max(sizes)) * (step or 1.0)
-        data = np.asarray(channels[column][:])
-        return data if data.dtype.kind in "iufMm" else np.empty(data.shape, dtype="U1")
 
-    remarks = [f"{name}: {value}"[:200] for name, value in properties.items() if isinstance(value, (str, int, float))]
-    return array_table(source, names, units, column_of, label=group.name, title=title, remarks=remarks)
+def _channel(channel: Any, clock: dict[str, float]) -> dict[str, Any]:
+    kind = getattr(channel.dtype, "kind", "")
+    dtype = channel.dtype if kind in "iufMm" else np.dtype("U1")
+
+    def load() -> np.ndarray:
+        return np.asarray(channel[:]) if kind in "iufMm" else np.empty(len(channel), dtype)
+
+    return {"name": channel.name, "unit": _unit(channel), "data": Stored((len(channel),), dtype, load), **clock}
+
+
+def _clock(channel: Any, begin: Any) -> dict[str, float]:
+    """Step and start of a waveform [s]; empty for a step of a second without a start, as LabVIEW writes it unset."""
+    says = channel.properties
+    step, offset = says.get("wf_increment"), float(says.get("wf_start_offset") or 0.0)
+    if not isinstance(step, (int, float)) or not step > 0 or (step == 1.0 and "wf_xname" not in says):
+        return {}
+    later = (says["wf_start_time"] - begin) / np.timedelta64(1, "s") if "wf_start_time" in says else 0.0
+    return {"dt [s]": float(step), "t0 [s]": offset + float(later)}
 
 
 def _unit(channel: Any) -> str:
     if getattr(channel.dtype, "kind", "") in "Mm":
         return "s"
     return next((str(channel.properties[n]) for n in _UNIT_NAMES if channel.properties.get(n)), "")
-
-
-def _step(channel: Any) -> float | None:
-    """Step of a waveform [s]; one of exactly a second without a start is what LabVIEW writes where nobody set it."""
-    step = channel.properties.get("wf_increment")
-    if not isinstance(step, (int, float)) or not step > 0:
-        return None
-    return None if step == 1.0 and "wf_xname" not in channel.properties else float(step)
