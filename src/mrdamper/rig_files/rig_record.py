@@ -16,6 +16,7 @@ from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
 from mrdamper.rig_files.conditions import stated_motion, stated_quantities
 from mrdamper.rig_files.mapping.clocks import past_midnight, refuse_two_rates
+from mrdamper.rig_files.mapping.integration import integral
 from mrdamper.rig_files.mapping.session import stretches_of_session
 from mrdamper.rig_files.parts import stretches_of_time
 from mrdamper.rig_files.profile import Correction, Profile
@@ -52,7 +53,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         channels["time"] = past_midnight(channels["time"])
         refuse_two_rates(table, profile, channels["time"], channels["displacement"])
     if profile.channel("displacement").integrate:
-        channels["displacement"] = _integrated(channels["time"], channels["displacement"])
+        channels["displacement"] = integral(channels["time"], channels["displacement"])
         findings.append(Finding("W_SCALE", "the displacement is the integral of the velocity"))
     further = _further(table, assigned, size)
     stretches = [slice(0, size)] if profile.file.blocks == "join" else stretches_of_time(channels["time"])
@@ -154,15 +155,6 @@ def _refuse_tiny_currents(table: RawTable, assigned: dict[str, Assigned], channe
         problem = f"the current in MA is {1e3 * largest:.3g} at most: milliamperes would be no current of a coil"
         remedy = 'set [channels.current] unit = "A" or unit = "mA" in a profile'
         raise table.source.refuse("E_AMBIGUOUS", problem, remedy, column=assigned["current"].column + 1)
-
-
-def _integrated(time: Floats, velocity: Floats) -> Floats:
-    """Integral of a velocity [m/s] over time [s] by the trapezoidal rule [m]; missing samples stay missing."""
-    there = np.isfinite(time) & np.isfinite(velocity)
-    integral = np.full(velocity.shape, np.nan)
-    t, v = time[there], velocity[there]
-    integral[there] = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))]) if t.size else t
-    return integral
 
 
 def _counted_time(table: RawTable, profile: Profile, size: int) -> tuple[Floats, str]:

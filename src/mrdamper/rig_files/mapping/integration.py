@@ -41,6 +41,14 @@ def is_integrated(record: Record) -> bool:
     return any(finding.code == "W_CHOSEN" and finding.text.startswith(_INTEGRAL) for finding in record.findings)
 
 
+def integral(time: Floats, velocity: Floats) -> Floats:
+    """Integral of a velocity [m/s] over time [s] by the trapezoidal rule [m]; NaN where a sample is missing."""
+    there = np.isfinite(time) & np.isfinite(velocity)
+    moved = np.full(time.shape, np.nan)
+    moved[there] = cumulative_trapezoid(velocity[there], time[there], initial=0) if there.any() else ()
+    return moved
+
+
 def displacement_of(time: Floats, velocity: Floats) -> Floats | None:
     """Displacement [m] of a velocity [m/s] that repeats, about the middle of its whole cycles; None under one cycle.
 
@@ -52,10 +60,9 @@ def displacement_of(time: Floats, velocity: Floats) -> Floats | None:
     rising = np.flatnonzero(~above[:-1] & above[1:])
     if rising.size < 2 or np.any(np.diff(t) <= 0):
         return None
-    x = cumulative_trapezoid(v, t, initial=0)
-    first, last = rising[0], rising[-1]
+    moved, (first, *_, last) = integral(time, velocity), rising
+    x = moved[there]
     x -= (x[last] - x[first]) / (t[last] - t[first]) * (t - t[first])
     whole = x[first : last + 1]
-    moved = np.full(time.shape, np.nan)
     moved[there] = x - (np.max(whole) + np.min(whole)) / 2
     return moved

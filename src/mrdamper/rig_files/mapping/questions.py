@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.profile import Channel, CurrentSource, Profile
+from mrdamper.rig_files.profile import Channel, Profile
 from mrdamper.rig_files.units import DIMENSION
 
 _ROLE = re.compile(r"\[channels\.(\w+)\]")
@@ -22,19 +22,21 @@ _UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A possible answer: how it is shown, the lines of the profile it stands for, and the change it makes."""
+    """A possible answer: what a channel's key in the profile is then."""
 
-    shown: str
-    lines: str
-    channel: str = ""
-    change: tuple[tuple[str, object], ...] = ()
+    channel: str
+    key: str
+    value: str | int
+
+    @property
+    def shown(self) -> str:
+        """The answer as it is listed."""
+        return str(self.value)
 
     def applied(self, profile: Profile) -> Profile:
         """Return the profile with this answer."""
-        if not self.channel:
-            return profile.model_copy(update={"current": CurrentSource(**dict(self.change))})  # type: ignore[arg-type]
         settings = profile.channel(self.channel).model_dump(exclude_unset=True, exclude_none=True)
-        channel = Channel(**{**settings, **dict(self.change)})  # type: ignore[arg-type]
+        channel = Channel(**{**settings, self.key: self.value})
         return profile.model_copy(update={"channels": {**profile.channels, self.channel: channel}})
 
 
@@ -57,17 +59,12 @@ def question_of(error: InputError, columns: Sequence[str] = ()) -> Question | No
         return None
     if error.code == "E_UNITS_MISSING":
         units = _UNITS.get(DIMENSION[role], ())
-        return Question(f"{error.found}. Unit of the {role}?", tuple(_answer(role, "unit", unit) for unit in units))
+        return Question(f"{error.found}. Unit of the {role}?", tuple(Answer(role, "unit", unit) for unit in units))
     if error.code in ("E_COLUMN", "E_AMBIGUOUS", "E_DUPLICATE_COLUMN"):
         named = [name for name in columns if name and list(columns).count(name) == 1]
-        answers = [_answer(role, "column", name) for name in named]
-        answers += [_answer(role, "column", i) for i, name in enumerate(columns, 1) if name not in named]
+        answers = [Answer(role, "column", name) for name in named]
+        answers += [Answer(role, "column", i) for i, name in enumerate(columns, 1) if name not in named]
         return Question(f"{error.found}. Which column is the {role}?", tuple(answers)) if answers else None
     if error.code in ("E_SIGN_CONVENTION", "E_DISSIPATION_SIGN"):
-        return Question(f"{error.found}. Sign of the {role}?", (_answer(role, "sign", 1), _answer(role, "sign", -1)))
+        return Question(f"{error.found}. Sign of the {role}?", (Answer(role, "sign", 1), Answer(role, "sign", -1)))
     return None
-
-
-def _answer(role: str, key: str, value: str | int) -> Answer:
-    shown = f'"{value}"' if isinstance(value, str) else str(value)
-    return Answer(str(value), f"[channels.{role}] {key} = {shown}", role, ((key, value),))

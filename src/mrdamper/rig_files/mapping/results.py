@@ -89,7 +89,7 @@ class Results:
         return None
 
 
-def results_in(lines: Sequence[str], decimal: str | None = None) -> Results | None:
+def results_in(lines: Sequence[str]) -> Results | None:
     """Return the table of results among lines of text; None if there is none or several."""
     columns = {}
     for separator in _SEPARATORS:

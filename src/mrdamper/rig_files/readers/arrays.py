@@ -77,7 +77,6 @@ def array_table(
     *,
     label: str = "",
     title: str = "",
-    fallback: bool = False,
     constants: Mapping[str, float] | None = None,
     remarks: Sequence[str] = (),
     over: Sequence[str] = (),
@@ -106,7 +105,7 @@ def array_table(
         return words_of([text_of(item) for item in array.reshape(-1).tolist()])
 
     return RawTable(
-        source, tuple(names), tuple(units), read, label=label, fallback=fallback, constants=constants or {},
+        source, tuple(names), tuple(units), read, label=label, constants=constants or {},
         remarks=tuple(remarks), words=words, over=tuple(over),
     )  # fmt: skip
 
@@ -123,6 +122,14 @@ def text_of(item: object) -> str:
     if isinstance(item, bytes):
         return item.decode("utf-8", "replace").strip()
     return f"{item:g}" if isinstance(item, float) else str(item).strip()
+
+
+def value_of(array: np.ndarray) -> Any:
+    """Return the number or the text of an array of one item, a list for one of words, any other array as it is."""
+    if array.dtype.kind in "US" and array.size <= MOST_COLUMNS:
+        words = [text_of(item) for item in array.reshape(-1).tolist()]
+        return words if array.size > 1 else "".join(words)
+    return float(array.reshape(-1)[0]) if array.size == 1 and array.dtype.kind in "iuf" else array
 
 
 def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floats:

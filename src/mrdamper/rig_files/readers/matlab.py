@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import check_unpacked, refusing_damage, twice
+from mrdamper.rig_files.readers.arrays import check_unpacked, refusing_damage, twice, value_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, MOST_STRUCTS, hdf5_tables
 from mrdamper.rig_files.readers.nested import DEEPEST, nested_tables
@@ -64,8 +64,7 @@ def _tree(value: Any, depth: int = 0) -> Any:
         items = array.reshape(-1)[:MOST_STRUCTS] if depth < DEEPEST else []
         members = [{name: _tree(item[name], depth + 1) for name in names} for item in items]
         return members[0] if len(members) == 1 else members
-    words = _words(array) if size > 1 else []
-    if words:
+    if words := _words(array):
         return words
     if kind == "O" and size and depth < DEEPEST:
         cells = [np.asarray(cell) for cell in array.flat]
@@ -74,18 +73,12 @@ def _tree(value: Any, depth: int = 0) -> Any:
         if all(cell.dtype.names for cell in cells) or all(cell.dtype.kind in "iuf" and cell.size > 1 for cell in cells):
             return [_tree(cell, depth + 1) for cell in cells[:MOST_STRUCTS]]
         return array
-    if kind in "US":
-        return str(array.reshape(-1)[0]) if size == 1 else "" if not size else array
-    if kind in "iuf" and size == 1:
-        return float(array.reshape(-1)[0])
-    return array if size else ""
+    return value_of(array) if size else ""
 
 
 def _words(array: np.ndarray) -> list[str]:
-    """Return a cell array of texts, or the rows of a matrix of characters; empty if it is neither."""
-    if array.dtype.kind == "U" and array.size <= MOST_COLUMNS:
-        return [str(item).strip() for item in array.reshape(-1)]
-    if array.dtype.kind != "O" or array.size > MOST_COLUMNS:
+    """Return the texts of a cell array of several; empty if it holds anything else."""
+    if array.dtype.kind != "O" or not 1 < array.size <= MOST_COLUMNS:
         return []
     cells = [np.asarray(item) for item in array.reshape(-1)]
     if any(cell.dtype.kind != "U" or cell.size > 1 for cell in cells):

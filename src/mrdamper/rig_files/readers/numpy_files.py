@@ -18,10 +18,10 @@ from mrdamper.rig_files.readers.arrays import (
     pick,
     refusing_damage,
     stated_array,
-    text_of,
     twice,
+    value_of,
 )
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 
 
@@ -86,14 +86,7 @@ class Npz(Reader):
 
 
 def _value(array: np.ndarray) -> Any:
-    """Return an array, a number or a text for one of one item, a list for one of words."""
-    kind = array.dtype.kind
-    if array.size == 1 and kind in "iuf":
-        return float(array.reshape(-1)[0])
-    if kind in "US" and array.size <= MOST_COLUMNS:
-        words = [text_of(item) for item in array.reshape(-1).tolist()]
-        return words if array.size > 1 else "".join(words)
-    return {"unit": "s", "data": array} if kind in "Mm" else array
+    return {"unit": "s", "data": array} if array.dtype.kind in "Mm" else value_of(array)
 
 
 def _check_headers(source: Source) -> dict[str, tuple[str, ...]]:
