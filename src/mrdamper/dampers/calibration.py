@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mrdamper.dampers.distance import AT_TESTS, Distance
 from mrdamper.data.arrays import Floats, index_at
-from mrdamper.data.runs import Run
+from mrdamper.data.runs import Run, once_per_run
 from mrdamper.data.sessions import session_of
 from mrdamper.identification.intervals import student
 from mrdamper.physics.motion.sines import equivalent_sine
@@ -75,11 +75,12 @@ class PredictedRun:
     @classmethod
     def of(cls, run: Run, predicted: Floats, velocity: Floats, distance: Distance = AT_TESTS) -> PredictedRun:
         """From the prediction (N,) [N] along the whole run; raises E_CLOCK as `session_of`."""
-        at = np.flatnonzero(run.in_window)
-        loops, forces = _loops(run, at), (run.force, predicted)
-        peaks = np.array([[_peak(run, loop, force) for loop in loops] for force in forces])
+        at, loops = np.flatnonzero(run.in_window), _loops(run)
         powers = np.array(
-            [[dissipated_power(force[loop], velocity[loop], run.time[loop]) for loop in loops] for force in forces]
+            [
+                [dissipated_power(force[loop], velocity[loop], run.time[loop]) for loop, _ in loops]
+                for force in (run.force, predicted)
+            ]
         )
         step = max(1, at.size // _MAX_SAMPLES)
         return cls(
@@ -87,7 +88,7 @@ class PredictedRun:
             session_of(run),
             predicted[at[::step]],
             run.force[at[::step]],
-            peaks[0] / np.maximum(peaks[1], 1e-300),
+            _peaks(run) / np.maximum([_peak(predicted[loop], cycles) for loop, cycles in loops], 1e-300),
             np.divide(powers[0], powers[1], out=np.full(len(loops), np.inf), where=powers[1] != 0),
             distance,
         )
@@ -120,20 +121,35 @@ class PredictedRun:
         return gain, float(self.measured.mean()) - gain * float(self.predicted.mean())
 
 
-def _loops(run: Run, at: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Return the samples of each loop whose peak and energy are compared: the window `at` of a sine at one current.
+@once_per_run
+def _loops(run: Run) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Return the samples of each loop whose peak and energy are compared, the window of a sine at one current, and
+    where among them its cycles begin.
 
     A record of another motion, or of changing current, is cut into cycles of its mean frequency: over all of it the
     errors at its motions and currents cancel, and a prediction is asked for one of them. Cycles of less than half its
     mean amplitude have no loop.
     """
-    sine = equivalent_sine(run)
-    count = int(np.ptp(run.time[at]) * sine.condition.frequency_Hz)
-    if count < 2 or (sine.is_sine and not run.current_changes):
-        return [at]
-    cycles = np.array_split(at, count)
-    moved = [np.ptp(run.displacement[cycle]) for cycle in cycles]
-    return [cycle for cycle, swing in zip(cycles, moved, strict=True) if swing >= sine.condition.amplitude_m] or [at]
+    sine, at = equivalent_sine(run), np.flatnonzero(run.in_window)
+    frequency = sine.condition.frequency_Hz
+    loops, count = [at], int(np.ptp(run.time[at]) * frequency)
+    if count >= 2 and (run.current_changes or not sine.is_sine):
+        cycles = np.array_split(at, count)
+        moved = [np.ptp(run.displacement[cycle]) for cycle in cycles]
+        loops = [c for c, swing in zip(cycles, moved, strict=True) if swing >= sine.condition.amplitude_m] or [at]
+    counts = [max(int(np.ptp(run.time[loop]) * frequency), 1) for loop in loops]
+    return [(loop, _split(loop.size, count)) for loop, count in zip(loops, counts, strict=True)]
+
+
+def _split(size: int, parts: int) -> NDArray[np.intp]:
+    """Return where parts of about one size begin, as `numpy.array_split` cuts them."""
+    return np.arange(parts) * (size // parts) + np.minimum(np.arange(parts), size % parts)
+
+
+@once_per_run
+def _peaks(run: Run) -> Floats:
+    """(L,) measured peak forces [N] of the loops."""
+    return np.array([_peak(run.force[loop], cycles) for loop, cycles in _loops(run)])
 
 
 def measured_peak(run: Run) -> float:
@@ -141,14 +157,13 @@ def measured_peak(run: Run) -> float:
 
     Of a sine of several cycles it is the median: the first may still hold the start of the motion, and one a spike.
     """
-    at = np.flatnonzero(run.in_window)
-    return _peak(run, at, run.force) if len(_loops(run, at)) == 1 else peak_force(run.force[at])
+    peaks = _peaks(run)
+    return float(peaks[0]) if peaks.size == 1 else peak_force(run.force[run.in_window])
 
 
-def _peak(run: Run, loop: NDArray[np.intp], force: Floats) -> float:
-    """Median over the cycles of a loop of half their peak-to-peak force [N]."""
-    count = int(np.ptp(run.time[loop]) * equivalent_sine(run).condition.frequency_Hz)
-    return float(np.median([peak_force(force[cycle]) for cycle in np.array_split(loop, max(count, 1))]))
+def _peak(force: Floats, cycles: NDArray[np.intp]) -> float:
+    """Median over cycles, which begin at some samples, of half their peak-to-peak force [N]."""
+    return float(np.median(np.maximum.reduceat(force, cycles) - np.minimum.reduceat(force, cycles)) / 2)
 
 
 @dataclass(frozen=True)
