@@ -211,16 +211,17 @@ def _best_rates(
     lower, upper = bounds[:, 0], bounds[:, 1]
     right = target * weight
 
-    def fitted(u: Floats) -> tuple[Floats, Floats]:
+    @lru_cache(maxsize=2)
+    def fitted(u: tuple[float, ...]) -> tuple[Floats, Floats]:
         columns = form.columns(I, f, A, tuple(np.exp(u))) * weight[:, None]
         return columns, solve_linear(columns, right)
 
     def residual(u: Floats) -> Floats:
-        columns, fit = fitted(u)
+        columns, fit = fitted(tuple(u))
         return columns @ fit - right
 
     def slopes(u: Floats) -> Floats:
-        columns, fit = fitted(u)
+        columns, fit = fitted(tuple(u))
         by_rate = (form.slopes(columns, I, f, tuple(np.exp(u))) @ fit).T
         return project_out_columns(columns, by_rate)  # the coefficients move along [Kaufman 1975]
 

@@ -116,6 +116,7 @@ class ExplanationCandidate:
     def set_tracks(self, tracks: Sequence[Track]) -> None:
         """Compare with these runs, of which some have other motions than before."""
         self._others = [t for k, t in enumerate(tracks) if k != self._index]
+        self._usual_step = float(np.median([track.step for track in self._others]))
         self._motions: list[tuple[Trial, RowProducts]] = []
 
     def explanations(self, others: Posterior, like: Sequence[Trial] = ()) -> list[Explanation]:
@@ -242,8 +243,7 @@ class ExplanationCandidate:
 
     def _is_usual(self, factor: float) -> int:
         """1 if a factor of time makes the time between two samples that of most other runs, −1 if it was that."""
-        usual = float(np.median([track.step for track in self._others]))
-        after, before = (abs(self.track.step * f / usual - 1) < _SAME_STEP for f in (factor, 1.0))
+        after, before = (abs(self.track.step * f / self._usual_step - 1) < _SAME_STEP for f in (factor, 1.0))
         return int(after) - int(before)
 
     def moved(self, trial: Trial) -> Track:
@@ -267,7 +267,7 @@ class ExplanationCandidate:
     def _is_nearer(self, cause: Cause, factor: float) -> bool:
         """Tell whether a factor brings the stroke or the time between samples nearer to the usual one, as units do."""
         if cause == "time":
-            size = self.track.step / float(np.median([track.step for track in self._others]))
+            size = self.track.step / self._usual_step
         else:
             size = float(np.ptp(self.track.displacement)) / 2 / self.evidence.amplitude
         return abs(np.log(size * factor)) < abs(np.log(size))

@@ -94,7 +94,7 @@ def _weighed(
     """Weighted products at the coefficients that follow if a group has gains of its own; wide gains of some runs."""
     expected = evidence.prior
     of_group, of_wide = (
-        [replace(run, gain=_GAIN if k in runs else None) for k, run in enumerate(products)] for runs in (group, wide)
+        [replace(run, gain=_GAIN) if k in runs else run for k, run in enumerate(products)] for runs in (group, wide)
     )
     for _ in range(_REFITS + 1):
         expected = evidence.posterior(expected.weigh(of_group))

@@ -353,8 +353,9 @@ class Search:
                 high += at[int(np.argmax(jumps)) + 1 :]
         sets += [low, high]
         ranked = sorted(order, key=gains.__getitem__)
-        for seeds in (*([k] for k in order[:_GROUP_SEEDS]), ranked[: len(ranked) // 3], ranked[-(len(ranked) // 3) :]):
-            sets.append(self._grown(seeds, posterior))
+        third = len(ranked) // 3
+        seeds = (*([k] for k in order[:_GROUP_SEEDS]), ranked[:third], ranked[-third:])
+        sets += [self._grown(group, posterior) for group in dict.fromkeys(map(tuple, seeds))]
         return list(dict.fromkeys(tuple(sorted(s)) for s in sets if 2 <= len(s) <= len(self.tracks) // 2))
 
     def _alike(self) -> list[tuple[int, ...]]:
