@@ -6,6 +6,7 @@ import base64
 import json
 import math
 from dataclasses import asdict
+from importlib.metadata import version
 from importlib.resources import files
 from typing import Any, ClassVar
 
@@ -81,14 +82,9 @@ def _facts(damper: Damper | Model, stepping: Stream, name: str, library: bytes |
         "words": _words(damper, stepping),
         "knobs": _knobs(envelope),
         "parameters": [
-            {
-                "meaning": info.meaning,
-                "value": f"{getattr(stepping.model, info.name):.6g}",
-                "unit": info.unit,
-                "name": n,
-            }
+            {fact: getattr(info, fact) for fact in ("meaning", "unit", "name")}
+            | {"value": f"{getattr(stepping.model, info.name):.6g}"}
             for info in (stepping.model.parameters() if stepping.model else ())
-            for n in (info.name,)
         ],
         "facts": json.dumps(computed).replace("<", "\\u003c"),  # no text can end the element it stands in
         "damper": render("damper.js.j2", **c_facts(stepping, name, "", JavaScriptWriter)),
@@ -129,8 +125,6 @@ def _tested(envelope: Envelope) -> list[dict[str, Any]]:
 
 def _words(damper: Damper | Model, stepping: Stream) -> list[str]:
     """Describe the origin of the damper and its range of validity, in sentences."""
-    from importlib.metadata import version
-
     sentence = f"{stepping.title[:1].upper()}{stepping.title[1:]}, exported by mrdamper {version('mrdamper')}"
     if count := getattr(damper, "parameter_count", 0):  # a bare model was determined from nothing
         facts = "; ".join(f"{key}: {value}" for key, value in getattr(damper, "provenance", {}).items())

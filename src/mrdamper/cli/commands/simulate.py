@@ -16,9 +16,7 @@ from mrdamper.cli.progress import progress_soon
 from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
-    from mrdamper.cli.progress import Progress
     from mrdamper.dampers.base import Damper
-    from mrdamper.systems.controller_comparison import ControllerComparison
     from mrdamper.systems.controllers import Controller
     from mrdamper.systems.monte_carlo import Bands
     from mrdamper.systems.result import Simulation
@@ -77,11 +75,19 @@ def simulate(
         if drawn is not None:
             bands = monte_carlo(SystemLoop(*given, controller, highest, free=True), drawn, done, tell)
         if out is not None:
+            from mrdamper.report.simulation import write_simulation
+
             compared = compare_controllers(*given, others, done.step, highest, tell) if others else None
-            paths = _write(done, out, compared, bands, tell)
+            tell("writing", 1.0)
+            paths = write_simulation(done, out, compared, bands)
     for line in shortened([f"{path}" for path in paths], 2, verbose):
         typer.echo(line, err=True)
-    _print(done, bands, dampers, as_json)
+    if as_json:
+        print(json.dumps(_figures(done, dampers) | _banded(bands), indent=1))
+        return
+    _print_peaks(done)
+    _print_warnings(done)
+    _print_bands(done, bands, dampers)
 
 
 def _dampers(loaded: SystemFile, model: Path | None, where: str) -> dict[str, Damper]:
@@ -98,15 +104,6 @@ def _dampers(loaded: SystemFile, model: Path | None, where: str) -> dict[str, Da
             code="E_NO_DAMPER",
         )
     return dampers
-
-
-def _write(
-    done: Simulation, folder: Path, compared: ControllerComparison | None, bands: Bands | None, tell: Progress
-) -> list[Path]:
-    from mrdamper.report.simulation import write_simulation
-
-    tell("writing", 1.0)
-    return write_simulation(done, folder, compared, bands)
 
 
 def _export_law(loop: SystemLoop, folder: Path | None, fmu: Path | None) -> None:
@@ -228,15 +225,6 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
         if damper.uncertainty and damper.uncertainty.left_out:
             share = 100 * damper.uncertainty.force
             typer.echo(f"not included: model error of {name}, {share:.2g} % of half the peak-to-peak force")
-
-
-def _print(done: Simulation, bands: Bands | None, dampers: Mapping[str, Damper], as_json: bool) -> None:
-    if as_json:
-        print(json.dumps(_figures(done, dampers) | _banded(bands), indent=1))
-    else:
-        _print_peaks(done)
-        _print_warnings(done)
-        _print_bands(done, bands, dampers)
 
 
 def _print_peaks(done: Simulation) -> None:

@@ -35,7 +35,7 @@ def integrate(
     *,
     tolerance: float = 1e-5,
 ) -> Floats:
-    """State along a motion.
+    """(N, S) state along a motion: (N,) time [s], displacement [m], velocity [m/s], current [A]; from a start (S,).
 
     Between samples the displacement is the cubic with the given values and slopes, the velocity its derivative, and
     the current straight. Raises `ExcitationError` if time does not increase. Raises `ParameterError` if the tolerance
@@ -46,20 +46,10 @@ def integrate(
     rate : function (x, v, current, state, parameters, out)
         Writes d(state)/dt into `out`, with operators and NumPy's functions. It runs once on symbols
         (`mrdamper.tracing`); what comes out is compiled.
-    parameters : P numbers
-        Passed on to `rate`.
-    motion : four (N,) arrays
-        Time [s], displacement [m], velocity [m/s], current [A].
-    start : S numbers
-        State at the first sample.
     scale : S numbers
         A usual size of each state; errors are measured against the larger of it and the state.
     tolerance : float
         Error allowed per step, relative.
-
-    Returns
-    -------
-    (N, S) array
 
     References
     ----------
