@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from support.dampers import ENVELOPE, joint_damper, modified_damper
+from support.systems import quarter_car
 
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.modified import ModifiedModel
@@ -22,7 +23,6 @@ from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inverse import check_monotone, invert
 from mrdamper.systems.measures import cost
 from mrdamper.systems.simulate import SystemLoop
-from mrdamper.systems.structure import quarter_car
 from mrdamper.systems.system_file import load_system
 
 CAR = quarter_car("car", 300, 40, 20e3, 200e3)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.dampers import joint_damper
+from support.systems import quarter_car
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
@@ -24,7 +25,6 @@ from mrdamper.systems.controllers import controller_type
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inverse import invert
 from mrdamper.systems.simulate import SystemLoop
-from mrdamper.systems.structure import quarter_car
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 

@@ -6,11 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_lyapunov
+from support.systems import quarter_car
 
 from mrdamper.systems.controllers import controller_type
 from mrdamper.systems.controllers.clipped_optimal import ClippedOptimal
 from mrdamper.systems.linear import aims, linear_system
-from mrdamper.systems.structure import Link, quarter_car, shear_building
+from mrdamper.systems.structure import Link, shear_building
 
 CAR = quarter_car("car", 300, 40, 20e3, 200e3)
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.systems import half_car, quarter_car
 
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.joint import JointDamper
@@ -13,7 +14,7 @@ from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inputs.record import record
 from mrdamper.systems.simulate import SystemLoop, simulate_system
-from mrdamper.systems.structure import Link, building, half_car, quarter_car, shear_building
+from mrdamper.systems.structure import Link, building, shear_building
 
 ENVELOPE = Envelope((0.0, 1.0), (0.5, 4.0), (0.004, 0.02), (0.02, 0.3))
 

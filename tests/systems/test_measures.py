@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.systems import quarter_car
 
 from mrdamper.dampers.envelope import UNTESTED
 from mrdamper.dampers.joint import JointDamper
@@ -13,7 +14,7 @@ from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inputs.record import record
 from mrdamper.systems.measures import benchmark_ratios, comfort, cost, measures, tyre_load
 from mrdamper.systems.simulate import SystemLoop
-from mrdamper.systems.structure import Link, quarter_car, shear_building
+from mrdamper.systems.structure import Link, shear_building
 from mrdamper.systems.weighting import WEIGHTINGS
 
 STEP = 0.005

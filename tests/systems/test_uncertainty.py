@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from support.dampers import ENVELOPE, joint_damper, modified_damper
+from support.systems import quarter_car
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
@@ -25,7 +26,7 @@ from mrdamper.systems.inputs.record import record
 from mrdamper.systems.monte_carlo import Draw, draw, monte_carlo
 from mrdamper.systems.rise_time import rise_times
 from mrdamper.systems.simulate import SystemLoop
-from mrdamper.systems.structure import Link, quarter_car, shear_building
+from mrdamper.systems.structure import Link, shear_building
 
 CAR = quarter_car("car", 300, 40, 20e3, 200e3)
 ROAD = load_input("bump", {"length_s": 1.0})

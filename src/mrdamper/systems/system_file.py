@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.model_file import load_model
@@ -17,22 +16,15 @@ from mrdamper.data import Floats
 from mrdamper.data.atomic import path_of
 from mrdamper.errors import StructureError, UnknownNameError
 from mrdamper.rig_files.strict_toml import load_toml
-from mrdamper.systems.structure import Link, System, building, half_car, quarter_car, shear_building
-
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Pair = tuple[Positive, Positive]
+from mrdamper.systems.cars import HalfCar, NotNegative, Positive, QuarterCar, SystemPart
+from mrdamper.systems.structure import Link, System, building, shear_building
 
 
-class _SystemPart(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class _Building(_SystemPart):
+class _Building(SystemPart):
     mass_kg: list[float] | list[list[float]]
     damping_N_s_m: list[list[float]]
     stiffness_N_m: list[list[float]]
-    floors: list[str] = []
+    floors: list[str] = Field([])
 
     def build(self, name: str, title: str, links: Sequence[Link]) -> System:
         M = np.array(self.mass_kg, dtype=float)
@@ -41,66 +33,29 @@ class _Building(_SystemPart):
         return building(name, floors, *matrices, links, title)
 
 
-class _Storey(_SystemPart):
+class _Storey(SystemPart):
     mass_kg: float
     stiffness_N_m: Positive
     damping_N_s_m: NotNegative = 0.0
 
 
-class _Car(_SystemPart):
-    body_kg: Positive
-    tyre_damping_N_s_m: NotNegative = 0.0
-    stop_gap_m: Positive | None = None
-    stop_N_m: NotNegative = 0.0
-
-    @property
-    def stop(self) -> tuple[float, float] | None:
-        return None if self.stop_gap_m is None else (self.stop_gap_m, self.stop_N_m)
-
-
-class _QuarterCar(_Car):
-    wheel_kg: Positive
-    spring_N_m: Positive
-    tyre_N_m: Positive
-    damping_N_s_m: NotNegative = 0.0
-
-    def build(self, name: str, title: str) -> System:
-        masses, springs = (self.body_kg, self.wheel_kg), (self.spring_N_m, self.tyre_N_m)
-        damping = (self.tyre_damping_N_s_m, self.damping_N_s_m)
-        return quarter_car(name, *masses, *springs, *damping, stop=self.stop, title=title)
-
-
-class _HalfCar(_Car):
-    pitch_inertia_kg_m2: Positive
-    front_arm_m: Positive
-    rear_arm_m: Positive
-    wheel_kg: Pair
-    spring_N_m: Pair
-    tyre_N_m: Pair
-
-    def build(self, name: str, title: str) -> System:
-        body = (self.body_kg, self.pitch_inertia_kg_m2, self.front_arm_m, self.rear_arm_m)
-        axles = (self.wheel_kg, self.spring_N_m, self.tyre_N_m)
-        return half_car(name, *body, *axles, self.tyre_damping_N_s_m, self.stop, title=title)
-
-
-class _DamperEntry(_SystemPart):
+class _DamperEntry(SystemPart):
     name: str
     above: str | None = None
     below: str = "ground"
     model: str | None = None
 
 
-class SystemDocument(_SystemPart):
+class SystemDocument(SystemPart):
     """A vehicle or building as a file states it."""
 
     title: str = ""
     source: str = ""
     building: _Building | None = None
     storey: list[_Storey] | None = None
-    quarter_car: _QuarterCar | None = None
-    half_car: _HalfCar | None = None
-    damper: list[_DamperEntry] = []
+    quarter_car: QuarterCar | None = None
+    half_car: HalfCar | None = None
+    damper: list[_DamperEntry] = Field([])
 
 
 @dataclass(frozen=True, eq=False)
