@@ -102,6 +102,36 @@ def test_a_long_table_of_a_data_base_is_told_apart_by_the_tag_that_has_several_v
     np.testing.assert_allclose(records[1].force, force(0.5), rtol=0, atol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("field", "values", "late"),
+    [("oil_temperature_degC", 30 + T, 0.001), ("coil_current_A", 0 * T + 0.5, 0.001), ("stroke_mm", X, 0.0)],
+)
+def test_a_channel_of_a_long_table_with_other_times_is_put_on_the_clock_of_the_force(tmp_path, field, values, late):
+    """The last of these is only longer than the force's: at equal times it is what it was."""
+    channels = {"stroke_mm": (T, X), "load_N": (T[:-20], force(0.5)[:-20]), "coil_current_A": (T, 0 * T + 0.5)}
+    channels |= {"oil_temperature_degC": (T, 30 + T), field: (T + late, values + late)}
+    text = "time_s,value,channel\n"
+    for name, columns in channels.items():
+        text += "".join(f"{t:.6f},{v:.6f},{name}\n" for t, v in zip(*columns, strict=True))
+    (tmp_path / "query.csv").write_text(text)
+    (record,) = import_files([tmp_path]).records
+    assert "W_RASTER" in [finding.code for finding in record.findings]
+    np.testing.assert_allclose(record.force, force(0.5)[:-20], rtol=0, atol=1e-4)
+    np.testing.assert_allclose(1e3 * record.displacement, X[:-20], rtol=0, atol=1e-4)
+    assert record.temperature is not None
+    np.testing.assert_allclose(record.temperature, 30 + record.time, rtol=0, atol=2e-3)
+
+
+def test_a_temperature_on_a_slower_clock_has_the_samples_of_the_record(tmp_path):
+    from scipy.io import savemat
+
+    test = {"time_s": T, "disp_mm": X, "force_N": force(0.5), "time2_s": T[::10], "temperature_degC": 30 + T[::10]}
+    savemat(tmp_path / "run_0.5A.mat", test)
+    record = read_run(tmp_path / "run_0.5A.mat")
+    assert record.temperature is not None
+    np.testing.assert_allclose(record.temperature, 30 + record.time, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("name", ["run_0.5A.xls", "run_0.5A.mat", "run_0.5A.tdms"])
 def test_the_content_decides_what_a_text_of_another_name_is(tmp_path, name):
     rows = lines(lambda i, t, x, f: f"{t:.3f}\t{x:.6f}\t{f:.4f}")

@@ -8,7 +8,6 @@ from functools import cache
 
 import numpy as np
 
-from mrdamper.data import held_current
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.readers.base import Content, RawTable, Words
 from mrdamper.rig_files.vocabulary import words
@@ -20,8 +19,7 @@ _MOST_CHANNELS = 60
 def with_channels_as_columns(table: RawTable) -> RawTable:
     """Return a long table with a column for each of its channels; any other table as it is.
 
-    Raises `RigFileError`: E_RASTER, when the table is read, if the channels have other times or other tests than the
-    force.
+    Raises `RigFileError`: E_RASTER if channels of several tests have other times than the force.
     """
     names = [name.strip(" _").casefold() for name in table.names]
     value = [i for i, name in enumerate(names) if name in _VALUE]
@@ -37,9 +35,9 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
     if units is None:
         return table
     others = [i for i in range(len(names)) if i not in (value[0], channel[0], *unit)]
+    others.sort(key=lambda i: table.headers[i].role != "time")
     rows = [np.flatnonzero(words.codes == code) for code in range(len(words.labels))]
-    base = rows[roles["force"]]
-    return _pivoted(table, value[0], others, words.labels, units, rows, base)
+    return _pivoted(table, value[0], others, words.labels, units, rows, rows[roles["force"]])
 
 
 def _pivoted(
@@ -51,44 +49,34 @@ def _pivoted(
     rows: list[np.ndarray],
     base: np.ndarray,
 ) -> RawTable:
+    """Return the channels as columns, those with other times than the force behind their own clock."""
     of_table = table.words
     assert of_table is not None
-    clocks = [i for i in others if table.headers[i].role == "time"]
     column = cache(lambda i: table.read([i]).values[i])
-
-    def of_channel(number: int) -> np.ndarray:
-        own = rows[number]
-        same = own.size == base.size and all(np.allclose(column(i)[own], column(i)[base]) for i in clocks)
-        if not same and len(clocks) == 1 and split_name(labels[number]).role == "current":
-            return _on_clock(column(clocks[0])[base], column(clocks[0])[own], column(value)[own])
-        if not same:
-            raise table.source.refuse(
-                "E_RASTER", f"{labels[number]!r} has other times than the force", "export one column a channel"
-            )
-        return column(value)[own]
-
-    def read(columns: Sequence[int]) -> Content:
-        size = len(others)
-        return Content({i: column(others[i])[base] if i < size else of_channel(i - size) for i in columns})
+    clocks = [i for i in others if table.headers[i].role == "time"]
+    apart = [n for n, own in enumerate(rows) if not _alike(own, base, [column(i) for i in clocks])]
+    tests = [i for i in others if i not in clocks and len(of_table(i).labels) > 1]
+    if apart and (len(clocks) != 1 or tests):
+        problem = f"{labels[apart[0]]!r} has other times than the force"
+        raise table.source.refuse("E_RASTER", problem, "export one column a channel")
+    places = [(i, base, table.names[i], table.units[i]) for i in others]
+    places += [(value, own, labels[n], units[n]) for n, own in enumerate(rows) if n not in apart]
+    for n in apart:
+        places += [(clocks[0], rows[n], *places[0][2:]), (value, rows[n], labels[n], units[n])]
 
     def words(i: int) -> Words:
-        if i >= len(others):
-            return Words(np.zeros(base.size, dtype=np.int32), ("",))
-        layout = of_table(others[i])
-        return Words(layout.codes[base], layout.labels)
+        layout = of_table(places[i][0])
+        return Words(layout.codes[places[i][1]], layout.labels)
 
-    names = (*(table.names[i] for i in others), *labels)
-    own = (*(table.units[i] for i in others), *units)
+    def read(columns: Sequence[int]) -> Content:
+        return Content({i: column(places[i][0])[places[i][1]] for i in columns})
+
+    names, own = tuple(name for *_, name, _ in places), tuple(unit for *_, unit in places)
     return replace(table, names=names, units=own, read=read, words=words, odd=(), over=(), remarks=())
 
 
-def _on_clock(clock: np.ndarray, own: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return a current recorded more rarely: the one that is held, else interpolated onto the force's clock."""
-    there = np.isfinite(own) & np.isfinite(values)
-    held, change = held_current(values[there])
-    if not change:
-        return np.full(clock.shape, held)
-    return np.interp(clock, own[there], values[there])
+def _alike(own: np.ndarray, base: np.ndarray, clocks: Sequence[np.ndarray]) -> bool:
+    return own.size == base.size and all(np.allclose(clock[own], clock[base]) for clock in clocks)
 
 
 def _units(table: RawTable, words: Words, column: list[int]) -> list[str] | None:

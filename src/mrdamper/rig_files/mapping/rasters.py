@@ -32,7 +32,7 @@ def with_one_clock(table: RawTable) -> RawTable:
     if not roles["force"] or not roles["displacement"]:
         return table
     together = [c for c in groups if all(any(owner[i] == c for i in roles[r]) for r in ("displacement", "force"))]
-    if together and (len(together) > 1 or not roles["current"] or owner[roles["current"][0]] in together):
+    if len(together) > 1 or (together and all(owner[i] in together for columns in roles.values() for i in columns)):
         return table  # groups that are tests, or a clock with all that is needed
     clock = together[0] if together else owner[roles["force"][0]]
     kept = [clock, *(i for i in owner if owner[i] == clock), *(i for i in owner if owner[i] != clock)]
