@@ -18,6 +18,8 @@ from mrdamper.export.c import CExporter
 from mrdamper.physics.motion import sine
 
 DAMPERS = all_dampers()
+# Of each kind of generated code one: without memory, hysteresis, inner equations, functions of the condition.
+SELF_TESTED = ("bingham", "bouc-wen", "spencer", "play-bypass", "joint", "modified", "conditioned")
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler on this machine")
 pytestmark = needs_compiler
 
@@ -69,7 +71,7 @@ def test_optimised_c_stays_within_rounding(name, compiler, tmp_path):
     assert np.max(np.abs(fast - force)) <= 4 * np.finfo(float).eps * np.max(np.abs(force))
 
 
-@pytest.mark.parametrize("name", DAMPERS)
+@pytest.mark.parametrize("name", [n if n in SELF_TESTED else pytest.param(n, marks=pytest.mark.slow) for n in DAMPERS])
 def test_the_self_test_passes_in_both_precisions(name, tmp_path):
     written = CExporter().export(DAMPERS[name], "damper")
     for file, content in written.files.items():

@@ -5,6 +5,7 @@ have by theory, an own search of alpha and beta, own least squares for the funct
 """
 
 from functools import cache
+from math import cos
 
 import numpy as np
 import pytest
@@ -46,8 +47,8 @@ def loop(amplitude, beta=BETA):
     """Steady z [m] over a cycle of x = X sin(theta), by an integrator of SciPy."""
 
     def rate(theta, z):
-        v = amplitude * np.cos(theta)
-        return v - beta * abs(v) * np.abs(z) * z - beta * v * z**2
+        v, (z,) = amplitude * cos(theta), z
+        return (v - beta * abs(v * z) * z - beta * v * z * z,)
 
     times = 2 * np.pi + PHASE
     z = solve_ivp(rate, (0, times[-1]), [0.0], t_eval=times, method="LSODA", rtol=1e-8, atol=1e-12, max_step=0.05).y[0]

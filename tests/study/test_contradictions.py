@@ -41,7 +41,9 @@ def test_no_run_of_a_bundled_rig_is_accused(bundled_study, rig):
     assert bundled_study.rig(rig).contradictions == ()
 
 
-@pytest.mark.parametrize("number", [1, 4, 9, 14, 24, 86, 3152, 3159, 3191])
+@pytest.mark.parametrize(
+    "number", [4, 86, 3191, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 9, 14, 24, 3152, 3159))]
+)
 def test_no_run_of_a_sound_folder_is_accused(number):
     assert find_contradictions(sound_folder(number)) == []
 
@@ -71,18 +73,18 @@ def test_a_reversed_coil_is_no_contradiction(sound):
     ("name", "value"),
     [
         ("one run in lbf", 4.448),
-        ("one run in kgf", 9.807),
         ("N under lbf", 1 / 4.448),
-        ("three runs in lbf", 4.448),
         ("one run in inches", 25.4),
-        ("one run in cm", 10.0),
         ("current in mA", 1.0),
         ("open coil", 0.0),
-        ("half-open coil", 0.5),
+        ("two half-open coils", 0.75),
         ("both channels inverted", -1.0),
         ("a random record in lbf", 4.448),
-        ("two half-open coils", 0.75),
-        ("half the force", 2.0),
+        pytest.param("one run in kgf", 9.807, marks=pytest.mark.slow),
+        pytest.param("three runs in lbf", 4.448, marks=pytest.mark.slow),
+        pytest.param("one run in cm", 10.0, marks=pytest.mark.slow),
+        pytest.param("half-open coil", 0.5, marks=pytest.mark.slow),
+        pytest.param("half the force", 2.0, marks=pytest.mark.slow),
     ],
 )
 def test_the_run_and_its_cause_are_named(cases, name, value):
@@ -195,7 +197,7 @@ def test_runs_with_gains_of_their_own_are_found_and_gains_of_sessions_are_not(so
     assert factors or differences.everywhere < 0
 
 
-@pytest.mark.parametrize("kind", [0, 3])
+@pytest.mark.parametrize("kind", [pytest.param(0, marks=pytest.mark.slow), 3])
 def test_two_dampers_half_the_runs_each_are_refused_with_both_groups(kind):
     """A single model of many coefficients describes both dampers together with an error of a few per cent."""
     folder = next(f for f in folders(DAMPERS[kind]) if f.name == "two dampers, half the runs each")
@@ -224,8 +226,8 @@ def test_motions_that_complete_the_matrix_of_tests_are_those_of_another_stroke(s
 
 
 @pytest.mark.parametrize("name", [
-    "a copy with noise", "a copy cropped", "a copy decimated", "a copy cropped, decimated, with noise",
-    "a validation run that is a copy", "a copy under another current",
+    "a copy cropped, decimated, with noise", "a validation run that is a copy", "a copy under another current",
+    *(pytest.param(f"a copy {how}", marks=pytest.mark.slow) for how in ("with noise", "cropped", "decimated")),
 ])  # fmt: skip
 def test_a_copy_is_found_and_its_original_kept(cases, name):
     (found,) = find_contradictions(cases[name].runs)
