@@ -51,7 +51,7 @@ def test_intervals_are_bounded_or_refused(stated, make, runs):
     assert all(np.isfinite(list(numbers.values())).all() for numbers in drawn)
 
 
-@pytest.mark.parametrize("stated", ["one", "unknown", "one a run"])
+@pytest.mark.parametrize("stated", ["one", "unknown", pytest.param("one a run", marks=pytest.mark.slow)])
 def test_tests_are_planned_whatever_is_known_of_sessions(stated):
     truth = joint_damper()
     runs = [replace(r, notes={"session": STATED[stated](i)}) for i, r in enumerate(session_runs(truth))]

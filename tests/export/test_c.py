@@ -63,7 +63,9 @@ def test_c_equals_python_to_the_last_bit(name, conditions, steps, tmp_path):
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("name", ["bouc-wen, gamma apart", "kwok", "joint", "modified"])
+@pytest.mark.parametrize(
+    "name", ["kwok", "joint", *(pytest.param(n, marks=pytest.mark.slow) for n in ("bouc-wen, gamma apart", "modified"))]
+)
 def test_optimised_c_stays_within_rounding(name, compiler, tmp_path):
     rows = many_conditions(20, 4000, 5)
     fast = run(build(DAMPERS[name], tmp_path, compiler, "-O3"), rows)[:, 0]

@@ -236,7 +236,8 @@ def test_the_same_study_runs_on_real_data_whose_gas_spring_is_unknown(bundled, q
 
 
 @pytest.mark.parametrize(
-    ("currents", "motions", "held"), [((1.0,), 3, True), ((0.0, 1.0), 2, False), ((0.0, 1.0, 2.0), 1, True)]
+    ("currents", "motions", "held"),
+    [((1.0,), 3, True), pytest.param((0.0, 1.0), 2, False, marks=pytest.mark.slow), ((0.0, 1.0, 2.0), 1, True)],
 )
 def test_thin_data_give_what_they_allow_and_say_why_the_rest_is_missing(
     quick, undrawn, tmp_path, currents, motions, held

@@ -35,7 +35,10 @@ def preview():
     return SystemLoop(CAR, ROAD, {"damper": joint_damper()}, NonCausalOptimum()).run(1e-3)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(
+    "name",
+    [n if n in ("skyhook", "hybrid", "clipped-optimal") else pytest.param(n, marks=pytest.mark.slow) for n in LAWS],
+)
 def test_nothing_beats_the_preview(name, preview):
     done = SystemLoop(CAR, ROAD, {"damper": joint_damper()}, controller_type(name)()).run(1e-3, machine=False)
     assert cost(preview) < cost(done)

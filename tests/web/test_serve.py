@@ -23,7 +23,7 @@ from mrdamper.web.app import plotly_script
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks into /proc for what is left running")
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", pytest.param("SIGHUP", marks=pytest.mark.slow)])
 def test_it_starts_answers_and_stops_cleanly(tmp_path, name):
     stop = getattr(signal, name)
     process = subprocess.Popen(
