@@ -65,6 +65,7 @@ def pytest_collection_modifyitems(items):
 
 def pytest_collection_finish():
     gc.freeze()
+    gc.set_threshold(50_000, 20, 100)  # young objects of numerical tests hold no circles: a twentieth of their time
     gc.enable()
 
 
