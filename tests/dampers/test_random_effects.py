@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mrdamper.dampers.random_effects import Effects, GainsAndOffsets, _Forms
+from mrdamper.dampers.random_effects import Effects, GainsAndOffsets
 
 PHASE = np.linspace(0.0, 2 * np.pi, 120, endpoint=False)
 FORCE = 100 * np.sin(PHASE)
@@ -84,11 +84,12 @@ def test_balanced_sessions_give_the_analysis_of_variance(sessions, each):
 
 def test_no_variance_is_negative():
     """Residuals that show less than their noise, in one of the forms or in all of them."""
-    sessions = np.kron(np.eye(3), np.ones((2, 2)))
-    forms = _Forms.of(np.ones(2), [sessions, np.eye(6)], 2 * np.eye(6))
+    sessions = np.kron(np.eye(3), np.ones((2, 1)))
+    effects = GainsAndOffsets.__new__(GainsAndOffsets)
+    vars(effects).update(_designs={0: sessions, 2: np.eye(6)}, _turned=np.eye(6), _noise=np.full(6, 2.0))
     for shown in (np.zeros(6), np.tile([3.0, -3.0], 3), np.full(6, 3.0)):
-        assert np.all(forms.variances(shown[None]) >= 0)
-    assert not forms.variances(np.zeros((1, 6))).any()
+        assert np.all(effects._variances(shown[None], np.ones((1, 2)))[0] >= 0)
+    assert not effects._variances(np.zeros((1, 6)), np.ones((1, 2)))[0].any()
 
 
 def test_a_truth_is_found_from_many_sessions():
@@ -96,6 +97,26 @@ def test_a_truth_is_found_from_many_sessions():
     found = effects_of(runs_of(gains, offsets, names, noise=20.0)).effects()
     assert (found.gain, found.run_gain) == pytest.approx((0.05, 0.02), rel=0.2)
     assert (found.offset, found.run_offset) == pytest.approx((4.0, 2.0), rel=0.2)
+
+
+def test_forms_are_those_of_their_matrices():
+    rng = np.random.default_rng(3)
+    designs, noise = {0: rng.standard_normal((7, 3)), 2: np.eye(7)}, rng.uniform(0.1, 0.3, 7)
+    effects = GainsAndOffsets.__new__(GainsAndOffsets)
+    vars(effects).update(_designs=designs, _turned=np.eye(7), _noise=noise)
+    shown = 2 * rng.standard_normal((4, 3)) @ designs[0].T + rng.standard_normal((4, 7))
+    at = rng.uniform(0.5, 2.0, (4, 2))
+    found, inner = effects._variances(shown, at)
+    own = [z @ z.T for z in designs.values()]
+    for y, variances, row, products in zip(shown, at, found, inner, strict=True):
+        inverse = np.linalg.inv(np.diag(noise) + variances[0] * own[0] + variances[1] * own[1])
+        weights = [inverse @ v @ inverse for v in own]
+        table = [[np.trace(w @ v) for v in own] for w in weights]
+        exact = np.linalg.solve(table, [y @ w @ y - np.trace(w @ np.diag(noise)) for w in weights])
+        if (exact > 0).all():
+            assert row == pytest.approx(exact, rel=1e-6)
+        assert products[:3, :3] == pytest.approx(designs[0].T @ inverse @ designs[0], rel=1e-6)
+    assert (found > 0).all(axis=1).any()
 
 
 def test_noise_alone_is_no_scatter_of_gains():

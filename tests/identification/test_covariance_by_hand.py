@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from mrdamper.identification import covariance
+from mrdamper.identification.autoregression import Autoregression, memories
 from mrdamper.identification.covariance import spread
+from mrdamper.identification.intervals import student
 
 RNG = np.random.default_rng(11)
 
@@ -16,12 +18,16 @@ def the_same_draws_whatever_ran_before():
     RNG.bit_generator.state = np.random.default_rng(11).bit_generator.state
 
 
+def numbers(model):
+    return np.append(model.variance, model.coefficients)
+
+
 def burg(series):
     """Burg's recursion with the mean's bias taken out of the first order, and the corrected criterion of Akaike."""
     N = len(series)
     f = b = [v - sum(series) / N for v in series]
     variance, a = sum(v * v for v in f) / N, []
-    best, least = [variance], N * math.log(variance) + 2
+    best, least = [variance], N * math.log(variance) + 2 * N / (N - 2)
     for order in range(1, min(12, N // 10) + 1):
         ahead, behind = f[1:], b[:-1]
         k = (
@@ -34,7 +40,7 @@ def burg(series):
         f = [p + k * q for p, q in zip(ahead, behind, strict=True)]
         b = [q + k * p for p, q in zip(ahead, behind, strict=True)]
         a = [*(p + k * q for p, q in zip(a, a[::-1], strict=True)), k]
-        variance *= 1 - k * k
+        variance = sum(p * p + q * q for p, q in zip(f, b, strict=True)) / (2 * len(f))
         criterion = N * math.log(variance) + 2 * (order + 1) * N / max(N - order - 2, 1)
         if criterion < least:
             best, least = [variance, *a], criterion
@@ -49,15 +55,15 @@ def test_an_autoregression_is_burgs(size, coefficients):
     for i in range(len(coefficients), series.size):
         series[i] = noise[i] - sum(a * series[i - k] for k, a in enumerate(coefficients, 1))
     series = series[50:] + 3.0
-    assert covariance._autoregression(series) == pytest.approx(np.array(burg(series.tolist())))
-    assert covariance._autoregression(np.full(40, 2.0)).tolist() == [0.0]
+    assert numbers(Autoregression.of(series)) == pytest.approx(np.array(burg(series.tolist())))
+    assert numbers(Autoregression.of(np.full(40, 2.0))).tolist() == [0.0]
 
 
 @pytest.mark.parametrize(("rho", "variance"), [(0.0, 1.7), (0.6, 1.7), (0.6, 1.7e-4), (-0.4, 1.7)])
 def test_noise_gives_the_score_of_its_covariance_matrix(monkeypatch, rho, variance):
     N = 90
-    model = np.array([variance, -rho]) if rho else np.array([variance])
-    monkeypatch.setattr(covariance, "_autoregression", lambda residual: model)
+    model = Autoregression(variance, np.array([-rho] if rho else []))
+    monkeypatch.setattr(Autoregression, "of", lambda residual: model)
     J = RNG.standard_normal((N, 3)) * [1.0, 2.0, 0.5]
     inverse = np.linalg.inv(J.T @ J)
     (score, relative), memory = covariance._noise(J, RNG.standard_normal(N), inverse)
@@ -246,8 +252,14 @@ def test_some_samples_of_many_become_one(monkeypatch, block):
 
 
 def spectrum(model, omega):
-    response = 1 + sum(a * np.exp(-1j * omega * k) for k, a in enumerate(model[1:], 1))
+    response = np.ones_like(omega) + sum(a * np.exp(-1j * omega * k) for k, a in enumerate(model[1:], 1))
     return model[0] / abs(response) ** 2
+
+
+def covariance_matrix(model, size):
+    circle = 2 * np.pi * np.arange(1 << 14) / (1 << 14)
+    memory = np.fft.ifft(spectrum(model, circle)).real[:size]
+    return memory[np.abs(np.subtract.outer(np.arange(size), np.arange(size)))]
 
 
 def repeated_by_hand(J, r, time, f, inverse):
@@ -265,7 +277,9 @@ def repeated_by_hand(J, r, time, f, inverse):
         np.mean([1 - (J.T @ w) @ inverse @ (J.T @ w) / (w @ w) for w in waves[2 * k : 2 * k + 2]]) for k in range(most)
     ]
     power = [(a[2 * k] ** 2 + a[2 * k + 1] ** 2) / 2 for k in range(most)]
-    expected = [2 * spectrum(model, 2 * np.pi * f * step * k) / (N - 2 * most) for k in range(1, most + 1)]
+    whole = covariance_matrix(model, N)
+    each = [w @ whole @ w / (w @ w) ** 2 * N / (N - 2 * most) for w in waves]
+    expected = [(each[2 * k] + each[2 * k + 1]) / 2 for k in range(most)]
     left, power, expected = (np.array(v) for v in (left, power, expected))
     if power.sum() < (1 + 3 / np.sqrt(left.sum())) * (expected @ left):
         return r, None, None
@@ -334,12 +348,14 @@ def test_a_surplus_that_chance_explains_does_not_repeat(seed):
 def test_orders_are_chosen_as_by_the_criterion_in_short_and_white_records():
     for seed in range(200):
         series = np.random.default_rng(seed).standard_normal((31 if seed < 60 else 20) + seed % 5)
-        assert covariance._autoregression(series) == pytest.approx(np.array(burg(series.tolist()))), seed
+        assert numbers(Autoregression.of(series)) == pytest.approx(np.array(burg(series.tolist()))), seed
 
 
 def test_doubt_of_two_coefficients_is_that_of_their_joint_spread(monkeypatch):
     N, model = 80, np.array([1.7, -0.9, 0.4])
-    monkeypatch.setattr(covariance, "_autoregression", lambda residual: model)
+    lattice = Autoregression(1.7, np.array([-0.9 / 1.4, 0.4]))
+    assert lattice.coefficients == pytest.approx(model[1:])
+    monkeypatch.setattr(Autoregression, "of", lambda residual: lattice)
     J = np.random.default_rng(1).standard_normal((N, 3)).cumsum(axis=0)
     inverse = np.linalg.inv(J.T @ J)
     circle = 2 * np.pi * np.arange(4096) / 4096
@@ -372,3 +388,50 @@ def test_a_motion_repeats_from_nearly_a_cycle_on(monkeypatch, cycles, asked):
 def test_powers_are_powers():
     base = np.exp(1j * np.array([0.1, 2.0]))
     assert covariance._powers(base, 3) == pytest.approx(np.array([base, base**2, base**3]))
+
+
+@pytest.mark.parametrize("reflections", [(-0.9,), (-0.8, 0.3, -0.2)])
+def test_innovations_are_white_from_the_first_sample_on(reflections):
+    model = Autoregression(2.5, np.array(reflections))
+    whole = covariance_matrix(numbers(model), 40)
+    turned = model.innovations(np.eye(40))
+    assert turned @ whole @ turned.T == pytest.approx(2.5 * np.eye(40), abs=1e-9)
+    assert model.lags == pytest.approx(spectrum(numbers(model), 0.0) / whole[0, 0])
+
+
+def test_the_chance_of_a_memory_is_its_restricted_likelihood():
+    N = 120
+    residual = np.random.default_rng(4).standard_normal(N).cumsum()
+    J = np.column_stack([np.ones(N), np.cos(np.arange(N) / 9.0), np.zeros(N)])
+    residual -= J @ np.linalg.lstsq(J, residual, rcond=None)[0]
+    models, chances = memories(J, residual)
+    assert chances.sum() == pytest.approx(1.0)
+    logs = []
+    for model in models:
+        whole = covariance_matrix(numbers(model), N)
+        inverse, X = np.linalg.inv(whole), J[:, :2]
+        normal = X.T @ inverse @ X
+        left = inverse - inverse @ X @ np.linalg.inv(normal) @ X.T @ inverse
+        assert residual @ left @ residual == pytest.approx(N - 2, rel=1e-3)  # the most likely variance
+        determinants = np.linalg.slogdet(whole)[1] + np.linalg.slogdet(normal)[1]
+        logs.append(-determinants / 2 + np.log(1 + model.reflections[0]) / 2)
+    by_hand = np.exp(np.array(logs) - max(logs))
+    assert chances == pytest.approx(by_hand / by_hand.sum(), rel=0.02)
+
+
+@pytest.mark.parametrize("correlation", [0.99, 0.998])
+def test_intervals_hold_the_truth_where_a_record_is_shorter_than_its_memory(correlation):
+    N, repeats, rng = 800, 300, np.random.default_rng(8)
+    phase = 2 * np.pi * np.arange(N) / 160
+    J = np.column_stack([np.ones(N), np.cos(phase), np.sin(3 * phase)])
+    start, inside = rng.standard_normal(repeats), np.zeros(3)
+    noise = np.sqrt(1 - correlation**2) * rng.standard_normal((repeats, N))
+    noise[:, 0] = start
+    for k in range(1, N):
+        noise[:, k] += correlation * noise[:, k - 1]
+    for series in noise:
+        fitted = np.linalg.lstsq(J, series, rcond=None)[0]
+        found = spread(J, series - J @ fitted, np.arange(N) / 160, 1.0)
+        inside += np.abs(fitted) <= found.errors * [student(0.95, d) for d in found.dof]
+    assert (inside / repeats > 0.92).all()
+    assert (inside[1:] / repeats < 0.99).all()  # of the mean such a record tells little, and no interval is exact

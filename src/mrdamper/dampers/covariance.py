@@ -144,9 +144,10 @@ class _Spread:
         )  # fmt: skip
 
     def curved(self, damper: Damper, parts: Sequence[RunResiduals]) -> _Spread:
-        """Scale the draws to those that are fitted without linearisation, where one model describes the damper.
+        """Scale the draws to the mean square of those that are fitted without linearisation, of one model of a damper.
 
-        Few are fitted, and their search ends early: a scatter below that of linearised fits is not counted.
+        Beside the linearised fit to the same draw, a fit shows its bias with little scatter. Few are fitted, and
+        their search ends early: a variance below that of linearised fits is not counted.
         """
         linear, size = self.draws.moved[:_REFITS], np.sqrt(np.mean(self.draws.moved[:_REFITS] ** 2, axis=0))
         if damper.one_model is None or not size.all():
@@ -154,7 +155,9 @@ class _Spread:
         shifts = np.concatenate([np.zeros((1, len(parts), 2)), self.draws.shifts[:_REFITS]])
         starts = np.concatenate([np.zeros((1, len(self.names))), linear])
         fits = refitted(damper, parts, self.rests, self.names, shifts, starts)
-        factors = np.maximum(np.sqrt(np.mean((fits[1:] - fits[0]) ** 2, axis=0)) / size, 1.0)
+        moved: Floats = (fits[1:] - fits[0]) / size
+        bias: Floats = np.mean(moved - linear / size, axis=0)
+        factors = np.sqrt(np.maximum(np.mean(moved**2, axis=0) - bias**2, 1.0) + bias**2)
         return replace(self, draws=replace(self.draws, moved=self.draws.moved * factors))
 
     @cached_property

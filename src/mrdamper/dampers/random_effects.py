@@ -23,6 +23,8 @@ from mrdamper.statistics.linear import nonnegative_least_squares
 _MIN_RETAINED = 0.05  # share of a variance that the fit must have left in the residuals for it to be estimated
 _MAX_CONDITION = 100.0  # condition number of the equations; beyond, runs and sessions are not separated
 _ITERATIONS = 4  # of the variances at which the quadratic forms are of least variance
+_ITERATIONS_OF_DRAWS = 1  # the same, of what draws show; more changes their quantiles by a per cent
+_MAX_SHOWN = 128  # gains and offsets up to which they are iterated: the time grows with the third power of their number
 _MIN_SHARE = 1e-4  # of the largest variance, with which every other one counts in these forms
 _DRAWS, _ROUNDS, _SEED = 600, 4, 20240813  # draws of gains and offsets; rounds of weights, as in the joint fit
 _MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
@@ -69,46 +71,6 @@ class Draws:
     shown: Floats
 
 
-@dataclass(frozen=True, eq=False)
-class _Forms:
-    """Quadratic forms of what residuals show, of least variance at some variances, and their expectations.
-
-    Attributes
-    ----------
-    weights : sequence of (K, K) arrays
-    table : (C, C) array
-        Expectation of each form by each variance.
-    noise : (C,) array
-        By noise alone.
-    """
-
-    weights: Sequence[Floats]
-    table: Floats
-    noise: Floats
-
-    @classmethod
-    def of(cls, variances: Floats, designs: Sequence[Floats], noise: Floats) -> _Forms:
-        """Of variances (C,), the covariance (K, K) that one of each gives, and that of the noise."""
-        least = _MIN_SHARE * float(variances.max())
-        whole: Floats = noise + least * _MIN_SHARE * np.eye(len(noise))
-        for variance, design in zip(variances.tolist(), designs, strict=True):
-            whole = whole + max(variance, least) * design
-        inverse: Floats = np.linalg.inv(whole).astype(float)
-        weights: list[Floats] = [inverse @ design @ inverse for design in designs]
-        table = np.array([[np.sum(weight * design) for design in designs] for weight in weights])
-        return cls(weights, table, np.array([np.sum(weight * noise) for weight in weights]))
-
-    def variances(self, shown: Floats, noise: float = 1.0) -> Floats:
-        """(D, C) variances, none of them negative, by what residuals show (D, K), with a share of the noise in it."""
-        size = np.sqrt(np.diag(self.table))
-        forms = np.array([np.einsum("dk,kl,dl->d", shown, weight, shown, optimize=True) for weight in self.weights]).T
-        table, right = self.table / np.outer(size, size), (forms - noise * self.noise) / size
-        solved = np.linalg.solve(table, right.T).T
-        for row in np.flatnonzero((solved < 0).any(axis=1)):
-            solved[row] = nonnegative_least_squares(table, right[row])[0]
-        return solved / size
-
-
 class GainsAndOffsets:
     """Gains and offsets of runs as the residuals of a fit show them.
 
@@ -152,40 +114,72 @@ class GainsAndOffsets:
 
     @cached_property
     def _designs(self) -> dict[int, Floats]:
-        """Covariance (K, K) of what residuals show by one of each variance that they can tell."""
+        """What residuals show (K, G) of each effect of the variances that they can tell."""
         tables = {component: self._groups(component) for component in range(4)}
         shown = {c: self._turned @ self._shown @ table for c, table in tables.items()}
         enough = {c: np.sum(shown[c] ** 2) >= _MIN_RETAINED * max(table.sum(), 1.0) for c, table in tables.items()}
-        used = [c for c in tables if enough[c] and enough[c - c % 2]]  # offsets only where gains show
-        designs = {c: shown[c] @ shown[c].T for c in used}
-        if 0 in used and 2 in used:
-            unit = [design.ravel() / np.linalg.norm(design) for design in designs.values()]
+        designs = {c: shown[c] for c in tables if enough[c] and enough[c - c % 2]}  # offsets only where gains show
+        if 0 in designs and 2 in designs:
+            unit = [(z @ z.T).ravel() / np.linalg.norm(z @ z.T) for z in designs.values()]
             if np.linalg.cond(np.inner(unit, unit)) > _MAX_CONDITION:
                 # Sessions of one run each: all scatter is counted as that between sessions.
                 return {c: design for c, design in designs.items() if c < 2}
         return designs
 
-    def _forms(self, variances: Floats) -> _Forms:
-        return _Forms.of(variances, list(self._designs.values()), self._turned * self._noise @ self._turned.T)
+    def _variances(self, shown: Floats, at: Floats, noise: float = 1.0) -> tuple[Floats, Floats]:
+        """Quadratic forms of least variance at some variances, solved for what variances they are of.
+
+        Parameters
+        ----------
+        shown : (D, K) array
+            What residuals show, with a share `noise` of their noise in it.
+        at : (D, C) or (1, C) array
+            None of its rows zero.
+
+        Returns
+        -------
+        variances : (D, C) array
+            None of them negative.
+        inner : (D, G, G) array
+            Zᵀ V⁻¹ Z of the effects.
+        """
+        designs = list(self._designs.values())
+        whole, first = np.hstack(designs), np.cumsum([0, *(z.shape[1] for z in designs[:-1])])
+        own: Floats = self._turned * self._noise @ self._turned.T
+        least = _MIN_SHARE * at.max(axis=1, keepdims=True)
+        covariance = own + np.multiply.outer(_MIN_SHARE * least[:, 0], np.eye(len(own)))
+        covariance = covariance + np.tensordot(np.maximum(at, least), [z @ z.T for z in designs], 1)
+        turned: Floats = np.linalg.inv(covariance) @ whole
+        inner: Floats = whole.T @ turned
+        table = np.add.reduceat(np.add.reduceat(inner**2, first, axis=1), first, axis=2)
+        by_noise = np.add.reduceat(np.sum(turned * (own @ turned), axis=1), first, axis=1)
+        seen = np.add.reduceat((shown[:, None, :] @ turned)[:, 0] ** 2, first, axis=1)
+        size: Floats = np.sqrt(np.einsum("dcc->dc", table))
+        table: Floats = table / size[:, :, None] / size[:, None, :]
+        right: Floats = (seen - noise * by_noise) / size
+        solved = np.linalg.solve(table, right[:, :, None])[:, :, 0].astype(float)
+        for row in np.flatnonzero((solved < 0).any(axis=1)):
+            solved[row] = nonnegative_least_squares(table[row % len(table)], right[row])[0]
+        return solved / size, inner
 
     def effects(self) -> Effects:
         """Return the four standard deviations and the degrees of freedom behind them."""
-        designs, shown = self._designs, (self._turned @ self._read)[None]
-        used = list(designs)
+        used, shown = list(self._designs), (self._turned @ self._read)[None]
         variances, dof = np.zeros((2, 4))
-        fitted = np.full(len(used), float(np.mean(shown**2)) if used else 0.0)
+        fitted = np.full((1, len(used)), float(np.mean(shown**2)) if used else 0.0)
+        for _ in range(_ITERATIONS):
+            if not fitted.any():
+                return Effects()
+            fitted = self._variances(shown, fitted)[0]
         if not fitted.any():
             return Effects()
-        forms = self._forms(fitted)
-        for _ in range(_ITERATIONS):
-            if not (fitted := forms.variances(shown)[0]).any():
-                return Effects()
-            forms = self._forms(fitted)
-        variances[used] = fitted
-        for c, weight in zip(used, forms.weights, strict=True):  # Satterthwaite of a form
-            product = weight @ designs[c]
+        variances[used], inner = fitted[0], self._variances(shown, fitted)[1]
+        begin = 0
+        for c in used:  # Satterthwaite of a form
+            end = begin + self._designs[c].shape[1]
+            product = inner[0, begin:end, begin:end] @ inner[0, begin:end, begin:end]
             count = len(self.sessions) if c < 2 else len(self.runs)
-            dof[c] = min(np.trace(product) ** 2 / np.sum(product * product.T), count - 1.0)
+            dof[c], begin = min(np.trace(product) ** 2 / np.sum(product * product.T), count - 1.0), end
         gain, offset, run_gain, run_offset = (np.sqrt(variances) * [1.0, self.unit, 1.0, self.unit]).tolist()
         return Effects(gain, offset, float(dof[0]), run_gain, run_offset, float(dof[2]))
 
@@ -224,8 +218,13 @@ class GainsAndOffsets:
             return np.ones((len(drawn), len(self.effect)))
         moved = np.array([np.sum((self.effect @ self._groups(c)) ** 2, axis=1) for c in used])
         read = (drawn / [1.0, self.unit]).reshape(len(drawn), -1) @ (self._turned @ self._shown).T
-        shown = self._forms(variances).variances(read, noise=0.0) @ moved
-        return shown / np.maximum(variances @ moved, np.finfo(float).tiny)
+        found = self._variances(read, variances[None], noise=0.0)[0]
+        if read.shape[1] <= _MAX_SHOWN:
+            # As the estimate, each draw is weighted by the variances that it shows itself.
+            for _ in range(_ITERATIONS_OF_DRAWS):
+                some = np.flatnonzero(found.any(axis=1))
+                found[some] = self._variances(read[some], found[some], noise=0.0)[0]
+        return found @ moved / np.maximum(variances @ moved, np.finfo(float).tiny)
 
     def _refitted(self, shift: Floats) -> Floats:
         """(D, P) parameters by draws of gains and offsets (D, R, 2)."""

@@ -14,14 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.data.arrays import Floats
+from mrdamper.identification.autoregression import Autoregression, circle, memories, points
+from mrdamper.identification.intervals import dof_of_quantile, student
 
 _MIN_VARIANCE = 1e-200  # a variance of nothing, that shares of it can still be divided by
-_HIGHEST_ORDER = 12  # of the autoregression
 _HARMONICS = 24  # of the motion in which model error is looked for
 _REPEATS = 0.95  # cycles from which harmonics of the motion can be told apart
 _MIN_CYCLES = 1.9  # cycles from which repeats are seen as such
 _MAX_SAMPLES = 2001  # samples that are looked at
-_MAX_NEIGHBOUR_CORRELATION = 0.9995  # correlation of neighbours
+_ENOUGH_LAGS = 20  # lags of the noise in a record from which its memory is known
+_LEVEL = 0.95  # of intervals whose degrees of freedom are sought
 _TAKES_PART = 0.1  # in a direction, of its unit vector
 _NO_MORE = 1e-12  # of the largest: eigenvalue of the scaled normal matrix below which nothing is known
 
@@ -165,9 +167,10 @@ def _repeated(
     taken = np.clip(np.sum(responses * (inverse @ responses), axis=0) / np.diag(gram), 0.0, 1.0)
     left = (1 - taken).reshape(most, 2).mean(axis=1)
     power = (amplitudes**2).reshape(most, 2).mean(axis=1)
-    model = _autoregression(rest)
-    lags = _powers(np.exp(-2j * np.pi * frequency * step * orders), model.size - 1)
-    expected = 2 * model[0] / np.abs(1 + model[1:] @ lags) ** 2 / (size - 2 * most)
+    # A record that ends elsewhere than it began has more power there than the spectrum of its noise.
+    seen = np.abs(np.fft.rfft(waves.T, points(size), axis=0)) ** 2
+    expected = (circle(size) * Autoregression.of(rest).spectrum(size)) @ seen / np.diag(gram) ** 2
+    expected = expected.reshape(most, 2).mean(axis=1) * size / (size - 2 * most)
     # Noise alone has power at these frequencies too; only a surplus that chance does not explain repeats.
     if np.sum(power) < (1 + 3 / np.sqrt(left.sum())) * np.sum(expected * left):
         return residual, []
@@ -207,57 +210,53 @@ def _power_law(orders: Floats, power: Floats, expected: Floats, left: Floats) ->
 def _noise(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, float]:
     """Calculate the score's covariance from the residual's own spectrum, and its memory in samples."""
     size = residual.size
-    model = _autoregression(residual)
-    points = 1 << (2 * size - 1).bit_length()
-    response = np.fft.rfft(np.append(1.0, model[1:]), points)
-    spectrum = model[0] / np.abs(response) ** 2  # its mean over the circle is the variance
-    transformed = np.fft.rfft(jacobian, points, axis=0)
-    weights = np.full(spectrum.size, 2.0) / points
-    weights[[0, -1]] = 1.0 / points
-    score = np.real((transformed.conj().T * (weights * spectrum)) @ transformed)
-    memory = np.fft.irfft(spectrum, points)[: model.size]  # covariance of the residual at its lags
+    model = Autoregression.of(residual)
+    if model.order and size < _ENOUGH_LAGS * model.lags:
+        return _noise_of_long_memory(jacobian, residual, inverse)
+    spectrum = model.spectrum(size)
+    transformed = np.fft.rfft(jacobian, points(size), axis=0)
+    score = _score(transformed, circle(size) * spectrum)
+    memory = np.fft.irfft(spectrum, points(size))[: model.order + 1]  # covariance of the residual at its lags
     if memory[0] <= 0:
         return (score, np.zeros(len(inverse))), 1.0
     # The fit took a share of the noise with it.
     taken = float(np.sum(inverse * score)) / (size * memory[0])
     relative = np.full(len(inverse), 2.0 / size)
-    if order := model.size - 1:  # what uncertain coefficients bend of the spectrum, as each parameter sees it
+    if order := model.order:  # what uncertain coefficients bend of the spectrum, as each parameter sees it
         lags = np.arange(order)
-        doubt = model[0] / size * np.linalg.pinv(memory[np.abs(np.subtract.outer(lags, lags))])
+        doubt = model.variance / size * np.linalg.pinv(memory[np.abs(np.subtract.outer(lags, lags))])
         influence = np.abs(transformed @ inverse) ** 2 * spectrum[:, None]
-        base = weights @ influence
-        bent = -2 * np.fft.irfft(influence / response.conj()[:, None], points, axis=0)[1 : order + 1]
-        slopes = bent / np.maximum(base, 1e-300)
+        response = np.fft.rfft(np.append(1.0, model.coefficients), points(size))
+        bent = -np.fft.irfft(influence / response.conj()[:, None], points(size), axis=0)[1 : order + 1]
+        slopes = 2 * bent / np.maximum(circle(size) @ influence, 1e-300)
         relative = relative + np.sum(slopes * (doubt @ slopes), axis=0)
-    return (score / max(1 - taken, 0.2), relative), float(spectrum[0] / memory[0])
+    return (score / max(1 - taken, 0.2), relative), model.lags
 
 
-def _autoregression(residual: Floats) -> Floats:
-    """Variance of the innovation, then coefficients: Burg's recursion, order by the corrected criterion of Akaike."""
-    forward = backward = residual - residual.mean()
+def _score(transformed: NDArray[np.complex128], spectrum: Floats) -> Floats:
+    """(P, P) covariance of the score by noise, of the Fourier transform of the Jacobian and means of the spectrum."""
+    return np.real((transformed.conj().T * spectrum) @ transformed)
+
+
+def _noise_of_long_memory(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, float]:
+    """Calculate the same where the record is only some lags of its noise long, and cannot tell how many.
+
+    Means over memories by their restricted likelihood, which counts what the fit took out of the residual; the
+    degrees of freedom of a parameter are those at which Student's interval is that of the mixture.
+    """
+    from scipy.special import ndtr  # type: ignore[reportMissingTypeStubs]
+
+    models, chances = memories(jacobian, residual)
     size = residual.size
-    variance = float(forward @ forward) / size
-    if variance == 0:
-        return np.zeros(1)
-    coefficients = np.zeros(0)
-    best, least = np.array([variance]), size * np.log(variance) + 2
-    for order in range(1, min(_HIGHEST_ORDER, size // 10) + 1):
-        ahead, behind = forward[1:], backward[:-1]
-        power = float(ahead @ ahead + behind @ behind)
-        if power <= 0:
-            break
-        reflection = -2 * float(ahead @ behind) / power
-        if order == 1:  # what a mean taken out hides of a long memory [Kendall 1954, Marriott and Pope 1954]
-            reflection = max(reflection - max(1 - 3 * reflection, 0.0) / size, -_MAX_NEIGHBOUR_CORRELATION)
-        forward, backward = ahead + reflection * behind, behind + reflection * ahead
-        coefficients = np.concatenate([coefficients + reflection * coefficients[::-1], [reflection]])
-        variance *= 1 - reflection**2
-        if variance <= 0:
-            break
-        criterion = size * np.log(variance) + 2 * (order + 1) * size / (size - order - 2)
-        if criterion < least:
-            best, least = np.concatenate([[variance], coefficients]), criterion
-    return best
+    transformed, weights = np.fft.rfft(jacobian, points(size), axis=0), circle(size)
+    scores = np.array([_score(transformed, weights * model.spectrum(size)) for model in models])
+    score: Floats = np.tensordot(chances, scores, 1)
+    variances = np.einsum("ip,mpq,iq->mi", inverse, scores, inverse)
+    ratios = np.sqrt(variances / np.maximum(chances @ variances, _MIN_VARIANCE))  # of a memory's standard error
+    quantiles = np.linspace(student(_LEVEL, np.inf), student(_LEVEL, 1.0), 400)
+    inside = np.tensordot(chances, 2 * ndtr(quantiles[:, None, None] / np.maximum(ratios, 1e-9)) - 1, (0, 1))
+    dof = np.array([dof_of_quantile(float(np.interp(_LEVEL, own, quantiles)), _LEVEL) for own in inside.T])
+    return (score, 2 / dof + 2 / size), float(np.exp(chances @ np.log([model.lags for model in models])))
 
 
 def _powers(base: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:

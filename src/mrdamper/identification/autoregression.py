@@ -1,0 +1,153 @@
+"""Autoregressions of a residual: one by Burg's recursion, and those of longer memory that are likely, too."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrdamper.data.arrays import Floats
+
+_HIGHEST_ORDER = 12
+_MAX_CORRELATION = 0.9995  # of neighbours
+_RANK = 1e-10  # of the largest singular value of a Jacobian, below which a direction is no other one
+_SHORTER, _STEP = 4.0, 0.35  # shortest memory that is looked at, as a part of the one found; step of its logarithm
+
+
+@dataclass(frozen=True, eq=False)
+class Autoregression:
+    """Noise whose samples follow from those before.
+
+    Attributes
+    ----------
+    variance : float
+        Of the innovation.
+    reflections : (K,) array
+        Of the lattice.
+    """
+
+    variance: float
+    reflections: Floats
+
+    @classmethod
+    def of(cls, residual: Floats) -> Autoregression:
+        """By Burg's recursion, of an order by the corrected criterion of Akaike."""
+        size = residual.size
+        found = _burg(residual, min(_HIGHEST_ORDER, size // 10))
+        best, least = found[0], np.inf
+        for model in found:
+            order = model.order
+            criterion = size * np.log(max(model.variance, 1e-300)) + 2 * (order + 1) * size / (size - order - 2)
+            if criterion < least:
+                best, least = model, criterion
+        return best
+
+    @property
+    def order(self) -> int:
+        """Number of coefficients."""
+        return self.reflections.size
+
+    @property
+    def predictors(self) -> list[Floats]:
+        """Coefficients of each order up to its own, by Levinson's recursion."""
+        rows = [np.zeros(0)]
+        for reflection in self.reflections.tolist():
+            rows.append(np.append(rows[-1] + reflection * rows[-1][::-1], reflection))
+        return rows
+
+    @property
+    def coefficients(self) -> Floats:
+        """(K,) of the samples before, on the side of the innovation."""
+        return self.predictors[-1]
+
+    @property
+    def lags(self) -> float:
+        """Samples that one independent one stands for where a mean is taken."""
+        own = float(np.prod(1 - self.reflections**2))
+        return own / float(1 + self.coefficients.sum()) ** 2
+
+    def spectrum(self, size: int) -> Floats:
+        """Calculate the spectrum at `points(size)` of the circle, over which its mean is the variance."""
+        return self.variance / np.abs(np.fft.rfft(np.append(1.0, self.coefficients), points(size))) ** 2
+
+    def innovations(self, table: Floats) -> Floats:
+        """Columns (N, C) as innovations of one variance; the first from the samples that there are."""
+        rows, out = self.predictors, table.copy()
+        for lag, coefficient in enumerate(rows[-1].tolist(), 1):
+            out[lag:] += coefficient * table[:-lag]
+        for first in range(self.order):
+            share = np.sqrt(np.prod(1 - self.reflections[first:] ** 2))
+            out[first] = share * (table[first] + rows[first] @ table[:first][::-1])
+        return out
+
+
+def points(size: int) -> int:
+    """Points of a Fourier transform in which a record does not meet itself."""
+    return 1 << (2 * size - 1).bit_length()
+
+
+def circle(size: int) -> Floats:
+    """Weights of the upper half of the circle by which a mean over the whole is taken."""
+    weights = np.full(points(size) // 2 + 1, 2.0 / points(size))
+    weights[[0, -1]] /= 2
+    return weights
+
+
+def _burg(residual: Floats, highest: int, first: float | None = None) -> list[Autoregression]:
+    """Autoregressions of each order; the first reflection may be given."""
+    forward = backward = residual - residual.mean()
+    size = residual.size
+    models = [Autoregression(float(forward @ forward) / size, np.zeros(0))]
+    for order in range(1, highest + 1):
+        ahead, behind = forward[1:], backward[:-1]
+        power = float(ahead @ ahead + behind @ behind)
+        if power <= 0:
+            break
+        reflection = -2 * float(ahead @ behind) / power
+        if order == 1:  # what a mean taken out hides of a long memory [Kendall 1954, Marriott and Pope 1954]
+            reflection = max(reflection - max(1 - 3 * reflection, 0.0) / size, -_MAX_CORRELATION)
+            reflection = reflection if first is None else first
+        forward, backward = ahead + reflection * behind, behind + reflection * ahead
+        variance = float(forward @ forward + backward @ backward) / (2 * forward.size)
+        if variance <= 0:
+            break
+        models.append(Autoregression(variance, np.append(models[-1].reflections, reflection)))
+    return models
+
+
+def memories(jacobian: Floats, residual: Floats) -> tuple[list[Autoregression], Floats]:
+    """Autoregressions of shorter and longer memory than the one found, and the chance of each.
+
+    A fit takes slow noise out of its residual. Restricted likelihood is that of what no parameter can take up
+    [Cheang and Reinsel 2000, J. Am. Stat. Assoc. 95, 1173]; the prior of the correlation φ of neighbours is that of
+    Jeffreys, (1 - φ²)^-½.
+
+    Parameters
+    ----------
+    jacobian : (N, P) array
+        P less than N, its columns of similar size.
+    residual : (N,) array
+        Of an order above zero.
+    """
+    turned, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
+    columns = turned[:, sizes > _RANK * sizes[0]]
+    found, free = Autoregression.of(residual), residual.size - columns.shape[1]
+    apart = min(_SHORTER * (1 + float(found.reflections[0])), 1.0)  # 1 - φ
+    logs = np.arange(np.log(1 - _MAX_CORRELATION), np.log(apart) + _STEP, _STEP)
+    models, likelihoods = list[Autoregression](), list[float]()
+    for log in logs.tolist():
+        shape = _burg(residual, found.order, float(np.exp(log)) - 1)[-1]
+        table = shape.innovations(np.column_stack([residual, columns]))
+        basis, triangle = np.linalg.qr(table[:, 1:])
+        rest = table[:, 0] - basis @ (basis.T @ table[:, 0])
+        variance = float(rest @ rest) / free
+        orders = np.arange(1, shape.order + 1)
+        likelihoods.append(
+            float(orders @ np.log(1 - shape.reflections**2)) / 2
+            - free * np.log(variance) / 2
+            - float(np.log(np.abs(np.diag(triangle))).sum())
+            + log / 2
+        )
+        models.append(Autoregression(variance, shape.reflections))
+    chances = np.exp(np.array(likelihoods) - max(likelihoods))
+    return models, chances / chances.sum()
