@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.simulation import BETA, OMEGA, SHAPE, T, X
 from benchmarks.timing import race
 from mrdamper.dampers.streaming import stepper, stream
-from mrdamper.export.c import c_sources
+from mrdamper.exporters.c import c_sources
 from mrdamper.models import Model
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.play_bypass import PlayBypass

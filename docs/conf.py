@@ -70,8 +70,8 @@ html_theme_options = {
 def _live_dampers() -> None:
     """The two bundled dampers as pages that the site embeds."""
     from mrdamper import load_dataset, run_study
-    from mrdamper.export.base import write_export
-    from mrdamper.export.page import PageExporter
+    from mrdamper.exporters.base import write_export
+    from mrdamper.exporters.page import PageExporter
 
     folder = HERE / "_live" / "dampers"
     folder.mkdir(parents=True, exist_ok=True)

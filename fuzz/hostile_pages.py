@@ -39,7 +39,7 @@ COMMANDS = (
 def attack_exports(share: float) -> list[Count]:
     """Every way a damper leaves, its rig by a hostile name; and the model, saved and loaded again."""
     from mrdamper.dampers.model_file import dump_model, parse_model
-    from mrdamper.export import all_exporters
+    from mrdamper.exporters import all_exporters
 
     damper = bench_damper()
     count, saved, rng = Count("whole export of a named rig"), Count("model of a named rig, saved"), random.Random(2)

@@ -56,7 +56,7 @@ _DEAR = {"reproduce": 0.4, "fmu": 0.5}  # of the usual number of tries
 _LOADED = (
     "numpy", "scipy.optimize", "scipy.special", "polars", "matplotlib.pyplot", "matplotlib.backends.backend_svg", "jinja2",
     "pydantic", "mrdamper.cli.output", "mrdamper.study.workflow", "mrdamper.study.comparison", "mrdamper.report.study",
-    "mrdamper.report.comparison", "mrdamper.report.damper_tests", "mrdamper.report.simulation", "mrdamper.export",
+    "mrdamper.report.comparison", "mrdamper.report.damper_tests", "mrdamper.report.simulation", "mrdamper.exporters",
     "mrdamper.rig_files.dataset_folder", "mrdamper.dampers.model_file", "mrdamper.study.validation", "mrdamper.rig_files.rig_import",
     "mrdamper.systems.simulate", "mrdamper.study.plan", "mrdamper.paper.output",
 )  # fmt: skip

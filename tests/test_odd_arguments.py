@@ -138,7 +138,7 @@ def doors(folder):
         "sweep": (mrdamper.sweep, {
             "start_Hz": 1.0, "end_Hz": 2.0, "duration": 1.0, "amplitude": 0.01, "current": 0.0, "sample_rate": 100.0,
         }),
-        "export_model": (mrdamper.export_model, {"damper": joint, "to": "none such", "out": folder / "e", "name": "d"}),
+        "export": (mrdamper.export, {"damper": joint, "to": "none such", "out": folder / "e", "name": "d"}),
         "register": (mrdamper.register, {"cls": Bingham}),
         "plot_loop": (mrdamper.plot_loop, {"what": run, "axes": None, "over": "displacement"}),
         "plot_force": (mrdamper.plot_force, {"what": run, "axes": None}),

@@ -3,6 +3,7 @@
 import ast
 import doctest
 import importlib
+import inspect
 from importlib.metadata import version
 from pathlib import Path
 
@@ -26,6 +27,13 @@ def test_completion_shows_every_public_name_and_the_version_and_nothing_of_the_m
     assert {name for name in dir(mrdamper) if not name.startswith("__")} == set(mrdamper.__all__)
     assert "__version__" in dir(mrdamper)
     assert mrdamper.__version__ == version("mrdamper")
+
+
+def test_every_verb_that_gives_a_result_is_a_function_whatever_was_imported_before():
+    for package in sorted(Path(mrdamper.__file__).parent.glob("*/__init__.py")):
+        importlib.import_module(f"mrdamper.{package.parent.name}")
+    for verb in ("check", "compare", "export", "identify", "import_files", "plan_tests", "reproduce", "validate"):
+        assert inspect.isfunction(getattr(mrdamper, verb)), verb
 
 
 def test_model_classes_are_imported_by_their_names():

@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # here type checkers find the names, which "as" exports; ever
     from mrdamper.data import Run as Run
     from mrdamper.discovery import register as register
     from mrdamper.errors import InputError as InputError
-    from mrdamper.export import export_model as export_model
+    from mrdamper.exporters import export as export
     from mrdamper.fleet.run import run_fleet as run_fleet
     from mrdamper.paper.study import reproduce as reproduce
     from mrdamper.physics.gas_spring import GasSpring as GasSpring
@@ -58,7 +58,7 @@ _HOME = {
     "Run": "data",
     "check": "study.check",
     "compare": "study.comparison",
-    "export_model": "export",
+    "export": "exporters",
     "identify": "study.check",
     "import_files": "rig_files.rig_import",
     "invert": "systems.inverse",

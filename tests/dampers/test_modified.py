@@ -16,7 +16,7 @@ from mrdamper.dampers.normal_equations import FormChoice
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, InputError
-from mrdamper.export.equations import equations
+from mrdamper.exporters.equations import equations
 from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper.functions import PAPER_FORMS, paper_functions

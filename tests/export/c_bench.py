@@ -7,7 +7,7 @@ import subprocess
 import numpy as np
 
 from mrdamper.dampers.streaming import stream
-from mrdamper.export.c import c_sources
+from mrdamper.exporters.c import c_sources
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]

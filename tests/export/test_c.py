@@ -12,9 +12,9 @@ from support.dampers import ENVELOPE, all_dampers, joint_damper
 from mrdamper.dampers.streaming import stepper
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
-from mrdamper.export import all_exporters, exporter
-from mrdamper.export.base import identifier
-from mrdamper.export.c import CExporter
+from mrdamper.exporters import all_exporters, exporter
+from mrdamper.exporters.base import identifier
+from mrdamper.exporters.c import CExporter
 from mrdamper.physics.motion import sine
 
 DAMPERS = all_dampers()

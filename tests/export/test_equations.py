@@ -15,8 +15,8 @@ from mrdamper.dampers.model_file import load_model
 from mrdamper.dampers.published import all_conditioned
 from mrdamper.data.parameters import latex_symbol
 from mrdamper.errors import ParameterError
-from mrdamper.export.documents import LatexExporter, MarkdownExporter
-from mrdamper.export.equations import equations, function_text, number
+from mrdamper.exporters.documents import LatexExporter, MarkdownExporter
+from mrdamper.exporters.equations import equations, function_text, number
 from mrdamper.models import all_models
 from mrdamper.statistics.functions.forms import FORMS, ParameterFunction
 

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.dampers.model_file import save_model
-from mrdamper.export import all_exporters
+from mrdamper.exporters import all_exporters
 
 run = CliRunner()
 

@@ -11,11 +11,11 @@ from support.fmu_files import COMPILERS, DAMPERS, FEW, fmu_bytes, unpacked
 
 from mrdamper.dampers.streaming import FLAGS, stepper, stream
 from mrdamper.errors import InputError
-from mrdamper.export import all_exporters, toolchain
-from mrdamper.export.c import reference_motion
-from mrdamper.export.fmu import FMUExporter, reference
-from mrdamper.export.fmu_description import base_powers, parameters_of_stream
-from mrdamper.export.toolchain import PLATFORMS, build_library, compiler_for, here
+from mrdamper.exporters import all_exporters, toolchain
+from mrdamper.exporters.c import reference_motion
+from mrdamper.exporters.fmu import FMUExporter, reference
+from mrdamper.exporters.fmu_description import base_powers, parameters_of_stream
+from mrdamper.exporters.toolchain import PLATFORMS, build_library, compiler_for, here
 
 FMIS = (2, 3)
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler on this machine")

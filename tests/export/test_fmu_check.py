@@ -7,10 +7,10 @@ import pytest
 from support.fmu_files import COMPILERS, DAMPERS, FEW, fmu_bytes, unpacked
 
 from mrdamper.errors import MissingExtraError
-from mrdamper.export import fmu_check
-from mrdamper.export.fmu import token_of, zipped
-from mrdamper.export.fmu_check import check_fmu
-from mrdamper.export.toolchain import build_library, here
+from mrdamper.exporters import fmu_check
+from mrdamper.exporters.fmu import token_of, zipped
+from mrdamper.exporters.fmu_check import check_fmu
+from mrdamper.exporters.toolchain import build_library, here
 
 FMIS = (2, 3)
 pytest.importorskip("fmpy", reason="FMPy is not installed")

@@ -8,8 +8,8 @@ import pytest
 from support.fmu_files import COMPILERS, DAMPERS, FEW, drive, driver, fmu_bytes, library, unpacked
 
 from mrdamper.dampers.streaming import stepper, stream
-from mrdamper.export.fmu import FMUExporter, reference
-from mrdamper.export.toolchain import PLATFORMS, compiler_for
+from mrdamper.exporters.fmu import FMUExporter, reference
+from mrdamper.exporters.toolchain import PLATFORMS, compiler_for
 
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="no C compiler on this machine")
 FMIS = (2, 3)

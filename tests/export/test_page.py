@@ -16,9 +16,9 @@ from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.streaming import stepper
 from mrdamper.data import Condition, Run
-from mrdamper.export import page as page_module
-from mrdamper.export.page import PageExporter
-from mrdamper.export.toolchain import Built, build_webassembly
+from mrdamper.exporters import page as page_module
+from mrdamper.exporters.page import PageExporter
+from mrdamper.exporters.toolchain import Built, build_webassembly
 from mrdamper.models import model_type
 
 DAMPERS = all_dampers()

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from support.dampers import joint_damper
 
-from mrdamper import export_model
-from mrdamper.export.curves import force_velocity
+from mrdamper import export
+from mrdamper.exporters.curves import force_velocity
 
 WIDTHS = ((0, 10), (10, 40), (40, 50), (50, None))  # columns of an entry in TYDEX 1.3
 
@@ -42,7 +42,7 @@ def matlab(path):
 
 def test_a_tydex_file_holds_the_curves(tmp_path):
     damper = joint_damper()
-    (path,) = export_model(damper, "tydex", tmp_path / "damper.tdx", "front")
+    (path,) = export(damper, "tydex", tmp_path / "damper.tdx", "front")
     order, entries, read = tydex(path)
     assert order == ["HEADER", "COMMENTS", "MEASURCHANNELS", "MEASURDATA", "END"]
     assert ["RELEASE", "TYDEX release", "", "1.3"] in entries["HEADER"]
@@ -56,7 +56,7 @@ def test_a_tydex_file_holds_the_curves(tmp_path):
 
 def test_a_matlab_script_holds_the_grid(tmp_path):
     damper = joint_damper()
-    (path,) = export_model(damper, "dyna4", tmp_path / "damper.m", "front")
+    (path,) = export(damper, "dyna4", tmp_path / "damper.m", "front")
     read, curves = matlab(path), force_velocity(damper)
     np.testing.assert_allclose(read["current_A"], [[c.current_A for c in curves]], rtol=1e-9)
     np.testing.assert_allclose(read["velocity_m_s"], [curves[0].velocity], rtol=1e-9)
@@ -67,8 +67,8 @@ def test_a_matlab_script_holds_the_grid(tmp_path):
 @pytest.mark.parametrize("to", ["tydex", "dyna4"])
 def test_a_rig_named_by_anybody_stays_in_its_line(to, tmp_path):
     damper = replace(joint_damper(), rig="**END\n% }; quit; ☃")
-    (path,) = export_model(damper, to, tmp_path / "out", "front")
+    (path,) = export(damper, to, tmp_path / "out", "front")
     lines = path.read_text(encoding="ascii").splitlines()
     assert sum("quit" in line for line in lines) == 1
     assert next(line for line in lines if "quit" in line).startswith(("%", "MEASID"))
-    assert len(lines) == len(export_model(joint_damper(), to, tmp_path / "plain", "front")[0].read_text().splitlines())
+    assert len(lines) == len(export(joint_damper(), to, tmp_path / "plain", "front")[0].read_text().splitlines())

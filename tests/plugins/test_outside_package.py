@@ -16,7 +16,7 @@ GROUPS = {
     "methods": "identification/methods",
     "readers": "rig_files/readers",
     "checks": "rig_files/quality",
-    "exporters": "export",
+    "exporters": "exporters",
     "controllers": "systems/controllers",
     "inputs": "systems/inputs",
     "commands": "cli/commands",

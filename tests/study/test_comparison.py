@@ -15,7 +15,7 @@ from mrdamper.dampers.published import all_published, conditioned_type
 from mrdamper.dampers.streaming import stepper
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError, ModelFileError, UnknownNameError
-from mrdamper.export.equations import equations
+from mrdamper.exporters.equations import equations
 from mrdamper.identification import identify
 from mrdamper.models import all_models
 from mrdamper.models.bouc_wen import BoucWen

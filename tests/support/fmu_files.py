@@ -8,8 +8,8 @@ from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
-from mrdamper.export.fmu import FMUExporter
-from mrdamper.export.toolchain import here
+from mrdamper.exporters.fmu import FMUExporter
+from mrdamper.exporters.toolchain import here
 from support.dampers import all_dampers, joint_damper, modified_damper
 
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]

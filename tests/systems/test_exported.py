@@ -16,11 +16,11 @@ from mrdamper.cli import application
 from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.streaming import stepper
 from mrdamper.errors import InputError
-from mrdamper.export.c import program_sources
-from mrdamper.export.fmu import FMUExporter
-from mrdamper.export.fmu_check import check_fmu
-from mrdamper.export.fmu_program import write_program_fmu
-from mrdamper.export.toolchain import here
+from mrdamper.exporters.c import program_sources
+from mrdamper.exporters.fmu import FMUExporter
+from mrdamper.exporters.fmu_check import check_fmu
+from mrdamper.exporters.fmu_program import write_program_fmu
+from mrdamper.exporters.toolchain import here
 from mrdamper.systems.controllers import controller_type
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inverse import invert

@@ -24,8 +24,8 @@ from mrdamper.dampers.kernel import KernelDamper
 from mrdamper.dampers.model_file import dump_model, parse_model
 from mrdamper.dampers.modified import fit_modified
 from mrdamper.data import Condition
-from mrdamper.export import exporter
-from mrdamper.export.base import identifier
+from mrdamper.exporters import exporter
+from mrdamper.exporters.base import identifier
 from mrdamper.identification import identify
 from mrdamper.identification.loop_analysis import analyse_loop
 from mrdamper.identification.methods import all_methods

@@ -105,8 +105,8 @@ def write_compared(tell: Tell, comparison: Comparison, folder: Path) -> list[Pat
 
 def export_damper(tell: Tell, damper: Damper, form: str, folder: Path) -> tuple[list[Path], tuple[str, ...]]:
     """Return a damper in an export format: files in a folder, and what to know about them."""
-    from mrdamper.export import exporter
-    from mrdamper.export.base import write_export
+    from mrdamper.exporters import exporter
+    from mrdamper.exporters.base import write_export
 
     tell(f"making {form}", 0.1)
     kind, name = exporter(form), export_name(damper.rig)
@@ -118,7 +118,7 @@ def export_damper(tell: Tell, damper: Damper, form: str, folder: Path) -> tuple[
 
 def export_name(rig: str) -> str:
     """Return a name for files and symbols: of the rig, where its letters make one."""
-    from mrdamper.export.base import identifier
+    from mrdamper.exporters.base import identifier
 
     try:
         return identifier(rig)

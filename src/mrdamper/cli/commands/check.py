@@ -74,7 +74,7 @@ def check(
 
 
 def _check_fmu(path: Path, as_json: bool) -> None:
-    from mrdamper.export.fmu_check import check_fmu
+    from mrdamper.exporters.fmu_check import check_fmu
 
     findings = check_fmu(path)
     rows = [asdict(finding) for finding in findings]

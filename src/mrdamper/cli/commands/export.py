@@ -12,7 +12,7 @@ from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
-    from mrdamper.export.base import Exporter
+    from mrdamper.exporters.base import Exporter
 
 app = typer.Typer()
 
@@ -31,8 +31,8 @@ def export(
     """Export a model as C, FMU, web page, equations or tables."""
     from mrdamper.dampers.model_file import load_model
     from mrdamper.data.atomic import require_writable
-    from mrdamper.export import exporter
-    from mrdamper.export.base import identifier, write_export
+    from mrdamper.exporters import exporter
+    from mrdamper.exporters.base import identifier, write_export
 
     kind = exporter(to)
     if fmi is not None and to != "fmu":
@@ -56,9 +56,9 @@ def export(
 
 def _inverse(damper: Damper, name: str, to: str, exporter: Exporter, out: Path) -> tuple[list[Path], tuple[str, ...]]:
     """Return the current for a wanted force: files written, and what to know about them."""
-    from mrdamper.export.c import write_program
-    from mrdamper.export.fmu import FMUExporter
-    from mrdamper.export.fmu_program import write_program_fmu
+    from mrdamper.exporters.c import write_program
+    from mrdamper.exporters.fmu import FMUExporter
+    from mrdamper.exporters.fmu_program import write_program_fmu
     from mrdamper.systems.inverse import invert
 
     turned = invert(damper)

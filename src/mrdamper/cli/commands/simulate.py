@@ -108,8 +108,8 @@ def _dampers(loaded: SystemFile, model: Path | None, where: str) -> dict[str, Da
 
 def _export_law(loop: SystemLoop, folder: Path | None, fmu: Path | None) -> None:
     """Return the law of a loop as C99 in a folder, and as an FMU."""
-    from mrdamper.export.c import write_program
-    from mrdamper.export.fmu_program import write_program_fmu
+    from mrdamper.exporters.c import write_program
+    from mrdamper.exporters.fmu_program import write_program_fmu
 
     law, (name, title) = loop.control.program, (type(loop.controller).name, type(loop.controller).title)
     if law is None:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field
 from mrdamper.dampers.model_file import dump_model, parse_model
 from mrdamper.data.encoding import csv_text
 from mrdamper.errors import InputError
-from mrdamper.export import all_exporters
+from mrdamper.exporters import all_exporters
 from mrdamper.report.tables import prediction_rows
 from mrdamper.web.answers import archive, download, in_units, zipped
 from mrdamper.web.api.model import PredictionRequest

@@ -19,11 +19,11 @@ from mrdamper.dampers.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.data import Floats
 from mrdamper.data.encoding import csv_text
 from mrdamper.errors import InputError
-from mrdamper.export.base import Exporter, Written, identifier
-from mrdamper.export.c import c_facts, c_sources, reference_motion
-from mrdamper.export.fmu_description import c_bounds, description_facts, parameters_of_stream, serial_fields
-from mrdamper.export.templates import render
-from mrdamper.export.toolchain import PLATFORMS, build_library
+from mrdamper.exporters.base import Exporter, Written, identifier
+from mrdamper.exporters.c import c_facts, c_sources, reference_motion
+from mrdamper.exporters.fmu_description import c_bounds, description_facts, parameters_of_stream, serial_fields
+from mrdamper.exporters.templates import render
+from mrdamper.exporters.toolchain import PLATFORMS, build_library
 from mrdamper.models import Model
 
 _SAMPLES_PER_CYCLE = 200

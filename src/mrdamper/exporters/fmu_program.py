@@ -12,10 +12,10 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.encoding import c_comment
-from mrdamper.export.base import Written, identifier, write_export
-from mrdamper.export.c import program_sources
-from mrdamper.export.fmu import MOST_STEPS, FMUExporter, all_texts, with_token
-from mrdamper.export.fmu_description import units_of, variable
+from mrdamper.exporters.base import Written, identifier, write_export
+from mrdamper.exporters.c import program_sources
+from mrdamper.exporters.fmu import MOST_STEPS, FMUExporter, all_texts, with_token
+from mrdamper.exporters.fmu_description import units_of, variable
 from mrdamper.tracing import Program
 from mrdamper.tracing.python import python_functions
 

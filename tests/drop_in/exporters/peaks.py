@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from mrdamper.export.base import Exporter, Written
-from mrdamper.export.curves import force_velocity
+from mrdamper.exporters.base import Exporter, Written
+from mrdamper.exporters.curves import force_velocity
 
 
 class PeakExporter(Exporter):

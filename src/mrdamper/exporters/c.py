@@ -16,8 +16,8 @@ from mrdamper.dampers.joint import damper_of
 from mrdamper.dampers.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.data import Floats
 from mrdamper.data.encoding import c_comment
-from mrdamper.export.base import Exporter, Written, identifier, write_export
-from mrdamper.export.templates import render
+from mrdamper.exporters.base import Exporter, Written, identifier, write_export
+from mrdamper.exporters.templates import render
 from mrdamper.models import Model
 from mrdamper.tracing import Expression, Program
 from mrdamper.tracing.c_writer import CWriter

@@ -18,8 +18,8 @@ from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Condition, Floats
 from mrdamper.data.encoding import c_comment, csv_text
 from mrdamper.errors import InputError
-from mrdamper.export.base import Exporter, Written
-from mrdamper.export.templates import render
+from mrdamper.exporters.base import Exporter, Written
+from mrdamper.exporters.templates import render
 from mrdamper.models import Model
 
 COLUMNS = ("current_A", "amplitude_m", "velocity_m_s", "force_N", "peak_force_N", "tested")

@@ -7,9 +7,9 @@ from pathlib import Path
 from mrdamper.dampers.base import Damper
 from mrdamper.discovery import Registry
 from mrdamper.errors import validate_arguments
-from mrdamper.export.base import Exporter, Written, identifier, write_export
+from mrdamper.exporters.base import Exporter, Written, identifier, write_export
 
-__all__ = ["Exporter", "Written", "all_exporters", "export_model", "exporter"]
+__all__ = ["Exporter", "Written", "all_exporters", "export", "exporter"]
 
 
 _registry: Registry[Exporter] = Registry("mrdamper.exporters", Exporter, "export format")  # type: ignore[type-abstract]
@@ -18,7 +18,7 @@ exporter = _registry.type_named
 
 
 @validate_arguments()
-def export_model(damper: Damper, to: str, out: str | Path, name: str = "") -> list[Path]:
+def export(damper: Damper, to: str, out: str | Path, name: str = "") -> list[Path]:
     """Write a damper in an export format, whole or not at all.
 
     Parameters
@@ -48,11 +48,11 @@ def export_model(damper: Damper, to: str, out: str | Path, name: str = "") -> li
     --------
     >>> from pathlib import Path
     >>> from tempfile import mkdtemp
-    >>> from mrdamper import export_model, identify, load_dataset
+    >>> from mrdamper import export, identify, load_dataset
     >>> from mrdamper.dampers.modified import fit_modified
     >>> runs = load_dataset().rig("utfsm").split("train")[:8]
     >>> damper = fit_modified([identify(run, "bingham") for run in runs]).damper
-    >>> [path.name for path in export_model(damper, "adams", Path(mkdtemp()) / "adams")]
+    >>> [path.name for path in export(damper, "adams", Path(mkdtemp()) / "adams")]
     ['utfsm_0A.dmp', 'utfsm_0.2A.dmp', 'utfsm_0.4A.dmp', 'utfsm_0.6A.dmp', 'utfsm_0.8A.dmp', 'utfsm_1A.dmp']
     """
     kind = exporter(to)

@@ -18,7 +18,7 @@ def _environment() -> Any:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("mrdamper.export", "templates"),
+        loader=PackageLoader("mrdamper.exporters", "templates"),
         undefined=StrictUndefined,
         keep_trailing_newline=True,
         autoescape=False,  # each place has its own encoding

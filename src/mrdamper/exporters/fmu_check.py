@@ -21,10 +21,10 @@ from typing import Literal
 
 from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import MissingExtraError
-from mrdamper.export import fmu_probe
-from mrdamper.export.c import TOLERANCE
-from mrdamper.export.fmu import token_of
-from mrdamper.export.toolchain import build_library, here
+from mrdamper.exporters import fmu_probe
+from mrdamper.exporters.c import TOLERANCE
+from mrdamper.exporters.fmu import token_of
+from mrdamper.exporters.toolchain import build_library, here
 
 _CHECK_TIMEOUT_S = 60  # s
 _MAX_UNPACKED_BYTES = 200_000_000  # bytes, unpacked

@@ -16,10 +16,10 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.envelope import SLACK, Envelope
 from mrdamper.dampers.joint import damper_of
 from mrdamper.dampers.streaming import FLAGS, Stepper, Stream, stream
-from mrdamper.export.base import Exporter, Written, identifier
-from mrdamper.export.c import TOLERANCE, c_facts, c_sources, reference_motion, shared_points
-from mrdamper.export.templates import render
-from mrdamper.export.toolchain import build_webassembly
+from mrdamper.exporters.base import Exporter, Written, identifier
+from mrdamper.exporters.c import TOLERANCE, c_facts, c_sources, reference_motion, shared_points
+from mrdamper.exporters.templates import render
+from mrdamper.exporters.toolchain import build_webassembly
 from mrdamper.models import Model
 from mrdamper.tracing.c_writer import JavaScriptWriter
 
@@ -76,7 +76,7 @@ def _facts(damper: Damper | Model, stepping: Stream, name: str, library: bytes |
         "flags": FLAGS,
         "band": stepping.band and asdict(stepping.band),
     }
-    folder = files("mrdamper.export.templates")
+    folder = files("mrdamper.exporters.templates")
     return {
         "heading": f"Damper of rig {rig}" if rig else stepping.title,
         "words": _words(damper, stepping),

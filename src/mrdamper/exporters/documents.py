@@ -9,9 +9,9 @@ from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data.encoding import latex, markdown
 from mrdamper.data.parameters import latex_symbol
-from mrdamper.export.base import Exporter, Written
-from mrdamper.export.equations import equations, number, unit_text
-from mrdamper.export.templates import render
+from mrdamper.exporters.base import Exporter, Written
+from mrdamper.exporters.equations import equations, number, unit_text
+from mrdamper.exporters.templates import render
 from mrdamper.models import Model
 
 _ROUNDED = ("numbers are rounded to five digits; model.json has them all",)
