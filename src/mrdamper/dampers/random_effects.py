@@ -114,7 +114,7 @@ class GainsAndOffsets:
 
     @cached_property
     def _designs(self) -> dict[int, Floats]:
-        """What residuals show (K, G) of each effect of the variances that they can tell."""
+        """(K, G) effects of one unit of the gains and offsets, of each variance that residuals can tell."""
         tables = {component: self._groups(component) for component in range(4)}
         shown = {c: self._turned @ self._shown @ table for c, table in tables.items()}
         enough = {c: np.sum(shown[c] ** 2) >= _MIN_RETAINED * max(table.sum(), 1.0) for c, table in tables.items()}
@@ -153,10 +153,10 @@ class GainsAndOffsets:
         inner: Floats = whole.T @ turned
         table = np.add.reduceat(np.add.reduceat(inner**2, first, axis=1), first, axis=2)
         by_noise = np.add.reduceat(np.sum(turned * (own @ turned), axis=1), first, axis=1)
-        seen = np.add.reduceat((shown[:, None, :] @ turned)[:, 0] ** 2, first, axis=1)
+        forms = np.add.reduceat((shown[:, None, :] @ turned)[:, 0] ** 2, first, axis=1)
         size: Floats = np.sqrt(np.einsum("dcc->dc", table))
         table: Floats = table / size[:, :, None] / size[:, None, :]
-        right: Floats = (seen - noise * by_noise) / size
+        right: Floats = (forms - noise * by_noise) / size
         solved = np.linalg.solve(table, right[:, :, None])[:, :, 0].astype(float)
         for row in np.flatnonzero((solved < 0).any(axis=1)):
             solved[row] = nonnegative_least_squares(table[row % len(table)], right[row])[0]
@@ -218,13 +218,13 @@ class GainsAndOffsets:
             return np.ones((len(drawn), len(self.effect)))
         moved = np.array([np.sum((self.effect @ self._groups(c)) ** 2, axis=1) for c in used])
         read = (drawn / [1.0, self.unit]).reshape(len(drawn), -1) @ (self._turned @ self._shown).T
-        found = self._variances(read, variances[None], noise=0.0)[0]
+        estimates = self._variances(read, variances[None], noise=0.0)[0]
         if read.shape[1] <= _MAX_SHOWN:
             # As the estimate, each draw is weighted by the variances that it shows itself.
             for _ in range(_ITERATIONS_OF_DRAWS):
-                some = np.flatnonzero(found.any(axis=1))
-                found[some] = self._variances(read[some], found[some], noise=0.0)[0]
-        return found @ moved / np.maximum(variances @ moved, np.finfo(float).tiny)
+                some = np.flatnonzero(estimates.any(axis=1))
+                estimates[some] = self._variances(read[some], estimates[some], noise=0.0)[0]
+        return estimates @ moved / np.maximum(variances @ moved, np.finfo(float).tiny)
 
     def _refitted(self, shift: Floats) -> Floats:
         """(D, P) parameters by draws of gains and offsets (D, R, 2)."""

@@ -33,9 +33,9 @@ class Autoregression:
     def of(cls, residual: Floats) -> Autoregression:
         """By Burg's recursion, of an order by the corrected criterion of Akaike."""
         size = residual.size
-        found = _burg(residual, min(_HIGHEST_ORDER, size // 10))
-        best, least = found[0], np.inf
-        for model in found:
+        models = _burg(residual, min(_HIGHEST_ORDER, size // 10))
+        best, least = models[0], np.inf
+        for model in models:
             order = model.order
             criterion = size * np.log(max(model.variance, 1e-300)) + 2 * (order + 1) * size / (size - order - 2)
             if criterion < least:
@@ -131,12 +131,12 @@ def memories(jacobian: Floats, residual: Floats) -> tuple[list[Autoregression], 
     """
     turned, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
     columns = turned[:, sizes > _RANK * sizes[0]]
-    found, free = Autoregression.of(residual), residual.size - columns.shape[1]
-    apart = min(_SHORTER * (1 + float(found.reflections[0])), 1.0)  # 1 - φ
+    usual, free = Autoregression.of(residual), residual.size - columns.shape[1]
+    apart = min(_SHORTER * (1 + float(usual.reflections[0])), 1.0)  # 1 - φ
     logs = np.arange(np.log(1 - _MAX_CORRELATION), np.log(apart) + _STEP, _STEP)
     models, likelihoods = list[Autoregression](), list[float]()
     for log in logs.tolist():
-        shape = _burg(residual, found.order, float(np.exp(log)) - 1)[-1]
+        shape = _burg(residual, usual.order, float(np.exp(log)) - 1)[-1]
         table = shape.innovations(np.column_stack([residual, columns]))
         basis, triangle = np.linalg.qr(table[:, 1:])
         rest = table[:, 0] - basis @ (basis.T @ table[:, 0])

@@ -168,8 +168,8 @@ def _repeated(
     left = (1 - taken).reshape(most, 2).mean(axis=1)
     power = (amplitudes**2).reshape(most, 2).mean(axis=1)
     # A record that ends elsewhere than it began has more power there than the spectrum of its noise.
-    seen = np.abs(np.fft.rfft(waves.T, points(size), axis=0)) ** 2
-    expected = (circle(size) * Autoregression.of(rest).spectrum(size)) @ seen / np.diag(gram) ** 2
+    windows = np.abs(np.fft.rfft(waves.T, points(size), axis=0)) ** 2
+    expected = (circle(size) * Autoregression.of(rest).spectrum(size)) @ windows / np.diag(gram) ** 2
     expected = expected.reshape(most, 2).mean(axis=1) * size / (size - 2 * most)
     # Noise alone has power at these frequencies too; only a surplus that chance does not explain repeats.
     if np.sum(power) < (1 + 3 / np.sqrt(left.sum())) * np.sum(expected * left):
