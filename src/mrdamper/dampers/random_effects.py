@@ -23,8 +23,7 @@ from mrdamper.statistics.linear import nonnegative_least_squares
 _MIN_RETAINED = 0.05  # share of a variance that the fit must have left in the residuals for it to be estimated
 _MAX_CONDITION = 100.0  # condition number of the equations; beyond, runs and sessions are not separated
 _ITERATIONS = 4  # of the variances at which the quadratic forms are of least variance
-_ITERATIONS_OF_DRAWS = 1  # the same, of what draws show; more changes their quantiles by a per cent
-_MAX_SHOWN = 128  # gains and offsets up to which they are iterated: the time grows with the third power of their number
+_MAX_SHOWN = 128  # gains and offsets up to which those of draws are iterated: time grows with the cube of their number
 _MIN_SHARE = 1e-4  # of the largest variance, with which every other one counts in these forms
 _DRAWS, _ROUNDS, _SEED = 600, 4, 20240813  # draws of gains and offsets; rounds of weights, as in the joint fit
 _MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
@@ -162,16 +161,20 @@ class GainsAndOffsets:
             solved[row] = nonnegative_least_squares(table[row % len(table)], right[row])[0]
         return solved / size, inner
 
+    def _iterated(self, shown: Floats, noise: float = 1.0) -> Floats:
+        """(D, C) variances at which their own forms are of least variance, by what residuals show (D, K)."""
+        estimates = np.tile(np.mean(shown**2, axis=1)[:, None], len(self._designs))
+        for _ in range(_ITERATIONS):
+            some = np.flatnonzero(estimates.any(axis=1))
+            if some.size:
+                estimates[some] = self._variances(shown[some], estimates[some], noise)[0]
+        return estimates
+
     def effects(self) -> Effects:
         """Return the four standard deviations and the degrees of freedom behind them."""
         used, shown = list(self._designs), (self._turned @ self._read)[None]
         variances, dof = np.zeros((2, 4))
-        fitted = np.full((1, len(used)), float(np.mean(shown**2)) if used else 0.0)
-        for _ in range(_ITERATIONS):
-            if not fitted.any():
-                return Effects()
-            fitted = self._variances(shown, fitted)[0]
-        if not fitted.any():
+        if not used or not (fitted := self._iterated(shown)).any():
             return Effects()
         variances[used], inner = fitted[0], self._variances(shown, fitted)[1]
         begin = 0
@@ -218,12 +221,10 @@ class GainsAndOffsets:
             return np.ones((len(drawn), len(self.effect)))
         moved = np.array([np.sum((self.effect @ self._groups(c)) ** 2, axis=1) for c in used])
         read = (drawn / [1.0, self.unit]).reshape(len(drawn), -1) @ (self._turned @ self._shown).T
-        estimates = self._variances(read, variances[None], noise=0.0)[0]
-        if read.shape[1] <= _MAX_SHOWN:
-            # As the estimate, each draw is weighted by the variances that it shows itself.
-            for _ in range(_ITERATIONS_OF_DRAWS):
-                some = np.flatnonzero(estimates.any(axis=1))
-                estimates[some] = self._variances(read[some], estimates[some], noise=0.0)[0]
+        if read.shape[1] > _MAX_SHOWN:
+            estimates = self._variances(read, variances[None], noise=0.0)[0]
+        else:
+            estimates = self._iterated(read, noise=0.0)
         return estimates @ moved / np.maximum(variances @ moved, np.finfo(float).tiny)
 
     def _refitted(self, shift: Floats) -> Floats:
