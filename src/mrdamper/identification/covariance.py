@@ -22,7 +22,7 @@ _HARMONICS = 24  # of the motion in which model error is looked for
 _REPEATS = 0.95  # cycles from which harmonics of the motion can be told apart
 _MIN_CYCLES = 1.9  # cycles from which repeats are seen as such
 _MAX_SAMPLES = 2001  # samples that are looked at
-_ENOUGH_LAGS = 20  # lags of the noise in a record from which its memory is known
+_MUCH = 0.1  # share of the noise that a fit has taken with it, from which its residual does not show its memory
 _LEVEL = 0.95  # of intervals whose degrees of freedom are sought
 _TAKES_PART = 0.1  # in a direction, of its unit vector
 _NO_MORE = 1e-12  # of the largest: eigenvalue of the scaled normal matrix below which nothing is known
@@ -211,8 +211,6 @@ def _noise(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, f
     """Calculate the score's covariance from the residual's own spectrum, and its memory in samples."""
     size = residual.size
     model = Autoregression.of(residual)
-    if model.order and size < _ENOUGH_LAGS * model.lags:
-        return _noise_of_long_memory(jacobian, residual, inverse)
     spectrum = model.spectrum(size)
     transformed = np.fft.rfft(jacobian, points(size), axis=0)
     score = _score(transformed, circle(size) * spectrum)
@@ -221,6 +219,8 @@ def _noise(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, f
         return (score, np.zeros(len(inverse))), 1.0
     # The fit took a share of the noise with it.
     taken = float(np.sum(inverse * score)) / (size * memory[0])
+    if model.order and taken > _MUCH:
+        return _noise_of_long_memory(jacobian, residual, inverse)
     relative = np.full(len(inverse), 2.0 / size)
     if order := model.order:  # what uncertain coefficients bend of the spectrum, as each parameter sees it
         lags = np.arange(order)
@@ -239,7 +239,7 @@ def _score(transformed: NDArray[np.complex128], spectrum: Floats) -> Floats:
 
 
 def _noise_of_long_memory(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, float]:
-    """Calculate the same where the record is only some lags of its noise long, and cannot tell how many.
+    """Calculate the same where the fit has taken much of the noise with it, and its residual cannot tell what it remembers.
 
     Means over memories by their restricted likelihood, which counts what the fit took out of the residual; the
     degrees of freedom of a parameter are those at which Student's interval is that of the mixture.
@@ -251,7 +251,7 @@ def _noise_of_long_memory(jacobian: Floats, residual: Floats, inverse: Floats) -
     transformed, weights = np.fft.rfft(jacobian, points(size), axis=0), circle(size)
     scores = np.array([_score(transformed, weights * model.spectrum(size)) for model in models])
     score: Floats = np.tensordot(chances, scores, 1)
-    variances = np.einsum("ip,mpq,iq->mi", inverse, scores, inverse)
+    variances = np.maximum(np.einsum("ip,mpq,iq->mi", inverse, scores, inverse), 0.0)
     ratios = np.sqrt(variances / np.maximum(chances @ variances, _MIN_VARIANCE))  # of a memory's standard error
     quantiles = np.linspace(student(_LEVEL, np.inf), student(_LEVEL, 1.0), 400)
     inside = np.tensordot(chances, 2 * ndtr(quantiles[:, None, None] / np.maximum(ratios, 1e-9)) - 1, (0, 1))
