@@ -239,7 +239,7 @@ def _score(transformed: NDArray[np.complex128], spectrum: Floats) -> Floats:
 
 
 def _noise_of_long_memory(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, float]:
-    """Calculate the same where the fit has taken much of the noise with it, and its residual cannot tell what it remembers.
+    """Calculate the same where the fit has taken much of the noise with it, so that the residual hides its memory.
 
     Means over memories by their restricted likelihood, which counts what the fit took out of the residual; the
     degrees of freedom of a parameter are those at which Student's interval is that of the mixture.
