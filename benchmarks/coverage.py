@@ -1,6 +1,6 @@
 """Share of nominal 95 % intervals that hold the truth, ours beside the textbook's: `python -m benchmarks.coverage`.
 
-Run by run, through `identify`: noise that remembers, and model error that repeats with every cycle.
+Run by run, through `identify`: correlated noise, and model error that repeats with every cycle.
 Jointly, on the motions of the bundled rigs: noise, a gain of every session and an offset, through
 the joint fit; the 90 % band of the peak force and of the force measured in a future session beside them.
 Parameters outside 92–98 % and bands outside 85–95 % are listed, with the standard error of a coverage.
@@ -69,7 +69,7 @@ class Covered:
 
 
 def error_of(case: tuple[float, int, bool], rng: np.random.Generator) -> Floats:
-    """One draw of what a record leaves over [N], of one size whatever it remembers."""
+    """Draw a residual of a record [N], of one size whatever its correlation."""
     correlation, cycles, repeats = case
     noise = rng.standard_normal(_SAMPLES * cycles + 5000)
     if not repeats:
@@ -103,7 +103,7 @@ def run_by_run(case: tuple[float, int, bool], repeats: int, seed: int = 0) -> Co
             low, high = found.interval(name, LEVEL) or (-np.inf, np.inf)
             ours[i] += low <= truth <= high
             textbook[i] += abs(value - truth) <= plain[i]
-        warned += any("remembers" in note for note in found.doubts)
+        warned += any("correlation time" in note for note in found.doubts)
     return Covered(names, ours / repeats, textbook / repeats, warned / repeats)
 
 

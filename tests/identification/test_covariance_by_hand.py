@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mrdamper.identification import covariance
-from mrdamper.identification.autoregression import Autoregression, memories
+from mrdamper.identification.autoregression import Autoregression, models_by_likelihood
 from mrdamper.identification.covariance import spread
 from mrdamper.identification.intervals import student
 
@@ -399,13 +399,13 @@ def test_innovations_are_white_from_the_first_sample_on(reflections):
     assert model.lags == pytest.approx(spectrum(numbers(model), 0.0) / whole[0, 0])
 
 
-def test_the_chance_of_a_memory_is_its_restricted_likelihood():
+def test_the_probability_of_a_model_is_its_restricted_likelihood():
     N = 120
     residual = np.random.default_rng(4).standard_normal(N).cumsum()
     J = np.column_stack([np.ones(N), np.cos(np.arange(N) / 9.0), np.zeros(N)])
     residual -= J @ np.linalg.lstsq(J, residual, rcond=None)[0]
-    models, chances = memories(J, residual)
-    assert chances.sum() == pytest.approx(1.0)
+    models, probabilities = models_by_likelihood(J, residual)
+    assert probabilities.sum() == pytest.approx(1.0)
     logs = []
     for model in models:
         whole = covariance_matrix(numbers(model), N)
@@ -416,7 +416,7 @@ def test_the_chance_of_a_memory_is_its_restricted_likelihood():
         determinants = np.linalg.slogdet(whole)[1] + np.linalg.slogdet(normal)[1]
         logs.append(-determinants / 2 + np.log(1 + model.reflections[0]) / 2)
     by_hand = np.exp(np.array(logs) - max(logs))
-    assert chances == pytest.approx(by_hand / by_hand.sum(), rel=0.02)
+    assert probabilities == pytest.approx(by_hand / by_hand.sum(), rel=0.02)
 
 
 @pytest.mark.parametrize("correlation", [0.99, 0.998])

@@ -137,13 +137,9 @@ def _loops(run: Run) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         cycles = np.array_split(at, count)
         moved = [np.ptp(run.displacement[cycle]) for cycle in cycles]
         loops = [c for c, swing in zip(cycles, moved, strict=True) if swing >= sine.condition.amplitude_m] or [at]
-    counts = [max(int(np.ptp(run.time[loop]) * frequency), 1) for loop in loops]
-    return [(loop, _split(loop.size, count)) for loop, count in zip(loops, counts, strict=True)]
-
-
-def _split(size: int, parts: int) -> NDArray[np.intp]:
-    """Return where parts of about one size begin, as `numpy.array_split` cuts them."""
-    return np.arange(parts) * (size // parts) + np.minimum(np.arange(parts), size % parts)
+    counts = [min(max(int(np.ptp(run.time[loop]) * frequency), 1), loop.size) for loop in loops]
+    cycles = [np.array_split(np.arange(loop.size), count) for loop, count in zip(loops, counts, strict=True)]
+    return [(loop, np.array([part[0] for part in parts])) for loop, parts in zip(loops, cycles, strict=True)]
 
 
 @once_per_run

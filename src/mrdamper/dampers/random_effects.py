@@ -113,7 +113,7 @@ class GainsAndOffsets:
 
     @cached_property
     def _designs(self) -> dict[int, Floats]:
-        """(K, G) effects of one unit of the gains and offsets, of each variance that residuals can tell."""
+        """(K, G) gains and offsets of the residuals by one unit of each effect, for each variance they determine."""
         tables = {component: self._groups(component) for component in range(4)}
         shown = {c: self._turned @ self._shown @ table for c, table in tables.items()}
         enough = {c: np.sum(shown[c] ** 2) >= _MIN_RETAINED * max(table.sum(), 1.0) for c, table in tables.items()}
@@ -125,29 +125,29 @@ class GainsAndOffsets:
                 return {c: design for c, design in designs.items() if c < 2}
         return designs
 
-    def _variances(self, shown: Floats, at: Floats, noise: float = 1.0) -> tuple[Floats, Floats]:
-        """Quadratic forms of least variance at some variances, solved for what variances they are of.
+    def _variances(self, shown: Floats, assumed: Floats, noise: float = 1.0) -> tuple[Floats, Floats]:
+        """Estimate variances by the quadratic forms that have least variance at assumed variances.
 
         Parameters
         ----------
         shown : (D, K) array
-            What residuals show, with a share `noise` of their noise in it.
-        at : (D, C) or (1, C) array
-            None of its rows zero.
+            Gains and offsets of the residuals, with a share `noise` of their noise.
+        assumed : (D, C) or (1, C) array
+            No row is zero.
 
         Returns
         -------
         variances : (D, C) array
-            None of them negative.
+            Not negative.
         inner : (D, G, G) array
             Zᵀ V⁻¹ Z of the effects.
         """
         designs = list(self._designs.values())
         whole, first = np.hstack(designs), np.cumsum([0, *(z.shape[1] for z in designs[:-1])])
         own: Floats = self._turned * self._noise @ self._turned.T
-        least = _MIN_SHARE * at.max(axis=1, keepdims=True)
+        least = _MIN_SHARE * assumed.max(axis=1, keepdims=True)
         covariance = own + np.multiply.outer(_MIN_SHARE * least[:, 0], np.eye(len(own)))
-        covariance = covariance + np.tensordot(np.maximum(at, least), [z @ z.T for z in designs], 1)
+        covariance = covariance + np.tensordot(np.maximum(assumed, least), [z @ z.T for z in designs], 1)
         turned: Floats = np.linalg.inv(covariance) @ whole
         inner: Floats = whole.T @ turned
         table = np.add.reduceat(np.add.reduceat(inner**2, first, axis=1), first, axis=2)
@@ -162,7 +162,7 @@ class GainsAndOffsets:
         return solved / size, inner
 
     def _iterated(self, shown: Floats, noise: float = 1.0) -> Floats:
-        """(D, C) variances at which their own forms are of least variance, by what residuals show (D, K)."""
+        """(D, C) variances, iterated from equal ones, of the gains and offsets of residuals (D, K)."""
         estimates = np.tile(np.mean(shown**2, axis=1)[:, None], len(self._designs))
         for _ in range(_ITERATIONS):
             some = np.flatnonzero(estimates.any(axis=1))

@@ -1,4 +1,4 @@
-"""Autoregressions of a residual: one by Burg's recursion, and those of longer memory that are likely, too."""
+"""Autoregressive models of a residual, by Burg's recursion and by their restricted likelihood."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from mrdamper.data.arrays import Floats
 
 _HIGHEST_ORDER = 12
 _MAX_CORRELATION = 0.9995  # of neighbours
-_RANK = 1e-10  # of the largest singular value of a Jacobian, below which a direction is no other one
-_SHORTER, _STEP = 4.0, 0.35  # shortest memory that is looked at, as a part of the one found; step of its logarithm
+_RANK = 1e-10  # of the largest singular value of a Jacobian, below which a direction is linearly dependent
+_LARGEST_RATIO, _STEP = 4.0, 0.35  # of 1 - φ on the grid, to that of Burg's recursion; step of its logarithm
 
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
-    """Noise whose samples follow from those before.
+    """Autoregressive model of noise.
 
     Attributes
     ----------
     variance : float
         Of the innovation.
     reflections : (K,) array
-        Of the lattice.
+        Reflection coefficients of the lattice filter.
     """
 
     variance: float
@@ -31,7 +31,7 @@ class Autoregression:
 
     @classmethod
     def of(cls, residual: Floats) -> Autoregression:
-        """By Burg's recursion, of an order by the corrected criterion of Akaike."""
+        """By Burg's recursion, of the order that Akaike's corrected criterion chooses."""
         size = residual.size
         models = _burg(residual, min(_HIGHEST_ORDER, size // 10))
         best, least = models[0], np.inf
@@ -57,21 +57,21 @@ class Autoregression:
 
     @property
     def coefficients(self) -> Floats:
-        """(K,) of the samples before, on the side of the innovation."""
+        """(K,) coefficients of the preceding samples in the prediction error."""
         return self.predictors[-1]
 
     @property
     def lags(self) -> float:
-        """Samples that one independent one stands for where a mean is taken."""
+        """Number of samples that count as one independent sample in a mean."""
         own = float(np.prod(1 - self.reflections**2))
         return own / float(1 + self.coefficients.sum()) ** 2
 
     def spectrum(self, size: int) -> Floats:
-        """Calculate the spectrum at `points(size)` of the circle, over which its mean is the variance."""
-        return self.variance / np.abs(np.fft.rfft(np.append(1.0, self.coefficients), points(size))) ** 2
+        """Calculate the power spectrum, whose mean by `mean_weights(size)` is the variance."""
+        return self.variance / np.abs(np.fft.rfft(np.append(1.0, self.coefficients), transform_length(size))) ** 2
 
     def innovations(self, table: Floats) -> Floats:
-        """Columns (N, C) as innovations of one variance; the first from the samples that there are."""
+        """Prediction errors (N, C) of columns, of equal variance; the first are predicted from fewer samples."""
         rows, out = self.predictors, table.copy()
         for lag, coefficient in enumerate(rows[-1].tolist(), 1):
             out[lag:] += coefficient * table[:-lag]
@@ -81,20 +81,20 @@ class Autoregression:
         return out
 
 
-def points(size: int) -> int:
-    """Points of a Fourier transform in which a record does not meet itself."""
+def transform_length(size: int) -> int:
+    """Length of a zero-padded Fourier transform in which convolutions of a record do not overlap."""
     return 1 << (2 * size - 1).bit_length()
 
 
-def circle(size: int) -> Floats:
-    """Weights of the upper half of the circle by which a mean over the whole is taken."""
-    weights = np.full(points(size) // 2 + 1, 2.0 / points(size))
+def mean_weights(size: int) -> Floats:
+    """Weights of the non-negative frequencies of this transform in a mean over all frequencies."""
+    weights = np.full(transform_length(size) // 2 + 1, 2.0 / transform_length(size))
     weights[[0, -1]] /= 2
     return weights
 
 
 def _burg(residual: Floats, highest: int, first: float | None = None) -> list[Autoregression]:
-    """Autoregressions of each order; the first reflection may be given."""
+    """Models of each order up to the highest; the first reflection coefficient may be given."""
     forward = backward = residual - residual.mean()
     size = residual.size
     models = [Autoregression(float(forward @ forward) / size, np.zeros(0))]
@@ -104,7 +104,7 @@ def _burg(residual: Floats, highest: int, first: float | None = None) -> list[Au
         if power <= 0:
             break
         reflection = -2 * float(ahead @ behind) / power
-        if order == 1:  # what a mean taken out hides of a long memory [Kendall 1954, Marriott and Pope 1954]
+        if order == 1:  # bias by the mean that was subtracted [Kendall 1954, Marriott and Pope 1954]
             reflection = max(reflection - max(1 - 3 * reflection, 0.0) / size, -_MAX_CORRELATION)
             reflection = reflection if first is None else first
         forward, backward = ahead + reflection * behind, behind + reflection * ahead
@@ -115,12 +115,12 @@ def _burg(residual: Floats, highest: int, first: float | None = None) -> list[Au
     return models
 
 
-def memories(jacobian: Floats, residual: Floats) -> tuple[list[Autoregression], Floats]:
-    """Autoregressions of shorter and longer memory than the one found, and the chance of each.
+def models_by_likelihood(jacobian: Floats, residual: Floats) -> tuple[list[Autoregression], Floats]:
+    """Models of shorter and longer correlation times than that of Burg's recursion, and the probability of each.
 
-    A fit takes slow noise out of its residual. Restricted likelihood is that of what no parameter can take up
-    [Cheang and Reinsel 2000, J. Am. Stat. Assoc. 95, 1173]; the prior of the correlation φ of neighbours is that of
-    Jeffreys, (1 - φ²)^-½.
+    A fit reduces the slow part of the noise in its residual. The restricted likelihood is that of the part of the
+    noise that no parameter can describe [Cheang and Reinsel 2000, J. Am. Stat. Assoc. 95, 1173]; the prior of the
+    correlation φ of neighbouring samples is that of Jeffreys, (1 - φ²)^-½.
 
     Parameters
     ----------
@@ -131,12 +131,12 @@ def memories(jacobian: Floats, residual: Floats) -> tuple[list[Autoregression], 
     """
     turned, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
     columns = turned[:, sizes > _RANK * sizes[0]]
-    usual, free = Autoregression.of(residual), residual.size - columns.shape[1]
-    apart = min(_SHORTER * (1 + float(usual.reflections[0])), 1.0)  # 1 - φ
-    logs = np.arange(np.log(1 - _MAX_CORRELATION), np.log(apart) + _STEP, _STEP)
+    burg, free = Autoregression.of(residual), residual.size - columns.shape[1]
+    largest = min(_LARGEST_RATIO * (1 + float(burg.reflections[0])), 1.0)  # 1 - φ
+    logs = np.arange(np.log(1 - _MAX_CORRELATION), np.log(largest) + _STEP, _STEP)
     models, likelihoods = list[Autoregression](), list[float]()
     for log in logs.tolist():
-        shape = _burg(residual, usual.order, float(np.exp(log)) - 1)[-1]
+        shape = _burg(residual, burg.order, float(np.exp(log)) - 1)[-1]
         table = shape.innovations(np.column_stack([residual, columns]))
         basis, triangle = np.linalg.qr(table[:, 1:])
         rest = table[:, 0] - basis @ (basis.T @ table[:, 0])
@@ -149,5 +149,5 @@ def memories(jacobian: Floats, residual: Floats) -> tuple[list[Autoregression], 
             + log / 2
         )
         models.append(Autoregression(variance, shape.reflections))
-    chances = np.exp(np.array(likelihoods) - max(likelihoods))
-    return models, chances / chances.sum()
+    probabilities = np.exp(np.array(likelihoods) - max(likelihoods))
+    return models, probabilities / probabilities.sum()

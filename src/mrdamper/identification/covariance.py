@@ -1,6 +1,6 @@
 """Covariance of least-squares parameters where residuals are not independent.
 
-Two things make a damper's residuals depend on each other. Noise remembers: its spectrum decides
+Two things make a damper's residuals depend on each other. Noise is correlated: its spectrum decides
 what a parameter sees of it, an offset force the noise at 0 Hz, a viscous damping that at the
 frequency of the motion. And model error repeats with every cycle: more cycles do not average it
 away, so it counts as one unknown function of the phase, not as noise.
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.data.arrays import Floats
-from mrdamper.identification.autoregression import Autoregression, circle, memories, points
+from mrdamper.identification.autoregression import Autoregression, mean_weights, models_by_likelihood, transform_length
 from mrdamper.identification.intervals import dof_of_quantile, student
 
 _MIN_VARIANCE = 1e-200  # a variance of nothing, that shares of it can still be divided by
@@ -22,7 +22,7 @@ _HARMONICS = 24  # of the motion in which model error is looked for
 _REPEATS = 0.95  # cycles from which harmonics of the motion can be told apart
 _MIN_CYCLES = 1.9  # cycles from which repeats are seen as such
 _MAX_SAMPLES = 2001  # samples that are looked at
-_MUCH = 0.1  # share of the noise that a fit has taken with it, from which its residual does not show its memory
+_MAX_SHARE = 0.1  # of the noise in the fit, above which its residual does not show the correlation time of the noise
 _LEVEL = 0.95  # of intervals whose degrees of freedom are sought
 _TAKES_PART = 0.1  # in a direction, of its unit vector
 _NO_MORE = 1e-12  # of the largest: eigenvalue of the scaled normal matrix below which nothing is known
@@ -167,9 +167,9 @@ def _repeated(
     taken = np.clip(np.sum(responses * (inverse @ responses), axis=0) / np.diag(gram), 0.0, 1.0)
     left = (1 - taken).reshape(most, 2).mean(axis=1)
     power = (amplitudes**2).reshape(most, 2).mean(axis=1)
-    # A record that ends elsewhere than it began has more power there than the spectrum of its noise.
-    windows = np.abs(np.fft.rfft(waves.T, points(size), axis=0)) ** 2
-    expected = (circle(size) * Autoregression.of(rest).spectrum(size)) @ windows / np.diag(gram) ** 2
+    # By leakage, a record that ends elsewhere than it began has more power there than the spectrum of its noise.
+    windows = np.abs(np.fft.rfft(waves.T, transform_length(size), axis=0)) ** 2
+    expected = (mean_weights(size) * Autoregression.of(rest).spectrum(size)) @ windows / np.diag(gram) ** 2
     expected = expected.reshape(most, 2).mean(axis=1) * size / (size - 2 * most)
     # Noise alone has power at these frequencies too; only a surplus that chance does not explain repeats.
     if np.sum(power) < (1 + 3 / np.sqrt(left.sum())) * np.sum(expected * left):
@@ -212,23 +212,23 @@ def _noise(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, f
     size = residual.size
     model = Autoregression.of(residual)
     spectrum = model.spectrum(size)
-    transformed = np.fft.rfft(jacobian, points(size), axis=0)
-    score = _score(transformed, circle(size) * spectrum)
-    memory = np.fft.irfft(spectrum, points(size))[: model.order + 1]  # covariance of the residual at its lags
+    transformed = np.fft.rfft(jacobian, transform_length(size), axis=0)
+    score = _score(transformed, mean_weights(size) * spectrum)
+    memory = np.fft.irfft(spectrum, transform_length(size))[: model.order + 1]  # covariance of the residual at its lags
     if memory[0] <= 0:
         return (score, np.zeros(len(inverse))), 1.0
     # The fit took a share of the noise with it.
     taken = float(np.sum(inverse * score)) / (size * memory[0])
-    if model.order and taken > _MUCH:
-        return _noise_of_long_memory(jacobian, residual, inverse)
+    if model.order and taken > _MAX_SHARE:
+        return _noise_by_likelihood(jacobian, residual, inverse)
     relative = np.full(len(inverse), 2.0 / size)
     if order := model.order:  # what uncertain coefficients bend of the spectrum, as each parameter sees it
         lags = np.arange(order)
         doubt = model.variance / size * np.linalg.pinv(memory[np.abs(np.subtract.outer(lags, lags))])
         influence = np.abs(transformed @ inverse) ** 2 * spectrum[:, None]
-        response = np.fft.rfft(np.append(1.0, model.coefficients), points(size))
-        bent = -np.fft.irfft(influence / response.conj()[:, None], points(size), axis=0)[1 : order + 1]
-        slopes = 2 * bent / np.maximum(circle(size) @ influence, 1e-300)
+        response = np.fft.rfft(np.append(1.0, model.coefficients), transform_length(size))
+        bent = -np.fft.irfft(influence / response.conj()[:, None], transform_length(size), axis=0)[1 : order + 1]
+        slopes = 2 * bent / np.maximum(mean_weights(size) @ influence, 1e-300)
         relative = relative + np.sum(slopes * (doubt @ slopes), axis=0)
     return (score / max(1 - taken, 0.2), relative), model.lags
 
@@ -238,25 +238,27 @@ def _score(transformed: NDArray[np.complex128], spectrum: Floats) -> Floats:
     return np.real((transformed.conj().T * spectrum) @ transformed)
 
 
-def _noise_of_long_memory(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, float]:
-    """Calculate the same where the fit has taken much of the noise with it, so that the residual hides its memory.
+def _noise_by_likelihood(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, float]:
+    """Calculate the same where the fit has reduced the noise so much that its correlation time is not known.
 
-    Means over memories by their restricted likelihood, which counts what the fit took out of the residual; the
-    degrees of freedom of a parameter are those at which Student's interval is that of the mixture.
+    The covariance is the mean over models by their restricted likelihood; the degrees of freedom of a parameter are
+    those at which Student's interval is that of the mixture.
     """
     from scipy.special import ndtr  # type: ignore[reportMissingTypeStubs]
 
-    models, chances = memories(jacobian, residual)
+    models, probabilities = models_by_likelihood(jacobian, residual)
     size = residual.size
-    transformed, weights = np.fft.rfft(jacobian, points(size), axis=0), circle(size)
+    transformed, weights = np.fft.rfft(jacobian, transform_length(size), axis=0), mean_weights(size)
     scores = np.array([_score(transformed, weights * model.spectrum(size)) for model in models])
-    score: Floats = np.tensordot(chances, scores, 1)
+    score: Floats = np.tensordot(probabilities, scores, 1)
     variances = np.maximum(np.einsum("ip,mpq,iq->mi", inverse, scores, inverse), 0.0)
-    ratios = np.sqrt(variances / np.maximum(chances @ variances, _MIN_VARIANCE))  # of a memory's standard error
+    ratios = np.sqrt(
+        variances / np.maximum(probabilities @ variances, _MIN_VARIANCE)
+    )  # of the standard errors by each model
     quantiles = np.linspace(student(_LEVEL, np.inf), student(_LEVEL, 1.0), 400)
-    inside = np.tensordot(chances, 2 * ndtr(quantiles[:, None, None] / np.maximum(ratios, 1e-9)) - 1, (0, 1))
+    inside = np.tensordot(probabilities, 2 * ndtr(quantiles[:, None, None] / np.maximum(ratios, 1e-9)) - 1, (0, 1))
     dof = np.array([dof_of_quantile(float(np.interp(_LEVEL, own, quantiles)), _LEVEL) for own in inside.T])
-    return (score, 2 / dof + 2 / size), float(np.exp(chances @ np.log([model.lags for model in models])))
+    return (score, 2 / dof + 2 / size), float(np.exp(probabilities @ np.log([model.lags for model in models])))
 
 
 def _powers(base: NDArray[np.complex128], count: int) -> NDArray[np.complex128]:

@@ -49,8 +49,8 @@ def uncertainty_of_run(
         shown |= {name: float("inf") for name in shown if name in unseen or name not in problem.free}
     if estimate.memory < _MIN_LAGS and np.any(residual):
         doubts.append(
-            f"the record is only {estimate.memory:.1f} times as long as its noise remembers: "
-            "intervals are a guess, record longer"
+            f"the record is only {estimate.memory:.1f} times the correlation time of its noise: "
+            "the intervals are rough, record longer"
         )
     return RunUncertainty(shown, dof, {name: effective[name] for name in shown}, tuple(doubts))
 

@@ -211,14 +211,9 @@ def column_called(table: RawTable, column: str | int, what: str, key: str = "") 
         return column - 1
     wanted, named = column.strip(), split_name(column)
     with_unit = [f"{header.name} {header.known}" if header.unit else "" for header in table.headers]
-    for names, name in (
-        (table.names, wanted),
-        ([header.name for header in table.headers], wanted),
-        (
-            with_unit,
-            f"{named.name} {named.known}",
-        ),  # disp [mm], where the file has disp (mm), disp_mm or a row of units
-    ):
+    headings = (table.names, [header.name for header in table.headers], with_unit)
+    # The last finds disp [mm] where the file has disp (mm), disp_mm or a row of units.
+    for names, name in zip(headings, (wanted, wanted, f"{named.name} {named.known}"), strict=True):
         matches = [i for i, own in enumerate(names) if own == name]
         matches = matches or [i for i, own in enumerate(names) if own.casefold() == name.casefold()]
         if matches:

@@ -33,7 +33,7 @@ class Tdms(Reader):
             file = nptdms.TdmsFile.read_metadata(source.file)
             total = sum(len(channel) for group in file.groups() for channel in group.channels())
             if total > source.size:
-                raise damaged(source, self.title, "truncated: fewer samples than it says")
+                raise damaged(source, self.title, "truncated: fewer samples than its header states")
             check_unpacked(source, 8 * total)
             source.file.seek(0)
             file = nptdms.TdmsFile.read(source.file)
@@ -49,8 +49,8 @@ def _group(group: Any, properties: dict[str, Any]) -> dict[str, Any]:
     timed = any(channel.name.casefold().startswith(("time", "zeit")) for channel in channels)
     starts = {c.properties["wf_start_time"] for c in channels if "wf_start_time" in c.properties}
     begin = min(starts, default=None)
-    says = {name: f"{value}" for name, value in properties.items() if isinstance(value, (str, int, float))}
-    return {**says, "channels": [_channel(channel, {} if timed else _clock(channel, begin)) for channel in channels]}
+    texts = {name: f"{value}" for name, value in properties.items() if isinstance(value, (str, int, float))}
+    return {**texts, "channels": [_channel(channel, {} if timed else _clock(channel, begin)) for channel in channels]}
 
 
 def _channel(channel: Any, clock: dict[str, float]) -> dict[str, Any]:
@@ -65,11 +65,11 @@ def _channel(channel: Any, clock: dict[str, float]) -> dict[str, Any]:
 
 def _clock(channel: Any, begin: Any) -> dict[str, float]:
     """Step and start of a waveform [s]; empty for a step of a second without a start, as LabVIEW writes it unset."""
-    says = channel.properties
-    step, offset = says.get("wf_increment"), float(says.get("wf_start_offset") or 0.0)
-    if not isinstance(step, (int, float)) or not step > 0 or (step == 1.0 and "wf_xname" not in says):
+    properties = channel.properties
+    step, offset = properties.get("wf_increment"), float(properties.get("wf_start_offset") or 0.0)
+    if not isinstance(step, (int, float)) or not step > 0 or (step == 1.0 and "wf_xname" not in properties):
         return {}
-    later = (says["wf_start_time"] - begin) / np.timedelta64(1, "s") if "wf_start_time" in says else 0.0
+    later = (properties["wf_start_time"] - begin) / np.timedelta64(1, "s") if "wf_start_time" in properties else 0.0
     return {"dt [s]": float(step), "t0 [s]": offset + float(later)}
 
 

@@ -61,7 +61,7 @@ def _function(lines: list[str]) -> tuple[dict[str, object], dict[str, object]]:
     (_, x_unit), (name, unit) = _axis(lines[7]), _axis(lines[8])
     numbers = np.array(" ".join(lines[_HEADER:]).split(), dtype=float)
     if kind not in _REAL or (not even and numbers.size < 2 * count) or numbers.size < count:
-        raise ValueError("truncated: fewer values than it says, or complex ones")
+        raise ValueError("truncated: fewer values than its header states, or complex ones")
     values = numbers[:count] if even else numbers[1 : 2 * count : 2]
     time = begin + step * np.arange(count) if even else numbers[: 2 * count : 2]
     return texts, {"name": name, "unit": unit, "data": values, "time": time, "xunit": x_unit or "s"}

@@ -211,17 +211,16 @@ def _best_rates(
     lower, upper = bounds[:, 0], bounds[:, 1]
     right = target * weight
 
-    @lru_cache(maxsize=2)
-    def fitted(u: tuple[float, ...]) -> tuple[Floats, Floats]:
+    def fitted(u: Floats) -> tuple[Floats, Floats]:
         columns = form.columns(I, f, A, tuple(np.exp(u))) * weight[:, None]
         return columns, solve_linear(columns, right)
 
     def residual(u: Floats) -> Floats:
-        columns, fit = fitted(tuple(u))
+        columns, fit = fitted(u)
         return columns @ fit - right
 
     def slopes(u: Floats) -> Floats:
-        columns, fit = fitted(tuple(u))
+        columns, fit = fitted(u)
         by_rate = (form.slopes(columns, I, f, tuple(np.exp(u))) @ fit).T
         return project_out_columns(columns, by_rate)  # the coefficients move along [Kaufman 1975]
 
