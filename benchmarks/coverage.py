@@ -13,6 +13,7 @@ import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from multiprocessing import get_context
 
 import numpy as np
 from scipy.signal import lfilter
@@ -239,7 +240,8 @@ def table(repeats: int, workers: int = 1, only: Sequence[str] = ()) -> str:
     begin = time.perf_counter()
     titles = only or [*CASES, *load_dataset().rigs]
     jobs = [(title, repeats // workers, seed) for title in titles for seed in range(workers)]
-    with ProcessPoolExecutor(workers) as pool:
+    # Started anew: where the parent has read a dataset, Polars waits forever in a forked process.
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         found = list(pool.map(_share, jobs)) if workers > 1 else list(map(_share, jobs))
     lines, outside = list[str](), list[str]()
     for title in titles:
