@@ -102,6 +102,15 @@ def written(bundled_study, tmp_path_factory):
 
 
 @pytest.fixture
+def one_platform(monkeypatch):
+    """FMUs carry a binary for this machine alone: a cross compiler builds a C library for each of the others first."""
+    from mrdamper.exporters import fmu
+    from mrdamper.exporters.toolchain import here
+
+    monkeypatch.setattr(fmu, "PLATFORMS", tuple(filter(None, [here()])))
+
+
+@pytest.fixture
 def condition():
     return Condition(1.0, 1.0, 0.02)
 

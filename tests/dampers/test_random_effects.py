@@ -247,7 +247,7 @@ def test_one_parameter_scatters_as_the_mean_of_gains():
     assert covariance_of(scatter, Effects(offset=5.0, run_offset=5.0))[0, 0] == pytest.approx(0.0, abs=1e-20)
 
 
-@pytest.mark.parametrize("unit", [1.0, 1e3])
+@pytest.mark.parametrize("unit", [1e3, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_draws_show_a_variance_with_the_degrees_of_freedom_behind_it(unit):
     """One parameter that gains move and offsets do not; the unit of the force drops out."""
     force, slope = unit * FORCE, unit * FORCE[:, None]

@@ -32,7 +32,7 @@ def house(tmp_path_factory):
     """A copy of the project with a new file in every room that takes one."""
     copy = tmp_path_factory.mktemp("house")
     for part in ("src", "tests"):
-        shutil.copytree(ROOT / part, copy / part, ignore=shutil.ignore_patterns("__pycache__", "drop_in"))
+        shutil.copytree(ROOT / part, copy / part, ignore=shutil.ignore_patterns("drop_in"))
     shutil.copy(ROOT / "pyproject.toml", copy)
     for path in DROPPED:
         assert not (ROOT / "src/mrdamper" / path).exists(), f"{path} would replace a file of the house"

@@ -188,6 +188,7 @@ def test_a_hostile_rig_name_stays_in_its_comment(tmp_path):
     assert "*/ int evil" not in written
 
 
+@pytest.mark.usefixtures("one_platform")
 def test_every_format_exports_a_saved_damper():
     for name in all_exporters():
         written = exporter(name)().export(joint_damper(), "damper")

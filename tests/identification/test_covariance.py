@@ -23,7 +23,14 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from benchmarks.coverage import CASES, CONDITION, TRUTH, run_by_run
 
 
-@pytest.mark.parametrize("case", [case for case in CASES if "20 cycles" not in case])
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, marks=pytest.mark.slow if case in ("AR 0.9", "AR 0.99") else [])
+        for case in CASES
+        if "20 cycles" not in case
+    ],
+)
 def test_intervals_cover_what_they_say(case):
     found = run_by_run(CASES[case], repeats=50, seed=2)
     # 50 repeats of 95 %: three standard errors of the share are 9 points.

@@ -419,7 +419,7 @@ def test_the_probability_of_a_model_is_its_restricted_likelihood():
     assert probabilities == pytest.approx(by_hand / by_hand.sum(), rel=0.02)
 
 
-@pytest.mark.parametrize("correlation", [0.99, 0.998])
+@pytest.mark.parametrize("correlation", [0.998, pytest.param(0.99, marks=pytest.mark.slow)])
 def test_intervals_hold_the_truth_where_a_record_is_shorter_than_its_memory(correlation):
     N, repeats, rng = 800, 300, np.random.default_rng(8)
     phase = 2 * np.pi * np.arange(N) / 160

@@ -18,6 +18,7 @@ from mrdamper.dampers.model_file import load_model
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.paper.claims import check_claims
+from mrdamper.paper.genetic import GeneticSettings
 from mrdamper.paper.options import PaperOptions
 from mrdamper.paper.study import reproduce
 from mrdamper.physics.gas_spring import GasSpring
@@ -234,6 +235,7 @@ def test_amplitudes_far_over_the_yield_displacement_are_never_called_unseen():
 def test_a_damper_without_a_defect_at_the_stroke_end_does_not_show_one(monkeypatch):
     """After a reversal a Bouc–Wen damper's force is back after the same distance at every speed."""
     monkeypatch.setattr("mrdamper.paper.study.SOBOL_SAMPLES", 4)
+    monkeypatch.setattr("mrdamper.paper.study.GeneticSettings", lambda seed: GeneticSettings(generations=10, seed=seed))
     study = reproduce(matrix(currents=(1.0, 2.0)), PaperOptions(gas=GAS), with_comparators=False)
     claim = next(claim for claim in check_claims(study) if claim.key == "stroke end")
     assert (claim.verdict, claim.said) == ("differs", "differs from the paper on this damper"), claim.evidence

@@ -171,6 +171,7 @@ def test_the_damper_s_fmu_in_a_car_is_the_stepper_in_that_car(tmp_path):
     assert np.array_equal(ride(of_fmu), ride(steps.step))
 
 
+@pytest.mark.usefixtures("one_platform")
 def test_both_leave_by_the_command_line(tmp_path):
     save_model(joint_damper(), tmp_path / "model.json")
     model = ["--damper", str(tmp_path / "model.json")]
