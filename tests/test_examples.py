@@ -1,4 +1,4 @@
-"""Examples run as they stand; what they study of the bundled data was studied once for all tests."""
+"""Examples run as they stand; a study that they ask for is that of the bundled data, made once for all tests."""
 
 import runpy
 from pathlib import Path
@@ -16,12 +16,10 @@ EXAMPLES = [
 
 @pytest.fixture
 def studied_once(bundled, bundled_study, monkeypatch):
-    def run_study(dataset):
-        if not {run.id for run in dataset} <= {run.id for run in bundled}:
-            return studied(dataset)
-        return workflow.Study(dataset, tuple(bundled_study.rig(name) for name in dataset.rigs), 0.0)
+    def run_study(dataset):  # tests/rig_files/test_how_to.py studies the files of an example by the command
+        known = [name for name in dataset.rigs if name in bundled.rigs]
+        return workflow.Study(dataset, tuple(bundled_study.rig(name) for name in known or bundled.rigs[:1]), 0.0)
 
-    studied = workflow.run_study
     monkeypatch.setattr(workflow, "run_study", run_study)
 
 

@@ -14,17 +14,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.command import EACH
 from support.dampers import joint_damper
 
 from mrdamper.dampers.model_file import save_model
 
 HERE, ROOT = Path(__file__).parent, Path(__file__).parents[2]
 DROPPED = [path.relative_to(HERE) for path in HERE.rglob("*.py") if path != Path(__file__)]
-EACH = """
-import json, sys
-from support.command import mrdamper
-print(json.dumps([vars(mrdamper(*words)) for words in json.load(sys.stdin)]))
-"""
 
 
 @pytest.fixture(scope="module")

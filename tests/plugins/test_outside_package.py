@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.command import EACH
 
 PARTS = Path(__file__).parents[1] / "drop_in"
 GROUPS = {
@@ -91,15 +92,18 @@ def call(site):
     return called
 
 
-def test_every_part_is_listed_with_its_package(call):
-    parts = json.loads(call("plugins", "--json").stdout)
+@pytest.fixture(scope="module")
+def parts(call):
+    return json.loads(call("plugins", "--json").stdout)
+
+
+def test_every_part_is_listed_with_its_package(parts):
     ours = {(part["group"], part["name"]) for part in parts if part["package"] == "rig-parts 1.0"}
     assert {group.removeprefix("mrdamper.") for group, _ in ours} == set(GROUPS)
     assert ("mrdamper.models", "rounded-coulomb") in ours
 
 
-def test_a_broken_package_is_named_with_its_reason_and_skipped(call):
-    parts = json.loads(call("plugins", "--json").stdout)
+def test_a_broken_package_is_named_with_its_reason_and_skipped(call, parts):
     problems = {part["package"]: part["problem"] for part in parts if part["problem"]}
     assert "no licence" in problems["raises 1.0"]
     assert "'bingham' exists already in mrdamper" in problems["takes 1.0"]
@@ -124,12 +128,14 @@ def test_an_outside_model_is_identified_saved_loaded_and_exported(call, site, tm
     environment = {**os.environ, "PYTHONPATH": str(site), "PYTHONWARNINGS": "ignore"}
     subprocess.run([sys.executable, "-c", FIT, str(model)], check=True, env=environment)
     assert json.loads(model.read_text())["provenance"]["package of the model"] == "rig-parts 1.0"
-    condition = ("--current", 0.5, "--frequency", 2, "--amplitude", 10)
-    call("predict", model, *condition, "--out", tmp_path / "force.csv")
-    call("export", model, "--to", "c", "--out", tmp_path / "c")
-    call("export", model, "--to", "peaks", "--out", tmp_path / "peaks.csv")
+    predict = ("predict", model, "--current", 0.5, "--frequency", 2, "--amplitude", 10, "--out", tmp_path / "force.csv")
+    exports = [("export", model, "--to", to, "--out", tmp_path / out) for to, out in (("c", "c"), ("peaks", "peaks.csv"))]
+    words = json.dumps([[str(word) for word in command] for command in (predict, *exports)])
+    environment["PYTHONPATH"] += f"{os.pathsep}{PARTS.parent}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    done = subprocess.run([sys.executable, "-c", EACH], input=words, capture_output=True, text=True, env=environment)
+    assert [one["returncode"] for one in json.loads(done.stdout)] == [0, 0, 0], done
     assert (tmp_path / "peaks.csv").read_text().startswith("current_A,force_N\n")
-    refused = call("predict", model, *condition, "--out", tmp_path / "force.csv", installed=False, code=2)
+    refused = call(*predict, installed=False, code=2)
     assert "rounded-coulomb" in refused.stderr
     assert "rig-parts 1.0" in refused.stderr
 

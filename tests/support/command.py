@@ -8,6 +8,13 @@ from unittest.mock import patch
 
 from mrdamper.cli import main
 
+# A program that runs several commands in one process: lists of words as JSON on its input, what came of them on stdout.
+EACH = """
+import json, sys
+from support.command import mrdamper
+print(json.dumps([vars(mrdamper(*words)) for words in json.load(sys.stdin)]))
+"""
+
 
 @dataclass(frozen=True)
 class Done:
