@@ -11,7 +11,7 @@ import inspect
 import math
 import re
 import unicodedata
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
 from functools import cache, wraps
@@ -227,6 +227,11 @@ def shown(value: object) -> str:
         return f"{value!r:.60}"
     except ValueError:
         return "a number of thousands of digits"
+
+
+def listed(names: Sequence[str], most: int) -> str:
+    """Join the first names of a list with commas, and state how many more there are."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 class CombinedError(InputError):

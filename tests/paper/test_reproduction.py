@@ -313,7 +313,6 @@ def test_relative_errors_are_those_of_the_vector(vectors):
         "rmse": metrics.rmse,
         "nrmse_range": metrics.nrmse_pp,
         "nrmse_std": metrics.nrmse_std,
-        "r2": metrics.r_squared,
     }.items():
         assert function(measured, predicted) == pytest.approx(found[name], rel=1e-12), name
 

@@ -129,7 +129,9 @@ def test_an_outside_model_is_identified_saved_loaded_and_exported(call, site, tm
     subprocess.run([sys.executable, "-c", FIT, str(model)], check=True, env=environment)
     assert json.loads(model.read_text())["provenance"]["package of the model"] == "rig-parts 1.0"
     predict = ("predict", model, "--current", 0.5, "--frequency", 2, "--amplitude", 10, "--out", tmp_path / "force.csv")
-    exports = [("export", model, "--to", to, "--out", tmp_path / out) for to, out in (("c", "c"), ("peaks", "peaks.csv"))]
+    exports = [
+        ("export", model, "--to", to, "--out", tmp_path / out) for to, out in (("c", "c"), ("peaks", "peaks.csv"))
+    ]
     words = json.dumps([[str(word) for word in command] for command in (predict, *exports)])
     environment["PYTHONPATH"] += f"{os.pathsep}{PARTS.parent}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
     done = subprocess.run([sys.executable, "-c", EACH], input=words, capture_output=True, text=True, env=environment)

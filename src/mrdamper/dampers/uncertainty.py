@@ -18,7 +18,7 @@ import numpy as np
 from mrdamper.dampers.calibration import Calibration, Growth
 from mrdamper.dampers.sessions import Sessions
 from mrdamper.data import Floats
-from mrdamper.errors import InputError
+from mrdamper.errors import InputError, listed
 from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, weaknesses, written
 
 if TYPE_CHECKING:
@@ -189,9 +189,7 @@ def _grouped(entries: list[tuple[str, str]], single: str, several: str) -> list[
     """State one entry in a sentence of its own, several in one sentence."""
     if len(entries) < 2:
         return [single.format(*entry) + "." for entry in entries]
-    listed = ", ".join(f"{name} ({value})" for name, value in entries[:_MAX_LISTED])
-    more = f" and {len(entries) - _MAX_LISTED} more" if len(entries) > _MAX_LISTED else ""
-    return [f"{several}: {listed}{more}."]
+    return [f"{several}: {listed([f'{name} ({value})' for name, value in entries], _MAX_LISTED)}."]
 
 
 def _limit(own: FittedParameter) -> str:

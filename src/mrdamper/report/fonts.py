@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from mrdamper.errors import listed
+
 _MAX_FILE_BYTES = 40_000_000  # size of a font file [bytes]; larger ones are not opened
 
 
@@ -20,10 +22,9 @@ class Fallback:
     @property
     def sentence(self) -> str:
         """State which characters are not printed, and why."""
-        shown = ", ".join(f"U+{ord(c):04X} {unicodedata.name(c, 'unnamed character')}" for c in self.missing[:3])
-        more = f" and {len(self.missing) - 3} more" if len(self.missing) > 3 else ""
+        shown = listed([f"U+{ord(c):04X} {unicodedata.name(c, 'unnamed character')}" for c in self.missing], 3)
         return (
-            f"Not printed, because no installed font contains them: {shown}{more}. Install a font for this script, "
+            f"Not printed, because no installed font contains them: {shown}. Install a font for this script, "
             "for example Noto Sans, and write the report again; report.html shows them."
         )
 

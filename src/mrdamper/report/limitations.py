@@ -14,6 +14,7 @@ from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.prediction import NOT_A_SINE
 from mrdamper.dampers.uncertainty import uncertainty_warnings
 from mrdamper.data import Floats
+from mrdamper.errors import listed
 from mrdamper.identification import Identification
 from mrdamper.identification.loop_analysis import LoopAnalysis
 from mrdamper.study.contradictions import MIN_RUNS
@@ -29,6 +30,7 @@ _MAX_ENERGY_ERROR = 0.15  # relative error of the dissipated energy [-]
 _MAX_DRIFT_M_S = 1e-4  # drift of the mean position [m/s]
 _MAX_CORRELATION = 0.85  # correlation coefficient of tested frequencies and amplitudes [-]
 _MIN_LEVELS = 4  # number of tested currents
+_MAX_RUNS = 4  # number of runs named in one sentence
 _SAME_CURRENT_A = 0.01  # difference of currents that are one level [A]
 _SAME_MOTION = 0.05  # relative difference of frequencies or amplitudes that are one
 
@@ -140,7 +142,7 @@ def _prediction(cross_validated: Validation, validation: Validation) -> list[str
     if weak:
         sentences.append(
             f"Error of the dissipated energy above {100 * _MAX_ENERGY_ERROR:.0f} % in {len(weak)} cross-validated "
-            f"{'run' if len(weak) == 1 else 'runs'}: {_some(weak)}."
+            f"{'run' if len(weak) == 1 else 'runs'}: {listed(weak, _MAX_RUNS)}."
         )
     if not validation.runs:
         sentences.append("No validation runs: the errors stated are those of cross-validation.")
@@ -197,7 +199,7 @@ def _identifications(identifications: Sequence[Identification]) -> list[str]:
         for name in identification.at_bounds:
             bound.setdefault(name, []).append(identification.run_id)
     for name, runs in bound.items():
-        sentences.append(f"{name} at a bound of its range in {len(runs)} individual fits: {_some(runs)}.")
+        sentences.append(f"{name} at a bound of its range in {len(runs)} individual fits: {listed(runs, _MAX_RUNS)}.")
     for note in dict.fromkeys(
         n for identification in identifications for n in identification.notes if n.lower().startswith("mass")
     ):
@@ -227,15 +229,11 @@ def _tests(loops: Sequence[LoopAnalysis]) -> list[str]:
     if drifting:
         fastest = max(abs(loop.motion.drift) for loop in loops)
         sentences.append(
-            f"Drift of the mean position in {len(drifting)} runs, up to {1e3 * fastest:.2f} mm/s: {_some(drifting)}."
+            f"Drift of the mean position in {len(drifting)} runs, up to {1e3 * fastest:.2f} mm/s: "
+            f"{listed(drifting, _MAX_RUNS)}."
         )
     return sentences
 
 
 def _varied(values: Floats) -> bool:
     return float(np.ptp(values)) > _SAME_MOTION * float(np.max(values))
-
-
-def _some(names: Sequence[str], most: int = 4) -> str:
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

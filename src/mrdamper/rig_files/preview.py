@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mrdamper.errors import InputError
+from mrdamper.errors import InputError, listed
 from mrdamper.rig_files.coil_current import held_current_of
 from mrdamper.rig_files.column_names import Header, names_compression
 from mrdamper.rig_files.columns import assign, column_called, propose, rate_of
@@ -162,10 +162,8 @@ def tree_lines(trees: Sequence[FileTree]) -> list[str]:
             alike[node.columns].append((tree.name, node))
     for columns, places in alike.items():
         names = [f"{file}: {node.path}" if node.path else file for file, node in places]
-        shown = ", ".join(names[:_MOST_NAMES]) + (
-            f" and {len(names) - _MOST_NAMES} more" if names[_MOST_NAMES:] else ""
-        )
-        lines.append(f"{shown}" if len(names) == 1 else f"{len(names)} tables with the same columns: {shown}")
+        shown = listed(names, _MOST_NAMES)
+        lines.append(shown if len(names) == 1 else f"{len(names)} tables with the same columns: {shown}")
         lines += [
             f"  {i}  {c.name or '(no name)'}{f' [{c.unit}]' if c.unit else ''}"
             for i, c in enumerate(columns[:_MOST_COLUMNS], 1)

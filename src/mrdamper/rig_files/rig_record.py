@@ -9,7 +9,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.arrays import chunks
-from mrdamper.errors import ColumnError, InputError
+from mrdamper.errors import ColumnError, InputError, listed
 from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, constant, current_of, without_gaps
 from mrdamper.rig_files.column_names import role_of
@@ -269,7 +269,7 @@ def _remarks(table: RawTable, assigned: dict[str, Assigned]) -> dict[str, str]:
     ]
     remarks = {"columns": ", ".join(taken)}
     if ignored:
-        remarks["ignored_columns"] = ", ".join(ignored[:20]) + (" ..." if len(ignored) > 20 else "")
+        remarks["ignored_columns"] = listed(ignored, 20)
     return {key: as_data(text) for key, text in remarks.items()}
 
 

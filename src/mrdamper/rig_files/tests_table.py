@@ -10,7 +10,7 @@ from pathlib import Path, PurePath
 
 from mrdamper.data import held_current
 from mrdamper.data.strict_text import open_regular
-from mrdamper.errors import CombinedError, InputError
+from mrdamper.errors import CombinedError, InputError, listed
 from mrdamper.rig_files.coil_current import with_stated_current
 from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.conditions import CELL, LARGEST_STATED, quantity_in_cell
@@ -86,11 +86,9 @@ class TestsTable:
             and not (row.file and (self.path.parent / row.file).is_file() and not row.run)
         ]
         if absent:
-            shown = ", ".join(f"{' '.join(filter(None, (r.file, r.run)))!r} (line {r.line})" for r in absent[:10])
-            raise TestsTableError(
-                f"no such test: {shown}{' ...' if absent[10:] else ''}", where=self.path.name,
-                remedy="correct the names, or remove the rows",
-            )  # fmt: skip
+            shown = listed([f"{' '.join(filter(None, (r.file, r.run)))!r} (line {r.line})" for r in absent], 10)
+            remedy = "correct the names, or remove the rows"
+            raise TestsTableError(f"no such test: {shown}", where=self.path.name, remedy=remedy)
 
 
 def _is_file(name: str, path: Path) -> bool:

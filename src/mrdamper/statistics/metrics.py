@@ -42,11 +42,6 @@ def mean_relative_error(measured: Floats, predicted: Floats) -> float:
     return float(np.mean(np.abs((predicted - measured)[nonzero] / measured[nonzero])))
 
 
-def r_squared(measured: Floats, predicted: Floats) -> float:
-    """Coefficient of determination, 1 − nrmse_std²."""
-    return 1.0 - nrmse_std(measured, predicted) ** 2
-
-
 def peak_force(force: Floats) -> float:
     """Half the peak-to-peak force [N]."""
     return float(np.ptp(force) / 2)

@@ -16,7 +16,7 @@ import typer
 
 from mrdamper.cli.output import put_text, shortened
 from mrdamper.cli.progress import progress_on_stderr
-from mrdamper.errors import InputError, OutputError
+from mrdamper.errors import InputError, OutputError, listed
 
 if TYPE_CHECKING:
     from mrdamper.data import Dataset
@@ -197,7 +197,7 @@ def _joined(old: Dataset, new: Dataset) -> Dataset:
     again = [run.id for run in new if (run.notes.get("sha256"), run.id) in stored]
     if again:
         raise OutputError(
-            f"{len(again)} of the tests are there already: {', '.join(again[:5])}{' ...' if again[5:] else ''}",
+            f"{len(again)} of the tests are there already: {listed(again, 5)}",
             where=f"dataset {old.name}", remedy="give the new files only",
         )  # fmt: skip
     names = unique_names((run.id for run in new), (run.id for run in old))
@@ -257,10 +257,7 @@ def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = Fa
     for some, most in ((lines, 7), (_finding_lines(result, verbose), 4), (_refused_lines(result), 4)):
         print("".join(f"{line}\n" for line in shortened(some, most, verbose)), end="")
     if result.left_out:
-        shown = ", ".join(result.left_out[:5]) + (
-            f" and {len(result.left_out) - 5} more" if result.left_out[5:] else ""
-        )
-        print(f"left out, no tables of tests: {shown}")
+        print(f"left out, no tables of tests: {listed(result.left_out, 5)}")
     if any("profile" in refusal.error.remedy for refusal in result.refusals):
         print(
             "a profile answers once for all files: mrdamper import FILE --write-profile rig.toml, "
@@ -314,8 +311,7 @@ def _refused_lines(result: ImportResult) -> list[str]:
         if not all(file.is_absolute() for file in files):
             files = [Path(os.path.relpath(file)) for file in files]
         folder = Path(os.path.commonpath([file.parent for file in files]))
-        names = list(dict.fromkeys(str(file.relative_to(folder)) for file in files))
-        shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")
+        shown = listed(list(dict.fromkeys(str(file.relative_to(folder)) for file in files)), 3)
         first = "" if len({refusal.error.found for refusal in refusals}) == 1 else "the first of them: "
         remedy = f"; {error.remedy}" if error.remedy else ""
         lines.append(f"refused {len(files)} tests in {folder} ({shown}): {first}{error.found}{remedy} [{error.code}]")

@@ -11,7 +11,7 @@ import typer
 
 from mrdamper.cli.output import parse_gas, parse_pairs
 from mrdamper.cli.progress import in_two, progress_on_stderr
-from mrdamper.errors import IdentificationError, InputError, UnknownNameError
+from mrdamper.errors import IdentificationError, InputError, UnknownNameError, listed
 
 if TYPE_CHECKING:
     from mrdamper.data import Dataset
@@ -121,10 +121,8 @@ def _not_identified(result: Study, verbose: bool) -> list[str]:
         for run, reason in rig.not_identified.items():
             if run not in aside:
                 reasons.setdefault(reason, []).append(run)
-    most = None if verbose else 3
     return excluded + [
-        f"no individual fit: {', '.join(runs[:most])}{' ...' if runs[most:] and most else ''} ({reason})"
-        for reason, runs in reasons.items()
+        f"no individual fit: {listed(runs, len(runs) if verbose else 3)} ({reason})" for reason, runs in reasons.items()
     ]
 
 
