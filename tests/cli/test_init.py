@@ -37,17 +37,17 @@ def test_an_empty_head_of_a_report_states_nothing(tmp_path):
     assert load_about(written(tmp_path, "about", template("about"))) == About()
     text = template("about").replace('serial = ""', 'serial = "SN 1"')
     assert load_about(written(tmp_path, "about", text)).serial == "SN 1"
-    assert keys(template("about")) == {field.name for field in fields(About)}
+    assert keys(template("about")) == set(About.model_fields)
 
 
 def test_one_limits_file_serves_three_readers(tmp_path):
     path = written(tmp_path, "limits", completed("limits"))
-    assert load_limits(path) == (Limit(0.5, 0.1, "rebound", 300.0, 420.0),)
+    assert load_limits(path) == (Limit(current_A=0.5, velocity_m_s=0.1, side="rebound", lower_N=300.0, upper_N=420.0),)
     column = load_column_limits(path)["gas_force_N"]
     assert (column.lower, column.upper) == (110.0, 130.0)
     assert Limits.read(path).amplitude_mm == (2.0, 20.0)
     assert {field.name for field in fields(Limits)} == set(RIG_LIMITS)
-    assert keys(template("limits")) == {*RIG_LIMITS, *(field.name for field in fields(Limit)), "lower", "upper"}
+    assert keys(template("limits")) == {*RIG_LIMITS, *Limit.model_fields, "lower", "upper"}
 
 
 @pytest.mark.parametrize("read", [load_limits, load_column_limits, Limits.read])

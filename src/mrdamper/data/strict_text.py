@@ -95,19 +95,6 @@ def is_table(value: object) -> TypeGuard[dict[str, Any]]:
     return isinstance(value, dict)
 
 
-def read_toml_file(path: Path) -> dict[str, Any]:
-    """Read a TOML file without a schema; no more of it is read than one may hold, whatever it is.
-
-    Raises `OSError` if it cannot be read, `tomllib.TOMLDecodeError` also if it is no UTF-8.
-    """
-    with open_regular(path) as file:
-        content = file.read(4 * _LONGEST + 1)
-    try:
-        return read_toml(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise tomllib.TOMLDecodeError("no UTF-8 text") from error
-
-
 def read_toml(text: str) -> dict[str, Any]:
     """Return a TOML document.
 

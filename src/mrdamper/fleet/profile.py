@@ -8,9 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from mrdamper.rig_files.limits_file import FORCE_LIMITS, RIG_LIMITS, LimitsError
+from mrdamper.rig_files.limits_file import COLUMN_LIMITS, load_part
 from mrdamper.rig_files.profile import ProfileError
 from mrdamper.rig_files.strict_toml import load_toml
 
@@ -104,10 +104,6 @@ class ColumnLimits(_ProfileTable):
         return self
 
 
-_OTHER_PARTS: dict[str, Any] = {name: (Any, None) for name in (FORCE_LIMITS, *RIG_LIMITS)}  # of other commands
-_Limits = create_model("_Limits", __base__=_ProfileTable, limits=(dict[str, ColumnLimits], ...), **_OTHER_PARTS)
-
-
 def load_fleet_profile(path: str | Path | None) -> FleetProfile:
     """Read a fleet profile; without a path, the one that says nothing.
 
@@ -126,4 +122,4 @@ def load_limits(path: str | Path) -> dict[str, ColumnLimits]:
 
     Raises `LimitsError` if it is no TOML, a key is not known, or a lower limit is not below the upper.
     """
-    return load_toml(Path(path), _Limits, LimitsError, "mrdamper init limits shows the keys").limits  # type: ignore[attr-defined]
+    return load_part(path, {COLUMN_LIMITS: (dict[str, ColumnLimits], ...)})[COLUMN_LIMITS]

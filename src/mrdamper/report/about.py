@@ -8,17 +8,17 @@ from __future__ import annotations
 import base64
 import io
 import math
-import tomllib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from difflib import get_close_matches
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from mrdamper.data.strict_text import read_toml_file
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, WithJsonSchema, model_validator
+
 from mrdamper.errors import InputError
-from mrdamper.rig_files.limits_file import FORCE_LIMITS, require_known_keys
+from mrdamper.rig_files.limits_file import FORCE_LIMITS, load_part
+from mrdamper.rig_files.strict_toml import checked_table, load_toml
 
+_HELP = "mrdamper init about shows the fields"
 _LARGEST_LOGO = 500_000  # bytes; it stands in every page
 _LONGEST = 5_000  # letters of a field
 _LONGEST_SIDE = 5_000  # points of a logo
@@ -31,41 +31,55 @@ class AboutError(InputError):
     code = "E_ABOUT"
 
 
-@dataclass(frozen=True)
-class About:
+def _as_text(value: Any) -> Any:
+    """Numbers and dates of a file are text as they stand."""
+    return value if isinstance(value, (dict, list, bool)) else str(value)
+
+
+_SCHEMA = WithJsonSchema({"type": ["string", "number"]})
+_Text = Annotated[str, Field(max_length=_LONGEST), BeforeValidator(_as_text), _SCHEMA]
+_Number = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
+
+
+class About(BaseModel, extra="forbid", frozen=True, str_strip_whitespace=True):
     """The head of a report; what was not given is empty."""
 
-    title: str = ""
-    customer: str = ""
-    maker: str = ""
-    type: str = ""
-    serial: str = ""
-    rig: str = ""
-    operator: str = ""
-    date: str = ""
-    temperature_C: str = ""
-    standard: str = ""
-    notes: str = ""
-    logo: str = ""  # the picture as a data address
+    title: _Text = ""
+    customer: _Text = ""
+    maker: _Text = ""
+    type: _Text = ""
+    serial: _Text = ""
+    rig: _Text = ""
+    operator: _Text = ""
+    date: _Text = ""
+    temperature_C: _Text = ""
+    standard: _Text = ""
+    notes: _Text = ""
+    logo: Annotated[str, Field(max_length=2 * _LARGEST_LOGO), BeforeValidator(_as_text), _SCHEMA] = ""  # a data address
 
     @property
     def rows(self) -> list[tuple[str, str]]:
         """Fields that were given, with their names on the page."""
-        named = {"temperature_C": "temperature", "type": "type", "rig": "test rig"}
-        given = [(f.name, getattr(self, f.name)) for f in fields(self) if f.name not in ("title", "logo")]
+        named = {"temperature_C": "temperature", "rig": "test rig"}
+        given = [(name, value) for name, value in self if name not in ("title", "logo")]
         return [(named.get(n, n), f"{v} °C" if n == "temperature_C" else v) for n, v in given if v]
 
 
-@dataclass(frozen=True)
-class Limit:
+class Limit(BaseModel, extra="forbid", frozen=True):
     """A band the damping force must lie in."""
 
-    current_A: float
-    velocity_m_s: float
-    side: str  # "rebound" or "compression"
+    current_A: _Number
+    velocity_m_s: _Number
+    side: Literal["rebound", "compression"]
     # lower_N and upper_N: of the force with the gas force taken away, positive
-    lower_N: float
-    upper_N: float
+    lower_N: _Number
+    upper_N: _Number
+
+    @model_validator(mode="after")
+    def _lower_lies_below(self) -> Limit:
+        if self.lower_N > self.upper_N:
+            raise ValueError(f"lower_N {self.lower_N:g} lies above upper_N {self.upper_N:g}; exchange them")
+        return self
 
 
 def load_about(path: str | Path) -> About:
@@ -75,11 +89,8 @@ def load_about(path: str | Path) -> About:
     logo that is no PNG or JPEG or is too large.
     """
     path = Path(path)
-    table = dict(_toml(path))
-    logo = table.get("logo")
-    if isinstance(logo, str) and logo.strip():
-        table["logo"] = _picture(*_logo_file(path.parent / logo.strip()))
-    return about_of(table, str(path))
+    about = load_toml(path, About, AboutError, _HELP)
+    return about.model_copy(update={"logo": _picture(*_logo_file(path.parent / about.logo))}) if about.logo else about
 
 
 def about_of(table: Mapping[str, Any], where: str) -> About:
@@ -87,17 +98,7 @@ def about_of(table: Mapping[str, Any], where: str) -> About:
 
     Raises `AboutError` if a field is unknown, or no text or number.
     """
-    names = [f.name for f in fields(About)]
-    for name, value in table.items():
-        if name not in names:
-            near = get_close_matches(name, names, n=1)
-            remedy = f"did you mean {near[0]}?" if near else f"the fields are {', '.join(names)}"
-            raise AboutError(f"unknown field {name!r}", where=where, remedy=remedy)
-        if isinstance(value, (dict, list, bool)):
-            raise AboutError(f"{name} is no text", where=where, remedy=f'write {name} = "..."')
-        if len(str(value)) > (_LONGEST if name != "logo" else 2 * _LARGEST_LOGO):
-            raise AboutError(f"{name} has {len(str(value)):,} letters", where=where, remedy=f"at most {_LONGEST:,}")
-    return About(**{name: str(value).strip() for name, value in table.items()})
+    return checked_table(table, About, AboutError, _HELP, where)
 
 
 def logo_of(text: str) -> str:
@@ -118,64 +119,26 @@ def load_limits(path: str | Path) -> tuple[Limit, ...]:
     Raises `AboutError` if it cannot be read, a key is unknown, a limit is incomplete, no number, of no side, or its
     lower force above the upper, or two limits at one point exclude each other.
     """
-    path = Path(path)
-    table = _toml(path)
-    require_known_keys(table, AboutError, str(path))
-    entries = table.get(FORCE_LIMITS)
-    if not isinstance(entries, list) or not entries:
-        remedy = f"write one [[limit]] table per limit with {_FIELDS} (mrdamper init limits)"
-        raise AboutError("no [[limit]] tables", where=str(path), remedy=remedy)
-    limits = tuple(_limit(entry, f"{path}, limit {number}") for number, entry in enumerate(entries, 1))
-    _refuse_exclusion(limits, str(path))
-    return limits
+    kind = Annotated[tuple[Limit, ...], AfterValidator(_without_exclusion)]
+    return load_part(path, {FORCE_LIMITS: (kind, ...)}, AboutError)[FORCE_LIMITS]
 
 
-def _refuse_exclusion(limits: Sequence[Limit], where: str) -> None:
-    """Refuse two limits at the same point that no force meets."""
+def _without_exclusion(limits: tuple[Limit, ...]) -> tuple[Limit, ...]:
+    """Refuse two limits at the same point that no force meets, and a table of none."""
+    if not limits:
+        raise ValueError("no [[limit]] tables")
     points: dict[tuple[float, float, str], list[tuple[int, Limit]]] = {}
     for number, limit in enumerate(limits, 1):
         others = points.setdefault((limit.current_A, limit.velocity_m_s, limit.side), [])
         for before, other in others:
             if max(limit.lower_N, other.lower_N) > min(limit.upper_N, other.upper_N):
-                raise AboutError(
+                raise ValueError(
                     f"no force meets limit {before} ({other.lower_N:g} to {other.upper_N:g} N) and limit {number} "
                     f"({limit.lower_N:g} to {limit.upper_N:g} N), both at {limit.current_A:g} A, "
-                    f"{limit.velocity_m_s:g} m/s, {limit.side}",
-                    where=where,
-                    remedy="remove one of them",
+                    f"{limit.velocity_m_s:g} m/s, {limit.side}; remove one of them"
                 )
         others.append((number, limit))
-
-
-_FIELDS = "current_A, velocity_m_s, side, lower_N, upper_N"
-
-
-def _limit(entry: Any, where: str) -> Limit:
-    if not isinstance(entry, dict) or set(entry) != set(_FIELDS.split(", ")):
-        raise AboutError(f"fields {', '.join(sorted(map(str, entry)))}", where=where, remedy=f"give just {_FIELDS}")
-    if entry["side"] not in ("rebound", "compression"):
-        raise AboutError(f"side is {entry['side']!r}", where=where, remedy="write rebound or compression")
-    numbers = {name: value for name, value in entry.items() if name != "side"}
-    for name, value in numbers.items():
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or value < 0:
-            raise AboutError(f"{name} is {value!r}", where=where, remedy="give a number, zero or more")
-    if entry["lower_N"] > entry["upper_N"]:
-        raise AboutError(
-            f"lower_N {entry['lower_N']:g} lies above upper_N {entry['upper_N']:g}", where=where, remedy="exchange them"
-        )
-    return Limit(side=entry["side"], **{name: float(value) for name, value in numbers.items()})
-
-
-def _toml(path: Path) -> Mapping[str, Any]:
-    try:
-        return read_toml_file(path)
-    except OSError as error:
-        raise AboutError(
-            error.strerror or str(error), where=str(path), remedy="give a TOML file that exists"
-        ) from error
-    except tomllib.TOMLDecodeError as error:
-        remedy = 'write one `name = "text"` a line, in UTF-8'
-        raise AboutError(f"is no TOML: {str(error).splitlines()[0]}", where=str(path), remedy=remedy) from error
+    return limits
 
 
 def _logo_file(path: Path) -> tuple[bytes, str]:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
+from pydantic import ConfigDict, create_model
+
 from mrdamper.errors import InputError
+from mrdamper.rig_files.strict_toml import load_toml
 
 FORCE_LIMITS = "limit"  # [[limit]] tables, for reports and studies
 COLUMN_LIMITS = "limits"  # [limits.COLUMN] tables, for fleets
@@ -14,7 +17,6 @@ RIG_LIMITS = (
     "current_A", "frequency_Hz", "amplitude_mm", "velocity_m_s", "force_N", "cycles", "sample_rate_Hz",
     "minutes_between", "session_minutes", "sessions",
 )  # fmt: skip
-_KEYS = (FORCE_LIMITS, COLUMN_LIMITS, *RIG_LIMITS)
 
 
 class LimitsError(InputError):
@@ -23,12 +25,12 @@ class LimitsError(InputError):
     code = "E_LIMITS"
 
 
-def require_known_keys(table: Mapping[str, Any], refuse: type[InputError], where: str) -> None:
-    """Refuse the content of a limits file called `where` with a key of no part, by an error of the class `refuse`."""
-    for name in table:
-        if name not in _KEYS:
-            same = [key for key in RIG_LIMITS if key.split("_")[0] == name.split("_")[0]]
-            near = same[:1] or get_close_matches(name, _KEYS, 1, 0.5)
-            unit = ": the unit is part of the name" if same else ""
-            remedy = f"did you mean {near[0]}?{unit}" if near else "mrdamper init limits shows the keys"
-            raise refuse(f"unknown key {name}", where=where, remedy=remedy)
+def load_part(path: str | Path, part: Mapping[str, Any], refuse: type[InputError] = LimitsError) -> dict[str, Any]:
+    """Read the keys of one part of a limits file, each given by its type and default; keys of other parts may be there.
+
+    Raises `refuse` if the file cannot be read, is no TOML, or a key is unknown, missing or of another kind.
+    """
+    others: dict[str, Any] = {name: (Any, None) for name in (FORCE_LIMITS, COLUMN_LIMITS, *RIG_LIMITS)}
+    kind = create_model("Limits", __config__=ConfigDict(extra="forbid"), **{**others, **part})
+    content = load_toml(Path(path), kind, refuse, "mrdamper init limits shows the keys")
+    return {name: getattr(content, name) for name in part}

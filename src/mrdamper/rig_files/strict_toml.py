@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -36,13 +38,21 @@ def load_toml(path: Path, kind: type[T], refuse: type[InputError], help: str, la
 def parse_toml(text: str, kind: type[T], refuse: type[InputError], help: str, where: str) -> T:
     """Parse a TOML text by its schema; arguments as `load_toml`, `where` names its origin."""
     try:
-        return kind.model_validate(read_toml(text))
+        table = read_toml(text)
     except tomllib.TOMLDecodeError as error:
         raise refuse(str(error) or "nested too deeply", where=where, remedy="correct the TOML") from error
+    return checked_table(table, kind, refuse, help, where)
+
+
+def checked_table(table: Mapping[str, Any], kind: type[T], refuse: type[InputError], help: str, where: str) -> T:
+    """Check a table by its schema; arguments as `parse_toml`. Of several errors a misspelt key is named first."""
+    try:
+        return kind.model_validate(table)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        place = ".".join(str(part) for part in first["loc"])
-        more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+        errors = error.errors(include_url=False, include_context=False)
+        first = next((one for one in errors if one["type"] == "extra_forbidden"), errors[0])
+        place = re.sub(r"\.(\d+)", lambda index: f" {int(index[1]) + 1}", ".".join(map(str, first["loc"])))
+        more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
         unknown = first["type"] == "extra_forbidden"
         problem = f"unknown key {place}" if unknown else f"{place}: {first['msg'].removeprefix('Value error, ')}"
         near = _nearest(kind, first["loc"]) if unknown else ""

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import itertools
 import math
-import tomllib
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
-from mrdamper.data.strict_text import read_toml_file
-from mrdamper.errors import is_a
-from mrdamper.rig_files.limits_file import RIG_LIMITS, LimitsError, require_known_keys
+from mrdamper.rig_files.limits_file import LimitsError, load_part
 
 _MAX_SAMPLES = 500_000  # of a planned record
 _RANGES = ("current_A", "frequency_Hz", "amplitude_mm")
 _LEVELS = 4  # of each of them on the grid of candidates
+_Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]  # of a file
+_Whole = Annotated[int, Field(strict=True)]
 
 
 @dataclass(frozen=True)
@@ -105,24 +105,9 @@ class Limits:
         InputError
             E_LIMITS if the file cannot be read, or a key is unknown, missing, or no number.
         """
-        try:
-            given = read_toml_file(path)
-        except (OSError, tomllib.TOMLDecodeError) as error:
-            reason = str(error).splitlines()[0]
-            raise LimitsError(reason, where=str(path), remedy="give a TOML file of limits") from error
-        require_known_keys(given, LimitsError, str(path))
-        given = {name: value for name, value in given.items() if name in RIG_LIMITS}
-        for name, value in given.items():
-            numbers: list[Any] = value if is_a(value, list) else [value]
-            plain = all(isinstance(n, int | float) and not isinstance(n, bool) and math.isfinite(n) for n in numbers)
-            if not plain or is_a(value, list) != (name in _RANGES) or len(numbers) != 1 + (name in _RANGES):
-                raise bad_limits(
-                    f"{name} = {value!r}", "give [lowest, highest]" if name in _RANGES else "give one number"
-                )
-        if missing := [name for name in _RANGES if name not in given]:
-            raise bad_limits(f"no {', '.join(missing)}", "give [lowest, highest] of each (mrdamper init limits)")
-        values: dict[str, Any] = {n: tuple(map(float, v)) if is_a(v, list) else v for n, v in given.items()}
-        return cls(**values)
+        kinds: dict[str, Any] = {**dict.fromkeys(_RANGES, tuple[_Number, _Number]), "sessions": _Whole}
+        part = {f.name: (kinds.get(f.name, _Number), ... if f.default is MISSING else f.default) for f in fields(cls)}
+        return cls(**load_part(path, part))
 
     @classmethod
     def of(cls, damper: Damper) -> Limits:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields
 from pkgutil import resolve_name
 from typing import Any
 
@@ -14,6 +13,7 @@ from mrdamper.errors import UnknownNameError
 _FORMATS = ("model", "profile", "limits", "about", "fleet", "system", "plan", "results")
 _TYPES = {
     "profile": "rig_files.profile:Profile",
+    "about": "report.about:About",
     "fleet": "fleet.profile:FleetProfile",
     "system": "systems.system_file:SystemDocument",
     "plan": "study.proposal:PlanRow",
@@ -42,8 +42,6 @@ def _schema(name: str) -> dict:
         return model_schema()
     if name == "limits":
         document = _limits()
-    elif name == "about":
-        document = _about()
     else:
         kind: Any = resolve_name(f"mrdamper.{_TYPES[name]}")
         adapter = TypeAdapter(list[kind] if name == "plan" else kind)  # pyright: ignore[reportInvalidTypeForm]
@@ -60,19 +58,9 @@ def _limits() -> dict:
     from mrdamper.rig_files.limits_file import COLUMN_LIMITS, FORCE_LIMITS
     from mrdamper.study.limits import Limits
 
-    force = {**TypeAdapter(Limit).json_schema(), "additionalProperties": False}
-    force["properties"]["side"]["enum"] = ["rebound", "compression"]
     parts = {
-        FORCE_LIMITS: {"type": "array", "items": force},
+        FORCE_LIMITS: {"type": "array", "items": Limit.model_json_schema()},
         COLUMN_LIMITS: {"type": "object", "additionalProperties": ColumnLimits.model_json_schema()},
     }
     rig = TypeAdapter(Limits).json_schema()["properties"]
     return {"title": "Limits", "type": "object", "properties": {**rig, **parts}, "additionalProperties": False}
-
-
-def _about() -> dict:
-    """Fields of the head of a report: text or numbers."""
-    from mrdamper.report.about import About
-
-    properties = {field.name: {"type": ["string", "number"]} for field in fields(About)}
-    return {"title": "About", "type": "object", "properties": properties, "additionalProperties": False}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from inspect import signature
 from pathlib import Path
@@ -54,7 +53,7 @@ class Head(BaseModel, extra="forbid"):
     def given(self) -> About:
         """Checked, as the report takes it."""
         about = about_of(self.about, "head of the report")
-        return replace(about, logo=logo_of(self.logo)) if self.logo else about
+        return about.model_copy(update={"logo": logo_of(self.logo)}) if self.logo else about
 
 
 @router.get("/choices")
