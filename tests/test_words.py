@@ -26,8 +26,7 @@ def test_every_text_uses_the_terms_of_the_field():
 
 
 def test_the_search_finds_a_term_and_leaves_ordinary_uses_alone():
-    def matches(text):
-        return [term["use"] for term in TERMS if re.search(term["find"], text.lower())]
-
-    assert matches("3 held-out runs") == ["validation runs (not used for identification)"]
-    assert matches("error on line 12: the leak of a seal") == []
+    lines = [(3, "3 Held-out runs"), (12, "error on line 12: the leak of a seal")]
+    (hit,) = hits(ROOT / "README.md", lambda _: lines)
+    assert hit == "README.md, line 3: 'held-out'; use validation runs (not used for identification)"
+    assert hits(ROOT / "README.md", lambda _: lines[1:]) == []
