@@ -74,6 +74,7 @@ def test_the_truth_of_the_conditions_is_found():
         assert np.std(error) == pytest.approx(conditions.NOISE * np.std(problem.force), rel=0.1)
 
 
+@pytest.mark.slow  # tests/hysteresis compares strokes with the same distance
 def test_accuracy_meets_its_goals():
     found = accuracy.largest_errors()
     assert found["closed"] <= 1e-12
