@@ -3,6 +3,7 @@
 import re
 import sys
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,8 @@ from benchmarks.contradicting_folders import DAMPERS, folders, full_matrix, make
 from benchmarks.contradicting_folders_two import DAMPERS as SECOND
 from benchmarks.contradicting_folders_two import second_folders
 
+first_set, second_set = cache(folders), cache(second_folders)  # their dampers are integrated step by step
+
 
 @pytest.fixture(scope="module")
 def sound():
@@ -29,7 +32,7 @@ def sound():
 
 @pytest.fixture(scope="module")
 def cases():
-    return {folder.name: folder for folder in folders(DAMPERS[0])}
+    return {folder.name: folder for folder in first_set(DAMPERS[0])}
 
 
 def changed(runs, k, **channels):
@@ -126,7 +129,7 @@ def test_a_loop_that_widens_with_the_current_accuses_no_run():
 @pytest.mark.parametrize("name", ["half-open coil", "rows shifted from the seventh on"])
 def test_a_saturating_coil_hides_no_current(name):
     """The force of a smooth damper changes by a third only, but its course over the current is known."""
-    folder = next(f for f in folders(DAMPERS[2]) if f.name == name)
+    folder = next(f for f in first_set(DAMPERS[2]) if f.name == name)
     assert {one.run_id for one in find_contradictions(folder.runs)} == folder.wrong
 
 
@@ -156,7 +159,7 @@ def test_a_motion_that_empties_cells_of_the_matrix_is_less_probable(sound):
 @pytest.mark.parametrize("kind", [1, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ["a random record in inches", "three open coils", "rows shifted up from the third on"])
 def test_the_second_set_is_found(kind, name):
-    folder = next(f for f in second_folders(SECOND[kind]) if f.name == name)
+    folder = next(f for f in second_set(SECOND[kind]) if f.name == name)
     found = find_contradictions(folder.runs)
     assert {one.run_id for one in found} == folder.wrong
     assert {one.cause for one in found} <= set(folder.causes)
@@ -165,7 +168,7 @@ def test_the_second_set_is_found(kind, name):
 @pytest.mark.parametrize("name", ["stroke for amplitude in three runs", "a worn damper in a random record"])
 def test_runs_that_are_not_the_first_suspects_are_found(name):
     """Two of three alike raise the error assumed of the third; a record of many currents is improbable in any case."""
-    folder = next(f for f in second_folders(SECOND[0]) if f.name == name)
+    folder = next(f for f in second_set(SECOND[0]) if f.name == name)
     found = find_contradictions(folder.runs)
     assert {one.run_id for one in found} == folder.wrong
     assert {one.cause for one in found} <= set(folder.causes)
@@ -200,7 +203,7 @@ def test_runs_with_gains_of_their_own_are_found_and_gains_of_sessions_are_not(so
 @pytest.mark.parametrize("kind", [pytest.param(0, marks=pytest.mark.slow), 3])
 def test_two_dampers_half_the_runs_each_are_refused_with_both_groups(kind):
     """A single model of many coefficients describes both dampers together with an error of a few per cent."""
-    folder = next(f for f in folders(DAMPERS[kind]) if f.name == "two dampers, half the runs each")
+    folder = next(f for f in first_set(DAMPERS[kind]) if f.name == "two dampers, half the runs each")
     with pytest.raises(ContradictionError, match=r"times what the others show\) against t") as refusal:
         find_contradictions(folder.runs)
     groups = re.findall(r"((?:t\d\d(?:, )?)+) \(", str(refusal.value))
@@ -210,7 +213,7 @@ def test_two_dampers_half_the_runs_each_are_refused_with_both_groups(kind):
 
 def test_motions_that_complete_the_matrix_of_tests_are_those_of_another_stroke(sound):
     """Three strokes counted from peak to peak leave three cells of the matrix of tests empty."""
-    folder = next(f for f in second_folders(SECOND[1]) if f.name == "stroke for amplitude in three runs")
+    folder = next(f for f in second_set(SECOND[1]) if f.name == "stroke for amplitude in three runs")
     found = find_contradictions(folder.runs)
     assert [(one.run_id, one.cause, one.value) for one in found] == [
         (name, "displacement", 0.5) for name in sorted(folder.wrong)
