@@ -144,7 +144,7 @@ def test_the_report_has_page_print_and_tables(folder, dataset, tmp_path):
         ('titel = "x"', "did you mean title?"),
         ("title = [1]", "title: Input should be a valid string"),
         ("title = ", "correct the TOML"),
-        ('logo = "absent.png"', "logo absent.png"),
+        ('logo = "absent.png"', "absent.png: No such file"),
         ('logo = "large.png"', "kB"),
         ('logo = "about.toml"', "neither PNG nor JPEG"),
         ('logo = "damaged.png"', "is damaged"),

@@ -24,7 +24,7 @@ from mrdamper.dampers.sessions import Sessions
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import require_name
 from mrdamper.data.atomic import path_of, write_file
-from mrdamper.data.strict_text import is_table, open_regular, parse_json
+from mrdamper.data.strict_text import content_of, is_table, parse_json
 from mrdamper.errors import InputError, ModelFileError, require
 from mrdamper.models import model_parts
 
@@ -32,6 +32,7 @@ FORMAT = "mrdamper-model"
 _PACKAGE = "package of the model"  # key of the provenance
 MAJOR, MINOR = 1, 5
 _MAX_FILE_BYTES = 64_000_000  # bytes of a file
+_KIND = "a model.json written by mrdamper"
 _MAX_DEVIATION = 1e4  # standard deviation of a parameter over its size, or of its logarithm
 UNITS = {
     "time": "s",
@@ -224,14 +225,9 @@ def load_model(path: str | Path) -> Damper:
             raise ModelFileError(f"a folder with {names}", where=str(path), remedy="give one model.json")
         path = models[0]
     try:
-        with open_regular(path) as file:
-            content = file.read(_MAX_FILE_BYTES + 1)
-        if len(content) > _MAX_FILE_BYTES:
-            raise ModelFileError(f"over {_MAX_FILE_BYTES // 10**6} MB", where=str(path), remedy="is this a model.json?")
-        text = content.decode("utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
-        raise ModelFileError(reason, where=str(path), remedy="give a model.json written by mrdamper") from error
+        text = content_of(path, _MAX_FILE_BYTES, ModelFileError, _KIND).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise ModelFileError("not a text file", where=str(path), remedy=f"give {_KIND}") from error
     return parse_model(text, where=str(path))
 
 
@@ -242,7 +238,7 @@ def parse_model(text: str, where: str = "model") -> Damper:
     except ValueError as error:
         raise ModelFileError(str(error), where=where, remedy="copy the file again") from error
     if not is_table(raw) or raw.get("format") != FORMAT:
-        raise ModelFileError("not a saved model", where=where, remedy="give a model.json written by mrdamper")
+        raise ModelFileError("not a saved model", where=where, remedy=f"give {_KIND}")
     version = re.fullmatch(r"(\d{1,4})\.\d{1,4}", str(raw.get("version")))
     if version and int(version[1]) > MAJOR:
         raise ModelFileError(

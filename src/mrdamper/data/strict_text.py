@@ -16,6 +16,8 @@ import tomllib
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn, TypeGuard
 
+from mrdamper.errors import InputError
+
 _MAX_DEPTH = 64  # objects and arrays inside each other
 _MAX_DIGITS = 40  # characters of a whole number
 _LONGEST = 200_000  # characters; the profiles of the documentation have under 3,000
@@ -34,6 +36,22 @@ def open_regular(path: Path) -> BinaryIO:
         os.close(handle)
         raise OSError(errno.EINVAL, "not a regular file", str(path))
     return os.fdopen(handle, "rb")
+
+
+def content_of(path: Path, largest: int, refuse: type[InputError], kind: str) -> bytes:
+    """Return the bytes of a file that should be `kind`, as "a CSV file"; no more of it is read than it may hold.
+
+    Raises `refuse` if it cannot be read, or is larger.
+    """
+    try:
+        with open_regular(path) as file:
+            content = file.read(largest + 1)
+    except (OSError, ValueError) as error:  # also a name that no file can have
+        reason = getattr(error, "strerror", None) or str(error)
+        raise refuse(reason, where=str(path), remedy=f"give {kind}") from error
+    if len(content) > largest:
+        raise refuse(f"over {largest // 1000:,} kB", where=str(path), remedy=f"give {kind}")
+    return content
 
 
 def parse_json(text: str) -> Any:

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, WithJsonSchema, model_validator
 
+from mrdamper.data.strict_text import content_of
 from mrdamper.errors import InputError
 from mrdamper.rig_files.limits_file import FORCE_LIMITS, load_part
 from mrdamper.rig_files.strict_toml import checked_table, load_toml
@@ -90,7 +91,11 @@ def load_about(path: str | Path) -> About:
     """
     path = Path(path)
     about = load_toml(path, About, AboutError, _HELP)
-    return about.model_copy(update={"logo": _picture(*_logo_file(path.parent / about.logo))}) if about.logo else about
+    if not about.logo:
+        return about
+    kind = f"the path of a PNG or JPEG under {_LARGEST_LOGO // 1000} kB"
+    data = content_of(path.parent / about.logo, _LARGEST_LOGO, AboutError, kind)
+    return about.model_copy(update={"logo": _picture(data, f"logo {about.logo}")})
 
 
 def about_of(table: Mapping[str, Any], where: str) -> About:
@@ -139,17 +144,6 @@ def _without_exclusion(limits: tuple[Limit, ...]) -> tuple[Limit, ...]:
                 )
         others.append((number, limit))
     return limits
-
-
-def _logo_file(path: Path) -> tuple[bytes, str]:
-    where = f"logo {path.name}"
-    try:
-        with path.open("rb") as file:
-            data = file.read(_LARGEST_LOGO + 1)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise AboutError(reason, where=where, remedy="correct its path") from error
-    return data, where
 
 
 def _picture(data: bytes, where: str) -> str:

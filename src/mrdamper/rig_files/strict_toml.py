@@ -11,7 +11,7 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from mrdamper.data.strict_text import open_regular, read_toml
+from mrdamper.data.strict_text import content_of, read_toml
 from mrdamper.errors import InputError
 
 T = TypeVar("T", bound=BaseModel)
@@ -23,13 +23,7 @@ def load_toml(path: Path, kind: type[T], refuse: type[InputError], help: str, la
     Raises `refuse` if it cannot be read, is no TOML, or holds a key or value that is not known.
     """
     try:
-        with open_regular(path) as file:
-            content = file.read(largest + 1)  # no more, whatever it is
-        if len(content) > largest:
-            raise refuse(f"over {largest // 1024} KiB", where=path.name, remedy=f"is this the file? {help}")
-        text = content.decode("utf-8-sig")
-    except OSError as error:
-        raise refuse(error.strerror or str(error), where=str(path), remedy="give a TOML file") from error
+        text = content_of(path, largest, refuse, "a TOML file").decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise refuse("is no UTF-8 text", where=path.name, remedy="save it as UTF-8") from error
     return parse_toml(text, kind, refuse, help, path.name)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
 
 from mrdamper.data import held_current
-from mrdamper.data.strict_text import open_regular
+from mrdamper.data.strict_text import content_of
 from mrdamper.errors import CombinedError, InputError, listed
 from mrdamper.rig_files.coil_current import with_stated_current
 from mrdamper.rig_files.column_names import names_condition, split_name
@@ -169,14 +169,7 @@ def tests_text(records: Sequence[Record]) -> str:
 
 def _cells(path: Path) -> list[tuple[int, list[str]]]:
     """Line and cells of every row that holds something."""
-    try:
-        with open_regular(path) as file:
-            content = file.read(_LARGEST + 1)  # no more, whatever it is
-        if len(content) > _LARGEST:
-            raise TestsTableError("over 4 MiB", where=path.name, remedy="is this a table of tests?")
-        text = decoded(content)
-    except OSError as error:
-        raise TestsTableError(error.strerror or str(error), where=str(path), remedy="give a CSV file") from error
+    text = decoded(content_of(path, _LARGEST, TestsTableError, "a CSV file with one row a test"))
     first = text.split("\n", 1)[0]
     separator = max(";\t,", key=first.count)
     try:
