@@ -197,6 +197,14 @@ def test_a_knee_of_any_length_is_fitted_jointly_as_run_by_run(knee):
     assert not jointly.at_bounds
 
 
+def test_without_a_current_the_slope_of_the_shape_over_it_stays_that_of_the_start(runs):
+    """As in a fold that keeps the runs at 0 A alone."""
+    start = ParameterFunction("linear-current", (0.2, np.log(5e-4)), log=True)
+    fit = fit_jointly(condense(runs[:3], BoucWen), dict.fromkeys(FORMS, "constant"), start)
+    slope, log = fit.parameters.functions["yield_displacement"].coefficients
+    assert (slope, np.exp(log)) == pytest.approx((0.2, 1.2e-3), rel=0.02)
+
+
 def test_a_function_that_leaves_what_was_looked_for_says_so(runs):
     fit = fit_jointly(condense(runs, BoucWen), FORMS, ParameterFunction("constant", (np.log(1.0),), log=True))
     assert fit.at_bounds == ("yield_displacement",)

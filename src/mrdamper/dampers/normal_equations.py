@@ -389,7 +389,8 @@ class _ShapeSearch:
     def __init__(self, design: _Design, start: ParameterFunction, weights: Floats):
         data, self.design, self.start, self.weights = design.data, design, start, weights
         columns = FORMS[start.form].columns(*features(data.conditions), start.rates)
-        self.scale = np.linalg.norm(columns, axis=0) / np.sqrt(columns.shape[0])
+        size = np.linalg.norm(columns, axis=0) / np.sqrt(columns.shape[0])
+        self.scale = np.where(size > 0, size, 1.0)  # of runs at 0 A alone, a column over the current is zero
         self.columns = columns / self.scale
         self._last: tuple[bytes, Floats, Floats, Floats, _Solution] | None = None
 
