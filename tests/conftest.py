@@ -30,7 +30,7 @@ from mrdamper.rig_files.dataset_folder import load_dataset
 GROUPS = {
     "study": (
         "report/test_pictures.py", "report/test_summary.py", "study/test_workflow.py",
-        "study/test_contradictions.py::test_no_run_of_a_bundled", "test_docs.py::test_the_readme", "test_examples.py",
+        "study/test_contradictions.py::test_no_run_of_a_bundled", "test_docs.py::test_the_", "test_examples.py",
         "test_numbers.py",
     ),
     "fleet": ("fleet/",),
@@ -85,6 +85,21 @@ def bundled_study(bundled):
     from mrdamper.study.workflow import run_study
 
     return run_study(bundled)
+
+
+@pytest.fixture
+def studied_once(bundled_study, monkeypatch):
+    """A study that an example or a page asks for is that of the bundled data; test_how_to.py makes its own."""
+    from mrdamper.report import study
+    from mrdamper.study import workflow
+
+    def run_study(dataset):
+        ours = {rig.rig: rig for rig in bundled_study.rigs}
+        rigs = tuple(ours[name] for name in dataset.rigs if name in ours)
+        return workflow.Study(dataset, rigs or (ours["utfsm"],), 0.0)
+
+    monkeypatch.setattr(workflow, "run_study", run_study)
+    monkeypatch.setattr(study, "study_and_draw", lambda dataset, *others, **options: (run_study(dataset), []))
 
 
 @pytest.fixture(scope="session")

@@ -60,6 +60,7 @@ def run_page(page, monkeypatch, folder, *, slow):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.stem)
+@pytest.mark.usefixtures("studied_once")
 def test_the_blocks_of_a_page_run(page, monkeypatch, tmp_path):
     run_page(page, monkeypatch, tmp_path, slow=False)
 
@@ -73,8 +74,8 @@ def test_the_readme_runs_when_pasted(bundled_study, monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [p for p in PAGES if "<!-- slow -->" in p.read_text(encoding="utf-8")])
-def test_the_slow_blocks_of_a_page_run(page, monkeypatch, tmp_path):
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.stem)
+def test_the_slow_blocks_of_a_page_run_with_a_study_of_its_own(page, monkeypatch, tmp_path):
     run_page(page, monkeypatch, tmp_path, slow=True)
 
 
