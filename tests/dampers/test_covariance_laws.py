@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import sqrtm
+from support.dampers import joint_damper
 
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.calibration import Calibration, PredictedRun, StandardizedErrors, model_error
@@ -271,6 +272,28 @@ def test_where_no_gain_moves_the_parameters_the_degrees_of_freedom_are_those_wit
     spread = _Spread(("c", "fy"), [], within, np.full(2, 2 / dof), still, Effects(), [], np.ones(2), np.ones((1, 2)))
     assert spread.covariance == pytest.approx(within)
     assert spread.dof == pytest.approx(dof, rel=0.1)  # a quantile of 200,000 draws
+
+
+def test_draws_depart_from_linearised_fits_as_refits_do(monkeypatch):
+    """Departures add their mean square, and a departure that is common to all refits is a bias."""
+    rng, names = np.random.default_rng(4), ("c", "fy")
+    draws = Draws(np.zeros((4000, 3, 2)), rng.standard_normal((4000, 2)), np.ones((4000, 2)))
+    spread = _Spread(names, [], np.eye(2), np.ones(2), draws, Effects(), [], np.ones(2), np.ones((3, 2)))
+    departures = np.column_stack([np.full(16, 3.0), np.resize([2.0, -2.0], 16)])
+    start = np.array([[7.0, 5.0]])  # where the fit without gains ends
+
+    def refits(damper, parts, rests, names, shifts, starts):
+        assert len(shifts) == len(starts) == 17
+        assert not starts[0].any()
+        assert not shifts[0].any()
+        return start + starts + np.concatenate([np.zeros((1, 2)), departures])
+
+    monkeypatch.setattr("mrdamper.dampers.covariance.refitted", refits)
+    moved = spread.curved(joint_damper(), [None] * 3).draws.moved
+    assert moved.mean(axis=0) == pytest.approx([3.0, 0.0], abs=0.15)
+    assert np.mean(moved**2, axis=0) == pytest.approx([1 + 9, 1 + 4], rel=0.1)
+    still = replace(spread, draws=replace(draws, moved=np.zeros((4000, 2))))
+    assert still.curved(joint_damper(), [None] * 3) is still  # no gains, nothing to fit
 
 
 def test_what_gains_of_other_runs_moved_is_no_error_within_a_run():

@@ -275,7 +275,7 @@ def test_gains_that_the_residuals_show_are_taken_out_with_what_they_moved():
     for run in runs:
         run.residual = run.residual + slope @ moved
     scatter = effects_of(runs, slope, influence)
-    for rest in scatter.rests():
+    for rest in scatter.rests:
         assert rest == pytest.approx(0.0, abs=1e-9)
 
 

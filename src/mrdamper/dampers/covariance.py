@@ -139,26 +139,25 @@ class _Spread:
         left = sum(float(np.sum((part.residual * part.weight) ** 2)) for part in parts)
         squares = np.array([np.sum((table @ inverse) ** 2, axis=0) for table in weighted])
         return cls(
-            tuple(names), slopes, within, doubt, scatter.draws(effects), effects, scatter.rests(),
+            tuple(names), slopes, within, doubt, scatter.draws(effects), effects, scatter.rests,
             left * np.diag(inverse), squares / np.maximum(squares.sum(axis=0), np.finfo(float).tiny),
         )  # fmt: skip
 
     def curved(self, damper: Damper, parts: Sequence[RunResiduals]) -> _Spread:
-        """Scale the draws to the mean square of those that are fitted without linearisation, of one model of a damper.
+        """Add to the draws what their linearisation omits, of one model of a damper.
 
-        Beside the linearised fit to the same draw, a fit shows its bias with little scatter. Few are fitted, and
-        their search ends early: a variance below that of linearised fits is not counted.
+        Some draws are fitted without linearisation. How far each of these fits is from the linearised fit to the same
+        draw, its bias included, is added to a draw at random: it depends little on the change it departs from.
         """
-        linear, size = self.draws.moved[:_REFITS], np.sqrt(np.mean(self.draws.moved[:_REFITS] ** 2, axis=0))
-        if damper.one_model is None or not size.all():
+        moved = self.draws.moved
+        if damper.one_model is None or not moved.any():
             return self
         shifts = np.concatenate([np.zeros((1, len(parts), 2)), self.draws.shifts[:_REFITS]])
-        starts = np.concatenate([np.zeros((1, len(self.names))), linear])
+        starts = np.concatenate([np.zeros((1, len(self.names))), moved[:_REFITS]])
         fits = refitted(damper, parts, self.rests, self.names, shifts, starts)
-        moved: Floats = (fits[1:] - fits[0]) / size
-        bias: Floats = np.mean(moved - linear / size, axis=0)
-        factors = np.sqrt(np.maximum(np.mean(moved**2, axis=0) - bias**2, 1.0) + bias**2)
-        return replace(self, draws=replace(self.draws, moved=self.draws.moved * factors))
+        departures: Floats = fits[1:] - fits[0] - moved[:_REFITS]
+        chosen = np.random.default_rng(_SEED).integers(len(departures), size=len(moved))
+        return replace(self, draws=replace(self.draws, moved=moved + departures[chosen]))
 
     @cached_property
     def quantiles(self) -> Floats:

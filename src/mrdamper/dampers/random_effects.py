@@ -190,8 +190,9 @@ class GainsAndOffsets:
         """(P,) change of the parameters by the gains and offsets that the residuals show."""
         return self.effect @ np.linalg.lstsq(self._shown, self._read, rcond=_MIN_RETAINED)[0]
 
+    @cached_property
     def rests(self) -> list[Floats]:
-        """Return what is left of the residuals of each run after all gains and offsets, and what they moved."""
+        """What is left of the residuals of each run after all gains and offsets, and what they moved."""
         rests, by_gains = list[Floats](), self.by_gains()
         for run, slope in zip(self.runs, self.slopes, strict=True):
             rest, table = run.residual - slope @ by_gains, np.column_stack([run.predicted, np.ones(run.picked.size)])
@@ -231,14 +232,11 @@ class GainsAndOffsets:
         """(D, P) parameters by draws of gains and offsets (D, R, 2)."""
         size, count = self.slopes[0].shape[1], len(self.runs)
         grams, rest = np.empty((count, size + 2, size + 2)), np.empty(count)
-        for i, (run, slope) in enumerate(zip(self.runs, self.slopes, strict=True)):
+        for i, (run, slope, left) in enumerate(zip(self.runs, self.slopes, self.rests, strict=True)):
             table = np.column_stack([slope, run.predicted, np.ones(run.picked.size)])
             each = run.weight * np.sqrt(run.error) / run.information  # whose squares add up to the error's
             table: Floats = table * each[:, None]
-            residual: Floats = run.residual * each
-            grams[i] = table.T @ table
-            own = table[:, size:]
-            rest[i] = np.sum((residual - own @ np.linalg.lstsq(own, residual, rcond=None)[0]) ** 2)
+            grams[i], rest[i] = table.T @ table, np.sum((left * each) ** 2)
         pulls = np.einsum("rpk,drk->drp", grams[:, :size, size:], shift)
         information = np.array([run.information**2 for run in self.runs])
         moved, weight = np.zeros((len(shift), size)), np.ones((len(shift), count))
