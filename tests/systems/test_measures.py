@@ -4,18 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter, welch
 from support.systems import quarter_car
 
 from mrdamper.dampers.envelope import UNTESTED
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.models.bingham import Bingham
+from mrdamper.report.plots.simulation import power_spectral_density
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.inputs import load_input
 from mrdamper.systems.inputs.record import record
 from mrdamper.systems.measures import benchmark_ratios, comfort, cost, measures, tyre_load
 from mrdamper.systems.simulate import SystemLoop
 from mrdamper.systems.structure import Link, shear_building
-from mrdamper.systems.weighting import WEIGHTINGS
+from mrdamper.systems.weighting import WEIGHTINGS, frequency_weighted
 
 STEP = 0.005
 
@@ -67,6 +69,18 @@ def test_comfort_scales_with_the_acceleration_and_rest_has_none():
     shock = np.zeros(4000)
     shock[2000:2020] = 5.0
     assert comfort(shock, STEP)["mtvv_m_s2"] > 2 * comfort(shock, STEP)["a_w_m_s2"]
+
+
+def test_running_mean_and_spectrum_are_those_of_scipy():
+    series = np.cumsum(np.random.default_rng(1).standard_normal(3001))
+    keep = np.exp(-STEP)
+    running = lfilter([1 - keep], [1, -keep], frequency_weighted(series, STEP, "Wk") ** 2)
+    assert comfort(series, STEP)["mtvv_m_s2"] == pytest.approx(np.sqrt(running.max()), rel=1e-12)
+    for size in (3001, 500, 501):
+        frequency, density = power_spectral_density(series, STEP, size)
+        expected = welch(series, 1 / STEP, nperseg=size)
+        assert np.allclose(frequency, expected[0], rtol=1e-12)
+        assert np.allclose(density[1:-1], expected[1][1:-1], rtol=1e-9)
 
 
 def test_every_measure_is_that_of_its_series(ride):

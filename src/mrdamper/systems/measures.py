@@ -21,12 +21,13 @@ def comfort(acceleration: Floats, step: float, weighting: str = "Wk") -> dict[st
     `acceleration` (N,) [m/s²]; `step` [s]; `weighting`: "Wk" (seat, vertical), "Wd" (seat, horizontal), "Wf" (motion
     sickness). Returns dict: a_w [m/s²], mtvv [m/s²], vdv [m/s^1.75], crest factor [-].
     """
-    from scipy.signal import lfilter
-
     weighted = frequency_weighted(acceleration, step, weighting)
     squares = weighted**2
     keep = float(np.exp(-step / _WINDOW))
-    running = np.asarray(lfilter([1 - keep], [1, -keep], squares))
+    running, reach = (1 - keep) * squares, 1
+    while reach < running.size and keep**reach > 0:  # twice as many samples before each enter its mean in every pass
+        running[reach:] += keep**reach * running[:-reach]
+        reach *= 2
     a_w = float(np.sqrt(squares.mean()))
     return {
         "a_w_m_s2": a_w,
