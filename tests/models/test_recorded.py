@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from mrdamper.models import recorded
+from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.models.play_bypass import PlayBypass
 from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.simulation import simulate
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 
@@ -34,6 +36,19 @@ def test_compiled_states_are_those_of_the_arrays(noise, changed, monkeypatch):
     motion, model = wandering(noise), damper(**changed)
     found, expected = model.state(motion), PlayBypass.state.__wrapped__(model, motion)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "model", [damper(), BoucWen(c=900.0, alpha=4e5, beta=3e6, gamma=1e6, f0=20.0, k1=700.0, k3=1e6)]
+)
+def test_force_and_state_of_one_pass_are_those_of_two(model, monkeypatch):
+    motion = wandering(1e-6)
+    expected = model.force(motion, state := model.state(motion)), state
+    recorded.response(model, motion)
+    monkeypatch.delattr(type(model), "force")  # in one pass no array is given to it
+    done = simulate(model, motion)
+    for found, wanted in zip((done.force, done.state), expected, strict=True):
+        np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12 * np.ptp(wanted))
 
 
 def test_without_a_compiler_the_arrays_answer(monkeypatch):

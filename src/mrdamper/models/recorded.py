@@ -38,7 +38,20 @@ def recorded(state: S) -> S:
         outputs = _along(self, motion, None, lambda free, traced, tape: {"state": state(free, traced)})
         return state(self, motion) if outputs is None else outputs[0]
 
+    along.response = response  # type: ignore[attr-defined]  # `simulate` asks for it
     return cast(S, along)
+
+
+def response(model: Any, motion: Excitation) -> tuple[Floats, Floats]:
+    """(N,) force and state of a model along a motion, in one compiled pass where there is a compiler."""
+    names = ("force", "state")
+    both = _along(model, motion, names, lambda free, traced, _: dict(zip(names, _response(free, traced), strict=True)))
+    return _response(model, motion) if both is None else (both[0], both[1])
+
+
+def _response(model: Any, motion: Any) -> tuple[Any, Any]:
+    state = model.state(motion)
+    return model.force(motion, state), state
 
 
 def force_tangents(
@@ -50,12 +63,12 @@ def force_tangents(
     the model has no derivative of this kind.
     """
     return _along(
-        model, motion, tuple(names), lambda free, traced, tape: with_tangents(tape, _force(free, traced), names), picked
+        model,
+        motion,
+        tuple(names),
+        lambda free, traced, tape: with_tangents(tape, _response(free, traced)[0], names),
+        picked,
     )
-
-
-def _force(model: Any, motion: Any) -> Any:
-    return model.force(motion, model.state(motion))
 
 
 _PROGRAMS: dict[tuple[object, ...], list[RecordProgram]] = {}
