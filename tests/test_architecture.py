@@ -29,6 +29,20 @@ def test_the_command_lines_help_needs_no_numerics():
     assert done.stdout.strip() == "[]"
 
 
+def test_a_run_is_identified_without_scipy():
+    """Its import takes as long as the identification of a dozen runs, the checks of the import included."""
+    code = (
+        "import sys; import numpy as np; from mrdamper import Run, identify;"
+        "t = np.arange(3000) / 1000; noise = np.random.default_rng(0).standard_normal((2, t.size));"
+        "x, v = 0.01 * np.sin(2 * np.pi * t), np.cos(2 * np.pi * t);"
+        "force = 900 * v + 300 * np.tanh(9 * v) + 2 * noise[1];"
+        "identify(Run('a', t, x + 1e-7 * noise[0], force, 0.5)).standard_errors;"
+        "print([m for m in ('scipy', 'matplotlib', 'polars', 'pydantic') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def test_every_extra_is_imported_somewhere():
     """An extra nobody imports is a promise nobody keeps."""
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]

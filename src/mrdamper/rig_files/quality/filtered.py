@@ -73,8 +73,6 @@ def noise_by_octave(view: View, name: str) -> tuple[Floats, float]:
     As (K,) levels of the RMS, if it were white, over the channel's peak-to-peak value [dB]; empty where it is no noise,
     or too short.
     """
-    from scipy.ndimage import binary_dilation
-
     motion, values = view.motion, _at_every_step(view, name)
     assert motion is not None
     nyquist = 0.5 * (values.size - 1) / float(np.ptp(view.steady.time))
@@ -87,7 +85,7 @@ def noise_by_octave(view: View, name: str) -> tuple[Floats, float]:
     changes = np.diff(values[lag:] - _between(values, place))
     third = np.abs(values[3:] - values[:-3] - 3 * (values[2:-1] - values[1:-2]))
     corners = np.concatenate([[False], third > _CORNER_BENDS * np.median(third), [False, False]])
-    bends = np.asarray(binary_dilation(corners, iterations=_BESIDE), dtype=bool)
+    bends = np.convolve(corners, np.ones(2 * _BESIDE + 1), "same") > 0.5
     bends = bends[lag:] | bends[place.astype(int)] | bends[place.astype(int) + 1]
     window = np.hanning(changes.size + 2)[1:-1] * ~(bends[1:] | bends[:-1])
     weight = 4 * float(np.sum(window**2)) * float(np.ptp(values)) ** 2

@@ -21,8 +21,6 @@ _NOISY = 3e-5  # of the peak-to-peak value: without noise cycles repeat themselv
 
 def lost_or_doubled(view: View) -> Iterator[Finding]:
     """Report or refuse a displacement with steps a whole number of times, or none of, those around them."""
-    from scipy.ndimage import median_filter
-
     motion = view.motion
     if motion is None or view.noticed("W_FROZEN", "W_DISTURBED", "W_HELD"):
         return
@@ -31,7 +29,8 @@ def lost_or_doubled(view: View) -> Iterator[Finding]:
     if x.size < 50 or np.ptp(uneven) > 0.2 * float(np.median(uneven)):
         return
     steps = np.diff(x)
-    usual = median_filter(steps, 5, mode="wrap")
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(steps, 2, mode="wrap"), 5)
+    usual = np.partition(windows, 2, axis=1)[:, 2]  # their medians
     noise = max(sample_noise(x) * np.sqrt(6), 1e-9 * float(np.ptp(x)))
     fast = np.abs(usual) > _FAST * float(np.max(np.abs(usual)))
     odd = fast & (np.abs(steps - usual) > np.maximum(_BEND * noise, 0.5 * np.abs(usual)))
