@@ -164,4 +164,5 @@ def uniform_mutation(
     points: Floats, lower: Floats, upper: Floats, probability: float, rng: np.random.Generator
 ) -> Floats:
     """Draw every number anew from the box with a probability."""
-    return np.where(rng.random(points.shape) < probability, rng.uniform(lower, upper, points.shape), points)
+    chosen = rng.random(points.shape) < probability
+    return np.where(chosen, lower + (upper - lower) * rng.random(points.shape), points)

@@ -20,6 +20,7 @@ from mrdamper.errors import ParameterError
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.physics.hysteresis import Shape, follow
 from mrdamper.physics.motion import Excitation, Path, sine, triangle
+from mrdamper.physics.motion.lag import decaying_sum
 
 MOTIONS = ((0.020, 1.0), (0.020, 1.5), (0.020, 2.0), (0.050, 0.5), (0.050, 1.0), (0.050, 1.5))
 HELD_OUT = (0.080, 1.0)
@@ -202,10 +203,8 @@ def _follow_lag(force: Floats, time: Floats, lag: float) -> Floats:
     """Apply a first-order lag, exact for a force that is held over each step."""
     if lag == 0:
         return force
-    from scipy.signal import lfilter
-
     keep = np.exp(-float(time[1] - time[0]) / lag)
-    return lfilter([1 - keep], [1, -keep], force, zi=[keep * force[0]])[0]
+    return decaying_sum(np.append(force[:1], (1 - keep) * force[1:]), keep)
 
 
 def _speed_before(velocity: Floats, stroke: np.ndarray) -> Floats:

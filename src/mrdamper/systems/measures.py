@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.physics.motion.lag import decaying_sum
 from mrdamper.systems.linear import aims
 from mrdamper.systems.result import Simulation
 from mrdamper.systems.structure import GRAVITY
@@ -24,10 +25,7 @@ def comfort(acceleration: Floats, step: float, weighting: str = "Wk") -> dict[st
     weighted = frequency_weighted(acceleration, step, weighting)
     squares = weighted**2
     keep = float(np.exp(-step / _WINDOW))
-    running, reach = (1 - keep) * squares, 1
-    while reach < running.size and keep**reach > 0:  # twice as many samples before each enter its mean in every pass
-        running[reach:] += keep**reach * running[:-reach]
-        reach *= 2
+    running = decaying_sum((1 - keep) * squares, keep)
     a_w = float(np.sqrt(squares.mean()))
     return {
         "a_w_m_s2": a_w,

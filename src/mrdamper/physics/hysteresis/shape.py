@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -29,9 +29,11 @@ class Shape:
     n: float = 2.0  # sharpness of the yield [-], from 1 to 20
 
     def __post_init__(self) -> None:
-        if not np.all((np.asarray(self.kappa) > 0) & np.isfinite(self.kappa)):
+        least, most = _ends(self.kappa)
+        if not (least > 0 and most < np.inf):
             raise ParameterError(f"kappa is {self.kappa}", remedy="A/z_max must be positive and finite")
-        if not np.all((np.asarray(self.rho) >= -STEEPEST) & (np.asarray(self.rho) <= 1)):
+        least, most = _ends(self.rho)
+        if not (least >= -STEEPEST and most <= 1):
             raise ParameterError(
                 f"(gamma − beta)/(gamma + beta) is {self.rho}", remedy=f"it lies between {-STEEPEST:g} and 1"
             )
@@ -78,6 +80,11 @@ class Shape:
     def is_many(self) -> bool:
         """True if this holds P shapes rather than one."""
         return np.ndim(self.kappa) > 0 or np.ndim(self.rho) > 0
+
+
+def _ends(value: Any) -> tuple[Any, Any]:
+    """Smallest and largest of some numbers, NaN if one of them is; of one number or symbol, itself."""
+    return (value.min(), value.max()) if isinstance(value, np.ndarray) else (value, value)
 
 
 def z_max(beta: float | Floats, gamma: float | Floats, n: float = 2.0, A: float = 1.0) -> float | Floats:

@@ -80,6 +80,15 @@ def _summed(spans: Iterable[Floats], value: Floats) -> Floats:
     return value
 
 
+def decaying_sum(value: Floats, keep: float) -> Floats:
+    """(N,) y_i = keep · y_(i−1) + value_i, from y_0 = value_0: a filter of one pole, its span doubled in every pass."""
+    total, span = value.copy(), 1
+    while span < total.size and keep**span > _FORGOTTEN:
+        total[span:] += keep**span * total[:-span]
+        span *= 2
+    return total
+
+
 def load_step(tape: Tape, time: Any, path: Any, length: Any, leak: Any) -> Any:
     """`leaking_load` for one sample."""
     held = tape.remember("load", 1.0)
