@@ -374,13 +374,12 @@ def stop_operators(displacements: Sequence[Floats], yields: Floats) -> list[Floa
     steps = np.zeros((longest, len(displacements), 1))
     for i, x in enumerate(displacements):
         steps[: x.size, i, 0] = np.diff(x, prepend=x[:1])
-    state = np.zeros((len(displacements), yields.size))
+    state, least = np.zeros((len(displacements), yields.size)), -yields
     outputs = np.empty((longest, *state.shape))
     for step, row in zip(steps, outputs, strict=True):
-        np.add(state, step, out=state)
-        np.minimum(state, yields, out=state)
-        np.maximum(state, -yields, out=row)
-        state[:] = row
+        np.add(state, step, out=row)
+        np.minimum(row, yields, out=row)
+        state = np.maximum(row, least, out=row)
     return [outputs[: x.size, i] for i, x in enumerate(displacements)]
 
 

@@ -49,7 +49,8 @@ def gain_differences(evidence: Evidence, products: Sequence[RowProducts]) -> Gai
     """
     scatter = evidence.spread
     best: tuple[float, float, Sequence[RowProducts]] | None = None
-    for variant in (products, [replace(run, misfit=1.0) for run in products]):
+    usual = [replace(run, misfit=1.0) for run in products]
+    for variant in (products, usual) if any(run.misfit != 1.0 for run in products) else (products,):
         for misfit in _MISFITS:
             evidence.spread = replace(scatter, misfit=misfit)
             odds = evidence.log_evidence(_weighed(evidence, variant, ()))
