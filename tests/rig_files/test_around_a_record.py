@@ -9,7 +9,7 @@ import pytest
 from support import rig_files as rig
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.conditions import stated_in_titles, stated_quantities, stated_rate
+from mrdamper.rig_files.conditions import stated_by_lines, stated_in_titles, stated_quantities, stated_rate
 from mrdamper.rig_files.rig_import import import_files, read_run
 
 HEAD = "time_s,displacement_mm,force_N,current_A"
@@ -110,9 +110,20 @@ def test_a_damaged_last_row_is_no_footer(tmp_path, row):
         read_run(tmp_path / "a.csv")
 
 
-@pytest.mark.parametrize("line", ["Amplifier range 2 A", "max current 2 A", "Rated 1.5 A", "5 A supply, 0.4 A probe"])
-def test_a_rating_states_no_current(line):
-    assert stated_in_titles([line]) == []
+RATINGS = [
+    "Amplifier range 2 A", "max current 2 A", "Rated 1.5 A", "5 A supply, 0.4 A probe", "Messbereich Strom: 10 A",
+    "coil driver: 100 % duty = 2 A", "shunt 60 mV = 10 A", "driver gain 1 A per V", "Current resolution: 0.01 A",
+    "coil current tolerance 0.05 A", "PSU 30 V 5 A", "offset 0.02 A", "standby current 0.2 A", "I_ref = 2 A (100 %)",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("line", RATINGS)
+def test_a_rating_or_a_scale_states_no_current(line):
+    assert stated_in_titles([line]) == stated_by_lines([line]) == []
+
+
+def test_a_tolerance_is_no_current():
+    assert [s.amperes for s in stated_by_lines(["Coil current: 1.0 +/- 0.02 A"])] == [1.0]
 
 
 def test_free_text_that_says_two_currents_says_none(tmp_path):

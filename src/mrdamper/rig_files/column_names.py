@@ -18,6 +18,7 @@ COIL, COMPUTED, WEIGHT = words("coil"), words("computed"), words("weight")
 _SET, _NOT_MEASURED, _ELSEWHERE = words("set"), words("not_measured"), words("elsewhere")
 _MEANINGFUL = frozenset().union(_ROLES, _NOT_MEASURED, COMPUTED, _ELSEWHERE, _SET)
 _COMMANDED = re.compile("|".join(words("commanded")))
+RATING = re.compile("(?i)" + "|".join(words("rating")))  # of a line or a number that is not the value of the test
 _COMPRESSION = tuple(words("compression"))
 _FACTOR = re.compile(r"[\s_][x×*·]\s?10+(?![0-9])|\bp-p\b")  # Force x10, Force p-p
 _CONDITION = re.compile(r"=\s*[+-]?[0-9]")  # stroke = 40
@@ -147,7 +148,7 @@ def names_compression(name: str) -> bool:
 def names_condition(key: str, role: str) -> bool:
     """Tell if the name of a line or an attribute stands for a channel's value in the whole test, set or measured."""
     kept = [word for word in words_of(key) if word.casefold() not in _SET]
-    return bool(kept) and role_of(" ".join(kept)) == role
+    return bool(kept) and role_of(" ".join(kept)) == role and not RATING.search(key)
 
 
 def names_command(name: str) -> bool:

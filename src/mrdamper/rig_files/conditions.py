@@ -16,7 +16,7 @@ import numpy as np
 
 from mrdamper.data.arrays import Floats
 from mrdamper.data.runs import held_current
-from mrdamper.rig_files.column_names import COIL, holds, names_condition, split_name
+from mrdamper.rig_files.column_names import COIL, RATING, holds, names_condition, split_name
 from mrdamper.rig_files.units import Unit, parse_unit
 
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
@@ -36,13 +36,8 @@ _LINE = re.compile(
 )
 CELL = re.compile(r"\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*([A-Za-z°]{0,8})\s*")  # a number, and a unit behind it
 _LONGEST_LINE, _MOST_PARTS = 300, 20
-_OTHER_TIMES = r"previous|vorher|\blast\b|\bnext\b|before|after|\bnach\b|instead|statt"
-_OTHER_TIME = re.compile(_OTHER_TIMES, re.IGNORECASE)
-_RATING = re.compile(
-    r"max|min|limit|range|rated|suppl|amplif|sensor|full|scale|fuse|bereich|grenz|messverst|nenn|speis|probe|clamp|zange|"
-    + _OTHER_TIMES,
-    re.IGNORECASE,
-)
+_TOLERANCE = re.compile(r"\s*(?:\+\s?/?\s?[-−]|±)\s*[0-9]+(?:[.,][0-9]+)?\s*%?")
+_SCALE = re.compile(r"[0-9]\s*(?:%|m?V\b|counts?\b|bits?\b)[^=:;]*=|\bper\b|\b100 ?%")  # 60 mV = 10 A, 1 A per V
 _LABELLED_RATING = re.compile(
     r"fuse|suppl|amplif|rated|range|probe|clamp|(?<![a-z])(?:max|limit)(?![a-z])", re.IGNORECASE
 )
@@ -116,12 +111,10 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
     lines, currents, rated = list(lines), [], []
     for line in lines:
         for key, value, unit in _quantities(line, decimal):
-            coil = names_condition(key, "current") or (holds(key, COIL) and not _RATING.search(key))
-            if unit.dimension != "current" or _OTHER_TIME.search(key):
-                continue
-            if re.search("rated", key, re.IGNORECASE):
+            coil = names_condition(key, "current") or (holds(key, COIL) and not RATING.search(key))
+            if unit.dimension == "current" and re.search("rated", key, re.IGNORECASE):
                 rated.append(value)
-            elif coil and not _LABELLED_RATING.search(key):
+            elif unit.dimension == "current" and coil and not _SCALE.search(line):
                 currents.append(Statement(value, f"the line {line.strip()[:60]!r}"))
     shares = [(match, line) for line in lines if len(set(rated)) == 1 and (match := _SHARE.match(line[:_LONGEST_LINE]))]
     for match, line in shares:
@@ -134,7 +127,7 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
     """Return the current in free text of lines that name no limit or range, if all state one: "Test 3: 0.4 A"."""
     statements = []
     for line in lines:
-        stated = () if _RATING.search(line) else currents_in(line)
+        stated = () if RATING.search(line) or _SCALE.search(line) else currents_in(_TOLERANCE.sub("", line))
         if len(stated) == 1:
             statements.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))
     return statements if len({statement.amperes for statement in statements}) == 1 else []
@@ -249,7 +242,7 @@ def stated_speed(quantities: Iterable[Quantity]) -> float | None:
 
 def _quantities(line: str, decimal: str | None) -> Iterator[Quantity]:
     """Yield what a line states: one quantity, or several behind each other."""
-    line = line[:_LONGEST_LINE]
+    line = _TOLERANCE.sub("", line[:_LONGEST_LINE])
     match = _LINE.match(line) or _SPACED.match(line)
     parts = [line] if match else re.split(r"[,;|]\s+|[{}\t]|\s{2,}", re.sub(r" *= +", "=", line))
     for part in parts[:_MOST_PARTS]:
