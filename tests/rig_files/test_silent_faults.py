@@ -11,7 +11,9 @@ from support.rig_records import clean_record, codes_of, random_record, with_chan
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.conditions import currents_in
+from mrdamper.rig_files.mapping.results import results_in
 from mrdamper.rig_files.preview import guess_profile
+from mrdamper.rig_files.profile import Channel, Profile
 from mrdamper.rig_files.rig_import import read_run
 from mrdamper.rig_files.rig_record import thousands_in
 
@@ -255,6 +257,25 @@ def test_whole_numbers_beside_their_scale_are_refused(tmp_path):
     counts = np.round(10 * F).astype(np.int16)
     path = write(tmp_path, "a_0.5A.mat", mat_bytes({"time_s": T, "disp_mm": X, "force_N": counts, "force_scale": 0.1}))
     assert code(path) == "E_AMBIGUOUS"
+
+
+@pytest.mark.parametrize(
+    "head", ["Scale;1;1;0.5\n{}", "{}Gain;;;0.5\n", "# Gain Load = 0.5\n{}", "# Load sensitivity: 0.5 N/digit\n{}"]
+)
+def test_whole_numbers_of_a_text_beside_their_scale_are_refused_until_a_profile_states_it(head, tmp_path):
+    columns = {"time [s]": T, "disp [mm]": X, "load [N]": [f"{v:.0f}" for v in 2 * F]}
+    lines = table(columns, ";").splitlines(keepends=True)
+    if "Gain;;" in head:
+        lines = [f"{i};{line}" for i, line in enumerate(lines)]
+        lines[0] = lines[0].replace("0;", "channel;", 1)
+    path = write(tmp_path, "a_0.5A.csv", head.format(lines[0]) + "".join(lines[1:]))
+    assert code(path) == "E_AMBIGUOUS"
+    stated = Profile(channels={"force": Channel(unit="N", scale=0.5)})
+    np.testing.assert_allclose(read_run(path, stated).force, np.round(2 * F) / 2)
+
+
+def test_a_line_that_states_a_current_heads_no_table_of_results():
+    assert results_in(["Test 1;coil current 0.5 A", "Scale;0.004;0.0125", "Offset;0;-25"]) is None
 
 
 def test_a_filtered_sheet_beside_the_measured_one_is_left_out_and_said(tmp_path):

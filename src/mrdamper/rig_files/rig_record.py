@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.arrays import chunks
-from mrdamper.errors import ColumnError, InputError, listed
+from mrdamper.errors import ColumnError, InputError, listed, printable
 from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, constant, current_of, without_gaps
 from mrdamper.rig_files.column_names import role_of
@@ -30,6 +31,8 @@ from mrdamper.rig_files.vocabulary import words
 
 _KEPT = {**FURTHER, "length": "m", "force": "N"}
 _SCALES = words("scale")
+_SCALE_CELL = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)(?:\s*[A-Za-zµ]+/(?:digit|bit|count|cnt|lsb|inc)s?)?")
+_LONGEST_LINE = 300
 _SAMPLE = 10_000  # samples looked at
 _LEAST_CURRENT = 0.02  # [A] largest of a record: less is no current of a coil
 _MOST_FURTHER = 12  # channels
@@ -43,7 +46,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     contradict each other about the current.
     """
     assigned = assign(table, profile)
-    raw, findings, lines = _read(table, assigned)
+    raw, findings, lines = _read(table, assigned, profile)
     channels = {name: rescale(raw[of.column], of.factor, of.offset) for name, of in assigned.items()}
     size, rate = next(iter(raw.values())).size, ""
     _refuse_tiny_currents(table, assigned, channels)
@@ -100,7 +103,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     return records
 
 
-def _read(table: RawTable, assigned: dict[str, Assigned]):
+def _read(table: RawTable, assigned: dict[str, Assigned], profile: Profile):
     """Return the columns' numbers, findings and lines; a damaged cell of a further channel costs that channel."""
     content = table.read([entry.column for name, entry in assigned.items() if name not in _LENIENT])
     raw = dict(content.values)
@@ -113,7 +116,7 @@ def _read(table: RawTable, assigned: dict[str, Assigned]):
                 "export it without separators of thousands",
                 column=column + 1,
             )
-    _refuse_unscaled(table, assigned, raw)
+    _refuse_unscaled(table, assigned, raw, profile)
     findings = [*table.findings, *content.findings]
     for name in [name for name in assigned if name in _LENIENT]:
         try:
@@ -130,9 +133,9 @@ def _read(table: RawTable, assigned: dict[str, Assigned]):
     return raw, findings, content.lines
 
 
-def _refuse_unscaled(table: RawTable, assigned: dict[str, Assigned], raw: dict[int, Floats]) -> None:
+def _refuse_unscaled(table: RawTable, assigned: dict[str, Assigned], raw: dict[int, Floats], profile: Profile) -> None:
     """Refuse whole numbers beside which their scale stands: nobody says whether they were multiplied by it."""
-    for key, value in table.constants.items():
+    for key, value in (*table.constants.items(), *_numbers_in_lines(table)):
         words = [word for word in re.split(r"[^A-Za-z]+", key.casefold()) if word]
         rest = " ".join(word for word in words if word not in _SCALES)
         role = role_of(rest) if len(rest.split()) < len(words) else None
@@ -140,9 +143,22 @@ def _refuse_unscaled(table: RawTable, assigned: dict[str, Assigned], raw: dict[i
         if role is None or len(rest.split()) == len(words) or value in (0.0, 1.0):
             continue
         some = raw.get(assigned[role].column, np.empty(0))[:_SAMPLE]
-        if some.size and np.array_equal(some, np.round(some), equal_nan=True):
-            problem = f"{role} is whole numbers, and {key} is {value:g}: are they scaled?"
-            raise table.source.refuse("E_AMBIGUOUS", problem, f"set [channels.{role}] unit and scale in a profile")
+        if profile.channel(role).scale is None and some.size and np.array_equal(some, np.round(some), equal_nan=True):
+            problem = f"{role} is whole numbers, and {printable(key)} is {value:g}, which may be applied or not"
+            remedy = f"set [channels.{role}] unit and scale in a profile, scale = 1 if it is applied"
+            raise table.source.refuse("E_AMBIGUOUS", problem, remedy)
+
+
+def _numbers_in_lines(table: RawTable) -> Iterator[tuple[str, float]]:
+    """Yield what lines beside the columns call a number, or one a column: Load gain: 0.5; Gain; 1; 0.5."""
+    marks = r"[:=;\t|]" if table.decimal == "," else r"[:=;,\t|]"
+    for line in table.remarks:
+        key, *cells = (cell.strip(' "#%') for cell in re.split(marks, line[:_LONGEST_LINE]))
+        own = 0 <= len(table.names) - len(cells) <= 1 < len(cells)
+        names = [header.name for header in table.headers][-len(cells) :] if own else [""]
+        for name, cell in zip(names, cells if own or len(cells) == 1 else (), strict=False):
+            if match := _SCALE_CELL.fullmatch(cell):
+                yield f"{key} {name}".strip(), float(match[1].replace(",", "."))
 
 
 def _refuse_tiny_currents(table: RawTable, assigned: dict[str, Assigned], channels: dict[str, Floats]) -> None:

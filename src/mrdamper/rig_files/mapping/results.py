@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.rig_files.column_names import names_condition, split_name, words_of
-from mrdamper.rig_files.conditions import quantity_in_cell
+from mrdamper.rig_files.conditions import currents_in, quantity_in_cell
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of
 from mrdamper.rig_files.units import is_unit
@@ -190,7 +190,8 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
 
 def _is_current(cell: str) -> bool:
     header = split_name(cell)
-    return names_condition(header.name, "current") and header.dimension in (None, "current")
+    named = names_condition(header.name, "current") and header.dimension in (None, "current")
+    return named and not currents_in(cell)  # coil current 0.5 A heads no column
 
 
 def _is_units_row(cells: Sequence[str], width: int) -> bool:

@@ -34,7 +34,7 @@ _MARKS, _DIGITS = frozenset("#%/"), frozenset("0123456789+-.")
 _FEWEST_LINES = 20  # of a text: fewer, with words among the numbers, are notes
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
-_UNIT_KEYS, _NOTES = words("unit"), words("notes")
+_UNIT_KEYS, _NOTES, _SCALES = words("unit"), words("notes"), words("scale") | {"offset"}
 _MOST_LEVELS = 4  # lines of headings
 _TELLING = 2  # columns whose names tell what they are
 _WORD = re.compile(r"(?:[^\W\d_]-)?[^\W\d_]{3,}")  # also x-axis
@@ -401,8 +401,8 @@ def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) ->
             keyed, worded = None, worded or (i, cells)
         elif len(cells) == width and not _is_key(cells[0].strip('"')):
             return keyed or (i, cells)
-        elif width > 2 and len(set(filter(None, cells[1:]))) == 1:  # a key with one value for all columns
-            keyed = None
+        elif cells[0].strip('"').casefold() in _SCALES or (width > 2 and len(set(filter(None, cells[1:]))) == 1):
+            keyed = None  # a key with the scales of the columns, or one value for all of them
         elif len(cells) == width:
             keyed = keyed or (i, cells)
             worded = worded or keyed
