@@ -14,7 +14,7 @@ from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.mapping.results import results_in
 from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import Channel, Profile
-from mrdamper.rig_files.rig_import import read_run
+from mrdamper.rig_files.rig_import import import_files, read_run
 from mrdamper.rig_files.rig_record import thousands_in
 
 TRUE = channels()
@@ -282,3 +282,13 @@ def test_a_filtered_sheet_beside_the_measured_one_is_left_out_and_said(tmp_path)
     rows = [["time [s]", "disp [mm]", "force [N]"], *np.column_stack([T, X, F]).tolist()]
     record = read_run(write(tmp_path, "a_0.5A.xlsx", xlsx_bytes(rows, {"Filtered": rows})))
     assert "W_TABLE" in {finding.code for finding in record.findings}
+
+
+@pytest.mark.parametrize("copy", ["filtered/run_0.5A.csv", "run_filtered_0.5A.csv"])
+def test_a_filtered_copy_of_a_file_is_no_second_test(copy, tmp_path):
+    write(tmp_path, "run_0.5A.csv", table(NAMES))
+    (tmp_path / copy).parent.mkdir(exist_ok=True)
+    write(tmp_path, copy, table(NAMES))
+    found = import_files([tmp_path])
+    assert [record.id for record in found.records] == ["run_0.5A"]
+    assert found.left_out == (copy.rpartition("/")[2],)

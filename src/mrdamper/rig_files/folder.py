@@ -14,6 +14,7 @@ from typing import IO
 
 from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import InputError
+from mrdamper.rig_files.column_names import COMPUTED, holds, words_of
 from mrdamper.rig_files.readers import raw_tables, suffixes
 from mrdamper.rig_files.readers.archive import (
     UNREADABLE_ZIP,
@@ -62,9 +63,9 @@ def files_in(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
         inside.sort(key=_by_number)
         inside = [file for file in inside if file.is_file() and not _is_packed_folder(file)]  # no pipes
         recognised = [file for file in inside if file.suffix.lower() in suffixes()]
-        recognised = recognised or [
-            file for file in inside if _is_table(file)
-        ]  # suffixes of a laboratory's own: run.001
+        # Suffixes of a laboratory's own: run.001
+        recognised = recognised or [file for file in inside if _is_table(file)]
+        recognised = _measured(recognised, path)
         files += recognised
         read = set(recognised)
         others += [file for file in inside if file not in read]
@@ -79,6 +80,14 @@ def files_in(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
 def _by_number(path: Path) -> list[list[int | str]]:
     """Return the key of an order in which test 2 comes before test 10."""
     return [[int(text) if i % 2 else text for i, text in enumerate(re.split(r"([0-9]+)", part))] for part in path.parts]
+
+
+def _measured(files: list[Path], top: Path) -> list[Path]:
+    """Return the files without those called filtered, or in such a folder, beside one that is called alike."""
+    computed = {file for file in files if holds(str(file.relative_to(top)), COMPUTED)}
+    names = {file: tuple(w for w in words_of(file.name) if w.casefold() not in COMPUTED) for file in files}
+    measured = {name for file, name in names.items() if file not in computed}
+    return [file for file in files if file not in computed or names[file] not in measured]
 
 
 def _is_table(path: Path) -> bool:
