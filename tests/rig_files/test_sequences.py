@@ -51,6 +51,7 @@ def test_files_are_tests_of_their_own_where_time_motion_or_numbers_do_not_go_on(
     one, two = loop(1.0, 10.0, 300.0, 6.5), loop(1.0, 10.0, 300.0, 6.5)
     two[:, 0] += {"clock": 0.0, "gap": one[-1, 0] + 30.0}.get(change, one[-1, 0] + 1 / RATE_HZ)
     two[:, 1] += 3.0 * (change == "leap")
+    two[:, 2] += 1.0  # no copy
     write_parts(tmp_path, "0.5A_run", one, 10_000, first=1)
     write_parts(tmp_path, "0.5A_run", two, 10_000, first=3 if change == "number" else 2)
     assert [record.id for record in import_files([tmp_path]).records] == [

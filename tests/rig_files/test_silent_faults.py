@@ -292,3 +292,12 @@ def test_a_filtered_copy_of_a_file_is_no_second_test(copy, tmp_path):
     found = import_files([tmp_path])
     assert [record.id for record in found.records] == ["run_0.5A"]
     assert found.left_out == (copy.rpartition("/")[2],)
+
+
+def test_a_copy_of_a_file_in_another_folder_is_no_second_test(tmp_path):
+    for name in ("run_0.5A.csv", "backup/run_0.5A.csv"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        write(tmp_path, name, table(NAMES))
+    found = import_files([tmp_path])
+    assert [record.id for record in found.records] == ["run_0.5A"]
+    assert found.left_out == ("run_0.5A.csv",)

@@ -130,9 +130,9 @@ def test_a_table_against_the_files_name_is_refused_and_its_remedies_work(tmp_pat
 
 
 def test_a_row_that_names_tests_of_two_files_is_refused_and_folders_tell_them_apart(tmp_path):
-    for folder in ("one", "two"):
+    for folder, factor in (("one", 1.0), ("two", 1.001)):
         (tmp_path / folder).mkdir()
-        write(tmp_path / folder, "a.csv", text())
+        write(tmp_path / folder, "a.csv", text(factor * rows()))
     table = write(tmp_path, "tests.csv", "file,current_A\na.csv,0.5\n")
     with pytest.raises(InputError, match="tests of 2 files"):
         import_files([tmp_path])

@@ -18,7 +18,7 @@ from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, with_stated_cur
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.folder import files_in, unpacked
 from mrdamper.rig_files.long_records import check_long_record
-from mrdamper.rig_files.mapping.agreement import contradictions
+from mrdamper.rig_files.mapping.agreement import contradictions, repeated
 from mrdamper.rig_files.mapping.companions import (
     TEXTS,
     currents_beside,
@@ -142,6 +142,7 @@ def import_files(
         profile.require_matches([*intake.met, *((path, "") for path in files)])
         refusals = intake.refusals or ([] if intake.tests() else intake.notes)
         left_out += [] if refusals is intake.notes else [Path(note.file) for note in intake.notes]
+        left_out += intake.copies
         names = tuple(path.name for path in left_out)
         return ImportResult(with_unique_ids(_with_folders(intake.tests())), tuple(refusals), names)
 
@@ -157,6 +158,7 @@ class _Intake:
         self._found: list[tuple[Path, Record]] = []
         self.refusals: list[Refusal] = []
         self.notes: list[Refusal] = []  # texts of a folder that hold no table
+        self.copies: list[Path] = []  # files of tests that hold the samples of another
         self.met: list[tuple[Path, str]] = []
         self._given: set[Path] = set()
         self._shares: dict[Path, tuple[str, Profile]] = {}  # files of some channels each, by the profile
@@ -244,6 +246,10 @@ class _Intake:
             else:
                 continue
             self._drop_refusals({path})
+        tests = self.tests()
+        again = repeated([record for _, record in tests])
+        self.copies = [path for i, (path, _) in enumerate(tests) if i in again]
+        self._found = [test for i, test in enumerate(tests) if i not in again]
         self._refuse(contradictions([record for _, record in self.tests()]))
         return used
 

@@ -257,7 +257,7 @@ def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = Fa
     for some, most in ((lines, 7), (_finding_lines(result, verbose), 4), (_refused_lines(result), 4)):
         print("".join(f"{line}\n" for line in shortened(some, most, verbose)), end="")
     if result.left_out:
-        print(f"left out, no tests or filtered copies of tests: {listed(result.left_out, 5)}")
+        print(f"left out, no tests or copies of tests: {listed(result.left_out, 5)}")
     if any("profile" in refusal.error.remedy for refusal in result.refusals):
         print(
             "a profile answers once for all files: mrdamper import FILE --write-profile rig.toml, "

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from mrdamper.data import held_current
+from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import take
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality.strokes import find_strokes
@@ -44,13 +44,8 @@ def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:
 
 def _copies(records: Sequence[Record], points: Mapping[int, _Point]) -> dict[int, QualityError]:
     """Return the tests that hold the samples of another test and have another current than it."""
-    groups: dict[tuple[int, bytes, bytes], list[int]] = defaultdict(list)
-    for i, record in enumerate(records):
-        samples = np.arange(0, record.time.size, max(1, record.time.size // _MOST_SAMPLES))
-        force, moved = (take(channel, samples).tobytes() for channel in (record.force, record.displacement))
-        groups[record.time.size, force, moved].append(i)
     refused: dict[int, QualityError] = {}
-    for members in groups.values():
+    for members in _of_same_samples(records):
         currents = {i: points[i][2] for i in members if i in points}
         for i, current in currents.items():
             others = [records[j].id for j, its in currents.items() if abs(its - current) > _ALIKE_A]
@@ -63,6 +58,24 @@ def _copies(records: Sequence[Record], points: Mapping[int, _Point]) -> dict[int
                 code="E_CONDITIONS",
             )
     return refused
+
+
+def repeated(records: Sequence[Record]) -> set[int]:
+    """Return the tests that hold the samples, the current too, of one before them: by their place."""
+    groups = _of_same_samples(records, lambda record: () if record.current is None else (record.current,))
+    return {i for members in groups for i in members[1:]}
+
+
+def _of_same_samples(
+    records: Sequence[Record], further: Callable[[Record], tuple[Floats, ...]] = lambda record: ()
+) -> list[list[int]]:
+    """Group the tests of equal force, displacement and further channels, by their places."""
+    groups: dict[tuple[int | bytes, ...], list[int]] = defaultdict(list)
+    for i, record in enumerate(records):
+        samples = np.arange(0, record.time.size, max(1, record.time.size // _MOST_SAMPLES))
+        channels = (record.force, record.displacement, *further(record))
+        groups[record.time.size, *(take(channel, samples).tobytes() for channel in channels)].append(i)
+    return list(groups.values())
 
 
 def _contradict(one: _Point, other: _Point) -> bool:
