@@ -51,6 +51,37 @@ def test_channels_called_by_numbers_have_the_names_and_scales_that_a_line_gives_
     expect(tmp_path, 0.5)
 
 
+def test_counts_have_the_scale_that_a_line_gives_one_of_them(tmp_path):
+    head = ["# encoder: 1 count = 5 um", "# load cell: 200 N/V", "time_s,encoder_counts,loadcell_V"]
+    table(tmp_path / "test_0.5A.csv", head, T, 200 * X, force(0.5) / 200)
+    expect(tmp_path, 0.5)
+
+
+def test_counts_without_a_scale_are_refused_until_a_profile_states_it(tmp_path):
+    table(tmp_path / "test_0.5A.csv", ["time_s,disp_counts,force_N"], T, 200 * X, force(0.5))
+    for profile in (None, '[channels.displacement]\nunit = "mm"\n'):
+        found = import_files([tmp_path], profile and parse_profile(profile))
+        assert [(r.error.code, "scale" in r.error.remedy) for r in found.refusals] == [("E_UNITS_DIMENSION", True)]
+    stated = parse_profile('[channels.displacement]\nunit = "mm"\nscale = 0.005\n')
+    assert np.ptp(import_files([tmp_path], stated).records[0].displacement) == pytest.approx(0.02, rel=1e-3)
+
+
+def test_letters_over_the_columns_of_a_sheet_are_no_units_and_names_with_units_answer(tmp_path):
+    table(tmp_path / "test_0.5A.csv", ["A,B,C"], T, X, force(0.5))
+    assert {r.error.code for r in import_files([tmp_path]).refusals} == {"E_COLUMN"}
+    named = parse_profile('[file]\nnames = ["time [s]", "displacement [mm]", "force [N]"]\n')
+    assert np.ptp(import_files([tmp_path], named).records[0].displacement) == pytest.approx(0.02, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["Tekercsáram;0,5;A", "Natężenie prądu: 0,5 A", "Bobin akımı: 0,5 A", "Сила тока: 0,5 А", "Kelavirta: 0,5 A"],
+)
+def test_the_current_of_the_coil_is_known_in_many_languages(line, tmp_path):
+    table(tmp_path / "a.csv", [line, "Time [s],Displacement [mm],Force [N],T [℃]"], T, X, force(0.5), 20 + T)
+    expect(tmp_path, 0.5)
+
+
 def test_a_clock_named_after_each_channel_is_the_time_of_that_channel(tmp_path):
     channels = {"Force_N": force(0.5), "Stroke_mm": X, "Current_A": np.full(T.shape, 0.5)}
     clocks = {f"time_{name}": T for name in channels}

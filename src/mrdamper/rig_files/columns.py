@@ -227,7 +227,9 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
     missing = [r for r in REQUIRED if r not in columns and not (r == "time" and rate_of(table, profile))]
     if missing and not any(table.names):
         what = f"{len(table.names)} columns without names or units"
-        remedy = "name them in a profile: [file] names = [...], [channels.force] unit = ..."
+        remedy = (
+            'name them in a profile, with their units: [file] names = ["time [s]", "displacement [mm]", "force [N]"]'
+        )
         return [_refusal(UnitError, table, what, remedy, "E_UNITS_MISSING")]
     shown = ", ".join(name or f"column {i}" for i, name in enumerate(table.names, 1))
     shown += "" if any(header.unit for header in table.headers) else ", without units"
@@ -255,7 +257,7 @@ def _convert(table: RawTable, role: str, column: int, channel: Channel) -> Assig
     header = table.headers[column]
     unit = channel.unit or header.unit
     unit = "degF" if unit == "F" and role == "temperature" else unit
-    uncalibrated = channel.scale is None and header.dimension == "voltage"  # no unit makes newtons of volts
+    uncalibrated = channel.scale is None and header.dimension in ("voltage", "count")  # no unit makes them newtons
     for text in (unit, header.unit) if uncalibrated else (unit,):
         problem = _unit_problem(table, "velocity" if channel.integrate else role, column, text)
         if problem is not None:
@@ -297,7 +299,7 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
     if parsed.dimension == "mass" and role == "force":
         force = "kgf" if parsed.factor == 1 else "lbf"
         remedy = f'if the force of that weight is meant, set [channels.force] unit = "{force}" in a profile'
-    if parsed.dimension == "voltage":
+    if parsed.dimension in ("voltage", "count"):
         remedy = f"give the calibration: [channels.{role}] unit and scale (unit per {unit}) in a profile"
     problem = f"{named} is in {unit}, which is no unit of {DIMENSION[role]}"
     return _refusal(UnitError, table, problem, remedy, "E_UNITS_DIMENSION")

@@ -32,9 +32,9 @@ _NEGATIVE = re.compile(r"[=:]\s*[-−]$")  # a dash elsewhere may stand between 
 _NUMERIC_CELL = re.compile(r"[,;]\s*\"?[+-]?[0-9.]+\"?\s*$")
 _LINE = re.compile(
     r"^[\s#%/\"]*(?P<key>[^:=;\t]{1,60}?)[\s\"]*(?:[:=;\t]|(?<![0-9]),|,(?![0-9]+(?![0-9.])))[\s:=;,\t\"]*(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)"
-    r"[\s;,\t\"]*[\[(]?(?P<unit>(?:1/)?[A-Za-zµ/]{0,9}(?:-1)?)[\])]?[\s;,\t\"]*$"
+    r"[\s;,\t\"]*[\[(]?(?P<unit>(?:1/)?(?:[^\W\d_]|/){0,9}(?:-1)?)[\])]?[\s;,\t\"]*$"
 )
-CELL = re.compile(r"\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*([A-Za-z°]{0,8})\s*")  # a number, and a unit behind it
+CELL = re.compile(r"\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*((?:[^\W\d_]|°){0,8})\s*")  # a number, and a unit behind it
 _LONGEST_LINE, _MOST_PARTS = 300, 20
 _TOLERANCE = re.compile(r"\s*(?:\+\s?/?\s?[-−]|±)\s*[0-9]+(?:[.,][0-9]+)?\s*%?")
 _SCALE = re.compile(r"[0-9]\s*(?:%|m?V\b|counts?\b|bits?\b)[^=:;]*=|\bper\b|\b100 ?%")  # 60 mV = 10 A, 1 A per V
@@ -58,7 +58,7 @@ _RATE_IN_NAME = re.compile(
     r"|(?P<b>[0-9]+(?:[.,][0-9]+)?)[ _]?(?P<kb>k?)Hz[_ ]?fs(?![A-Za-z]))"
 )
 _SPACED = re.compile(
-    r"^[\s#%/\"]*(?P<key>[^\d:=;,\t]{1,60}?)\s+(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)\s*(?P<unit>(?:1/)?[A-Za-zµ/]{1,9}(?:-1)?)\s*$"
+    r"^[\s#%/\"]*(?P<key>[^\d:=;,\t]{1,60}?)\s+(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)\s*(?P<unit>(?:1/)?(?:[^\W\d_]|/){1,9}(?:-1)?)\s*$"
 )
 
 

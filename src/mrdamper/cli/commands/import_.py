@@ -7,6 +7,7 @@ import os
 import re
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from glob import escape
 from pathlib import Path
@@ -269,10 +270,8 @@ def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = Fa
         whence = more or f" from {len(tests)} file{'s' * (len(tests) != 1)}"
         print(f"dataset: {out} ({total} runs{whence})")
     elif dry:
-        count = len(result.records)
-        print(
-            f"{count} test{'s' * (count != 1)} would be written, {len(result.refusals)} refused; --out DATASET writes"
-        )
+        would = _tests(len(result.records))
+        print(f"{would} would be written, {_count(result.refusals)} refused; --out DATASET writes")
     else:
         print("nothing written; correct or leave out the refused files, or give --skip-refused")
 
@@ -314,8 +313,18 @@ def _refused_lines(result: ImportResult) -> list[str]:
         shown = listed(list(dict.fromkeys(str(file.relative_to(folder)) for file in files)), 3)
         first = "" if len({refusal.error.found for refusal in refusals}) == 1 else "the first of them: "
         remedy = f"; {error.remedy}" if error.remedy else ""
-        lines.append(f"refused {len(files)} tests in {folder} ({shown}): {first}{error.found}{remedy} [{error.code}]")
+        tests = _tests(_count(refusals))
+        lines.append(f"refused {tests} in {folder} ({shown}): {first}{error.found}{remedy} [{error.code}]")
     return lines
+
+
+def _count(refusals: Sequence[Refusal]) -> int:
+    """Return the number of tests that are refused, each for one reason or several."""
+    return len({(refusal.file, refusal.run) for refusal in refusals})
+
+
+def _tests(count: int) -> str:
+    return f"{count} test{'s' * (count != 1)}"
 
 
 def _current(record: Record) -> str:

@@ -32,7 +32,7 @@ from mrdamper.rig_files.vocabulary import meanings, words
 _SEPARATORS = ("\t", ";", ",", "|")
 _CLOCKS, _WEIGHTS = meanings("clocks") | {"time since start": ""}, meanings("weights")
 _SCALE = re.compile(
-    r"(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{1,4}|%)"
+    r"(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{1,6}|%)"
     r"(?:\s*(?:PWM|duty(?: cycle)?|drive|output))?\s*(?:/|=|per|pro|entspricht|->)\s*"
     r"(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{1,6}|%)(?![A-Za-z0-9/])"
 )

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from string import ascii_uppercase
 from typing import Literal
 
 from mrdamper.rig_files.column_names import split_name
@@ -530,7 +531,8 @@ def _cells(line: str, separator: str, width: int) -> tuple[str, ...]:
 def _is_units(cells: Sequence[str]) -> bool:
     filled = [cell for cell in cells if cell and cell not in ("-", "--", "[-]", "(-)")]
     count = sum(is_unit(_unbracket(cell)) for cell in filled)
-    return count >= 1 and 2 * count >= len(filled)
+    letters = len(filled) > 2 and "".join(filled) == ascii_uppercase[: len(filled)]  # of the columns of a sheet
+    return count >= 1 and 2 * count >= len(filled) and not letters
 
 
 def _is_times(cells: Sequence[str]) -> bool:
