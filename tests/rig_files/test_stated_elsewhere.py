@@ -82,6 +82,14 @@ def test_the_current_of_the_coil_is_known_in_many_languages(line, tmp_path):
     expect(tmp_path, 0.5)
 
 
+@pytest.mark.parametrize("encoding", ["koi8-r", "cp1251", "cp866"])
+def test_names_in_an_older_encoding_are_read(encoding, tmp_path):
+    path = tmp_path / "a.csv"
+    table(path, ["Ток в обмотке: 0.5 А", "Время [с],Перемещение [мм],Усилие [Н]"], T, X, force(0.5))
+    path.write_bytes(path.read_text("utf-8").encode(encoding))
+    expect(tmp_path, 0.5)
+
+
 def test_a_clock_named_after_each_channel_is_the_time_of_that_channel(tmp_path):
     channels = {"Force_N": force(0.5), "Stroke_mm": X, "Current_A": np.full(T.shape, 0.5)}
     clocks = {f"time_{name}": T for name in channels}
@@ -94,6 +102,24 @@ def test_rows_of_tables_beside_a_vector_of_currents_are_tests(tmp_path):
     forces = np.array([force(current) for current in currents])
     np.savez(tmp_path / "a.npz", time_s=T, displacement_mm=np.tile(X, (3, 1)), force_N=forces, current_A=currents)
     expect(tmp_path, *currents)
+
+
+@pytest.mark.parametrize("cube", [False, True], ids=["a clock a test", "a cube"])
+def test_tests_of_different_lengths_in_one_array_are_cut_where_they_end(tmp_path, cube):
+    tests = np.full((3, 3, T.size), np.nan)
+    for n, current in enumerate((0.0, 0.5, 1.0)):
+        stop = T.size - 250 * n
+        tests[n, :, :stop] = np.array([T, X, force(current)])[:, :stop]
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["current_A"] = [0.0, 0.5, 1.0]
+        if cube:
+            file["data"] = tests
+            file["data"].attrs.update({"channels": ["time [s]", "displacement [mm]", "force [N]"]})
+        else:
+            for name, values in zip(("time_s", "disp_mm", "force_N"), np.swapaxes(tests, 0, 1), strict=True):
+                file[name] = values
+    expect(tmp_path, 0.0, 0.5, 1.0)
+    assert [r.time.size for r in import_files([tmp_path]).records] == [T.size, T.size - 250, T.size - 500]
 
 
 def test_an_attribute_has_the_unit_that_another_attribute_states(tmp_path):

@@ -144,7 +144,12 @@ def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Split a list of matrices into a node each, with its own of the numbers that vectors beside them hold."""
+    """Split a list of matrices, or a cube of them, into a node each, with its own of the numbers of vectors beside."""
+    cubes = [
+        key for key, value in tree.items() if isinstance(value, Array) and value.ndim == 3 and min(value.shape) > 1
+    ]
+    if len(cubes) == 1 and tree[cubes[0]].shape[0] <= MOST_ITEMS:
+        tree = {**tree, cubes[0]: [_unpadded(matrix) for matrix in np.asarray(tree[cubes[0]])]}
     lists = {
         key: value
         for key, value in tree.items()
@@ -170,7 +175,7 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
 def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     """Split tables whose rows are tests into a node each, with its own of the numbers of a vector of conditions.
 
-    Two tables of K rows and N samples or more, N samples of a time, and else only N or K numbers each.
+    Two tables of K rows and N samples or more, one of times or N samples of it, and else only N or K numbers each.
     """
     numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf"}
     shapes = {key: tuple(n for n in array.shape if n != 1) for key, array in numeric.items()}
@@ -180,18 +185,27 @@ def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     count, samples = shapes[tables[0]]
     vectors = {key: shape for key, shape in shapes.items() if key not in tables}
     conditions = [key for key, shape in vectors.items() if shape == (count,)]
-    timed = any(shape == (samples,) and split_name(key).role == "time" for key, shape in vectors.items())
+    timed = any(shape != (count,) and split_name(key).role == "time" for key, shape in shapes.items())
     if not (timed and conditions) or count == samples or {*vectors.values()} - {(samples,), (count,)}:
         return tree
     arrays = {key: np.squeeze(np.asarray(numeric[key])) for key in (*tables, *conditions)}
     rest = {key: value for key, value in tree.items() if key not in tables and key not in conditions}
     clocks = {key: value for key, value in rest.items() if isinstance(value, Array)}
+    rows = [np.array([arrays[key][i] for key in tables]) for i in range(count)]
+    rows = rows if clocks else [_unpadded(row) for row in rows]
     own = [
-        {**clocks, **{k: arrays[k][i] for k in tables}, **{k: float(arrays[k][i]) for k in conditions}}
-        for i in range(count)
+        {**clocks, **dict(zip(tables, row, strict=True)), **{k: float(arrays[k][i]) for k in conditions}}
+        for i, row in enumerate(rows)
     ]
     rest = {key: value for key, value in rest.items() if key not in clocks}
     return {**rest, **{f"test_{i}": node for i, node in enumerate(own, 1)}}
+
+
+def _unpadded(matrix: np.ndarray) -> np.ndarray:
+    """Return the samples of some channels without those at the end that no channel has: other tests are longer."""
+    matrix = matrix if matrix.shape[0] <= matrix.shape[1] else matrix.T
+    there = np.flatnonzero(~np.isnan(matrix).all(axis=0)) if matrix.dtype.kind == "f" else ()
+    return matrix[:, : there[-1] + 1] if len(there) else matrix
 
 
 def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, Any]:
