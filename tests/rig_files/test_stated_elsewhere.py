@@ -90,6 +90,40 @@ def test_names_in_an_older_encoding_are_read(encoding, tmp_path):
     expect(tmp_path, 0.5)
 
 
+@pytest.mark.parametrize(
+    "head",
+    [["# coil driver: 100 % duty = 2.0 A", "# duty = 25 %"], ["[Header]", "CoilCurrent=0.50", "CoilCurrentUnit=A"]],
+    ids=["a share", "the unit on a line of its own"],
+)
+def test_a_current_that_two_lines_state_counts(head, tmp_path):
+    table(tmp_path / "a.csv", [*head, "Time [s],Displacement [mm],Force [N]"], T, X, force(0.5))
+    expect(tmp_path, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "clock"), [("Clock", "10:15:{:02.0f}"), ("Time [s]", "{:.1f}")], ids=["whole seconds", "tenths"]
+)
+def test_samples_are_counted_where_the_clock_repeats_itself_and_the_rate_is_stated(name, clock, tmp_path):
+    coarse = [clock.format(np.floor(10 * t) / 10 if "1f" in clock else np.floor(t)) for t in T]
+    rows = [f"{t},{x:.4f},{f:.3f}" for t, x, f in zip(coarse, X, force(0.5), strict=True)]
+    head = f"{name},Displacement [mm],Force [N]\n"
+    path = tmp_path / "a_0.5A.csv"
+    path.write_text("Sample rate: 500 Hz\n" + head + "\n".join(rows))
+    expect(tmp_path, 0.5)
+    path.write_text(head + "\n".join(rows))
+    (refusal,) = import_files([tmp_path]).refusals
+    assert (refusal.error.code, "sample_rate_Hz" in refusal.error.remedy) == ("E_TIME_DUPLICATE", True)
+    assert len(import_files([tmp_path], parse_profile("[file]\nsample_rate_Hz = 500\n")).records) == 1
+
+
+def test_minutes_of_one_digit_are_a_clock(tmp_path):
+    rows = [
+        f"{int(t + 59) // 60}:{(t + 59) % 60:06.3f},{x:.4f},{f:.3f}" for t, x, f in zip(T, X, force(0.5), strict=True)
+    ]
+    (tmp_path / "a_0.5A.csv").write_text("Time (min:s),Displacement [mm],Force [N]\n" + "\n".join(rows))
+    expect(tmp_path, 0.5)
+
+
 def test_a_clock_named_after_each_channel_is_the_time_of_that_channel(tmp_path):
     channels = {"Force_N": force(0.5), "Stroke_mm": X, "Current_A": np.full(T.shape, 0.5)}
     clocks = {f"time_{name}": T for name in channels}

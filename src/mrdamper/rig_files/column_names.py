@@ -76,7 +76,7 @@ def split_name(header: str, unit: str = "") -> Header:
     text = unicodedata.normalize("NFKC", header).strip()
     if unit:
         match = _BRACKETED.match(text)
-        return Header(match["name"] if match and parse_unit(match["unit"]) else text, unit)
+        return Header(match["name"] if match and (parse_unit(match["unit"]) or ":" in match["unit"]) else text, unit)
     for pattern in (_BRACKETED, _SLASHED):
         match = pattern.match(text)
         if match and parse_unit(match["unit"].strip()):

@@ -50,9 +50,10 @@ _STEP = re.compile(
     re.IGNORECASE,
 )
 _SHARE = re.compile(
-    r"^[\s#%/\"]*(?:coil )?(?:current|drive|strom)\s*[:=;,\t]\s*(?P<number>[0-9]+(?:[.,][0-9]+)?)\s*%\s*of rated",
-    re.IGNORECASE,
-)
+    r"^[\s#%/\"]*(?:coil )?(?:current|drive|strom|pwm|duty(?: cycle)?)\s*[:=;,\t]\s*"
+    r"(?P<number>[0-9]+(?:[.,][0-9]+)?)\s*%(?:\s*of rated|\s*$)", re.IGNORECASE,
+)  # fmt: skip
+_WHOLE = re.compile(r"\b100 ?%[^=:]{0,30}[=:]\s*([0-9]+(?:[.,][0-9]+)?)\s*(m?A)\b")  # 100 % duty = 2 A
 _RATE_IN_NAME = re.compile(
     r"(?<![A-Za-z0-9.])(?:fs[_=]?(?P<a>[0-9]+(?:[.,][0-9]+)?)[ _]?(?P<ka>k?)Hz"
     r"|(?P<b>[0-9]+(?:[.,][0-9]+)?)[ _]?(?P<kb>k?)Hz[_ ]?fs(?![A-Za-z]))"
@@ -116,6 +117,7 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
                 rated.append(value)
             elif unit.dimension == "current" and coil and not _SCALE.search(line):
                 currents.append(Statement(value, f"the line {line.strip()[:60]!r}"))
+    rated += [amperes(match[1], match[2]) for line in lines if (match := _WHOLE.search(line[:_LONGEST_LINE]))]
     shares = [(match, line) for line in lines if len(set(rated)) == 1 and (match := _SHARE.match(line[:_LONGEST_LINE]))]
     for match, line in shares:
         share = float(match["number"].replace(",", ".")) / 100

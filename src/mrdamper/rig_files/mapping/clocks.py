@@ -30,6 +30,7 @@ _EPOCH_NS = 9.4e17, 4.2e18  # the years 2000 to 2100 [ns since 1970]
 _LARGEST = 64 * 2**20  # bytes of a file whose clock without a unit is looked at
 _LONGEST = 5_000_000  # samples; a longer record lies in a file and is not read as a whole
 _SAME_RATE, _SAME_FREQUENCY = 0.2, 0.1  # relative differences of what is stated from what is measured
+_COARSE = 0.1  # share of the samples whose stamp is that of the one before
 _SAMPLES = 100_000  # looked at
 
 
@@ -112,7 +113,7 @@ def with_time_stated(table: RawTable) -> RawTable:
     """
     times = table.columns("time") or [i for i in table.columns(dimension="time") if not table.names[i]]
     if len(times) == 1:
-        return _with_date(_with_fractions(table, times[0]), times[0])
+        return _with_samples_counted(_with_date(_with_fractions(table, times[0]), times[0]), times[0])
     return table if times else _with_crank(table)
 
 
@@ -132,6 +133,23 @@ def _with_fractions(table: RawTable, clock: int) -> RawTable:
     if not apart or not np.any(np.diff(seconds) == 0):
         return table
     return table.computed(clock, (clock, part), lambda values: values[clock] + factor * values[part])
+
+
+def _with_samples_counted(table: RawTable, clock: int) -> RawTable:
+    """Return a clock whose steps are longer than the samples', counted at the rate that the file states."""
+    try:
+        rate = stated_rate(table.quantities)
+    except ValueError:
+        return table
+    values = table.try_read(clock) if rate and table.source.size <= _LARGEST else None
+    if values is None or not rate:
+        return table
+    factor, steps = table.headers[clock].factor, np.diff(values[clock])
+    coarse = steps.size and np.mean(steps == 0) > _COARSE and np.all(steps >= 0)
+    if not coarse or abs(steps.size / rate - factor * np.sum(steps)) > factor * np.max(steps):
+        return table
+    note = Finding("W_CHOSEN", f"the clock repeats itself: time is counted at the {rate:g} Hz that the file states")
+    return table.computed(clock, (clock,), lambda v: np.arange(v[clock].size) / (rate * factor)).noted(note)
 
 
 def _with_date(table: RawTable, clock: int) -> RawTable:

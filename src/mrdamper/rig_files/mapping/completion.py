@@ -44,6 +44,7 @@ _PER_COUNT = re.compile(
     r"(?:counts?|cnts?|cts?|digits?|bits?|lsb|incs?|increments?|inkr?|steps?|pulses?|imp|ticks?))?",
     re.IGNORECASE,
 )
+_KEY = re.compile(r"[\s#%;\"]*([^=:]{1,60}?)\s*[=:]\s*(\S+)\s*")  # CoilCurrent=0.5, CoilCurrentUnit=A
 _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.IGNORECASE)
 _LABELS, _MONITOR, _SENSE_NAMES = words("label"), words("monitor"), words("sense")
 _LABVIEW = ("Delta_X", "X_Dimension")
@@ -150,7 +151,7 @@ def _keyed_cells(table: RawTable, longest: int = _LONGEST_LINE) -> Iterator[tupl
 
 
 def _with_values_for_all(table: RawTable) -> RawTable:
-    """Lines of a key with one value for all columns, whose unit another states: HResolution, 5E-3, 5E-3; HUnit, s, s.
+    """Lines of a key whose unit another states, with one value, or one for all columns: HResolution, 1, 1; HUnit, s, s.
 
     The steps of LabVIEW and of the format RPC are in seconds.
     """
@@ -168,6 +169,13 @@ def _with_values_for_all(table: RawTable) -> RawTable:
         lines += [f"{key}: {cell} {unit}" for key, cell in numbers.items() if start and key.startswith(start)]
     sections = _FULL_SCALE.finditer("\n".join(table.remarks))
     lines += [f"{m['name']}: 100 % = {m['full']} {m['unit']}" for m in sections]
+    plain = {match[1]: match[2] for line in table.remarks if (match := _KEY.fullmatch(line[:_LONGEST_LINE]))}
+    lines += [
+        f"{key}: {cell} {plain[unit]}"
+        for key, cell in plain.items()
+        for unit in (f"{key}Unit", f"{key}_unit", f"{key} unit")
+        if unit in plain and looks_numeric(cell)
+    ]
     lines += [f"DELTA_T: {line[8:].strip()} s" for line in table.remarks if line.startswith("DELTA_T=")]
     return replace(table, remarks=(*table.remarks, *lines)) if lines else table
 
