@@ -301,3 +301,14 @@ def test_a_copy_of_a_file_in_another_folder_is_no_second_test(tmp_path):
     found = import_files([tmp_path])
     assert [record.id for record in found.records] == ["run_0.5A"]
     assert found.left_out == ("run_0.5A.csv",)
+
+
+@pytest.mark.parametrize("title", ["# {} A", "Test at {} A", "Coil current: {} A"])
+def test_lines_among_the_rows_that_state_other_currents_begin_other_tests(title, tmp_path):
+    head = table(NAMES).partition("\n")[0] + "\n"
+    rows = {i: table({**NAMES, "force [N]": (1 + i) * F}).partition("\n")[2] for i in (0.5, 1.0)}
+    tests = "".join(f"{title.format(current)}\n{own}" for current, own in rows.items())
+    found = import_files([write(tmp_path, "a.csv", head + tests)])
+    assert [record.current[0] for record in found.records] == [0.5, 1.0]
+    (refusal,) = import_files([write(tmp_path, "b.csv", head + rows[1.0] + tests)]).refusals
+    assert refusal.error.code == "E_BLOCKS"

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+from mrdamper.rig_files.conditions import stated_by_lines, stated_in_titles
 from mrdamper.rig_files.text.layout import Layout, is_comment, is_footer, split, units_in
 from mrdamper.rig_files.text.stream import TextStream, line_feeds
 from mrdamper.rig_files.text.tokens import looks_numeric
 
 _SEGMENT = re.compile(r"(?:Channels|Samples|Date|Time|Y_Unit_Label|X_Dimension|X0|Delta_X|\*{3}End_of_Header)\b")
+_STATED = re.compile(
+    rb"(?m)^[ \t]*(?:[#%\"A-Za-z]|//)[^\n]*[0-9] ?(?:m?A|amp)[^\n]*"
+)  # a line that may state a current
+_TITLE_LINES = 20  # among which rows follow such a line
 _LOOK_BACK = 64 * 1024  # bytes of remarks there may be above a repeated header
 
 
@@ -27,14 +33,15 @@ class Block:
 def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> list[Block]:
     """Return the blocks between two places of a text; one where the header is not repeated."""
     if not layout.header.strip():
-        return [Block(start, stop, layout.data_line)]
+        return _cut_at_currents(stream, layout, Block(start, stop, layout.data_line))
     header = layout.header.strip(" \t\r").encode(stream.encoding, "ignore")
     blocks: list[Block] = []
     at, line, begin, begin_line = start, layout.data_line, start, layout.data_line
-    tail = b""
+    tail, worded = b"", False
     remarks: tuple[str, ...] = ()
     for chunk in stream.chunks(start, stop):
         stream.check(chunk, line)
+        worded |= b"A" in chunk or b"amp" in chunk
         position = chunk.find(header)
         while position >= 0:
             line_start = chunk.rfind(b"\n", 0, position) + 1
@@ -54,7 +61,46 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
         at += len(chunk)
         tail = chunk[-_LOOK_BACK:]
     blocks.append(Block(begin, stop, begin_line, remarks))
-    return [block for block in blocks if block.stop > block.start]
+    blocks = [block for block in blocks if block.stop > block.start]
+    if not worded:
+        return blocks
+    cut = (part for block in blocks for part in _cut_at_currents(stream, layout, block))
+    return [block for block in cut if block.stop > block.start]
+
+
+def _cut_at_currents(stream: TextStream, layout: Layout, block: Block) -> list[Block]:
+    """Cut a block at the lines among its rows that state another current: tests one below the other.
+
+    Raises `RigFileError`, E_BLOCKS, if none stands above the first of them: the lines may close their tests.
+    """
+    cuts: list[tuple[int, int, int, str]] = []  # start and end of a line, its number and text
+    at, line = block.start, block.line
+    for chunk in stream.chunks(block.start, block.stop):
+        for match in _STATED.finditer(chunk):
+            text = stream.decode(match[0]).strip()
+            if not _is_data(text, layout) and _currents([text]):
+                below = [stream.decode(raw) for raw in stream.lines_at(at + match.end() + 1, _TITLE_LINES)]
+                if any(_is_data(raw.rstrip("\r\n"), layout) for raw in below):
+                    number = line + line_feeds(chunk[: match.start()])
+                    cuts.append((at + match.start(), at + match.end() + 1, number, text))
+        line += line_feeds(chunk)
+        at += len(chunk)
+    above = block.remarks or layout.remarks
+    first = _currents(above)
+    if len({*first, *(current for *_, text in cuts for current in _currents([text]))}) < 2 or not cuts:
+        return [block]
+    if not first:
+        problem = "states a current among the rows, and no line above the first row does"
+        raise stream.source.refuse("E_BLOCKS", problem, "split the file, a test a file", line=cuts[0][2])
+    shared = tuple(text for text in above if not _currents([text]))
+    starts = [(block.start, block.line, above), *((end, n + 1, (*shared, text)) for _, end, n, text in cuts)]
+    stops = [*(start for start, *_ in cuts), block.stop]
+    return [Block(start, stop, n, own) for (start, n, own), stop in zip(starts, stops, strict=True)]
+
+
+def _currents(lines: Iterable[str]) -> list[float]:
+    lines = list(lines)
+    return [statement.amperes for statement in stated_by_lines(lines) or stated_in_titles(lines)]
 
 
 def _units_below(stream: TextStream, layout: Layout, start: int, header_line: int) -> tuple[int, int]:
