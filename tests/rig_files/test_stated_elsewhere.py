@@ -116,6 +116,31 @@ def test_samples_are_counted_where_the_clock_repeats_itself_and_the_rate_is_stat
     assert len(import_files([tmp_path], parse_profile("[file]\nsample_rate_Hz = 500\n")).records) == 1
 
 
+def test_two_currents_are_named_where_either_may_be_that_of_the_coil(tmp_path):
+    names = "Time [s],Displacement [mm],Force [N],Coil 1 current [A],Coil 2 current [A]"
+    table(tmp_path / "a.csv", [names], T, X, force(0.5), 0.5 + 0 * T, 0.3 + 0 * T)
+    (refusal,) = import_files([tmp_path]).refusals
+    assert "Coil 1 current [A]' and 'Coil 2 current [A]' may both" in refusal.error.found
+    stated = parse_profile('[channels.current]\ncolumn = "Coil 1 current [A]"\n')
+    assert import_files([tmp_path], stated).records[0].current[0] == 0.5
+
+
+def test_channels_that_are_logged_in_turn_are_asked_for_with_one_clock(tmp_path):
+    rows = [f"{t:.5f},{x:.4f},\n{t + 1e-3:.5f},,{f:.4f}" for t, x, f in zip(T, X, force(0.5), strict=True)]
+    (tmp_path / "a_0.5A.csv").write_text("Time [s],Displacement [mm],Force [N]\n" + "\n".join(rows))
+    (refusal,) = import_files([tmp_path]).refusals
+    assert (refusal.error.code, "one clock" in refusal.error.remedy) == ("E_MISSING", True)
+
+
+def test_a_page_heading_with_numbers_is_no_row(tmp_path):
+    pages = [slice(n, n + 60) for n in range(0, T.size, 60)]
+    rows = [f"{t:.4f} {x:.4f} {f:.3f}\n" for t, x, f in zip(T, X, force(0.5), strict=True)]
+    heading = "\nMR DAMPER TEST 1      PAGE {}\nCOIL CURRENT 0.50 A\n TIME DISP FORCE\n S MM N\n"
+    text = "".join(heading.format(n) + "".join(rows[page]) for n, page in enumerate(pages, 1))
+    (tmp_path / "a.prn").write_text(text)
+    expect(tmp_path, 0.5)
+
+
 def test_minutes_of_one_digit_are_a_clock(tmp_path):
     rows = [
         f"{int(t + 59) // 60}:{(t + 59) % 60:06.3f},{x:.4f},{f:.3f}" for t, x, f in zip(T, X, force(0.5), strict=True)

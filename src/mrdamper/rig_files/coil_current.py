@@ -137,7 +137,8 @@ def _statements(table: RawTable, path: Path) -> list[Statement]:
 
 
 def _set_points(table: RawTable, rows: slice) -> list[Statement]:
-    """Return the statements of a column of the commanded current that holds a single value."""
+    """Return the statements of columns of the commanded current that hold a single value, if it is one in all."""
+    statements = []
     for column, header in enumerate(table.headers):
         unit = header.known
         if unit is None or unit.dimension != "current" or not names_condition(header.name, "current"):
@@ -148,8 +149,8 @@ def _set_points(table: RawTable, rows: slice) -> list[Statement]:
             continue
         low, high = np.nanmin(values), np.nanmax(values)
         if low == high:
-            return [Statement(unit.factor * float(low), f"the column {table.names[column]!r}")]
-    return []
+            statements.append(Statement(unit.factor * float(low), f"the column {table.names[column]!r}"))
+    return statements if len({statement.amperes for statement in statements}) == 1 else []
 
 
 def _folders(table: RawTable, path: Path) -> list[Statement]:

@@ -150,6 +150,9 @@ def left_out(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]
             problem = _unit_problem(table, role, column, table.headers[column].unit)
             if problem is not None:
                 reasons[role] = problem.found
+    several = [table.names[i] for i in table.columns("current", "current") if i not in taken]
+    if len(several) > 1 and not {"current"} & {*assigned, *reasons}:
+        reasons["current"] = f"{several[0]!r} and {several[1]!r} may both be it"
     return reasons
 
 

@@ -391,7 +391,8 @@ def _with_current(record: Record) -> Record:
     raise ColumnError(
         why[0] if why else "no coil current in a column or in the file name",
         where=Path(record.provenance.get("file", record.id)).name,
-        remedy=(calibrated if why else "") + "write the currents into tests.csv (--write-tests), or set [current] "
+        remedy=(calibrated if why and "may both" not in why[0] else "")
+        + "write the currents into tests.csv (--write-tests), or set [current] "
         'pattern = "*_{current}A_*", values = {"test1*" = 0.5}, [channels.current] column = "..." or, '
         "if all tests have one, [current] value = 0.5 in a profile",
         code="E_CURRENT_MISSING",

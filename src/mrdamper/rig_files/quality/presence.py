@@ -15,6 +15,8 @@ _OVERFLOW = 1e100  # squares of larger numbers leave double precision
 _FEWEST = 5  # samples
 USED = ("time", "displacement", "force", "current", "velocity")  # what a run is made of
 
+_IN_TURN = 0.3  # share of missing samples of a channel that is logged in turn with others
+
 
 def long_enough(view: View) -> None:
     """Refuse a record of a few samples."""
@@ -51,7 +53,9 @@ def missing(view: View) -> Iterator[Finding]:
             raise view.refused(
                 "E_MISSING",
                 f"{text}, {view.place(start)}",
-                f"record again, or cut the record; up to 2 % and {MOST_IN_A_ROW} in a row are taken",
+                "export the channels with one clock: each has rows of its own"
+                if share > _IN_TURN and longest < absent.size / 10
+                else f"record again, or cut the record; up to 2 % and {MOST_IN_A_ROW} in a row are taken",
             )
         yield Finding("W_MISSING", f"{text}; they are left out, not filled")
     longest, start = longest_run(~view.record.present)

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from mrdamper.rig_files.conditions import stated_by_lines, stated_in_titles
-from mrdamper.rig_files.text.layout import Layout, is_comment, is_footer, split, units_in
+from mrdamper.rig_files.text.layout import SPACES, Layout, is_comment, is_footer, split, units_in
 from mrdamper.rig_files.text.stream import TextStream, line_feeds
 from mrdamper.rig_files.text.tokens import looks_numeric
 
@@ -16,6 +16,7 @@ _SEGMENT = re.compile(r"(?:Channels|Samples|Date|Time|Y_Unit_Label|X_Dimension|X
 _STATED = re.compile(
     rb"(?m)^[ \t]*(?:[#%\"A-Za-z]|//)[^\n]*[0-9] ?(?:m?A|amp)[^\n]*"
 )  # a line that may state a current
+_WORD = re.compile(r"[^\W\d_]{2,}")
 _TITLE_LINES = 20  # among which rows follow such a line
 _LOOK_BACK = 64 * 1024  # bytes of remarks there may be above a repeated header
 
@@ -138,5 +139,7 @@ def _is_data(text: str, layout: Layout) -> bool:
         cells = split(text, layout.separator)
     except csv.Error:
         return True
+    if layout.separator == SPACES and len(cells) != layout.width and _WORD.match(cells[0]):  # MR DAMPER TEST 1  PAGE 2
+        return False
     values = [cell for cell in cells if cell and looks_numeric(cell)]
     return len(values) >= 2 or (len(values) == 1 and len(cells) == 1)
