@@ -116,6 +116,32 @@ def test_samples_are_counted_where_the_clock_repeats_itself_and_the_rate_is_stat
     assert len(import_files([tmp_path], parse_profile("[file]\nsample_rate_Hz = 500\n")).records) == 1
 
 
+def test_a_text_of_the_same_name_states_the_current_of_its_record(tmp_path):
+    for n, current in enumerate((0.0, 0.5), 1):
+        table(tmp_path / f"run{n}.csv", ["Time [s],Displacement [mm],Force [N]"], T, X, force(current))
+        (tmp_path / f"run{n}.txt").write_text(f"Coil current: {current} A\n")
+    expect(tmp_path, 0.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [
+        "No;Current [A];Remark\n1;0;\n2;0.5;aborted\n2;0.5;\n",
+        "Date;Current [A]\n12 March;2\n12 March;0\n12 March;0.5\n",
+        "Step;Current [A]\n2;0\n3;0.5\n",
+        "No;Coil A current [A];Coil B current [A]\n1;0;2\n2;0.5;2\n",
+    ],
+    ids=["a number twice", "a row more", "other numbers", "two coils"],
+)
+def test_rows_of_a_plan_are_not_counted_where_they_may_be_other_tests(plan, tmp_path):
+    for n, current in enumerate((0.0, 0.5), 1):
+        table(tmp_path / f"run{n}.csv", ["Time [s],Displacement [mm],Force [N]"], T, X, force(current))
+    (tmp_path / "plan.csv").write_text(plan)
+    found = import_files([tmp_path])
+    assert {refusal.error.code for refusal in found.refusals} == {"E_CURRENT_MISSING"}
+    assert found.left_out == ("plan.csv",)
+
+
 def test_two_currents_are_named_where_either_may_be_that_of_the_coil(tmp_path):
     names = "Time [s],Displacement [mm],Force [N],Coil 1 current [A],Coil 2 current [A]"
     table(tmp_path / "a.csv", [names], T, X, force(0.5), 0.5 + 0 * T, 0.3 + 0 * T)

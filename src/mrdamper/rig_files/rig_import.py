@@ -42,6 +42,7 @@ from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, name
 
 _PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")
 _TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
+_LARGEST_LIST = 2**16  # bytes of a plan of tests that states the current of none that was read
 _MAY_BE_PARTS = (
     "E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER", "E_FIELD_COUNT"
 )  # fmt: skip
@@ -237,7 +238,7 @@ class _Intake:
         for path, record in self._pending:
             self._check(path, record, [], several=counts[path] > 1)
         self._refuse_names_without_point()
-        for path in [path for path in (*others, *texts) if path not in used and self._found]:
+        for path in [path for path in (*others, *texts) if path not in used and (self._found or _is_short(path))]:
             stated = currents_beside(path, self._results(path), self.tests())
             if stated:
                 self._refuse_contradicted(stated)
@@ -380,6 +381,10 @@ def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
     from mrdamper.rig_files.to_run import to_run
 
     return Dataset(tuple(to_run(_with_current(record)) for record in records), name)
+
+
+def _is_short(path: Path) -> bool:
+    return path.stat().st_size <= _LARGEST_LIST
 
 
 def _with_current(record: Record) -> Record:

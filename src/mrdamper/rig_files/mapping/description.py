@@ -59,7 +59,8 @@ def _of_channels(line: str) -> str:
 def with_description(table: RawTable, path: Path) -> RawTable:
     """Return the table with what the text or XML file of its name, or the only other file of its folder, states."""
     other = _only_other(path)
-    named = [p for suffix in _STRUCTURES if (p := path.with_suffix(suffix)) != path and p.is_file()]
+    beside = [path.with_suffix(suffix) for suffix in (*_STRUCTURES, *_TEXTS)]
+    named = [p for p in beside if p != path and p.is_file() and (p.suffix in _STRUCTURES or is_description(p))]
     if named or (other is not None and is_description(other)):
         lines = short_lines(named[0] if named else other)  # type: ignore[arg-type]
         return replace(table, remarks=(*table.remarks, *lines))

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.rig_files.column_names import names_condition, split_name, words_of
-from mrdamper.rig_files.conditions import currents_in, quantity_in_cell
+from mrdamper.rig_files.conditions import contradicts, currents_in, quantity_in_cell
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of
 from mrdamper.rig_files.units import is_unit
@@ -23,6 +23,7 @@ _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
 _STARTS, _ENDS = words("start"), words("end")
+_NUMBERED = words("run") | words("run_number") | {"step", "schritt", "#"}
 _SPECIMEN = re.compile(
     r"(?i)^(?:specimen|probe|prüfkörper|test|versuch|run|sample|essai|éprouvette|ensayo|no|nr)\b[\s.:#]*"
 )
@@ -45,11 +46,19 @@ class Results:
         names = [_names(texts) for texts in tests]
         one_of_several = len(tests) == 1 < len(self.current)  # a number in its name alone may count anything
         for exact in (True,) if one_of_several else (True, False):
-            matches = [match for column in zip(*self.cells, strict=True) if (match := _match(column, names, exact))]
+            columns = list(zip(*self.cells, strict=True))
+            columns = columns if self._counts_tests(columns, len(tests)) else columns[1:]
+            matches = [match for column in columns if (match := _match(column, names, exact))]
             currents = [{i: self.current[row] for i, row in match.items()} for match in matches]
             if currents:
                 return currents[0] if all(other == currents[0] for other in currents) else {}
         return {}
+
+    def _counts_tests(self, columns: Sequence[Sequence[str]], tests: int) -> bool:
+        """Tell if the number of a row may be that of a test: as many rows, and no column that numbers the tests."""
+        keys = [{word.casefold() for word in words_of(split_name(key).name)} for key in self.keys]
+        named = [column for key, column in zip(keys, columns, strict=True) if key & _NUMBERED]
+        return tests == len(self.current) and not any(all(map(_NUMBER.fullmatch, column)) for column in named)
 
     def rows_in_time(self, times: Sequence[Floats]) -> dict[int, tuple[int, slice]]:
         """Return the row of each test by its number, and the samples between the start and the end that it states.
@@ -176,9 +185,16 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
             if not _QUANTITY.fullmatch(cell) and not _NUMBER.fullmatch(cell):
                 break
             body.append([*cells, *[""] * (len(row) - len(cells))][: len(row)])
-        currents = [_amperes(cells[columns[0]], unit or split_name(row[columns[0]]).unit) for cells in body]
+        every = [[_amperes(cells[i], unit or split_name(row[i]).unit) for cells in body] for i in columns]
+        currents = every[0]
         if len(body) < _FEWEST_ROWS or any(value is None for value in currents):
             continue
+        if any(
+            a is not None and b is not None and contradicts(a, b)
+            for o in every
+            for a, b in zip(currents, o, strict=True)
+        ):
+            continue  # of two coils
         others = [i for i in range(len(row)) if i not in columns]
         yield Results(
             tuple(value for value in currents if value is not None),
