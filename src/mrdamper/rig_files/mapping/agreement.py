@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mrdamper.data import Floats, held_current
+from mrdamper.data import held_current
 from mrdamper.data.arrays import take
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality.strokes import find_strokes
@@ -62,19 +62,17 @@ def _copies(records: Sequence[Record], points: Mapping[int, _Point]) -> dict[int
 
 def repeated(records: Sequence[Record]) -> set[int]:
     """Return the tests that hold the samples, the current too, of one before them: by their place."""
-    groups = _of_same_samples(records, lambda record: () if record.current is None else (record.current,))
-    return {i for members in groups for i in members[1:]}
+    return {i for members in _of_same_samples(records, with_current=True) for i in members[1:]}
 
 
-def _of_same_samples(
-    records: Sequence[Record], further: Callable[[Record], tuple[Floats, ...]] = lambda record: ()
-) -> list[list[int]]:
-    """Group the tests of equal force, displacement and further channels, by their places."""
+def _of_same_samples(records: Sequence[Record], *, with_current: bool = False) -> list[list[int]]:
+    """Group the tests of equal force and displacement, by their places."""
     groups: dict[tuple[int | bytes, ...], list[int]] = defaultdict(list)
     for i, record in enumerate(records):
         samples = np.arange(0, record.time.size, max(1, record.time.size // _MOST_SAMPLES))
-        channels = (record.force, record.displacement, *further(record))
-        groups[record.time.size, *(take(channel, samples).tobytes() for channel in channels)].append(i)
+        channels = [record.force, record.displacement, record.current if with_current else None]
+        same = (take(channel, samples).tobytes() for channel in channels if channel is not None)
+        groups[record.time.size, *same].append(i)
     return list(groups.values())
 
 

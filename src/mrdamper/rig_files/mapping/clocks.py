@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -74,10 +75,7 @@ def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displaceme
     An export of every n-th sample has a lower rate than it was recorded at: it is taken where the frequency that
     is stated is that of the time column, or where the profile names this column and no frequency contradicts it.
     """
-    try:
-        stated = stated_rate(table.quantities)
-    except ValueError:
-        return  # of several channels
+    stated = _rate_beside(table)
     time, displacement = time[:_SAMPLES], displacement[:_SAMPLES]
     steps = np.diff(time[np.isfinite(time)])
     step = float(np.median(steps)) if steps.size else 0.0
@@ -95,6 +93,13 @@ def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displaceme
         if not near
         else "set [file] sample_rate_Hz = ... in a profile, or correct the line that is wrong",
     )
+
+
+def _rate_beside(table: RawTable) -> float | None:
+    """Return the sampling rate [Hz] that stands beside the columns; None if there is none, or those of channels."""
+    with contextlib.suppress(ValueError):
+        return stated_rate(table.quantities)
+    return None
 
 
 def past_midnight(time: Floats) -> Floats:
@@ -137,10 +142,7 @@ def _with_fractions(table: RawTable, clock: int) -> RawTable:
 
 def _with_samples_counted(table: RawTable, clock: int) -> RawTable:
     """Return a clock whose steps are longer than the samples', counted at the rate that the file states."""
-    try:
-        rate = stated_rate(table.quantities)
-    except ValueError:
-        return table
+    rate = _rate_beside(table)
     values = table.try_read(clock) if rate and table.source.size <= _LARGEST else None
     if values is None or not rate:
         return table

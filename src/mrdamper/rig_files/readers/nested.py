@@ -204,8 +204,8 @@ def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
 def _unpadded(matrix: np.ndarray) -> np.ndarray:
     """Return the samples of some channels without those at the end that no channel has: other tests are longer."""
     matrix = matrix if matrix.shape[0] <= matrix.shape[1] else matrix.T
-    there = np.flatnonzero(~np.isnan(matrix).all(axis=0)) if matrix.dtype.kind == "f" else ()
-    return matrix[:, : there[-1] + 1] if len(there) else matrix
+    there = np.flatnonzero(~np.isnan(matrix.astype(float)).all(axis=0))
+    return matrix[:, : there[-1] + 1] if there.size else matrix
 
 
 def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, Any]:
