@@ -5,6 +5,7 @@ import io
 import re
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -68,7 +69,7 @@ def test_a_table_is_read_as_it_was_written(texts):
 
 
 def test_numbers_in_tables_are_exact_and_nothing_is_empty():
-    assert csv_text([{"a": 0.1 + 0.2, "b": None, "c": True}, {"d": -1}]) == (
+    assert csv_text([{"a": np.float64(0.1 + 0.2), "b": None, "c": True}, {"d": -1}]) == (
         "a,b,c,d\n0.30000000000000004,,True,\n,,,-1\n"
     )
 

@@ -98,7 +98,7 @@ def _csv_field(value: object) -> str:
         return ""
     if isinstance(value, str):
         return _csv_words(value)
-    return repr(value) if isinstance(value, float) else str(value)
+    return repr(float(value)) if isinstance(value, float) else str(value)  # NumPy's floats name their type
 
 
 @lru_cache(maxsize=256)  # names of rigs, runs and axes stand in every row
