@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats, Run, current_levels
+from mrdamper.data import Condition, Floats, Run, current_levels, same_motion
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification.loop_analysis import analyse_loop, whole_cycles
 from mrdamper.physics.motion import equivalent_sine, measured_motion
@@ -43,6 +43,11 @@ class Stroke:
         """Half the sum of the forces at mid-stroke [N]: what does not change sign with the motion."""
         return (self.mid_force[0] + self.mid_force[1]) / 2
 
+    @property
+    def mid_damping_force(self) -> float:
+        """Half the difference of the forces at mid-stroke [N]: what changes sign with the motion."""
+        return (self.mid_force[0] - self.mid_force[1]) / 2
+
 
 @dataclass(frozen=True)
 class Characteristics:
@@ -66,13 +71,17 @@ class Characteristics:
         """Peak force of a side (0 rebound, 1 compression) with the gas force taken away, positive [N]."""
         return abs(stroke.peak_force[side] - self.gas_force)
 
-    def at_velocity(self, current: float, velocity: float, side: int) -> float:
-        """Peak damping force at a peak velocity [N], straight between tested ones; nan outside them."""
+    def curve(self, current: float, side: int) -> tuple[Floats, Floats]:
+        """Peak velocity [m/s], rising, and peak damping force [N] of a level; tests of one motion are averaged."""
         strokes = self.at(current)
-        speeds = np.array([s.peak_velocity[side] for s in strokes])
-        forces = np.array([self.damping_force(s, side) for s in strokes])
-        order = np.argsort(speeds)
-        return float(np.interp(velocity, speeds[order], forces[order], left=np.nan, right=np.nan))
+        rows = np.array([(s.peak_velocity[side], self.damping_force(s, side)) for s in strokes])
+        means = np.array([rows[group].mean(axis=0) for group in same_motion([s.condition for s in strokes])])
+        speeds, forces = means[np.argsort(means[:, 0])].T
+        return speeds, forces
+
+    def at_velocity(self, current: float, velocity: float, side: int) -> float:
+        """Peak damping force at a peak velocity [N], linearly interpolated between tested ones; nan outside them."""
+        return float(np.interp(velocity, *self.curve(current, side), left=np.nan, right=np.nan))
 
     def ladder(self) -> tuple[float, ...]:
         """Round velocities [m/s] spread over what most currents were tested at."""
@@ -156,15 +165,17 @@ def _zero_force_velocity(velocity: Floats, force: Floats) -> float:
 
 def _gas_force(strokes: Sequence[Stroke]) -> tuple[float, str]:
     slow = [s for s in strokes if max(s.peak_velocity) <= _SLOW_VELOCITY]
-    if slow:
-        tests = f"from {len(slow)} slow tests, up to {1e3 * _SLOW_VELOCITY:g} mm/s"
-        return float(np.median([s.gas_force for s in slow])), tests
-    return float(np.median([s.gas_force for s in strokes])), "from the symmetry of the loops at mid-stroke, median"
+    tests = f"from {len(slow)} slow tests, up to {1e3 * _SLOW_VELOCITY:g} mm/s" if slow else "from mid-stroke forces"
+    gas = np.array([s.gas_force for s in slow or strokes])
+    damping = np.array([s.mid_damping_force for s in slow or strokes])
+    if gas.size >= 3 and damping.max() > 2 * damping.min() > 0:  # the sides differ in proportion to the damping force
+        return float(np.polyfit(damping, gas, 1, w=1 / damping)[1]), f"{tests}, extrapolated to no damping"
+    return float(np.median(gas)), f"{tests}, median"
 
 
 def _friction(strokes: Sequence[Stroke]) -> tuple[float, str]:
     lowest = [s for s in strokes if s.condition.current_A == min(s.condition.current_A for s in strokes)]
-    half = np.array([(s.mid_force[0] - s.mid_force[1]) / 2 for s in lowest])
+    half = np.array([s.mid_damping_force for s in lowest])
     speed = np.array([s.condition.peak_velocity for s in lowest])
     level = f"{lowest[0].condition.current_A:g} A"
     if speed.min() <= _SLOW_VELOCITY:

@@ -29,11 +29,12 @@ def peak_velocity_plot(
         for current in specimen.currents:
             strokes = specimen.at(current)
             for side, sign in ((0, 1.0), (1, -1.0)):
-                ordered = sorted(strokes, key=lambda s: s.peak_velocity[side])
-                x = [s.peak_velocity[side] for s in ordered]
-                y = [sign * specimen.damping_force(s, side) for s in ordered]
-                style = {"ms": 3.5, "lw": 1.0, "ls": "-" if mark == _MARKS[0] else "--", "color": colours[current]}
-                axes.plot(x, y, mark, label="" if side else _key(name, current, specimens), **style)
+                x = [s.peak_velocity[side] for s in strokes]
+                y = [sign * specimen.damping_force(s, side) for s in strokes]
+                speeds, forces = specimen.curve(current, side)
+                key = "" if side else _key(name, current, specimens)
+                axes.plot(speeds, sign * forces, ls="-" if mark == _MARKS[0] else "--", lw=1.0, color=colours[current])
+                axes.plot(x, y, mark, label=key, ms=3.5, color=colours[current])
     for current, velocity, lower, upper in limits:
         near = min(colours, key=lambda level: abs(level - current))
         axes.plot([velocity, velocity], [lower, upper], color=colours[near], lw=1.4)
