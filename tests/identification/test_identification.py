@@ -74,7 +74,7 @@ def test_mass_and_stiffness_together_are_refused(condition):
 
 
 def test_result_says_that_the_mass_was_left_out(condition):
-    assert any("mass left out" in note for note in identify(synthetic_run(condition)).notes)
+    assert any("mass not identified" in note for note in identify(synthetic_run(condition)).notes)
 
 
 @pytest.mark.parametrize(

@@ -46,6 +46,13 @@ def test_a_refused_run_exits_with_two_and_says_why(tmp_path):
     assert "E_DISSIPATION_SIGN" in result.output
 
 
+def test_a_finding_of_several_runs_is_printed_once_with_their_number(tmp_path):
+    runs = [to_run(replace(clean_record(n, cycles=4), id=f"5Hz_{n}")) for n in (3, 4)]
+    save_dataset(Dataset(tuple(runs)), tmp_path / "rig")
+    assert check(tmp_path / "rig").stderr.count("[W_NAME], in 2 tests") == 1
+    assert check(tmp_path / "rig", "--verbose").stderr.count("[W_NAME]\n") == 2
+
+
 def test_json_holds_numbers(folder):
     rows = json.loads(check(folder, "--json").stdout)
     assert [row["verdict"] for row in rows] == ["good", "not identified"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from mrdamper.errors import InputError, OutputError
 if TYPE_CHECKING:
     from mrdamper.physics.gas_spring import GasSpring
     from mrdamper.report.plots.figure import Figure
+    from mrdamper.rig_files.record import Finding
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -74,6 +75,18 @@ def aligned(rows: Sequence[Sequence[str]], left: Collection[int] = (0,)) -> list
             for i, (cell, width) in enumerate(zip(row, widths, strict=True))
         ).rstrip()
         for row in rows
+    ]
+
+
+def finding_lines(findings: Iterable[tuple[str, Finding]], verbose: bool) -> list[str]:
+    """List the findings of tests, those of one code once with the number of its tests unless all are asked for."""
+    alike: dict[str, list[tuple[str, Finding]]] = {}
+    for name, finding in findings:
+        alike.setdefault(f"{name}: {finding}" if verbose else finding.code, []).append((name, finding))
+    counts = [len({name for name, _ in group}) for group in alike.values()]
+    return [
+        f"{group[0][0]}: {group[0][1]}" + (f", in {count} tests" if count > 1 else "")
+        for group, count in zip(alike.values(), counts, strict=True)
     ]
 
 

@@ -155,7 +155,7 @@ def _notes(problem: Problem) -> tuple[str, ...]:
     notes: list[str] = []
     names = {info.name for info in problem.model_type.parameters()}
     if "m" in names and "m" not in problem.free and not problem.fixed.get("m"):
-        notes.append("mass left out: on one frequency it is part of k1 (a = −ω² x); k1 holds k1 − m ω²")
+        notes.append("mass not identified: at one frequency it is part of k1 (a = −ω² x); k1 holds k1 − m ω²")
     if not problem.analysis.is_sine:
         notes.append(f"the motion is no pure sine (distortion {100 * problem.analysis.distortion:.1f} %)")
     if problem.run.window is None:

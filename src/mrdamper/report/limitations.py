@@ -203,7 +203,7 @@ def _identifications(identifications: Sequence[Identification]) -> list[str]:
     for note in dict.fromkeys(
         n for identification in identifications for n in identification.notes if n.lower().startswith("mass")
     ):
-        sentences.append(f"{note[0].upper()}{note[1:]}.")
+        sentences.append(f"Individual fits: {note}.")
     return sentences
 
 

@@ -344,7 +344,7 @@ def _scatter(rig: RigStudy) -> str:
     )
     return omitted + (
         f"Scatter between runs: gain {100 * drift.gain:.1f} %, offset {drift.offset:.0f} N (standard deviations of "
-        f"measured over predicted force). All errors are those of a future test session; {sessions}"
+        f"measured over predicted force). No error is corrected for the session; {sessions}"
         + (f" {rig.calibration.summary}." if rig.calibration else "")
     )
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mrdamper.cli.output import aligned, figure_kind, put, put_figure
+from mrdamper.cli.output import aligned, figure_kind, finding_lines, put, put_figure
 from mrdamper.cli.progress import watched
 from mrdamper.errors import InputError
 
@@ -40,6 +40,7 @@ app = typer.Typer()
 def check(
     data: Path | None = typer.Argument(None, help="Dataset folder, or an .fmu; default: the bundled tests."),
     figure: Path | None = typer.Option(None, help="Draw the loops with flagged samples: PNG, SVG or PDF."),
+    verbose: bool = typer.Option(False, "--verbose", help="Print the findings of every run."),
     as_json: bool = typer.Option(False, "--json", help="Print JSON instead of a table."),
 ) -> None:
     """Check the quality of every run of a dataset.
@@ -65,8 +66,8 @@ def check(
     for verdict in verdicts:
         if verdict.refusal is not None:
             typer.echo(f"refused: {verdict.refusal}", err=True)
-        for finding in verdict.findings:
-            typer.echo(f"{verdict.record.id}: {finding}", err=True)
+    for line in finding_lines(((v.record.id, finding) for v in verdicts for finding in v.findings), verbose):
+        typer.echo(line, err=True)
     if figure is not None:
         _draw(verdicts, figure)
     if any(verdict.refusal is not None for verdict in verdicts):

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mrdamper.cli.output import put_text, shortened
+from mrdamper.cli.output import finding_lines, put_text, shortened
 from mrdamper.cli.progress import progress_on_stderr
 from mrdamper.errors import InputError, OutputError, listed
 
@@ -255,7 +255,14 @@ def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = Fa
         current = "" if record.current is None else f", {_current(record)}"
         more = f", {record.provenance['columns']}" if columns else ""
         lines.append(f"{record.id}: {record.time.size} samples, {seconds:.4g} s{current}{more}")
-    for some, most in ((lines, 7), (_finding_lines(result, verbose), 4), (_refused_lines(result), 4)):
+    found = (
+        (record.id, finding)
+        for record in result.records
+        for finding in record.findings
+        if verbose or finding.code not in _OF_FORM
+    )
+    findings = [f"  {line}" for line in finding_lines(found, verbose)]
+    for some, most in ((lines, 7), (findings, 4), (_refused_lines(result), 4)):
         print("".join(f"{line}\n" for line in shortened(some, most, verbose)), end="")
     if result.left_out:
         print(f"left out, no tests or copies of tests: {listed(result.left_out, 5)}")
@@ -274,23 +281,6 @@ def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = Fa
         print(f"{would} would be written, {_count(result.refusals)} refused; --out DATASET writes")
     else:
         print("nothing written; correct or leave out the refused files, or give --skip-refused")
-
-
-def _finding_lines(result: ImportResult, verbose: bool) -> list[str]:
-    """List the findings, each once with the number of its tests; notes on the form of files on request only."""
-    if verbose:
-        return [f"  {record.id}: {finding}" for record in result.records for finding in record.findings]
-    alike: dict[str, list[tuple[str, str]]] = {}
-    for record in result.records:
-        for finding in record.findings:
-            if finding.code not in _OF_FORM:
-                alike.setdefault(finding.code, []).append((record.id, finding.text))
-    lines = []
-    for code, group in alike.items():
-        first = f"{group[0][0]}: {group[0][1]} [{code}]"
-        tests = {name for name, _ in group}
-        lines.append(f"  {first}" if len(tests) == 1 else f"  {first}, in {len(tests)} tests")
-    return lines
 
 
 def _refused_lines(result: ImportResult) -> list[str]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
-_NUMBER = r"(?<![\d.,x])(\d{1,4}(?:[.,x]\d{1,4})?)[ _]?"
+_NUMBER = r"(?<![\d.,x])(?<!\dp)(\d{1,4}(?:[.,xp]\d{1,4})?)[ _]?"
 _FREQUENCY = re.compile(_NUMBER + r"hz(?![a-z])", re.IGNORECASE)
 _AMPLITUDE = re.compile(_NUMBER + r"mm(?![a-z/]|[ _]?s)", re.IGNORECASE)
 _SAME_FREQUENCY = 0.2  # relative difference of what is measured
@@ -53,5 +53,5 @@ def agrees_with_its_name(view: View) -> Iterator[Finding]:
 
 def _stated(pattern: re.Pattern[str], name: str) -> float | None:
     """Return the one value a name states; None for none, for several, and for zero."""
-    values = {float(re.sub("[,x]", ".", number.lower())) for number in pattern.findall(name)}
+    values = {float(re.sub("[,xp]", ".", number.lower())) for number in pattern.findall(name)}
     return values.pop() if len(values) == 1 and 0.0 not in values else None
