@@ -45,6 +45,15 @@ def test_names_listed_in_a_remark_with_other_separators_and_the_sense_of_a_load_
     expect(tmp_path, 0.5)
 
 
+def test_a_column_with_one_session_states_the_session_of_the_test(tmp_path):
+    names = "time [s],displacement [mm],force [N],current [A],Session"
+    table(tmp_path / "a.csv", [names], T, X, force(0.5), np.full(T.shape, 0.5), np.full(T.shape, 3))
+    table(tmp_path / "b.csv", [names], T, X, force(1.0), np.full(T.shape, 1.0), (T > 1) + 3)
+    notes = [record.provenance for record in import_files([tmp_path]).records]
+    assert [note.get("session") for note in notes] == ["3", None]
+    assert [note.get("ignored_columns") for note in notes] == [None, "Session"]
+
+
 def test_channels_called_by_numbers_have_the_names_and_scales_that_a_line_gives_them(tmp_path):
     head = ["# channel 1: load cell 250 N/V; channel 2: LVDT 5 mm/V", "x-axis,1,2", "second,Volt,Volt"]
     table(tmp_path / "test_0.5A.csv", head, T, force(0.5) / 250, X / 5)

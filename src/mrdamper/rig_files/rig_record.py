@@ -67,8 +67,8 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
             findings.append(Finding("W_CUT", text))
     motion = stated_motion(stated_quantities(table.remarks, decimal=table.decimal))
     remarks = {
-        **_remarks(table, assigned),
         **recording_time(table.remarks),
+        **_remarks(table, assigned),
         "time_from": rate,
         "motion_stated": motion if len(stretches) == 1 else "",
     }
@@ -279,11 +279,14 @@ def _aligned(channels: dict[str, Floats], assigned: dict[str, Assigned], lines):
 def _remarks(table: RawTable, assigned: dict[str, Assigned]) -> dict[str, str]:
     used = {entry.column for entry in assigned.values()}
     columns = [i for i, header in enumerate(table.headers) if header.dimension in _KEPT]
+    sessions = [i for i, header in enumerate(table.headers) if header.name.casefold() == "session"]
+    session = table.words(sessions[0]).labels if table.words and len(sessions) == 1 else ()
+    columns += sessions if len(session) == 1 else []
     ignored = [name for i, name in enumerate(table.names) if name and i not in used and i not in columns]
     taken = [
         f"{role} = {table.names[e.column] or f'column {e.column + 1}'} in {e.unit}" for role, e in assigned.items()
     ]
-    remarks = {"columns": ", ".join(taken)}
+    remarks = {"columns": ", ".join(taken)} | ({"session": session[0]} if len(session) == 1 else {})
     if ignored:
         remarks["ignored_columns"] = listed(ignored, 20)
     return {key: as_data(text) for key, text in remarks.items()}
