@@ -32,5 +32,14 @@ def test_a_model_with_a_smaller_error_than_the_chosen_one_has_a_reason(bundled_s
         assert not any("by a standard error" in line for line in study_lines(study, [], verbose=True))
 
 
+def test_runs_that_a_model_of_sines_does_not_use_are_not_among_its_identification_runs(bundled_study):
+    rig = bundled_study.rigs[0]
+    other = next(candidate for candidate in rig.candidates if candidate.identifications)
+    shorter = replace(rig, candidates=(replace(other, identifications=other.identifications[:3]),))
+    assert any(
+        line.endswith(", 3 identification runs") for line in study_lines(replace(bundled_study, rigs=(shorter,)), [])
+    )
+
+
 def test_conditions_are_written_as_in_a_test_plan():
     assert [plain(v) for v in (1.5003, -0.0004, 0.500000000013146, 12.0, 0.25)] == ["1.5", "0", "0.5", "12", "0.25"]
