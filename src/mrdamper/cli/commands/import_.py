@@ -255,13 +255,13 @@ def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = Fa
         current = "" if record.current is None else f", {_current(record)}"
         more = f", {record.provenance['columns']}" if columns else ""
         lines.append(f"{record.id}: {record.time.size} samples, {seconds:.4g} s{current}{more}")
-    found = (
+    every = (
         (record.id, finding)
         for record in result.records
         for finding in record.findings
         if verbose or finding.code not in _OF_FORM
     )
-    findings = [f"  {line}" for line in finding_lines(found, verbose)]
+    findings = [f"  {line}" for line in finding_lines(every, verbose)]
     for some, most in ((lines, 7), (findings, 4), (_refused_lines(result), 4)):
         print("".join(f"{line}\n" for line in shortened(some, most, verbose)), end="")
     if result.left_out:
