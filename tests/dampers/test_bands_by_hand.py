@@ -364,3 +364,10 @@ def test_gains_are_expected_of_other_runs_of_the_session_and_bands_follow():
     assert moved.known_session == pytest.approx(tuple(1.2 * end for end in plain.known_session))
     assert moved.energy == plain.energy
     assert session_band(known, damper(None), PREDICTION, 0.8) is None
+
+
+def test_a_damper_gives_the_prediction_interval_of_its_prediction():
+    of_damper, by_function = damper().prediction_interval(PREDICTION, level=0.8), band(damper(), PREDICTION, 0.8)
+    assert by_function is not None
+    np.testing.assert_array_equal(of_damper.low, by_function.low)
+    assert of_damper.peak == by_function.peak

@@ -184,6 +184,10 @@ class Damper(Displayable):
         """Write the damper as JSON; see `mrdamper.save_model`."""
         import_module("mrdamper").save_model(self, path)
 
+    def prediction_interval(self, prediction: Prediction, level: float = 0.9) -> Any:
+        """Prediction intervals of a force that this damper predicted; see `mrdamper.dampers.bands.band`."""
+        return import_module("mrdamper.dampers.bands").band(self, prediction, level)
+
     def score(self, runs: Iterable[Run]) -> Any:
         """Score the predictions of runs or of a dataset; see `mrdamper.validate`."""
         return import_module("mrdamper").validate(self, runs)
