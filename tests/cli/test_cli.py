@@ -128,6 +128,7 @@ def test_validate_scores_the_models_rig(model):
     assert {r["run_id"][:3] for r in rows} == {"utf"}
     assert {"nrmse_pp", "nrmse_std", "wape", "energy_error", "extrapolation"} <= set(rows[0])
     assert "median nrmse_pp" in done.stderr
+    assert "; runs corrected for their session: 0" in done.stderr
     other = mrdamper("validate", model, "--rig", "labcontrol", "--split", "validate")
     assert other.stdout.count("lab_") == 7
 

@@ -117,7 +117,7 @@ def test_a_drift_is_told_by_its_size(rig, line, verdict):
     assert (untold.verdict, f"Forces change by {100 * (rig + line):+.1f} %" in untold.text) == ("cannot tell", True)
     few = [i for i, s in enumerate(sessions) if s < "S2"]
     two = drift(np.array(values)[few], *([each[i] for i in few] for each in (sessions, serials, golden)))
-    assert (two.verdict, two.text) == ("cannot tell", "2 sessions: a drift needs three or more.")
+    assert (two.verdict, two.text) == ("cannot tell", "sessions: 2; a drift needs three or more.")
 
 
 def test_false_alarms_are_rare():

@@ -145,7 +145,7 @@ def test_a_plan_says_what_its_numbers_are(reckoning, damper):
     today = np.sqrt(np.diag(np.linalg.inv(reckoning.prior)))
     then = np.sqrt(np.diag(np.linalg.inv(reckoning.precision([[3], []])))) / today
     best = reckoning.names[int(np.argmin(then))]
-    assert made[0].reason == f"{best} is then known to {100 * then.min():.0f} % of today's error"
+    assert made[0].reason == f"standard error of {best} falls to {100 * then.min():.0f} % of today's"
     assert then.min() < 1
     before, after = reckoning.spread([]), reckoning.spread(played)
     assert (made[0].before, made[-1].after) == (before, pytest.approx(after))

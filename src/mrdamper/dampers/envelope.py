@@ -40,7 +40,8 @@ class Beyond(NamedTuple):
             if self.value > high
             else ("below", 1 - self.value / low)
         )
-        by = f" by {100 * share:.0f} %" if share < 1 else f", {1 + share:.2g} times the largest" if high else ""
+        times = float(f"{1 + share:.2g}")
+        by = f" by {100 * share:.0f} %" if share < 1 else f", {times:g} times the largest" if high else ""
         return (
             f"{self.quantity} {scale * self.value:.3g} {unit} lies {side} the tested range "
             f"({scale * low:.3g} to {scale * high:.3g} {unit}){by}"

@@ -113,7 +113,7 @@ def drift(values: Floats, sessions: Sequence[str], serials: Sequence[str], golde
     """
     order = sorted(set(sessions))
     if len(order) < 3:
-        return Drift("cannot tell", np.nan, np.nan, f"{len(order)} sessions: a drift needs three or more.")
+        return Drift("cannot tell", np.nan, np.nan, f"sessions: {len(order)}; a drift needs three or more.")
     logs, at = np.log(np.maximum(values, 1e-12)), np.array([order.index(s) for s in sessions])
     watch = np.array(golden, dtype=bool)
     everyone = _by_session(logs, at, ~watch, len(order))

@@ -243,7 +243,7 @@ class ExperimentDesign:
                 precision = self.precision(so_far)
                 then = np.sqrt(np.diag(np.linalg.inv(precision))) / today
                 best, after = int(np.argmin(then)), math.sqrt(self.variance(precision))
-                reason = f"{self.names[best]} is then known to {100 * then[best]:.0f} % of today's error"
+                reason = f"standard error of {self.names[best]} falls to {100 * then[best]:.0f} % of today's"
                 proposals.append(
                     Proposal(session + 1, self.conditions[i], float(self.minutes[i]), reason, before, after)
                 )

@@ -113,6 +113,6 @@ def _print_summary(
         f"({validation.worst().run_id}), median energy error {100 * validation.median('energy_error'):.1f} %"
         + (f", scatter of the rig {100 * sorted(floors)[len(floors) // 2]:.2f} %" if floors else "")
         + (f"; {outside} runs extrapolate" if outside else "")
-        + f"; session known in {sum(run.session == KNOWN for run in validation.runs)}",
+        + f"; runs corrected for their session: {sum(run.session == KNOWN for run in validation.runs)}",
         err=True,
     )
