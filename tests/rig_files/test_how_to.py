@@ -54,7 +54,7 @@ def test_the_commands_of_the_page_do_what_it_says(place):
         expected = 2 if "nothing written" in printed else 0
         assert done.exit_code == expected, (arguments, done.output)
         for line in printed.splitlines():
-            if line.startswith(("dataset: ", "table of ")) or "validation runs: " in line:
+            if line.startswith(("dataset: ", "table of ", "my-rig: ", "  force error ")) or "validation runs: " in line:
                 assert line in done.output, (arguments, done.output)
         if "--write-tests" in arguments:
             table = place / "no-current" / "tests.csv"
