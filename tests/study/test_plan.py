@@ -330,3 +330,11 @@ def test_a_record_of_too_many_samples_is_refused_and_the_remedy_works():
     assert caught.value.code == "E_LIMITS"
     most = int(caught.value.remedy.split("at most ")[1].split()[0].replace(",", ""))
     assert replace(LIMITS, sample_rate_Hz=most * LIMITS.frequency_Hz[0] / LIMITS.cycles).sample_rate_Hz > 1e4
+
+
+def test_conditions_of_a_plan_have_three_digits_and_stay_inside_the_limits():
+    allowed = replace(LIMITS, current_A=(0.0, 1.6), frequency_Hz=(0.4999998, 4.0000006), amplitude_mm=(5.004, 12.345))
+    found = allowed.candidates(2.0)
+    assert {c.current_A for c in found} == {0.0, 0.533, 1.07, 1.6}
+    assert {c.frequency_Hz for c in found} == {0.5, 1.0, 2.0, 4.0}
+    assert {round(1e3 * c.amplitude_m, 9) for c in found} == {5.004, 6.76, 9.14, 12.3}

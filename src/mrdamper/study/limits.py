@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from mrdamper.dampers.base import Damper
-from mrdamper.data import Condition
+from mrdamper.data import Condition, Floats
 from mrdamper.rig_files.limits_file import LimitsError, load_part
 
 _MAX_SAMPLES = 500_000  # of a planned record
@@ -134,9 +134,9 @@ class Limits:
         InputError
             E_LIMITS if nothing is allowed, or the hours do not hold one record.
         """
-        current = np.unique(np.linspace(*self.current_A, _LEVELS))
+        current = _rounded(np.linspace(*self.current_A, _LEVELS))
         frequency, amplitude = (
-            np.unique(np.geomspace(*ends, _LEVELS)) for ends in (self.frequency_Hz, self.amplitude_mm)
+            _rounded(np.geomspace(*ends, _LEVELS)) for ends in (self.frequency_Hz, self.amplitude_mm)
         )
         conditions = [
             Condition(float(i), float(f), 1e-3 * float(a))
@@ -149,6 +149,11 @@ class Limits:
                 f"{hours:g} hours", f"a session with its shortest record takes {least:.1f} minutes with setting up"
             )
         return allowed
+
+
+def _rounded(levels: Floats) -> Floats:
+    """Levels of three digits, none of them beyond the first and the last one given."""
+    return np.unique(np.clip([float(f"{level:.3g}") for level in levels], levels[0], levels[-1]))
 
 
 def bad_limits(problem: str, remedy: str) -> LimitsError:

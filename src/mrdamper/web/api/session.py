@@ -27,7 +27,9 @@ def open_session(request: Request) -> dict[str, Any]:
     """Return a new session and what the page must know of the bench."""
     token, shown = request.app.state.token, request.headers.get("x-bench-token", "")
     if token is not None and not secrets.compare_digest(shown.encode(), token.encode()):
-        raise HTTPException(403, "Open the address that the terminal shows: its token is missing or of an older bench.")
+        raise HTTPException(
+            403, "Open the address that the terminal shows: its token is missing or of an earlier start of the app."
+        )
     session = request.app.state.sessions.open()
     if request.app.state.read_ahead:  # not before: it would compete with the page being loaded
         request.app.state.read_ahead = False
