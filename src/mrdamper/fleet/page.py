@@ -153,7 +153,7 @@ def _chart(values: Floats, first: Any, ranges: Any, average: Any, about: tuple[s
         place.line("x", chart.centre, color=PALETTE[1], lw=0.8)
         out = list(chart.signals)
         place.plot(at[out], chart.values[out], "o", color=PALETTE[2], ms=5, mfc="none")
-        place.label("number", name, title)
+        place.label("number", f"value ({about[1]})", title)
     return figure
 
 
