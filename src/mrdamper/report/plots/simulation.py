@@ -68,4 +68,5 @@ def power_spectral_density(signal: Floats, step: float, size: int) -> tuple[Floa
     window = np.hanning(size + 1)[:-1]
     lines = np.fft.rfft((segments - segments.mean(axis=1, keepdims=True)) * window)
     density = 2 * step * np.mean(np.abs(lines) ** 2, axis=0) / np.sum(window**2)
-    return np.fft.rfftfreq(size, step), density
+    frequencies: Floats = np.fft.rfftfreq(size, step).astype(float)
+    return frequencies, density
