@@ -320,7 +320,7 @@ def test_the_records_are_read_back(damper, tmp_path):
 def test_a_plan_beats_chance_and_the_factorial_grid_by_choosing_its_sessions():
     found = designs(reckoned(1), 2.0, 1)
     for other in ("random records, one session", "factorial grid, one session", "plan that ignores drift"):
-        assert found["plan"] < 0.7 * found[other], other
+        assert found["plan"] < 0.75 * found[other], other
     assert found["plan"] < 0.9 * found["random records, sessions as the plan"]
 
 

@@ -192,7 +192,7 @@ class GainsAndOffsets:
 
     @cached_property
     def rests(self) -> list[Floats]:
-        """What is left of the residuals of each run after all gains and offsets, and what they moved."""
+        """Residuals of each run without all gains and offsets, and without what these moved."""
         rests, by_gains = list[Floats](), self.by_gains()
         for run, slope in zip(self.runs, self.slopes, strict=True):
             rest, table = run.residual - slope @ by_gains, np.column_stack([run.predicted, np.ones(run.picked.size)])

@@ -9,7 +9,7 @@ error at cross-validated conditions in excess of the other two.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from mrdamper.dampers.calibration import Calibration, Growth
 from mrdamper.dampers.sessions import Sessions
-from mrdamper.data import Floats
+from mrdamper.data import Displayable, Floats
 from mrdamper.errors import InputError, listed
 from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, weaknesses, written
 
@@ -41,8 +41,8 @@ class FittedParameter:
     exponent: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Uncertainty:
+@dataclass(frozen=True, eq=False, repr=False)
+class Uncertainty(Displayable):
     """Uncertainty of the parameters and predictions of a damper.
 
     Attributes
@@ -109,6 +109,23 @@ class Uncertainty:
     sessions: Sessions | None = None
     calibration: Calibration | None = None
     growth: Growth = field(default_factory=Growth)
+
+    @property
+    def headline(self) -> str:
+        """Number of parameters, and what is known of the scatter and of prediction intervals."""
+        scatter = f"gain {100 * self.gain:.2g} % between sessions, " if self.of_sessions else ""
+        coverage = f"; {self.calibration.summary}" if self.calibration else ""
+        return (
+            f"uncertainty of {len(self.names)} parameters: {scatter}{100 * self.run_gain:.2g} % between runs, "
+            f"force of the model {100 * self.force:.2g} %{coverage}"
+        )
+
+    @property
+    def table(self) -> Mapping[str, Sequence[Any]]:
+        """Standard error of each parameter, or of its logarithm, and the degrees of freedom behind it."""
+        errors = np.sqrt(np.diag(self.covariance)).tolist()
+        names, logs, dof = list(self.names), list(self.logs), self.dof.tolist()
+        return {"parameter": names, "logarithm": logs, "standard_error": errors, "degrees_of_freedom": dof}
 
     @property
     def of_sessions(self) -> bool:

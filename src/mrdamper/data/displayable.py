@@ -71,3 +71,9 @@ def _cell(value: Any) -> str:
     if isinstance(value, float | np.floating):
         return f"{value:.4g}"
     return "" if value is None else str(value)
+
+
+def joined(parts: Sequence[Displayable]) -> dict[str, list[Any]]:
+    """Return the rows of all parts, which have the same columns."""
+    tables = [part.table for part in parts]
+    return {name: [value for table in tables for value in table[name]] for name in tables[0]}

@@ -11,10 +11,12 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from mrdamper.data import Dataset, Run
+from mrdamper.data import Dataset, Displayable, Run
+from mrdamper.data.displayable import joined
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import Identification
 from mrdamper.identification.basis import Basis
@@ -23,7 +25,9 @@ from mrdamper.study.parallel import worker_pool
 from mrdamper.study.recipe import IdentificationCache, Progress, Recipe, RecipeResult, StudyMethod, recipes
 from mrdamper.study.workflow import (
     accepted_runs,
+    headline_of,
     runs_for_global_fit,
+    table_of,
     usable_sines,
     with_unused_runs,
     without_contradictions,
@@ -35,8 +39,8 @@ RANKING = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class RigComparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class RigComparison(Displayable):
     """All recipes on one rig, the best on left-out conditions first.
 
     Attributes
@@ -58,15 +62,35 @@ class RigComparison:
     refused: Mapping[str, str]
     not_identified: Mapping[str, str]
 
+    @property
+    def headline(self) -> str:
+        """Rig, the model of the smallest cross-validation error, and its errors."""
+        return headline_of(self.rig, self.entries[0]) if self.entries else f"no model of rig {self.rig}"
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+    @property
+    def table(self) -> Mapping[str, Sequence[Any]]:
+        """A row a model, the smallest cross-validation error first."""
+        return table_of(self.rig, self.entries)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Displayable):
     """The comparison of a dataset, rig by rig."""
 
     dataset: Dataset
     rigs: tuple[RigComparison, ...]
     seconds: float
     jobs: int
+
+    @property
+    def headline(self) -> str:
+        """The model of the smallest cross-validation error, by rig."""
+        return f"comparison on {self.dataset.name} — " + "; ".join(rig.headline for rig in self.rigs)
+
+    @property
+    def table(self) -> Mapping[str, Sequence[Any]]:
+        """A row a model of every rig."""
+        return joined(self.rigs)
 
 
 def compare(

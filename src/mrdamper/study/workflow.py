@@ -23,6 +23,7 @@ from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.sessions import Sessions, known_errors
 from mrdamper.data import Dataset, Displayable, Floats, Run
+from mrdamper.data.displayable import joined
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError, validate_arguments
 from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
@@ -61,6 +62,24 @@ _SIZES: tuple[tuple[str, str, int, Callable[[Run], float]], ...] = (
 CONDITION = "condition"  # kind of fold: the runs of one condition, a stretch of another record
 AWAY = ("current", "fastest motions")  # kinds that tell how errors grow away from the tests
 STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the one everybody compares with
+
+
+def headline_of(rig: str, result: RecipeResult) -> str:
+    """Return rig, model and its errors in a line."""
+    kinds = {"cross-validation": result.cross_validated, "validation": result.validation}
+    errors = ", ".join(f"{kind} {100 * s.median():.2f} %" if s.runs else f"no {kind} runs" for kind, s in kinds.items())
+    return f"{f'rig {rig}: ' if rig else ''}{result.title}, {errors} (median nrmse_pp)"
+
+
+def table_of(rig: str, results: Sequence[RecipeResult]) -> dict[str, list[Any]]:
+    """Return columns with a row for each model of a rig."""
+    return {
+        "rig": [rig] * len(results),
+        "model": [result.title for result in results],
+        "parameters": [result.damper.parameter_count for result in results],
+        "cv_nrmse_pp": [result.cross_validated.median() for result in results],
+        "validation_nrmse_pp": [result.validation.median() for result in results],
+    }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -102,24 +121,12 @@ class RigStudy(Displayable):
     @property
     def headline(self) -> str:
         """Rig, chosen model and its errors."""
-        chosen = self.chosen
-        kinds = {"cross-validation": chosen.cross_validated, "validation": chosen.validation}
-        errors = ", ".join(
-            f"{kind} {100 * s.median():.2f} %" if s.runs else f"no {kind} runs" for kind, s in kinds.items()
-        )
-        return f"{f'rig {self.rig}: ' if self.rig else ''}{chosen.title}, {errors} (median nrmse_pp)"
+        return headline_of(self.rig, self.chosen)
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
         """A row a candidate, the chosen one first."""
-        candidates = self.candidates
-        return {
-            "rig": [self.rig] * len(candidates),
-            "model": [c.title for c in candidates],
-            "parameters": [c.damper.parameter_count for c in candidates],
-            "cv_nrmse_pp": [c.cross_validated.median() for c in candidates],
-            "validation_nrmse_pp": [c.validation.median() for c in candidates],
-        }
+        return table_of(self.rig, self.candidates)
 
     @property
     def folds(self) -> Sequence[Mapping[str, tuple[float, float]]]:
@@ -180,8 +187,7 @@ class Study(Displayable):
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
         """A row a candidate of every rig."""
-        tables = [rig.table for rig in self.rigs]
-        return {name: [value for table in tables for value in table[name]] for name in tables[0]}
+        return joined(self.rigs)
 
     @property
     def model(self) -> Damper:
