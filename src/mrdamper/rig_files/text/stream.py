@@ -24,16 +24,8 @@ _BOMS = (
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
-_LOCAL = (
-    "cp1250",
-    "cp1251",
-    "cp1253",
-    "cp1254",
-    "mac_roman",
-    "koi8_r",
-    "cp866",
-    "iso8859_2",
-)  # a byte a character, as cp1252
+# A byte a character, as cp1252
+_LOCAL = ("cp1250", "cp1251", "cp1253", "cp1254", "mac_roman", "koi8_r", "cp866", "iso8859_2")
 _MULTIBYTE = ("cp932", "gb18030", "cp949", "big5", "shift_jis", "euc_jp", "gbk", "gb2312", "euc_kr")
 _NAMES = 16 * 1024  # bytes in which the names of columns stand
 _TEXT = bytes(b for b in range(256) if b >= 32 or b in b"\t\n\r\f\v")
