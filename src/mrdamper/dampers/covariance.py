@@ -147,17 +147,22 @@ class _Spread:
         """Add to the draws what their linearisation omits, of one model of a damper.
 
         Some draws are fitted without linearisation. How far each of these fits is from the linearised fit to the same
-        draw, its bias included, is added to a draw at random: it depends little on the change it departs from.
+        draw, its bias included, is added to a draw at random, but for the part in proportion to the linearised change
+        where that makes it larger.
         """
         moved = self.draws.moved
         if damper.one_model is None or not moved.any():
             return self
+        some = moved[:_REFITS]
         shifts = np.concatenate([np.zeros((1, len(parts), 2)), self.draws.shifts[:_REFITS]])
-        starts = np.concatenate([np.zeros((1, len(self.names))), moved[:_REFITS]])
+        starts = np.concatenate([np.zeros((1, len(self.names))), some])
         fits = refitted(damper, parts, self.rests, self.names, shifts, starts)
-        departures: Floats = fits[1:] - fits[0] - moved[:_REFITS]
-        chosen = np.random.default_rng(_SEED).integers(len(departures), size=len(moved))
-        return replace(self, draws=replace(self.draws, moved=moved + departures[chosen]))
+        departures: Floats = fits[1:] - fits[0] - some
+        squares = np.maximum(np.sum(some**2, axis=0), np.finfo(float).tiny)
+        slope: Floats = np.maximum(np.sum(some * departures, axis=0) / squares, 0.0)
+        chosen = np.random.default_rng(_SEED).integers(len(some), size=len(moved))
+        more = (departures - slope * some)[chosen]
+        return replace(self, draws=replace(self.draws, moved=(1 + slope) * moved + more))
 
     @cached_property
     def quantiles(self) -> Floats:
