@@ -210,6 +210,7 @@ def test_where_nothing_is_known_there_is_no_band_and_its_reason():
     # Not below nothing, however unsure; one run of each kind has one degree of freedom.
     wild = replace(KNOWN, gain=9.0, session_dof=1.0, run_dof=1.0, dof=np.array([1.0, 1.0]))
     assert band(damper(wild), PREDICTION).peak[0] == 0.0
+    assert band(damper(wild), PREDICTION).energy[0] == -1.0
 
 
 def test_beyond_the_reach_of_its_units_a_factor_has_their_degrees_of_freedom():

@@ -39,7 +39,7 @@ class Band:
     peak : (float, float)
         Of half the peak-to-peak force [N].
     energy : (float, float)
-        Relative, around the predicted dissipated energy.
+        Relative, around the predicted dissipated energy, and not below -1: a damper takes energy up.
     known_session : (float, float)
         Peak force once the session's gain is known [N].
     """
@@ -124,7 +124,8 @@ def band(
     model = model + uncertainty.growth.variance("force", distance) * half**2
     return Band(
         force - width, force + width, np.sqrt(parameter), np.sqrt(session), np.sqrt(model),
-        (max(half - future, 0.0), half + future), (-loss, loss), (max(half - known_session, 0.0), half + known_session),
+        (max(half - future, 0.0), half + future), (-min(loss, 1.0), loss),
+        (max(half - known_session, 0.0), half + known_session),
     )  # fmt: skip
 
 
