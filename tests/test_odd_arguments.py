@@ -200,6 +200,11 @@ def test_no_door_and_no_argument_is_forgotten(tmp_path):
         assert wanted <= set(suits), name
 
 
+def test_a_folder_in_place_of_a_dataset_is_answered_with_what_reads_it():
+    with pytest.raises(InputError, match=r"'rig/'; give it as Dataset, which mrdamper.load_dataset\(folder\) reads"):
+        mrdamper.run_study("rig/")
+
+
 def test_arguments_that_a_function_does_not_have_are_answered_with_those_it_has():
     damper, t = joint_damper(), np.arange(100) / 100
     for call, says in (

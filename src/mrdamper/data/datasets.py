@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -41,6 +41,7 @@ class Dataset(Displayable):
     1.0
     """
 
+    made_by: ClassVar = "mrdamper.load_dataset(folder) reads"
     runs: tuple[Run, ...]
     name: str = "dataset"
 
