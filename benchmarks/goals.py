@@ -30,7 +30,7 @@ class Goal:
 
 
 _STUDY = "every fold of every candidate is fitted again, for both rigs: see the parts below"
-_STATE = "passes of NumPy over the record, and one tanh a sample, remain; hand-written C takes 2 ns"
+_STATE = "passes of NumPy that cut the record into strokes, and one tanh a sample, remain; hand-written C takes 2 ns"
 _IN_C = "other exponents than 1 and 2 read tables of degree five, and a step checks its input and makes the velocity"
 _MOTION = "seven harmonics, a smoothed motion and its strokes are made for every record"
 _STREAM = "a step is the whole force of the model, every parameter free to change, not the state alone"
