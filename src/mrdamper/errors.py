@@ -142,8 +142,8 @@ def _require_fit(name: str, value: object, kind: object) -> None:
         fits = False
     if not fits:
         wanted = getattr(kind, "__name__", str(kind)).replace("typing.", "")
-        made = f", which {how}" if (how := getattr(kind, "made_by", "")) else ""
-        raise InputError(f"{name} is {shown(value)}", remedy=f"give it as {wanted}{made}", code="E_ARGUMENT")
+        hint = f", which {how}" if (how := getattr(kind, "made_by", "")) else ""
+        raise InputError(f"{name} is {shown(value)}", remedy=f"give it as {wanted}{hint}", code="E_ARGUMENT")
 
 
 def _fits(value: Any, kind: Any) -> bool:
