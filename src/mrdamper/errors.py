@@ -142,7 +142,7 @@ def _require_fit(name: str, value: object, kind: object) -> None:
         fits = False
     if not fits:
         wanted = getattr(kind, "__name__", str(kind)).replace("typing.", "")
-        hint = f", which {how}" if (how := getattr(kind, "made_by", "")) else ""
+        hint = f", which {reader} reads" if (reader := getattr(kind, "read_by", "")) else ""
         raise InputError(f"{name} is {shown(value)}", remedy=f"give it as {wanted}{hint}", code="E_ARGUMENT")
 
 

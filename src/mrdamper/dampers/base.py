@@ -84,7 +84,7 @@ class Damper(Displayable):
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]  # what `dataclasses.replace` takes
-    made_by: ClassVar = "mrdamper.load_model(file) reads"
+    read_by: ClassVar = "mrdamper.load_model(file)"
     kind: ClassVar[str]
     saved: ClassVar[type[Saved]]
     conditional: ClassVar[bool] = False

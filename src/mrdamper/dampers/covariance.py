@@ -153,16 +153,16 @@ class _Spread:
         moved = self.draws.moved
         if damper.one_model is None or not moved.any():
             return self
-        some = moved[:_REFITS]
+        linear = moved[:_REFITS]
         shifts = np.concatenate([np.zeros((1, len(parts), 2)), self.draws.shifts[:_REFITS]])
-        starts = np.concatenate([np.zeros((1, len(self.names))), some])
+        starts = np.concatenate([np.zeros((1, len(self.names))), linear])
         fits = refitted(damper, parts, self.rests, self.names, shifts, starts)
-        departures: Floats = fits[1:] - fits[0] - some
-        squares = np.maximum(np.sum(some**2, axis=0), np.finfo(float).tiny)
-        slope: Floats = np.maximum(np.sum(some * departures, axis=0) / squares, 0.0)
-        chosen = np.random.default_rng(_SEED).integers(len(some), size=len(moved))
-        more = (departures - slope * some)[chosen]
-        return replace(self, draws=replace(self.draws, moved=(1 + slope) * moved + more))
+        departures: Floats = fits[1:] - fits[0] - linear
+        squares = np.maximum(np.sum(linear**2, axis=0), np.finfo(float).tiny)
+        slope: Floats = np.maximum(np.sum(linear * departures, axis=0) / squares, 0.0)
+        chosen = np.random.default_rng(_SEED).integers(len(linear), size=len(moved))
+        rest = (departures - slope * linear)[chosen]
+        return replace(self, draws=replace(self.draws, moved=(1 + slope) * moved + rest))
 
     @cached_property
     def quantiles(self) -> Floats:

@@ -113,11 +113,11 @@ class Uncertainty(Displayable):
     @property
     def headline(self) -> str:
         """Number of parameters, and what is known of the scatter and of prediction intervals."""
-        scatter = f"gain {100 * self.gain:.2g} % between sessions, " if self.of_sessions else ""
+        sessions = f"gain {100 * self.gain:.2g} % between sessions, " if self.of_sessions else "gain "
         coverage = f"; {self.calibration.summary}" if self.calibration else ""
         return (
-            f"uncertainty of {len(self.names)} parameters: {scatter}{100 * self.run_gain:.2g} % between runs, "
-            f"force of the model {100 * self.force:.2g} %{coverage}"
+            f"uncertainty of {len(self.names)} parameters: {sessions}{100 * self.run_gain:.2g} % between runs, "
+            f"model error of the force {100 * self.force:.2g} %{coverage}"
         )
 
     @property

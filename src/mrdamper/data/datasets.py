@@ -41,7 +41,7 @@ class Dataset(Displayable):
     1.0
     """
 
-    made_by: ClassVar = "mrdamper.load_dataset(folder) reads"
+    read_by: ClassVar = "mrdamper.load_dataset(folder)"
     runs: tuple[Run, ...]
     name: str = "dataset"
 

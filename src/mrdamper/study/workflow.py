@@ -323,7 +323,7 @@ def study_rig(
     trusted, distrusted = accepted_runs(dataset)
     everything, unusable = runs_for_global_fit(run for run in trusted if run.split == "train")
     unusable |= distrusted
-    refused = {name: unusable.get(name, f"{why}; play and bypass uses it") for name, why in refused.items()}
+    refused = {name: unusable.get(name, why) for name, why in refused.items()}
     refused = {one.run_id: str(one) for one in contradictions} | refused
     _require_runs(train, everything, unusable, f"rig {rig}" if rig else dataset.name)
     candidates, impossible = fit_and_score_all(

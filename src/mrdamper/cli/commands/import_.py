@@ -265,7 +265,7 @@ def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = Fa
     for some, most in ((lines, 7), (findings, 4), (_refused_lines(result), 4)):
         print("".join(f"{line}\n" for line in shortened(some, most, verbose)), end="")
     if result.left_out:
-        print(f"left out, no tests or copies of tests: {listed(result.left_out, 5)}")
+        print(f"not imported, no tests or copies of tests: {listed(result.left_out, 5)}")
     if any("profile" in refusal.error.remedy for refusal in result.refusals):
         print(
             "a profile answers once for all files: mrdamper import FILE --write-profile rig.toml, "
@@ -278,7 +278,7 @@ def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = Fa
         print(f"dataset: {out} ({total} runs{whence})")
     elif dry:
         would = _tests(len(result.records))
-        print(f"{would} would be written, {_count(result.refusals)} refused; --out DATASET writes")
+        print(f"{would} would be written, {_refused_tests(result.refusals)} refused; --out DATASET writes")
     else:
         print("nothing written; correct or leave out the refused files, or give --skip-refused")
 
@@ -303,12 +303,12 @@ def _refused_lines(result: ImportResult) -> list[str]:
         shown = listed(list(dict.fromkeys(str(file.relative_to(folder)) for file in files)), 3)
         first = "" if len({refusal.error.found for refusal in refusals}) == 1 else "the first of them: "
         remedy = f"; {error.remedy}" if error.remedy else ""
-        tests = _tests(_count(refusals))
+        tests = _tests(_refused_tests(refusals))
         lines.append(f"refused {tests} in {folder} ({shown}): {first}{error.found}{remedy} [{error.code}]")
     return lines
 
 
-def _count(refusals: Sequence[Refusal]) -> int:
+def _refused_tests(refusals: Sequence[Refusal]) -> int:
     """Return the number of tests that are refused, each for one reason or several."""
     return len({(refusal.file, refusal.run) for refusal in refusals})
 

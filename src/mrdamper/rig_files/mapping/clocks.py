@@ -14,6 +14,7 @@ from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_rate, stated_speed
 from mrdamper.rig_files.mapping.proposals import frequency_of, stated_frequencies
 from mrdamper.rig_files.profile import Profile
+from mrdamper.rig_files.quality.clock import COARSE_CLOCK
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.tokens import stamp
@@ -31,7 +32,6 @@ _EPOCH_NS = 9.4e17, 4.2e18  # the years 2000 to 2100 [ns since 1970]
 _LARGEST = 64 * 2**20  # bytes of a file whose clock without a unit is looked at
 _LONGEST = 5_000_000  # samples; a longer record lies in a file and is not read as a whole
 _SAME_RATE, _SAME_FREQUENCY = 0.2, 0.1  # relative differences of what is stated from what is measured
-_COARSE = 0.1  # share of the samples whose stamp is that of the one before
 _SAMPLES = 100_000  # looked at
 
 
@@ -147,7 +147,7 @@ def _with_samples_counted(table: RawTable, clock: int) -> RawTable:
     if values is None or not rate:
         return table
     factor, steps = table.headers[clock].factor, np.diff(values[clock])
-    coarse = steps.size and np.mean(steps == 0) > _COARSE and np.all(steps >= 0)
+    coarse = steps.size and np.mean(steps == 0) > COARSE_CLOCK and np.all(steps >= 0)
     if not coarse or abs(steps.size / rate - factor * np.sum(steps)) > factor * np.max(steps):
         return table
     note = Finding("W_CHOSEN", f"the clock repeats itself: time is counted at the {rate:g} Hz that the file states")

@@ -189,11 +189,8 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
         currents = every[0]
         if len(body) < _FEWEST_ROWS or any(value is None for value in currents):
             continue
-        if any(
-            a is not None and b is not None and contradicts(a, b)
-            for o in every
-            for a, b in zip(currents, o, strict=True)
-        ):
+        pairs = [pair for other in every[1:] for pair in zip(currents, other, strict=True)]
+        if any(a is not None and b is not None and contradicts(a, b) for a, b in pairs):
             continue  # of two coils
         others = [i for i in range(len(row)) if i not in columns]
         yield Results(

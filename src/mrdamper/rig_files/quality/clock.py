@@ -13,7 +13,7 @@ from mrdamper.rig_files.record import Finding
 
 GAP = 5.5  # steps this many times the usual one are a gap: up to 4 samples lost are none
 _DAY, _HOUR, _NEAR = 86_400.0, 3600.0, 60.0  # [s]
-_COARSE = 0.1  # share of the samples whose stamp is that of the one before
+COARSE_CLOCK = 0.1  # share of the samples whose stamp is that of the one before
 _CHUNK = 1_000_000  # samples looked at together, to keep memory small
 
 
@@ -30,7 +30,7 @@ def order_of_time(view: View) -> None:
             "E_TIME_DUPLICATE",
             f"time stamp {before:.9g} s is repeated {where}{more}",
             "write time with more decimals, or set [file] sample_rate_Hz = ... in a profile if the clock is too coarse"
-            if len(wrong) > _COARSE * view.record.time.size
+            if len(wrong) > COARSE_CLOCK * view.record.time.size
             else "write time with more decimals, or drop the repeated rows",
         )
     raise view.refused(

@@ -14,7 +14,6 @@ MOST_IN_A_ROW = 5
 _OVERFLOW = 1e100  # squares of larger numbers leave double precision
 _FEWEST = 5  # samples
 USED = ("time", "displacement", "force", "current", "velocity")  # what a run is made of
-
 _IN_TURN = 0.3  # share of missing samples of a channel that is logged in turn with others
 
 
