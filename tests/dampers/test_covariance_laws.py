@@ -10,7 +10,7 @@ from support.dampers import joint_damper
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.calibration import Calibration, PredictedRun, StandardizedErrors, model_error
 from mrdamper.dampers.concatenated_runs import JointResiduals
-from mrdamper.dampers.covariance import _determined, _Spread, _within, estimate_uncertainty
+from mrdamper.dampers.covariance import _determined, _representative, _Spread, _within, estimate_uncertainty
 from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.envelope import UNTESTED
 from mrdamper.dampers.joint import JointDamper, JointProblem
@@ -274,12 +274,10 @@ def test_where_no_gain_moves_the_parameters_the_degrees_of_freedom_are_those_wit
     assert spread.dof == pytest.approx(dof, rel=0.1)  # a quantile of 200,000 draws
 
 
-def test_draws_depart_from_linearised_fits_as_refits_do(monkeypatch):
-    """Departures add their mean square, and a departure that is common to all refits is a bias."""
+def test_draws_are_as_wide_as_refits_and_no_narrower_than_linearised_fits(monkeypatch):
     rng, names = np.random.default_rng(4), ("c", "fy")
-    draws = Draws(np.zeros((4000, 3, 2)), rng.standard_normal((4000, 2)), np.ones((4000, 2)))
+    draws = Draws(np.zeros((600, 3, 2)), rng.standard_normal((600, 2)), np.ones((600, 2)))
     spread = _Spread(names, [], np.eye(2), np.ones(2), draws, Effects(), [], np.ones(2), np.ones((3, 2)))
-    departures = np.column_stack([np.full(16, 3.0), np.resize([2.0, -2.0], 16)])
     start = np.array([[7.0, 5.0]])  # where the fit without gains ends
 
     def refits(damper, parts, rests, names, shifts, starts):
@@ -288,19 +286,34 @@ def test_draws_depart_from_linearised_fits_as_refits_do(monkeypatch):
         assert not shifts[0].any()
         return start + factor * starts + np.concatenate([np.zeros((1, 2)), departures])
 
+    def widened():
+        moved = spread.curved(joint_damper(), [None] * 3).draws.moved
+        factors = moved / draws.moved
+        assert factors == pytest.approx(np.broadcast_to(factors[0], factors.shape))
+        return factors[0]
+
     monkeypatch.setattr("mrdamper.dampers.covariance.refitted", refits)
-    factor = 1.0
-    moved = spread.curved(joint_damper(), [None] * 3).draws.moved
-    assert moved.mean(axis=0) == pytest.approx([3.0, 0.0], abs=0.3)
-    assert np.mean(moved**2, axis=0) == pytest.approx([1 + 9, 1 + 4], rel=0.2)
-    departures, factor = np.zeros((16, 2)), 1.5  # in proportion: it belongs to its draw, where it makes it larger
-    assert spread.curved(joint_damper(), [None] * 3).draws.moved == pytest.approx(1.5 * draws.moved)
-    factor = 0.0
-    moved = spread.curved(joint_damper(), [None] * 3).draws.moved
-    assert moved != pytest.approx(0.0 * draws.moved)
-    assert np.std(moved - draws.moved, axis=0) == pytest.approx(np.std(draws.moved[:16], axis=0), rel=0.05)
-    still = replace(spread, draws=replace(draws, moved=np.zeros((4000, 2))))
+    departures, factor = np.zeros((16, 2)), 1.5
+    assert widened() == pytest.approx([1.5, 1.5])
+    factor = 0.1
+    assert widened() == pytest.approx([1.0, 1.0])
+    departures, factor = np.tile([9.0, 0.0], (16, 1)), 1.0  # all refits are off to one side: their bias
+    assert widened() == pytest.approx([9.0 / np.sqrt(2 / np.pi), 1.0], rel=0.15)
+    departures = np.zeros((16, 2))
+    departures[5] = [16.0, 0.0]  # one refit far off: by mean squares 4 times as wide
+    assert 1.5 < widened()[0] < 2.5
+    still = replace(spread, draws=replace(draws, moved=np.zeros((600, 2))))
     assert still.curved(joint_damper(), [None] * 3) is still  # no gains, nothing to fit
+
+
+@pytest.mark.parametrize("count", [3, 15])
+def test_representative_draws_have_no_mean_and_the_mean_squares_of_all(count):
+    for seed in range(5):
+        moved = np.random.default_rng(seed).standard_normal((600, count)) * np.logspace(-3, 3, count)
+        chosen, unit = _representative(moved), np.sqrt(np.mean(moved**2, axis=0))
+        assert len(chosen) == 16
+        assert np.mean(moved[chosen], axis=0) / unit == pytest.approx(np.zeros(count), abs=0.2)
+        assert np.mean(moved[chosen] ** 2, axis=0) == pytest.approx(unit**2, rel=0.25)
 
 
 def test_what_gains_of_other_runs_moved_is_no_error_within_a_run():

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import (
@@ -31,6 +32,7 @@ from mrdamper.statistics.metrics import dissipated_power, peak_force
 _MAX_RUN_SHARE = 0.6  # share of the information on a parameter from which one run mainly determines it
 _MIN_EIGENVALUE = 1e-10  # of the largest of the scaled normal matrix, below which a direction is not determined
 _REFITS = 16  # draws of gains and offsets that are fitted without linearisation
+_EXCHANGES = 3  # rounds in which each of these draws is exchanged
 _SEED = 20261124  # of errors within the runs that are drawn beside those of sessions
 _MIN_RETAINED = 0.05  # share of the information on a direction that a fit without a condition has at least
 _LEVEL = 0.95  # of the intervals by which a parameter is identifiable or not
@@ -144,25 +146,21 @@ class _Spread:
         )  # fmt: skip
 
     def curved(self, damper: Damper, parts: Sequence[RunResiduals]) -> _Spread:
-        """Add to the draws what their linearisation omits, of one model of a damper.
+        """Widen the draws by what their linearisation omits, of one model of a damper.
 
-        Some draws are fitted without linearisation. How far each of these fits is from the linearised fit to the same
-        draw, its bias included, is added to a draw at random, but for the part in proportion to the linearised change
-        where that makes it larger.
+        Some draws are fitted without linearisation. By the mean absolute change of a parameter over that of the
+        linearised fits to the same draws, but no less, all draws are widened: one fit far off is no rule.
         """
         moved = self.draws.moved
         if damper.one_model is None or not moved.any():
             return self
-        linear = moved[:_REFITS]
-        shifts = np.concatenate([np.zeros((1, len(parts), 2)), self.draws.shifts[:_REFITS]])
-        starts = np.concatenate([np.zeros((1, len(self.names))), linear])
+        some = _representative(moved)
+        shifts = np.concatenate([np.zeros((1, len(parts), 2)), self.draws.shifts[some]])
+        starts = np.concatenate([np.zeros((1, len(self.names))), moved[some]])
         fits = refitted(damper, parts, self.rests, self.names, shifts, starts)
-        departures: Floats = fits[1:] - fits[0] - linear
-        squares = np.maximum(np.sum(linear**2, axis=0), np.finfo(float).tiny)
-        slope: Floats = np.maximum(np.sum(linear * departures, axis=0) / squares, 0.0)
-        chosen = np.random.default_rng(_SEED).integers(len(linear), size=len(moved))
-        rest = (departures - slope * linear)[chosen]
-        return replace(self, draws=replace(self.draws, moved=(1 + slope) * moved + rest))
+        linear = np.maximum(np.mean(np.abs(moved[some]), axis=0), np.finfo(float).tiny)
+        wider = np.maximum(np.mean(np.abs(fits[1:] - fits[0]), axis=0) / linear, 1.0)
+        return replace(self, draws=replace(self.draws, moved=wider * moved))
 
     @cached_property
     def quantiles(self) -> Floats:
@@ -194,6 +192,20 @@ class _Spread:
         """Return independent samples behind each parameter, of those that there are."""
         variance = np.maximum(np.diag(self.covariance), np.finfo(float).tiny)
         return dict(zip(self.names, np.minimum(self.textbook / variance, samples).tolist(), strict=True))
+
+
+def _representative(moved: Floats) -> NDArray[np.intp]:
+    """(`_REFITS`,) draws of which the mean is near zero and the mean square near that of all, by exchanges.
+
+    Sixteen draws at random may be a third larger or smaller than all.
+    """
+    unit: Floats = moved / np.maximum(np.sqrt(np.mean(moved**2, axis=0)), np.finfo(float).tiny)
+    table = np.concatenate([unit, unit**2 - 1], axis=1)
+    chosen = np.arange(_REFITS)
+    for at in [*range(_REFITS)] * _EXCHANGES:
+        others = table[np.delete(chosen, at)].sum(axis=0)
+        chosen[at] = np.argmin(np.sum((others + table) ** 2, axis=1))
+    return chosen
 
 
 def _identifiable(
