@@ -1,4 +1,4 @@
-"""Synthetic dampers of six families, integrated here without the models of the package, and three designs of tests.
+"""Synthetic dampers of six families, integrated here without the models of the package, and four designs of tests.
 
 Every damper has seal friction, a gas spring and a moving mass beside its controllable force. Its sizes are drawn: 200 N
 to 20 kN, strokes of 8 to 60 mm, full currents of 0.5 to 4 A.
@@ -14,16 +14,20 @@ import numpy as np
 
 from mrdamper.data import Floats, Run
 
-Design = Literal["matrix", "sparse", "random"]
-DESIGNS: tuple[Design, ...] = ("matrix", "sparse", "random")
+Design = Literal["matrix", "sparse", "random", "few"]
+Asked = Literal["corner", "current", "beyond", "tested"]
+DESIGNS: tuple[Design, ...] = ("matrix", "sparse", "random", "few")
 PER_CYCLE, FINE = 128, 24  # samples of a cycle; steps of the integration between them
 NOISE, DRIFT = 0.004, (0.003, 0.04)  # of half the peak-to-peak force; gain of a session, smallest and largest
 _CYCLES = 5
 _MOTIONS = ((0.5, 1.0), (1.0, 1.0), (2.0, 0.4), (0.5, 0.4), (1.0, 0.4))  # frequency and amplitude; sparse: three
 _CORNERS = ((0.0, 2.0, 1.0), (1.0, 2.0, 1.0), (0.6, 1.6, 0.9))  # current, frequency, amplitude, of the largest
 _CURRENTS = ((0.06, 1.0, 1.0), (0.42, 0.5, 1.0), (0.85, 2.0, 0.4))
+_BEYOND = ((1.2, 0.5, 1.0), (1.2, 1.0, 0.4), (1.3, 1.0, 1.0))
 _TESTED = ((0.0, 0.5, 1.0), (1.0, 1.0, 1.0), (1.0, 2.0, 0.4))  # in the full matrix and in the sparse one
-_LEVELS: Mapping[str, tuple[float, ...]] = {"matrix": (0.0, 0.25, 0.5, 0.75, 1.0), "sparse": (0.0, 1 / 3, 2 / 3, 1.0)}
+_LEVELS: Mapping[str, tuple[float, ...]] = {
+    "matrix": (0.0, 0.25, 0.5, 0.75, 1.0), "sparse": (0.0, 1 / 3, 2 / 3, 1.0), "few": (0.0, 0.5, 1.0),
+}  # fmt: skip
 _RECORDS, _LENGTH = 4, 30  # of the random design; cycles of the middle frequency in each
 
 
@@ -252,9 +256,9 @@ def tests_of(damper: SyntheticDamper, design: Design, rng: np.random.Generator) 
     return _recorded(damper, _sines(damper, asked), "sine", gains, rng)
 
 
-def asked_of(damper: SyntheticDamper, what: Literal["corner", "current", "tested"]) -> list[Run]:
-    """Clean runs at untested corners of the motions, at currents between the tested ones, or at tested conditions."""
-    asked = {"corner": _CORNERS, "current": _CURRENTS, "tested": _TESTED}[what]
+def asked_of(damper: SyntheticDamper, what: Asked) -> list[Run]:
+    """Clean runs at untested corners of the motions, at currents between the tested ones or beyond, or at tests."""
+    asked = {"corner": _CORNERS, "current": _CURRENTS, "beyond": _BEYOND, "tested": _TESTED}[what]
     return _recorded(damper, _sines(damper, asked), "sine", None, np.random.default_rng(0))
 
 

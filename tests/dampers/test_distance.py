@@ -28,8 +28,12 @@ def test_a_current_between_two_levels_is_away_by_the_product_of_its_distances():
     assert away(1.0, 1.0, 0.02) == away(-1.0, 1.0, 0.02)
 
 
-def test_a_current_beyond_the_levels_is_away_by_its_distance():
-    assert away(2.6, 1.0, 0.02) == Distance(0.0, pytest.approx(0.3 - 0.02), pytest.approx(0.0, abs=1e-12))
+def test_a_current_beyond_the_levels_is_away_by_the_product_of_its_distances_from_the_last_two():
+    beyond = (0.3 - 0.02) * (0.3 - 0.02 + 1.5 / 2.0)
+    assert away(2.6, 1.0, 0.02) == Distance(0.0, pytest.approx(beyond), pytest.approx(0.0, abs=1e-12))
+    alone = Envelope.of([Condition(2.0, *motion) for motion in MOTIONS])
+    assert away(3.0, 1.0, 0.02, alone).beyond == pytest.approx(0.48 * 1.48)  # no current is the other level
+    assert away(1.0, 1.0, 0.02, alone).beyond == pytest.approx(0.48 * 1.48)
     assert away(2.02, 1.0, 0.02).beyond == 0  # sessions repeat a level to some per cent
 
 
@@ -43,7 +47,7 @@ def test_a_motion_is_away_by_the_distance_from_the_hull_in_logarithms():
 def test_records_with_a_current_that_changes_pass_through_all_currents():
     record = TESTED.with_motion(np.array([0.0, 2.5]), np.array([-0.02, 0.02]), np.array([0.3]))
     assert away(2.4, 1.0, 0.02, record).beyond == 0 < away(2.4, 1.0, 0.02).beyond
-    assert away(3.0, 1.0, 0.02, record).beyond == pytest.approx(0.5 / 2.5 - 0.02)
+    assert away(3.0, 1.0, 0.02, record).beyond == pytest.approx((0.5 / 2.5 - 0.02) ** 2)
     assert away(1.0, 1.0, 0.02, record).between == 0
     assert away(1.0, 2.0, 0.02, record).motion < away(1.0, 2.0, 0.02).motion
     assert away(1.0, 4.0, 0.02, record).motion == pytest.approx(np.log(2 * np.pi * 4 * 0.02 / 0.3))

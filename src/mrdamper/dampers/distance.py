@@ -31,7 +31,7 @@ class Distance:
         Product of the distances of a current from its two tested neighbours, over the square of the largest tested
         current: the error of interpolation grows with it.
     beyond : float
-        Distance of a current from the tested ones, over the largest.
+        The same product from the two nearest tested currents on one side: the error of extrapolation grows with it.
     motion : float
         Euclidean distance from the hull of tested motions in ln f and ln A.
     """
@@ -63,14 +63,15 @@ def distance_from(
     current : (N,) array
         [A]
     swept_A : (float, float), optional
-        Lowest and highest current of tests in which it changed: none between them is far from the tests.
+        Lowest and highest current of tests in which it changed, and passed through all between them.
     """
     levels = np.array(sorted({*(swept_A or current_levels([abs(c.current_A) for c in tested]))}))
-    between, beyond = _current_distances(np.abs(current[:: max(1, current.size // _MAX_SAMPLES)]), levels)
+    some = np.abs(current[:: max(1, current.size // _MAX_SAMPLES)])
+    distances = _current_distances(some, levels, changing=swept_A is not None)
+    between, beyond = (float(np.sqrt(np.mean(distance**2))) for distance in distances)
     frequency, amplitude = _nearest(MotionHull.of(tested), at.frequency_Hz, at.amplitude_m)
     motion = np.hypot(np.log(at.frequency_Hz / frequency), np.log(at.amplitude_m / amplitude))
-    gaps = 0.0 if swept_A else float(np.sqrt(np.mean(between**2)))
-    return Distance(gaps, float(np.sqrt(np.mean(beyond**2))), float(motion))
+    return Distance(between, beyond, float(motion))
 
 
 @lru_cache(maxsize=4096)
@@ -79,11 +80,15 @@ def _nearest(hull: MotionHull, frequency: float, amplitude: float) -> tuple[floa
     return hull.nearest(frequency, amplitude)
 
 
-def _current_distances(current: Floats, levels: Floats) -> tuple[Floats, Floats]:
-    """Product of distances to the neighbouring levels, and distance beyond the outer ones; over the largest level."""
+def _current_distances(current: Floats, levels: Floats, changing: bool) -> tuple[Floats, Floats]:
+    """Products of the distances to the two nearest levels, between them and beyond them, over the largest squared."""
     largest = float(levels[-1]) or 1.0
-    after = np.clip(np.searchsorted(levels, current), 1, max(levels.size - 1, 1))
-    lower, upper = levels[after - 1], levels[np.minimum(after, levels.size - 1)]
-    between = np.maximum(current - lower, 0) * np.maximum(upper - current, 0) / largest**2
-    beyond = np.maximum(np.maximum(levels[0] - current, current - levels[-1]) / largest - _CURRENT_TOLERANCE, 0)
-    return between, beyond
+    outside = np.maximum(np.maximum(levels[0] - current, current - levels[-1]) / largest - _CURRENT_TOLERANCE, 0)
+    if changing:  # a record passes through all currents between its ends
+        return np.zeros_like(outside), outside**2
+    if levels.size == 1:
+        levels = np.array([0.0, largest])  # no current counts as the other level
+    after = np.clip(np.searchsorted(levels, current), 1, levels.size - 1)
+    lower, upper = levels[after - 1], levels[after]
+    between = np.maximum((current - lower) * (upper - current), 0) / largest**2
+    return between, outside * (outside + (upper - lower) / largest)
