@@ -187,28 +187,15 @@ class PortableBand:
 
     The force F of a loop with half its peak-to-peak force P lies within
     sqrt((gain F)² + offset_N² + (of_peak P)²) of the prediction, in a future test session.
-
-    Attributes
-    ----------
-    level : float
-    gain : float
-        Of the force.
-    offset_N : float
-        [N]
-    of_peak : float
-        Of half the peak-to-peak force: the model's own error and that of its parameters.
-    of_peak_untested : float
-        In its place at combinations inside the tested ranges that were not tested: that of the farthest one.
-    scope : str
-        Sessions it holds for, as a phrase.
     """
 
     level: float
-    gain: float
-    offset_N: float
-    of_peak: float
+    gain: float  # of the force
+    offset_N: float  # [N]
+    of_peak: float  # of half the peak-to-peak force: the model's own error and that of its parameters
+    # in its place at combinations inside the tested ranges that were not tested: that of the farthest one
     of_peak_untested: float
-    scope: str = ""
+    scope: str = ""  # sessions it holds for, as a phrase
 
 
 def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:

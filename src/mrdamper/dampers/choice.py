@@ -32,23 +32,12 @@ SEARCHED = ("leak", "cq", "qb")  # presets free from the first fit on: without t
 
 @dataclass(frozen=True)
 class ModelTerm:
-    """Optional term of a model.
-
-    Attributes
-    ----------
-    title : str
-    names : tuple of str
-        Parameters it takes.
-    neutral : tuple of float
-        Their values in the model without the term.
-    held : tuple of (str, float)
-        Presets of the model that the term holds at another value.
-    """
+    """Optional term of a model."""
 
     title: str
-    names: tuple[str, ...]
-    neutral: tuple[float, ...]
-    held: tuple[tuple[str, float], ...] = ()
+    names: tuple[str, ...]  # parameters it takes
+    neutral: tuple[float, ...]  # their values in the model without the term
+    held: tuple[tuple[str, float], ...] = ()  # presets of the model that the term holds at another value
 
 
 _NO_ONSET = (("Ic", _NO_ONSET_A),)
@@ -73,41 +62,23 @@ TERMS = (
 
 @dataclass(frozen=True)
 class TermTrial:
-    """Result of the cross-validation of one term.
-
-    Attributes
-    ----------
-    term : str
-    kept : bool
-    left_out : mapping of str to float
-        Mean cross-validated nrmse_pp with the term (if rejected) or without it (if kept), by kind of fold.
-    before : mapping of str to float
-        The same of the model it was tried on.
-    """
+    """Result of the cross-validation of one term."""
 
     term: str
     kept: bool
+    # mean cross-validated nrmse_pp with the term (if rejected) or without it (if kept), by kind of fold
     left_out: Mapping[str, float]
-    before: Mapping[str, float]
+    before: Mapping[str, float]  # the same of the model it was tried on
 
 
 @dataclass(frozen=True, eq=False)
 class JointChoice:
-    """Global model whose terms were selected by cross-validation.
-
-    Attributes
-    ----------
-    problem : JointProblem
-    fit : JointFit
-    tried : tuple of Tried
-    left_out : mapping of str to float
-        Mean cross-validated nrmse_pp by kind of fold: "condition", "current", "session".
-    """
+    """Global model whose terms were selected by cross-validation."""
 
     problem: JointProblem
     fit: JointFit
     tried: tuple[TermTrial, ...]
-    left_out: Mapping[str, float]
+    left_out: Mapping[str, float]  # mean cross-validated nrmse_pp by kind of fold: "condition", "current", "session"
 
 
 @on_one_blas_thread

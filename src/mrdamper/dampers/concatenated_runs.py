@@ -167,26 +167,13 @@ def _lasting(time: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class LinearSolution:
-    """Linear parameters solved for at a point.
-
-    Attributes
-    ----------
-    model : Model
-    residual : (N,) array
-        Weighted.
-    nrmse_pp : (R,) array
-        Of each run.
-    held : tuple of str
-        Linear parameters at a bound.
-    columns : (N, K) array
-        Weighted, of the others.
-    """
+    """Linear parameters solved for at a point."""
 
     model: Model
-    residual: Floats
-    nrmse_pp: Floats
-    held: tuple[str, ...]
-    columns: Floats
+    residual: Floats  # (N,) weighted
+    nrmse_pp: Floats  # (R,) of each run
+    held: tuple[str, ...]  # linear parameters at a bound
+    columns: Floats  # (N, K) weighted, of the others
 
 
 class ConcatenatedRuns:
@@ -354,22 +341,12 @@ class JointResiduals:
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """Linearisation of the residuals near a point of the search axes.
-
-    Attributes
-    ----------
-    table : JointResiduals
-    point : (D,) array
-    residual : (N,) array
-        Weighted: its squares sum to the cost.
-    jacobian : (N, D + L) array
-        By the search axes, then the linear parameters.
-    """
+    """Linearisation of the residuals near a point of the search axes."""
 
     table: JointResiduals
-    point: Floats
-    residual: Floats
-    jacobian: Floats
+    point: Floats  # (D,)
+    residual: Floats  # (N,) weighted: its squares sum to the cost
+    jacobian: Floats  # (N, D + L) by the search axes, then the linear parameters
 
     @cached_property
     def _triangles(self) -> list[Floats]:

@@ -23,22 +23,14 @@ _MAX_SAMPLES = 400  # samples of a current that are looked at
 
 @dataclass(frozen=True)
 class Distance:
-    """Distance from the tests, by what is away from them.
+    """Distance from the tests, by what is away from them."""
 
-    Attributes
-    ----------
-    between : float
-        Product of the distances of a current from its two tested neighbours, over the square of the largest tested
-        current: the error of interpolation grows with it.
-    beyond : float
-        The same product from the two nearest tested currents on one side: the error of extrapolation grows with it.
-    motion : float
-        Euclidean distance from the hull of tested motions in ln f and ln A.
-    """
-
+    # product of the distances of a current from its two tested neighbours, over the square of the largest tested
+    # current: the error of interpolation grows with it
     between: float = 0.0
+    # the same product from the two nearest tested currents on one side: the error of extrapolation grows with it
     beyond: float = 0.0
-    motion: float = 0.0
+    motion: float = 0.0  # Euclidean distance from the hull of tested motions in ln f and ln A
 
     @property
     def squares(self) -> Floats:

@@ -59,27 +59,14 @@ class SavedJoint(Saved):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class JointDamper(Damper):
-    """One model for all currents and motions of a damper.
-
-    Attributes
-    ----------
-    rig : str
-    model : Model
-        Takes the current from the motion.
-    free : tuple of str
-        Parameters determined from the data.
-    envelope : Envelope
-    provenance : mapping
-    coil : Coil, optional
-    uncertainty : Uncertainty, optional
-    """
+    """One model for all currents and motions of a damper."""
 
     kind: ClassVar[str] = "joint"
     saved: ClassVar[type[Saved]] = SavedJoint
 
     rig: str
-    model: Model
-    free: tuple[str, ...]
+    model: Model  # takes the current from the motion
+    free: tuple[str, ...]  # parameters determined from the data
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict[str, str])
     coil: Coil | None = None
@@ -155,30 +142,15 @@ def damper_of(given: Damper | Model) -> Damper:
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """A joint identification.
-
-    Attributes
-    ----------
-    damper : JointDamper
-    nrmse_pp : (R,) array
-        Error of each run, on the samples that entered.
-    at_bounds : tuple of str
-    point : (D,) array
-        Where the search ended, on its axes.
-    ending : StopReason
-    seconds : float
-    searched : tuple of str
-        Names of the search axes.
-    second : Valley, optional
-    """
+    """A joint identification."""
 
     damper: JointDamper
-    nrmse_pp: Floats
+    nrmse_pp: Floats  # (R,) error of each run, on the samples that entered
     at_bounds: tuple[str, ...]
-    point: Floats
+    point: Floats  # (D,) where the search ended, on its axes
     ending: StopReason
     seconds: float
-    searched: tuple[str, ...] = ()
+    searched: tuple[str, ...] = ()  # names of the search axes
     second: LocalMinimum | None = None
 
     @property
@@ -189,18 +161,12 @@ class JointFit:
 
 @dataclass(frozen=True)
 class LocalMinimum:
-    """Another local minimum of the search: another yield displacement with nearly the same error.
+    """Another local minimum of the search: another yield displacement with nearly the same error."""
 
-    Attributes
-    ----------
-    yield_length, error : float
-        [m]; mean nrmse_pp.
-    chosen_yield_length, chosen_error : float
-        Of the end that was chosen.
-    """
-
+    # yield_length and error: [m]; mean nrmse_pp
     yield_length: float
     error: float
+    # chosen_yield_length and chosen_error: of the end that was chosen
     chosen_yield_length: float
     chosen_error: float
 

@@ -29,21 +29,12 @@ _INPUTS = 4
 
 @dataclass(frozen=True, eq=False)
 class KernelLaw:
-    """A force of the instant: Gaussian kernels about centres.
+    """A force of the instant: Gaussian kernels about centres."""
 
-    Attributes
-    ----------
-    centres : (K, 4) array
-        Displacement, bent velocity, acceleration and current, each over its spread.
-    weights : (K,) array
-    spread : (4,) array
-    mean, size : float
-        Of the force [N].
-    """
-
-    centres: Floats
-    weights: Floats
-    spread: Floats
+    centres: Floats  # (K, 4) displacement, bent velocity, acceleration and current, each over its spread
+    weights: Floats  # (K,)
+    spread: Floats  # (4,)
+    # mean and size: of the force [N]
     mean: float
     size: float
 

@@ -36,23 +36,12 @@ Kind = Literal["bounded", "one-sided", "flat"]
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Minus twice the logarithm of the likelihood of a damper's parameters, zero at the estimate.
+    """Minus twice the logarithm of the likelihood of a damper's parameters, zero at the estimate."""
 
-    Attributes
-    ----------
-    damper : Damper
-        With its covariance.
-    names : tuple of str, length P
-        Its parameters, including those at a bound.
-    start : (P,) array
-        The estimate; logarithms where the damper has them.
-    covariance : (P, P) array
-    """
-
-    damper: Damper
-    names: tuple[str, ...]
-    start: Floats
-    covariance: Floats
+    damper: Damper  # with its covariance
+    names: tuple[str, ...]  # its parameters, including those at a bound
+    start: Floats  # (P,) the estimate; logarithms where the damper has them
+    covariance: Floats  # (P, P)
     logs: tuple[bool, ...]
     bounds: Floats
     parts: tuple[RunResiduals, ...]
@@ -158,26 +147,14 @@ def _coordinates(bounds: tuple[float, float], log: bool) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class LikelihoodProfile:
-    """Profile likelihood: the least misfit over all other parameters as one parameter varies.
-
-    Attributes
-    ----------
-    name, unit : str
-    values : (K,) array
-    fall : (K,) array
-        Minus twice the logarithm of the likelihood, over its least.
-    estimate : float
-    interval : (float, float)
-        Ends of the interval within which the fall is below 3.84; infinite on an open side.
-    kind : "bounded", "one-sided" or "flat"
-    """
+    """Profile likelihood: the least misfit over all other parameters as one parameter varies."""
 
     name: str
     unit: str
-    values: Floats
-    fall: Floats
+    values: Floats  # (K,)
+    fall: Floats  # (K,) minus twice the logarithm of the likelihood, over its least
     estimate: float
-    interval: tuple[float, float]
+    interval: tuple[float, float]  # ends of the interval within which the fall is below 3.84; infinite on an open side
     kind: Kind
 
 

@@ -57,18 +57,7 @@ _EXTRAPOLATED_AMPLITUDE = 2.0  # largest amplitude over the largest tested one, 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ModifiedModel(Damper):
-    """A model whose parameters are functions of current, frequency and amplitude.
-
-    Attributes
-    ----------
-    rig : str
-    parameters : ParameterMap
-    envelope : Envelope
-    provenance : mapping
-        What it was made from.
-    coil : Coil, optional
-    uncertainty : Uncertainty, optional
-    """
+    """A model whose parameters are functions of current, frequency and amplitude."""
 
     kind: ClassVar[str] = "modified"
     saved: ClassVar[type[Saved]] = SavedModified
@@ -77,7 +66,7 @@ class ModifiedModel(Damper):
     rig: str
     parameters: ParameterMap
     envelope: Envelope
-    provenance: Mapping[str, str] = field(default_factory=dict[str, str])
+    provenance: Mapping[str, str] = field(default_factory=dict[str, str])  # what it was made from
     coil: Coil | None = None
     uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 
@@ -178,26 +167,15 @@ class ModifiedModel(Damper):
 
 @dataclass(frozen=True, eq=False)
 class ModifiedFit:
-    """A modified model and how each of its functions was found.
-
-    Attributes
-    ----------
-    damper : ModifiedModel
-    functions : mapping of str to FunctionFit
-    values : mapping of str to (N,) array
-        The identified values behind each function.
-    conditions : tuple of Condition
-    at_bounds : tuple of str
-        Coordinates whose function leaves what was looked for, or a bound of the parameter at a test.
-    refused : mapping of str to str
-        Forms that broke a law of physics, by coordinate and name, and which.
-    """
+    """A modified model and how each of its functions was found."""
 
     damper: ModifiedModel
     functions: Mapping[str, FunctionFit]
-    values: Mapping[str, Floats]
+    values: Mapping[str, Floats]  # (N,) the identified values behind each function
     conditions: tuple[Condition, ...]
+    # coordinates whose function leaves what was looked for, or a bound of the parameter at a test
     at_bounds: tuple[str, ...] = ()
+    # forms that broke a law of physics, by coordinate and name, and which
     refused: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property

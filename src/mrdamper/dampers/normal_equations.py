@@ -46,36 +46,19 @@ _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose 
 
 @dataclass(frozen=True, eq=False)
 class Condensed:
-    """Runs of one rig, condensed for one model type.
-
-    Attributes
-    ----------
-    model_type : type of Model
-    linear : tuple of str
-        Coordinates the force is linear in, in the order of the Gram matrices.
-    shape : str
-        The one shape coordinate.
-    run_ids : tuple of str, length R
-    conditions : tuple of Condition, length R
-    scale : (R,) array
-        Peak-to-peak force [N].
-    ladder : (K,) array
-        Values of the shape coordinate, evenly in the logarithm.
-    gram : (R, K, L+1, L+1) array
-        Mean products of the columns and, last, the measured force over its peak-to-peak
-        value, at each value of the ladder.
-    bend : (R, K, L+1, L+1) array
-        Their second derivatives along the ladder, counted in rungs, as a cubic spline has them.
-    """
+    """Runs of one rig, condensed for one model type."""
 
     model_type: type[Model]
-    linear: tuple[str, ...]
-    shape: str
-    run_ids: tuple[str, ...]
-    conditions: tuple[Condition, ...]
-    scale: Floats
-    ladder: Floats
+    linear: tuple[str, ...]  # coordinates the force is linear in, in the order of the Gram matrices
+    shape: str  # the one shape coordinate
+    run_ids: tuple[str, ...]  # length R
+    conditions: tuple[Condition, ...]  # length R
+    scale: Floats  # (R,) peak-to-peak force [N]
+    ladder: Floats  # (K,) values of the shape coordinate, evenly in the logarithm
+    # (R, K, L+1, L+1) mean products of the columns and, last, the measured force over its peak-to-peak value, at each
+    # value of the ladder
     gram: Floats
+    # (R, K, L+1, L+1) their second derivatives along the ladder, counted in rungs, as a cubic spline has them
     bend: Floats
 
     def only(self, rows: Sequence[int]) -> Condensed:
@@ -234,37 +217,20 @@ def law_of(form: str | Law) -> Law:
 
 @dataclass(frozen=True, eq=False)
 class FormChoice:
-    """Forms chosen for a joint fit.
-
-    Attributes
-    ----------
-    forms : mapping of str to str or Law
-    fit : JointFit
-    refused : mapping of str to str
-        Forms that broke a law of physics, and which.
-    """
+    """Forms chosen for a joint fit."""
 
     forms: Mapping[str, str | Law]
     fit: JointFunctionFit
-    refused: Mapping[str, str]
+    refused: Mapping[str, str]  # forms that broke a law of physics, and which
 
 
 @dataclass(frozen=True, eq=False)
 class JointFunctionFit:
-    """A parameter map fitted to all runs at once.
-
-    Attributes
-    ----------
-    parameters : ParameterMap
-    nrmse_pp : (R,) array
-        Error of each run (of the condensed runs; the linear parameters unbounded).
-    at_bounds : tuple of str
-        The shape coordinate, where its function leaves what was looked for.
-    """
+    """A parameter map fitted to all runs at once."""
 
     parameters: ParameterMap
-    nrmse_pp: Floats
-    at_bounds: tuple[str, ...] = ()
+    nrmse_pp: Floats  # (R,) error of each run (of the condensed runs; the linear parameters unbounded)
+    at_bounds: tuple[str, ...] = ()  # the shape coordinate, where its function leaves what was looked for
 
 
 @on_one_blas_thread

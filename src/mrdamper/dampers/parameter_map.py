@@ -13,20 +13,12 @@ from mrdamper.statistics.functions.motion_hull import MotionHull
 
 @dataclass(frozen=True, eq=False)
 class ParameterMap:
-    """A model type with one function per parameter: the modified model.
-
-    Attributes
-    ----------
-    model_type : type of Model
-    functions : mapping of str to ParameterFunction
-        By parameter, or by a coordinate the model can be built from.
-    motions : MotionHull, optional
-        Tested motions: outside them the functions are those of the nearest one. Without, they follow any
-        motion, as the functions of a publication do.
-    """
+    """A model type with one function per parameter: the modified model."""
 
     model_type: type[Model]
-    functions: Mapping[str, ParameterFunction]
+    functions: Mapping[str, ParameterFunction]  # by parameter, or by a coordinate the model can be built from
+    # tested motions: outside them the functions are those of the nearest one. Without, they follow any motion, as the
+    # functions of a publication do
     motions: MotionHull | None = None
 
     def __post_init__(self) -> None:

@@ -19,25 +19,13 @@ _MIN_AUTOCORRELATION_TIMES, _MAX_RHAT = 50, 1.01  # autocorrelation times a chai
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Draws from the posterior of a damper's numbers, flat priors within their bounds.
+    """Draws from the posterior of a damper's numbers, flat priors within their bounds."""
 
-    Attributes
-    ----------
-    names : tuple of str, length P
-    values : (N, P) array
-    time : float
-        Longest autocorrelation time [steps].
-    steps : int
-        Of each walker, after what was thrown away.
-    split_rhat : float
-        Largest split-R̂ of any number.
-    """
-
-    names: tuple[str, ...]
-    values: Floats
-    time: float
-    steps: int
-    split_rhat: float
+    names: tuple[str, ...]  # length P
+    values: Floats  # (N, P)
+    time: float  # longest autocorrelation time [steps]
+    steps: int  # of each walker, after what was thrown away
+    split_rhat: float  # largest split-R̂ of any number
 
 
 def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed: int = 1) -> Samples:

@@ -31,21 +31,13 @@ _MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight, as in t
 
 @dataclass(frozen=True)
 class Effects:
-    """Standard deviations of gains and offsets; zero degrees of freedom where these runs cannot show them.
+    """Standard deviations of gains and offsets; zero degrees of freedom where these runs cannot show them."""
 
-    Attributes
-    ----------
-    gain, offset : float
-        Between sessions, of the force as a share and as a shift [N].
-    session_dof : float
-    run_gain, run_offset : float
-        Between runs of one session [-] and [N].
-    run_dof : float
-    """
-
+    # gain and offset: between sessions, of the force as a share and as a shift [N]
     gain: float = 0.0
     offset: float = 0.0
     session_dof: float = 0.0
+    # run_gain and run_offset: between runs of one session [-] and [N]
     run_gain: float = 0.0
     run_offset: float = 0.0
     run_dof: float = 0.0
@@ -53,21 +45,11 @@ class Effects:
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Draws of gains and offsets, and fits to them.
+    """Draws of gains and offsets, and fits to them."""
 
-    Attributes
-    ----------
-    shifts : (D, R, 2) array
-        Gains and offsets of the runs [-, N].
-    moved : (D, P) array
-        Change of the parameters.
-    shown : (D, P) array
-        Variance of the parameters that the residuals of a draw would show, over that of the draws.
-    """
-
-    shifts: Floats
-    moved: Floats
-    shown: Floats
+    shifts: Floats  # (D, R, 2) gains and offsets of the runs [-, N]
+    moved: Floats  # (D, P) change of the parameters
+    shown: Floats  # (D, P) variance of the parameters that the residuals of a draw would show, over that of the draws
 
 
 class GainsAndOffsets:

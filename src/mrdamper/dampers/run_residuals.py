@@ -22,24 +22,15 @@ _MIN_STRETCH = 10  # samples in which the spectrum of a residual is looked for
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Evenly spaced samples of a run: their residuals have a spectrum.
+    """Evenly spaced samples of a run: their residuals have a spectrum."""
 
-    Attributes
-    ----------
-    time, velocity, predicted, residual : (M,) arrays
-        [s], [m/s], [N], and predicted minus measured force [N].
-    weight : float
-        Of each residual in the fit [1/N].
-    frequency : float or None
-        Of a steady sine [Hz].
-    """
-
+    # time, velocity, predicted and residual: (M,) [s], [m/s], [N], and predicted minus measured force [N]
     time: Floats
     velocity: Floats
     predicted: Floats
     residual: Floats
-    weight: float
-    frequency: float | None
+    weight: float  # of each residual in the fit [1/N]
+    frequency: float | None  # of a steady sine [Hz]
 
     @classmethod
     def of(cls, whole: Prediction, run: Run, samples: slice, square: float, frequency: float | None = None) -> Stretch:
@@ -51,42 +42,20 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class RunResiduals:
-    """Samples of a run that enter, what the fit left of them, and their weights.
-
-    Attributes
-    ----------
-    run : Run
-    session : str or None
-        None where it is not known.
-    prediction : Prediction
-        Along the samples that are simulated.
-    picked : (N,) array of int
-        Samples of the prediction: those of the joint fit, ramps and rests among them, where one model describes the
-        damper, else evenly spaced ones of the steady window.
-    residual : (N,) array
-        Predicted minus measured force [N].
-    scale : float
-        Peak-to-peak measured force [N].
-    error : float
-        nrmse_pp, by the time that samples represent; at least that from which a run gains no more weight.
-    information : float
-        Weight of the run by its length, as in the joint fit.
-    weight : (N,) array
-        Of each residual in the fit [1/N].
-    stretches : sequence of Stretch
-        The steady window, then what lies before and after it.
-    """
+    """Samples of a run that enter, what the fit left of them, and their weights."""
 
     run: Run
-    session: str | None
-    prediction: Prediction
+    session: str | None  # None where it is not known
+    prediction: Prediction  # along the samples that are simulated
+    # (N,) samples of the prediction: those of the joint fit, ramps and rests among them, where one model describes the
+    # damper, else evenly spaced ones of the steady window
     picked: NDArray[np.intp]
-    residual: Floats
-    scale: float
-    error: float
-    information: float
-    weight: Floats
-    stretches: Sequence[Stretch]
+    residual: Floats  # (N,) predicted minus measured force [N]
+    scale: float  # peak-to-peak measured force [N]
+    error: float  # nrmse_pp, by the time that samples represent; at least that from which a run gains no more weight
+    information: float  # weight of the run by its length, as in the joint fit
+    weight: Floats  # (N,) of each residual in the fit [1/N]
+    stretches: Sequence[Stretch]  # the steady window, then what lies before and after it
 
     @classmethod
     def of(cls, damper: Damper, run: Run) -> RunResiduals:

@@ -58,27 +58,15 @@ class RecordingTime:
 
 @dataclass(frozen=True)
 class GainOffset:
-    """Gain and offset that fit a prediction p to a run by least squares: gain · p + offset.
-
-    Attributes
-    ----------
-    gain : float
-    offset : float
-        [N]
-    mean, square : float
-        Mean of p [N] and of p² [N²].
-    rest : float
-        Mean square of what is left [N²].
-    pp : float
-        Peak-to-peak measured force [N].
-    """
+    """Gain and offset that fit a prediction p to a run by least squares: gain · p + offset."""
 
     gain: float
-    offset: float
+    offset: float  # [N]
+    # mean and square: mean of p [N] and of p² [N²]
     mean: float
     square: float
-    rest: float
-    pp: float
+    rest: float  # mean square of what is left [N²]
+    pp: float  # peak-to-peak measured force [N]
 
     @classmethod
     def of(cls, measured: Floats, predicted: Floats) -> GainOffset:
@@ -178,17 +166,11 @@ class RunScatter:
 
 @dataclass(frozen=True)
 class SessionCorrection:
-    """Expected gain and offset of a run by the other runs of its session, with standard deviations.
-
-    Attributes
-    ----------
-    gain, gain_spread : float
-    offset, offset_spread : float
-        [N]
-    """
+    """Expected gain and offset of a run by the other runs of its session, with standard deviations."""
 
     gain: float
     gain_spread: float
+    # offset and offset_spread: [N]
     offset: float
     offset_spread: float
 

@@ -16,18 +16,10 @@ _LARGEST_RATIO, _STEP = 4.0, 0.35  # of 1 - φ on the grid, to that of Burg's re
 
 @dataclass(frozen=True, eq=False)
 class Autoregression:
-    """Autoregressive model of noise.
+    """Autoregressive model of noise."""
 
-    Attributes
-    ----------
-    variance : float
-        Of the innovation.
-    reflections : (K,) array
-        Reflection coefficients of the lattice filter.
-    """
-
-    variance: float
-    reflections: Floats
+    variance: float  # of the innovation
+    reflections: Floats  # (K,) reflection coefficients of the lattice filter
 
     @classmethod
     def of(cls, residual: Floats) -> Autoregression:

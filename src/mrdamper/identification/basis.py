@@ -12,25 +12,13 @@ from mrdamper.physics.gas_spring import GasSpring
 
 @dataclass(frozen=True)
 class Basis:
-    """Model, method and options of the identification of every single run.
-
-    Attributes
-    ----------
-    model : str
-    method : str or Method
-    free : tuple of str
-        Preset parameters to determine as well.
-    fixed : tuple of (str, float)
-        Parameters held at a value [SI].
-    gas : GasSpring or None
-        Known gas spring.
-    """
+    """Model, method and options of the identification of every single run."""
 
     model: str
     method: str | Method = "projection"
-    free: tuple[str, ...] = ()
-    fixed: tuple[tuple[str, float], ...] = ()
-    gas: GasSpring | None = None
+    free: tuple[str, ...] = ()  # preset parameters to determine as well
+    fixed: tuple[tuple[str, float], ...] = ()  # parameters held at a value [SI]
+    gas: GasSpring | None = None  # known gas spring
 
     def identify(self, run: Run) -> Identification:
         """Identify it from one run."""

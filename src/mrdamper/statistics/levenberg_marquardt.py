@@ -32,21 +32,11 @@ _LENGTHENINGS, _MAX_LENGTHENING = 2, 4.0  # of a step, and the factor of each
 
 @dataclass(frozen=True)
 class Minimum:
-    """Minimum of a sum of squares.
+    """Minimum of a sum of squares."""
 
-    Attributes
-    ----------
-    point : (D,) array
-    residual : (N,) array
-    cost : float
-        Sum of squared residuals.
-    evaluations : int
-    ending : StopReason
-    """
-
-    point: Floats
-    residual: Floats
-    cost: float
+    point: Floats  # (D,)
+    residual: Floats  # (N,)
+    cost: float  # sum of squared residuals
     evaluations: int
     ending: StopReason
 

@@ -118,27 +118,13 @@ def _pivots(normal: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class FixedColumns:
-    """Columns that stay while one beside them moves: factored once.
+    """Columns that stay while one beside them moves: factored once."""
 
-    Attributes
-    ----------
-    basis : (N, L) array
-        Orthonormal, of the columns.
-    triangle : (L, L) array
-        columns = basis · triangle · scale.
-    scale : (L,) array
-        Root mean square of each column.
-    along : (L,) array
-        basisᵀ · right.
-    rest : (N,) array
-        The right side less its projection on the columns.
-    """
-
-    basis: Floats
-    triangle: Floats
-    scale: Floats
-    along: Floats
-    rest: Floats
+    basis: Floats  # (N, L) orthonormal, of the columns
+    triangle: Floats  # (L, L) columns = basis · triangle · scale
+    scale: Floats  # (L,) root mean square of each column
+    along: Floats  # (L,) basisᵀ · right
+    rest: Floats  # (N,) the right side less its projection on the columns
 
     @classmethod
     def of(cls, columns: Floats, right: Floats) -> Self:

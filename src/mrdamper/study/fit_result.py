@@ -12,17 +12,8 @@ from mrdamper.dampers.modified import ModifiedFit
 
 @dataclass(frozen=True, eq=False)
 class FitResult:
-    """Damper that a recipe identified from runs.
-
-    Attributes
-    ----------
-    damper : Damper
-    refit : callable
-        Identifies the damper again from the runs at some indices only.
-    fit : ModifiedFit, JointFit or None
-        Details of its functions or its search.
-    """
+    """Damper that a recipe identified from runs."""
 
     damper: Damper
-    refit: Callable[[Sequence[int]], Damper]
-    fit: ModifiedFit | JointFit | None = None
+    refit: Callable[[Sequence[int]], Damper]  # identifies the damper again from the runs at some indices only
+    fit: ModifiedFit | JointFit | None = None  # details of its functions or its search

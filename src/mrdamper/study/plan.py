@@ -88,37 +88,19 @@ Sessions = list[list[int]]  # conditions played in each, by their place in the g
 
 @dataclass(frozen=True, eq=False)
 class ExperimentDesign:
-    """Information of records at a grid of C conditions on P parameters, session by session.
-
-    Attributes
-    ----------
-    limits : Limits
-    conditions : sequence of Condition
-    names : tuple of str
-    prior : (P, P) array
-        Precision of the parameters before any new record.
-    goal : (P, P) array
-        Weights of the parameters' variances in the variance to be reduced.
-    grams : (C, D, P + 2, P + 2) array
-        Of each condition's derivatives by the numbers and by a session's gain and offset, over the error
-        of a sample, at D draws of the numbers.
-    session : (2,) array
-        Precision of the gain and the offset of a session not yet begun.
-    about : str
-        The uncertainty to reduce, as text.
-    beside : float
-        Variance of the force beside that by the numbers: an unknown session's, and the form's own.
-    """
+    """Information of records at a grid of C conditions on P parameters, session by session."""
 
     limits: Limits
     conditions: Sequence[Condition]
     names: tuple[str, ...]
-    prior: Floats
-    goal: Floats
+    prior: Floats  # (P, P) precision of the parameters before any new record
+    goal: Floats  # (P, P) weights of the parameters' variances in the variance to be reduced
+    # (C, D, P + 2, P + 2) of each condition's derivatives by the numbers and by a session's gain and offset, over the
+    # error of a sample, at D draws of the numbers
     grams: Floats
-    session: Floats
-    about: str
-    beside: float
+    session: Floats  # (2,) precision of the gain and the offset of a session not yet begun
+    about: str  # the uncertainty to reduce, as text
+    beside: float  # variance of the force beside that by the numbers: an unknown session's, and the form's own
 
     @classmethod
     def of(

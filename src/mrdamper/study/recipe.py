@@ -45,33 +45,16 @@ IdentificationCache = dict[tuple[Basis, str], tuple[Identification | str, float]
 
 @dataclass(frozen=True)
 class Recipe:
-    """A way from runs of one rig to a damper over all conditions.
+    """A way from runs of one rig to a damper over all conditions."""
 
-    Attributes
-    ----------
-    name : str
-        Model, and way where there are several: "bouc-wen:joint".
-    basis : Basis or None
-        Identification of single runs, if any.
-    make : callable
-        Makes the damper from runs and their identifications.
-    way : str
-        In words: "individual fits", "global fit".
-    title : str
-        For tables of many models.
-    source : str
-        Where it was published.
-    limits : str
-        What it cannot do.
-    """
-
-    name: str
-    basis: Basis | None
+    name: str  # model, and way where there are several: "bouc-wen:joint"
+    basis: Basis | None  # identification of single runs, if any
+    # makes the damper from runs and their identifications
     make: Callable[[Sequence[Run], Sequence[Identification]], FitResult] = field(compare=False)
-    way: str = ""
-    title: str = ""
-    source: str = ""
-    limits: str = ""
+    way: str = ""  # in words: "individual fits", "global fit"
+    title: str = ""  # for tables of many models
+    source: str = ""  # where it was published
+    limits: str = ""  # what it cannot do
     pure: bool = False  # identified from pure sines only; scored on every run all the same
     on_request: bool = False  # takes most of the time of a comparison
     notes: tuple[str, ...] = ()  # for the reader of the result
@@ -95,37 +78,22 @@ class Recipe:
 
 @dataclass(frozen=True, eq=False)
 class RecipeResult:
-    """Damper of a recipe on one rig, and its scores.
-
-    Attributes
-    ----------
-    recipe : Recipe
-    damper : Damper
-    fit : ModifiedFit, JointFit or None
-    identifications : tuple of Identification
-        Of the identification runs; empty where nothing is identified from single runs.
-    per_run : float
-        Median nrmse_pp of runs identified for themselves: what one run allows; NaN without.
-    train, cross_validated, validation : Validation
-        Identification runs; the same cross-validated by condition; validation runs.
-    seconds : float
-        Spent on identification and the fit over conditions.
-    by_kind : mapping of str to Validation
-        Train runs predicted without their fold, by kind of fold (`cross_validation.folds_by_kind`).
-    spread : mapping of str to (float, float)
-        Lowest and highest value of a parameter that holds everywhere, each condition left out in turn.
-    """
+    """Damper of a recipe on one rig, and its scores."""
 
     recipe: Recipe
     damper: Damper
     fit: ModifiedFit | JointFit | None
+    # of the identification runs; empty where nothing is identified from single runs
     identifications: tuple[Identification, ...]
-    per_run: float
+    per_run: float  # median nrmse_pp of runs identified for themselves: what one run allows; NaN without
+    # train, cross_validated and validation: identification runs; the same cross-validated by condition; validation runs
     train: Validation
     cross_validated: Validation
     validation: Validation
-    seconds: float
+    seconds: float  # spent on identification and the fit over conditions
+    # train runs predicted without their fold, by kind of fold (`cross_validation.folds_by_kind`)
     by_kind: Mapping[str, Validation] = field(default_factory=dict[str, Validation])
+    # lowest and highest value of a parameter that holds everywhere, each condition left out in turn
     spread: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
 
     @property

@@ -23,20 +23,11 @@ class SplitError(InputError):
 
 @dataclass(frozen=True)
 class Split:
-    """Validation runs and the reason for their choice.
+    """Validation runs and the reason for their choice."""
 
-    Attributes
-    ----------
-    held_out : frozenset of str
-        Ids of the runs.
-    reason : str
-    shown : dict of str to str
-        By run, its condition.
-    """
-
-    held_out: frozenset[str]
+    held_out: frozenset[str]  # ids of the runs
     reason: str
-    shown: dict[str, str]
+    shown: dict[str, str]  # by run, its condition
 
 
 def hold_out(

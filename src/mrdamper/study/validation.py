@@ -261,20 +261,12 @@ class SessionDrift:
     """Part of the error that a gain and an offset fitted to each run would explain.
 
     Estimated to be stated, never to correct a score.
-
-    Attributes
-    ----------
-    gain : float
-        Standard deviation of the gains between runs.
-    offset : float
-        Standard deviation of the offsets [N].
-    floor : float
-        Median nrmse_pp that would be left. No floor of every model: gains and offsets also take in
-        this model's own misfit.
     """
 
-    gain: float
-    offset: float
+    gain: float  # standard deviation of the gains between runs
+    offset: float  # standard deviation of the offsets [N]
+    # median nrmse_pp that would be left. No floor of every model: gains and offsets also take in this model's own
+    # misfit
     floor: float
 
 

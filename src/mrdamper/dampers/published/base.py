@@ -40,20 +40,7 @@ class SavedConditioned(Saved):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ConditionedDamper(Damper):
-    """A damper whose model is written down for every condition. Subclasses are final.
-
-    Attributes
-    ----------
-    rig : str
-    coefficients : mapping of str to float
-        Numbers determined from the data, SI.
-    reference : Condition
-        Frequency, amplitude and current that powers and breaks count from.
-    envelope : Envelope
-    provenance : mapping
-    coil : Coil, optional
-    uncertainty : Uncertainty, optional
-    """
+    """A damper whose model is written down for every condition. Subclasses are final."""
 
     kind: ClassVar[str] = "conditioned"
     saved: ClassVar[type[Saved]] = SavedConditioned
@@ -68,8 +55,8 @@ class ConditionedDamper(Damper):
     limits: ClassVar[str]  # what it cannot do, for tables
 
     rig: str
-    coefficients: Mapping[str, float]
-    reference: Condition
+    coefficients: Mapping[str, float]  # numbers determined from the data, SI
+    reference: Condition  # frequency, amplitude and current that powers and breaks count from
     envelope: Envelope
     provenance: Mapping[str, str] = field(default_factory=dict[str, str])
     coil: Coil | None = field(default=None, kw_only=True)

@@ -41,17 +41,12 @@ _PIECE_CYCLES, _PIECE_SAMPLES_A_CYCLE = 5, 500
 
 @dataclass(frozen=True)
 class Projection(Method):
-    """Least squares on the force in time, all parameters at once.
-
-    Attributes
-    ----------
-    refine_best : int
-        Number of grid points from which the refinement starts.
-    """
+    """Least squares on the force in time, all parameters at once."""
 
     name: ClassVar[str] = "projection"
     summary: ClassVar[str] = "least squares on the force in time, linear parameters eliminated"
 
+    # number of grid points from which the refinement starts
     refine_best: int = 2  # where more than one coordinate is searched; one alone has one valley
 
     @on_one_blas_thread

@@ -23,23 +23,14 @@ _RANK_LIMIT = 1e-5
 
 @dataclass(frozen=True)
 class FunctionFit:
-    """A fitted parameter function and how well it describes the identified values.
-
-    Attributes
-    ----------
-    function : ParameterFunction
-    r2 : float
-        Share of the variance it explains (in the logarithm, where the parameter is logarithmic).
-    left_out : float
-        RMS error at a condition left out of the fit, over the parameter's spread: under 1 the
-        function knows more than the mean does; infinite where a term rests on one condition alone.
-    refused : mapping of str to str
-        Forms that were no candidates, and why.
-    """
+    """A fitted parameter function and how well it describes the identified values."""
 
     function: ParameterFunction
-    r2: float
+    r2: float  # share of the variance it explains (in the logarithm, where the parameter is logarithmic)
+    # RMS error at a condition left out of the fit, over the parameter's spread: under 1 the function knows more than
+    # the mean does; infinite where a term rests on one condition alone
     left_out: float
+    # forms that were no candidates, and why
     refused: Mapping[str, str] = field(default_factory=dict[str, str], compare=False)
 
 

@@ -66,22 +66,12 @@ class Term:
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A family of parameter functions.
-
-    Attributes
-    ----------
-    name : str
-    terms : tuple of Term
-    rate_bounds : tuple of (float, float)
-        Limits of the searched rates.
-    source : str
-        Equation it comes from.
-    """
+    """A family of parameter functions."""
 
     name: str
     terms: tuple[Term, ...]
-    rate_bounds: tuple[tuple[float, float], ...] = ()
-    source: str = ""
+    rate_bounds: tuple[tuple[float, float], ...] = ()  # limits of the searched rates
+    source: str = ""  # equation it comes from
 
     @property
     def current_terms(self) -> int:
@@ -169,22 +159,13 @@ FORMS: Mapping[str, Form] = MappingProxyType(
 
 @dataclass(frozen=True)
 class ParameterFunction:
-    """p(I, f, A) with its coefficients.
+    """p(I, f, A) with its coefficients."""
 
-    Attributes
-    ----------
-    form : str
-        Name of the form.
-    coefficients, rates : tuple of float
-        In the order of the form's terms and rate bounds; SI with I in A, f in Hz, A in m.
-    log : bool
-        The form gives the logarithm of the parameter.
-    """
-
-    form: str
+    form: str  # name of the form
+    # coefficients and rates: in the order of the form's terms and rate bounds; SI with I in A, f in Hz, A in m
     coefficients: tuple[float, ...]
     rates: tuple[float, ...] = ()
-    log: bool = False
+    log: bool = False  # the form gives the logarithm of the parameter
 
     def __post_init__(self) -> None:
         form = form_named(self.form)

@@ -26,15 +26,10 @@ _ZERO_IN_LOGARITHM = 1e-12  # frequency [Hz] and amplitude [m] that stand for ze
 
 @dataclass(frozen=True)
 class MotionHull:
-    """Convex hull of tested motions over log f and log A.
+    """Convex hull of tested motions over log f and log A."""
 
-    Attributes
-    ----------
-    corners : tuple of (float, float)
-        Frequency [Hz] and amplitude [m] of the corners, counter-clockwise; one corner is a single
-        motion, two are a segment.
-    """
-
+    # frequency [Hz] and amplitude [m] of the corners, counter-clockwise; one corner is a single motion, two are a
+    # segment
     corners: tuple[tuple[float, float], ...]
 
     @classmethod

@@ -31,18 +31,11 @@ _RATIO_TOLERANCE = 0.01  # relative deviation of that ratio from a whole number
 
 @dataclass(frozen=True)
 class Copy:
-    """A run that holds the samples of another.
-
-    Attributes
-    ----------
-    run_id, original : str
-    correlation : float
-        Of the noise of the two forces.
-    """
+    """A run that holds the samples of another."""
 
     run_id: str
     original: str
-    correlation: float
+    correlation: float  # of the noise of the two forces
 
 
 def find_copies(runs: Sequence[Run]) -> list[Copy]:

@@ -39,58 +39,29 @@ _INDEPENDENT_SAMPLES = 12.0  # independent samples of a run's model error
 
 @dataclass(frozen=True)
 class AssumedScatter:
-    """Assumed differences between a run and the model of all runs.
+    """Assumed differences between a run and the model of all runs."""
 
-    Attributes
-    ----------
-    misfit : float
-        Factor of the model error that is usual.
-    gain : float
-        Standard deviation of a run's gain.
-    offset : float
-        Standard deviation of a run's offset, relative to the median force.
-    saturation : float
-        Current at which the course that all coefficients have over the current saturates, relative to the highest.
-    bend : float
-        Standard deviation of a coefficient about the course that all have over the current, relative to the
-        median force.
-    """
-
-    misfit: float = 1.0
-    gain: float = 0.06
-    offset: float = 0.04
+    misfit: float = 1.0  # factor of the model error that is usual
+    gain: float = 0.06  # standard deviation of a run's gain
+    offset: float = 0.04  # standard deviation of a run's offset, relative to the median force
+    # current at which the course that all coefficients have over the current saturates, relative to the highest
     saturation: float = 4.0
+    # standard deviation of a coefficient about the course that all have over the current, relative to the median force
     bend: float = 0.8
 
 
 @dataclass(frozen=True, eq=False)
 class RowProducts:
-    """Products of the rows of a run, in units of the median force.
+    """Products of the rows of a run, in units of the median force."""
 
-    Attributes
-    ----------
-    gram : (E, E) array, or (P, P) where the current changes
-    moment : (E,) or (P,) array
-    power : float
-    rows : int
-    size : float
-        Half the peak-to-peak force.
-    over : (K,) array or None
-        Shares of the nodes at the run's constant current.
-    misfit : float
-        Factor of the model error that is usual at the run's motion, over that of all runs.
-    gain : float, optional
-        Standard deviation of the run's gain, where it is not that of sessions.
-    """
-
-    gram: Floats
-    moment: Floats
+    gram: Floats  # (E, E), or (P, P) where the current changes
+    moment: Floats  # (E,) or (P,)
     power: float
     rows: int
-    size: float
-    over: Floats | None
-    misfit: float = 1.0
-    gain: float | None = None
+    size: float  # half the peak-to-peak force
+    over: Floats | None  # (K,) shares of the nodes at the run's constant current
+    misfit: float = 1.0  # factor of the model error that is usual at the run's motion, over that of all runs
+    gain: float | None = None  # standard deviation of the run's gain, where it is not that of sessions
 
     def unexplained(self, expected: Floats, most_gain: float) -> float:
         """RMS error of an expected force, at the best gain up to `most_gain` and the best offset."""
@@ -116,40 +87,22 @@ class RowProducts:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Weighted products of the rows of a run, all that its probability needs.
+    """Weighted products of the rows of a run, all that its probability needs."""
 
-    Attributes
-    ----------
-    gram : (E, E) array, or (P, P) where the current changes
-    moment : (E,) or (P,) array
-    power : float
-    over : (K,) array or None
-        Shares of the nodes at the run's constant current.
-    """
-
-    gram: Floats
-    moment: Floats
+    gram: Floats  # (E, E), or (P, P) where the current changes
+    moment: Floats  # (E,) or (P,)
     power: float
-    over: Floats | None
+    over: Floats | None  # (K,) shares of the nodes at the run's constant current
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Coefficients determined by a set of runs: mean and covariance.
+    """Coefficients determined by a set of runs: mean and covariance."""
 
-    Attributes
-    ----------
-    mean : (P,) array
-    root : (P, P) array
-        The covariance is root root'.
-    evidence : Evidence
-    known : dict
-        Mean and covariance at the currents that were asked for.
-    """
-
-    mean: Floats
-    root: Floats
+    mean: Floats  # (P,)
+    root: Floats  # (P, P) the covariance is root root'
     evidence: Evidence
+    # mean and covariance at the currents that were asked for
     known: dict[bytes, tuple[Floats, Floats]] = field(default_factory=dict[bytes, tuple[Floats, Floats]])
 
     def at(self, over: Floats | None) -> tuple[Floats, Floats]:

@@ -44,24 +44,13 @@ MAX_SESSION_GAIN = 1.12  # gain of a session against the others
 
 @dataclass(frozen=True)
 class Trial:
-    """A change of a run that may explain it.
+    """A change of a run that may explain it."""
 
-    Attributes
-    ----------
-    cause : str
-        "force", "offset", "current", "displacement", "time", "sign", or "damper" for a run no change explains.
-    value : float
-        Factor that corrects the force, the displacement or the time; force to add [N]; current [A].
-    unit : str
-        Unit the channel is in, where the factor is that of a unit.
-    odds : float
-        Logarithm of the prior odds against it.
-    """
-
+    # "force", "offset", "current", "displacement", "time", "sign", or "damper" for a run no change explains
     cause: Cause
-    value: float
-    unit: str
-    odds: float
+    value: float  # factor that corrects the force, the displacement or the time; force to add [N]; current [A]
+    unit: str  # unit the channel is in, where the factor is that of a unit
+    odds: float  # logarithm of the prior odds against it
 
     def is_like(self, other: Trial) -> bool:
         """Tell whether two runs have the same cause with the same value."""
@@ -74,20 +63,11 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """Change of a run's data that would make it agree with the others.
-
-    Attributes
-    ----------
-    trial : Trial
-    gain : float
-        Logarithm of the odds of the explanation against no explanation.
-    products : RowProducts
-        Of the run as corrected.
-    """
+    """Change of a run's data that would make it agree with the others."""
 
     trial: Trial
-    gain: float
-    products: RowProducts
+    gain: float  # logarithm of the odds of the explanation against no explanation
+    products: RowProducts  # of the run as corrected
 
     @property
     def cause(self) -> Cause:

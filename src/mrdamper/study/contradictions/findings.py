@@ -23,26 +23,14 @@ CODES = {
 
 @dataclass(frozen=True)
 class Contradiction:
-    """A run that contradicts the others of its rig.
-
-    Attributes
-    ----------
-    run_id : str
-    cause : str
-        "force", "offset", "current", "displacement", "time", "sign", "damper", "shifted" or "copy".
-    value : float
-        Factor that corrects force, displacement or time; force to add [N]; apparent current [A];
-        correlation of the noise of a copy.
-    evidence : float
-        Logarithm of the odds of the explanation against none.
-    explanation : str
-    remedy : str
-    """
+    """A run that contradicts the others of its rig."""
 
     run_id: str
-    cause: str
+    cause: str  # "force", "offset", "current", "displacement", "time", "sign", "damper", "shifted" or "copy"
+    # factor that corrects force, displacement or time; force to add [N]; apparent current [A]; correlation of the noise
+    # of a copy
     value: float
-    evidence: float
+    evidence: float  # logarithm of the odds of the explanation against none
     explanation: str
     remedy: str
 

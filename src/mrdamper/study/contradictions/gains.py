@@ -21,21 +21,11 @@ _ROUNDS = 4  # sets of runs that are tried in turn
 
 @dataclass(frozen=True)
 class GainDifferences:
-    """The runs whose gains differ, and logarithms of odds against gains as of sessions.
+    """The runs whose gains differ, and logarithms of odds against gains as of sessions."""
 
-    Attributes
-    ----------
-    members : frozenset of int
-        Positions of the runs with gains of their own; the others agree.
-    odds : float
-        That these runs have gains of their own.
-    everywhere : float
-        That every run has: so many differ that none can be called wrong.
-    """
-
-    members: frozenset[int]
-    odds: float
-    everywhere: float
+    members: frozenset[int]  # positions of the runs with gains of their own; the others agree
+    odds: float  # that these runs have gains of their own
+    everywhere: float  # that every run has: so many differ that none can be called wrong
 
 
 def gain_differences(evidence: Evidence, products: Sequence[RowProducts]) -> GainDifferences:

@@ -27,40 +27,22 @@ _SAME_MOTION = 0.04  # relative difference of frequencies and amplitudes that ar
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """The short version of a run.
-
-    Attributes
-    ----------
-    run : Run
-    displacement, velocity, acceleration : (L,) arrays
-        [m] about its mean, [m/s], [m/s²].
-    force : (L,) array
-        [N]
-    current : (L,) array
-        Magnitude [A].
-    current_changes : bool
-    rows : (R,) array of int
-        Samples that are rows of the regression.
-    half_range : float
-        Half the peak-to-peak force, without its outermost samples [N].
-    frequency, amplitude : float
-        Of a sine [Hz], [m]; zero for other motions.
-    step : float
-        Time between two samples of the run [s].
-    """
+    """The short version of a run."""
 
     run: Run
+    # displacement, velocity and acceleration: (L,) [m] about its mean, [m/s], [m/s²]
     displacement: Floats
     velocity: Floats
     acceleration: Floats
-    force: Floats
-    current: Floats
+    force: Floats  # (L,) [N]
+    current: Floats  # (L,) magnitude [A]
     current_changes: bool
-    rows: np.ndarray
-    half_range: float
+    rows: np.ndarray  # (R,) samples that are rows of the regression
+    half_range: float  # half the peak-to-peak force, without its outermost samples [N]
+    # frequency and amplitude: of a sine [Hz], [m]; zero for other motions
     frequency: float
     amplitude: float
-    step: float
+    step: float  # time between two samples of the run [s]
 
     def scaled(self, motion: float = 1.0, time: float = 1.0) -> Self:
         """Return the same test with displacement and time multiplied by factors; a negative one inverts the motion."""
