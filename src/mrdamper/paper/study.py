@@ -35,8 +35,8 @@ from mrdamper.paper.results import GeneticCheck, GeneticEnd, Reproduction
 from mrdamper.paper.sensitivity import OneAtATime, Sobol, one_at_a_time, sobol
 from mrdamper.paper.virtual_rig import CURRENTS, VirtualRig, friction_test, virtual_dataset
 from mrdamper.physics.gas_spring import GasSpring
-from mrdamper.study.parallel import IN_PROCESS, Processes, identify_quickly, shortened_method
-from mrdamper.study.recipe import IdentificationCache, Progress, Recipe, RecipeResult, fit_and_score_all
+from mrdamper.study.parallel import IN_PROCESS, Processes, follow_each, identify_quickly, shortened_method
+from mrdamper.study.recipe import IdentificationCache, Progress, RecipeResult, fit_and_score_all
 from mrdamper.study.workflow import usable_sines
 
 SOBOL_SAMPLES = 512
@@ -264,21 +264,11 @@ def _fit_all(
     steps: Steps, held_out: Sequence[Run], cache: IdentificationCache, processes: Processes, progress: Progress
 ) -> tuple[list[RecipeResult], dict[str, str]]:
     """Fit over conditions and score, a recipe a task; the joint fit takes longest."""
-    tasks = [
-        (recipe, runs, {(b, run.id): cache[b, run.id] for run in runs if (b := recipe.basis) and (b, run.id) in cache})
-        for recipe, runs in sorted(steps, key=lambda step: step[0].title != JOINT)
-    ]
-    done = processes.map(partial(_fit_one, held_out), tasks, progress)
-    scored = {one.recipe.title: one for part, _ in done for one in part}
-    refused = {name: why for _, part in done for name, why in part.items()}
+    tasks = [(*step, held_out) for step in sorted(steps, key=lambda step: step[0].title != JOINT)]
+    done = follow_each(tasks, cache, processes, progress, leave_out=False)
+    scored = {one.recipe.title: one for one in done if isinstance(one, RecipeResult)}
+    refused = {recipe.name: why for (recipe, *_), why in zip(tasks, done, strict=True) if isinstance(why, str)}
     return [scored[recipe.title] for recipe, _ in steps if recipe.title in scored], refused
-
-
-def _fit_one(
-    held_out: Sequence[Run], task: tuple[Recipe, Sequence[Run], IdentificationCache], progress: Progress
-) -> tuple[list[RecipeResult], dict[str, str]]:
-    recipe, runs, cache = task
-    return fit_and_score_all([(recipe, runs)], held_out, progress, leave_out=False, cache=cache)
 
 
 def _genetic_ends(searches: Mapping[str, Basis], optimum: Basis | None, cache: _Identified) -> tuple[GeneticEnd, ...]:

@@ -21,7 +21,7 @@ from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import Identification
 from mrdamper.identification.basis import Basis
 from mrdamper.physics.motion import analyse_motion
-from mrdamper.study.parallel import worker_pool
+from mrdamper.study.parallel import follow_each, identify_each, several
 from mrdamper.study.recipe import IdentificationCache, Progress, Recipe, RecipeResult, StudyMethod, recipes
 from mrdamper.study.workflow import (
     accepted_runs,
@@ -136,19 +136,17 @@ def compare(
     workers = jobs or os.cpu_count() or 1
     rigs = [_seen(dataset.rig(name)) for name in dataset.rigs]
     completed = [_completed(chosen, rig) for rig in rigs]
-    tasks, steps = list[tuple[Basis, Run]](), list[tuple[Recipe, Sequence[Run]]]()
+    tasks, steps = list[tuple[Basis, Run]](), list[tuple[Recipe, Sequence[Run], Sequence[Run]]]()
     for rig, (recipes_of_rig, _) in zip(rigs, completed, strict=True):
         bases = dict.fromkeys(recipe.basis for recipe in recipes_of_rig if recipe.basis)
         tasks += [(basis, run) for basis in bases for run in rig.sines]
-        steps += [(recipe, rig.train if recipe.basis else rig.everything) for recipe in recipes_of_rig]
-    with worker_pool(dataset, workers) as processes:
-        cache = processes.identify(tasks, lambda what, share: progress(what, 0.5 * share))
-        followed = processes.follow(
-            [step for step in steps if step[1]],
-            {rig.dataset.rigs[0]: rig.held_out for rig in rigs},
-            cache,
-            lambda what, share: progress(what, 0.5 + 0.5 * share),
-        )
+        steps += [(recipe, rig.train if recipe.basis else rig.everything, rig.held_out) for recipe in recipes_of_rig]
+    steps = [step for step in steps if step[1]]
+    steps.sort(key=lambda step: step[0].basis is not None and not step[0].basis.costly)
+    with several(workers) as processes:
+        cache = identify_each(tasks, processes, lambda what, share: progress(what, 0.5 * share))
+        results = follow_each(steps, cache, processes, lambda what, share: progress(what, 0.5 + 0.5 * share))
+    followed = {(runs[0].rig, recipe.name): one for (recipe, runs, _), one in zip(steps, results, strict=True)}
     compared = tuple(_ranked(rig, *one, followed, cache) for rig, one in zip(rigs, completed, strict=True))
     progress("compared", 1.0)
     return Comparison(dataset, compared, time.perf_counter() - begin, workers)

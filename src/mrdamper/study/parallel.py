@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import Executor, Future, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -26,7 +26,6 @@ from mrdamper.study.recipe import IdentificationCache, Progress, Recipe, RecipeR
 
 _CYCLES = 2  # of a run that costly identifications see
 _PER_CYCLE = 200  # samples of a cycle they see
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -90,83 +89,50 @@ def _quietly(function: Callable[[T, Progress], R], item: T) -> R:
     return function(item, lambda what, share: None)
 
 
-@contextmanager
-def worker_pool(runs: Iterable[Run], workers: int) -> Generator[WorkerPool]:
-    """Yield processes that hold these runs, of one thread each, so that their number changes no bit."""
-    held = {run.id: run for run in runs}.values()
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
-    try:
-        with processes(workers, _receive, ([_packed(run) for run in held],)) as pool:
-            yield WorkerPool(pool)
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+def identify_each(tasks: Iterable[tuple[Basis, Run]], processes: Processes, progress: Progress) -> IdentificationCache:
+    """Identify every basis from its run, the runs one by one."""
+    bases: dict[str, tuple[Run, list[Basis]]] = {}
+    for basis, run in tasks:
+        bases.setdefault(run.id, (run, []))[1].append(basis)
+    done = processes.map(_identify_run, list(bases.values()), progress)
+    return {key: one for part in done for key, one in part.items()}
 
 
-@dataclass(frozen=True)
-class WorkerPool:
-    """Processes that hold the runs of a dataset; `worker_pool` makes it."""
-
-    pool: Executor
-
-    def identify(self, tasks: Sequence[tuple[Basis, Run]], progress: Progress) -> IdentificationCache:
-        """Every basis from its run; what takes long begins first."""
-        named = [(basis, run.id) for basis, run in sorted(tasks, key=lambda task: not task[0].costly)]
-        return self._each(_identify_one, {one: one for one in named}, "identified", progress)
-
-    def follow(
-        self,
-        steps: Sequence[tuple[Recipe, Sequence[Run]]],
-        held_out: Mapping[str, Sequence[Run]],
-        cache: IdentificationCache,
-        progress: Progress,
-    ) -> dict[tuple[str, str], RecipeResult | str]:
-        """Recipes followed from identifications there are already, or why not, by rig and name of the recipe.
-
-        Parameters
-        ----------
-        steps : sequence of (Recipe, identification runs)
-            The runs of one step are of one rig.
-        held_out : mapping of rig to runs
-        cache : mapping
-            Identifications, by basis and run id.
-        progress : callable
-        """
-        tasks: dict[tuple[str, str], tuple[Any, ...]] = {}
-        for recipe, runs in sorted(steps, key=lambda step: step[0].basis is not None and not step[0].basis.costly):
-            own = {(recipe.basis, run.id): cache[recipe.basis, run.id] for run in runs if recipe.basis}
-            ids, held = [run.id for run in runs], [run.id for run in held_out[runs[0].rig]]
-            tasks[runs[0].rig, recipe.name] = (recipe, ids, held, own)
-        return self._each(_follow_one, tasks, "followed", progress)
-
-    def _each(
-        self, function: Callable[..., R], tasks: Mapping[T, tuple[Any, ...]], what: str, progress: Progress
-    ) -> dict[T, R]:
-        waiting = {self.pool.submit(function, *task): key for key, task in tasks.items()}
-        results: dict[T, R] = {}
-        for done in as_completed(waiting):
-            results[waiting[done]] = done.result()
-            progress(f"{len(results)} of {len(waiting)} {what}", len(results) / len(waiting))
-        return results
+def _identify_run(task: tuple[Run, Sequence[Basis]], progress: Progress) -> IdentificationCache:
+    run, bases = task
+    cache: IdentificationCache = {}
+    for number, basis in enumerate(bases):
+        progress(f"run {run.id}", number / len(bases))
+        cache[basis, run.id] = identify_quickly(basis, run)
+    return cache
 
 
-_RUNS: dict[str, Run] = {}  # of a worker process, received once
+def follow_each(
+    steps: Sequence[tuple[Recipe, Sequence[Run], Sequence[Run]]],
+    cache: IdentificationCache,
+    processes: Processes,
+    progress: Progress,
+    *,
+    leave_out: bool = True,
+) -> list[RecipeResult | str]:
+    """Follow recipes from identifications there are already; the result of each, or why there is none.
+
+    A step is a recipe, its identification runs and the runs held out; those that take longest ought to stand first.
+    """
+    tasks = [
+        (recipe, runs, held_out, {key: cache[key] for r in runs if (b := recipe.basis) and (key := (b, r.id)) in cache})
+        for recipe, runs, held_out in steps
+    ]
+    return processes.map(partial(_follow_one, leave_out), tasks, progress)
 
 
-def _receive(packed: Sequence[Mapping[str, Any]]) -> None:
-    _RUNS.update({values["id"]: Run(**values) for values in packed})
-
-
-def _packed(run: Run) -> dict[str, Any]:
-    return {f.name: getattr(run, f.name) for f in fields(run)} | {"notes": dict(run.notes)}
-
-
-def _identify_one(basis: Basis, run_id: str) -> tuple[Identification | str, float]:
-    return identify_quickly(basis, _RUNS[run_id])
+@on_one_blas_thread
+def _follow_one(
+    leave_out: bool, task: tuple[Recipe, Sequence[Run], Sequence[Run], IdentificationCache], progress: Progress
+) -> RecipeResult | str:
+    recipe, runs, held_out, cache = task
+    scored, refused = fit_and_score_all([(recipe, runs)], held_out, progress, leave_out=leave_out, cache=cache)
+    return scored[0] if scored else refused[recipe.name]
 
 
 @on_one_blas_thread
@@ -186,14 +152,6 @@ def shortened_method(basis: Basis, run: Run) -> tuple[Method, Problem]:
     if model_type(basis.model).integrated:
         method = Projection(refine_best=1)
     return method, basis.problem(shortened(run) if basis.costly else run)
-
-
-def _follow_one(
-    recipe: Recipe, runs: Sequence[str], held_out: Sequence[str], cache: IdentificationCache
-) -> RecipeResult | str:
-    train = [_RUNS[run_id] for run_id in runs]
-    scored, refused = fit_and_score_all([(recipe, train)], [_RUNS[run_id] for run_id in held_out], cache=cache)
-    return scored[0] if scored else refused[recipe.name]
 
 
 def shortened(run: Run) -> Run:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -19,23 +19,15 @@ from mrdamper.errors import ResourceError
 
 
 @contextmanager
-def processes(
-    count: int, begin: Callable[..., None] | None = None, arguments: tuple[Any, ...] = ()
-) -> Generator[ProcessPoolExecutor]:
+def processes(count: int) -> Generator[ProcessPoolExecutor]:
     """Yield a pool of processes; an exception in the block ends them at once, the death of this process too.
-
-    Parameters
-    ----------
-    count : int
-    begin : callable, optional
-        Called first in each process, with `arguments`.
 
     Raises
     ------
     ResourceError
         E_WORKER if a process was ended from outside, as systems do that run short of memory.
     """
-    pool = ProcessPoolExecutor(count, _Context(), initializer=_begin, initargs=(begin, arguments))
+    pool = ProcessPoolExecutor(count, _Context(), initializer=_begin)
     try:
         yield pool
         pool.shutdown()
@@ -76,8 +68,6 @@ class _Context(SpawnContext):
     Process = _Process
 
 
-def _begin(begin: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
+def _begin() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal sends it to all; the parent decides
     end_with_parent()
-    if begin is not None:
-        begin(*arguments)
