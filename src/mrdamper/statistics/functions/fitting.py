@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mrdamper.data import Condition, Floats
 from mrdamper.errors import IdentificationError
@@ -39,20 +39,16 @@ class _Fitted:
     """A fitted function with what its errors at values left out follow from."""
 
     fit: FunctionFit
-    columns: Floats
-    target: Floats
-    weight: Floats
+    basis: Floats  # (N, terms), orthonormal, of the weighted columns
+    residual: Floats  # (N,), weighted
     conditions: tuple[Condition, ...]
 
     @cached_property
     def errors(self) -> Mapping[str, Floats]:
         """(N,) cross-validation errors of the values, by kind of fold."""
-        penalty = self.target.size / (self.target.size - len(self.fit.function.rates))
-        basis = np.linalg.qr(self.columns * self.weight[:, None])[0]
-        right = self.target * self.weight
-        residual = right - basis @ (basis.T @ right)
+        penalty = self.residual.size / (self.residual.size - len(self.fit.function.rates))
         folds = _folds(self.conditions).items()
-        return {kind: penalty * _fold_errors(basis, residual, groups) for kind, groups in folds}
+        return {kind: penalty * _fold_errors(self.basis, self.residual, *rows) for kind, rows in folds}
 
 
 def fit_function(
@@ -98,13 +94,13 @@ def _fitted(form: str | Form, conditions: Sequence[Condition], values: ArrayLike
     columns = chosen.columns(I, f, A, rates) if rates else _fixed_columns(chosen, tuple(conditions))
     if columns is None or (rates and not _determined(columns)):
         raise _undetermined(chosen, "they do not tell its terms apart", I, f, A)
-    coefficients, left_out = _solved(columns, target, weight, len(rates))
+    coefficients, left_out, basis, residual = _solved(columns, target, weight, len(rates))
     cost = float(np.sum((columns @ coefficients - target) ** 2))
     spread = float(np.sum((target - target.mean()) ** 2))
     function = ParameterFunction(chosen.name, tuple(coefficients.tolist()), tuple(float(r) for r in rates), log)
     size = np.sqrt(spread / target.size) or 1.0
     fit = FunctionFit(function, r2=1.0 - cost / spread if spread > 0 else 1.0, left_out=left_out / size)
-    return _Fitted(fit, columns, target, weight, tuple(conditions))
+    return _Fitted(fit, basis, residual, tuple(conditions))
 
 
 def choose_function(
@@ -202,9 +198,15 @@ def _best_rates(
     lower, upper = bounds[:, 0], bounds[:, 1]
     right = target * weight
 
+    last: tuple[Floats, Floats, Floats] = (np.empty(0), np.empty(0), np.empty(0))
+
     def fitted(u: Floats) -> tuple[Floats, Floats]:
-        columns = form.columns(I, f, A, tuple(np.exp(u))) * weight[:, None]
-        return columns, solve_linear(columns, right)
+        """Columns and coefficients at some rates; remembered for the last, which residual and slopes share."""
+        nonlocal last
+        if not np.array_equal(last[0], u):
+            columns = form.columns(I, f, A, tuple(np.exp(u))) * weight[:, None]
+            last = u, columns, solve_linear(columns, right)
+        return last[1:]
 
     def residual(u: Floats) -> Floats:
         columns, fit = fitted(u)
@@ -233,41 +235,49 @@ def _fixed_columns(form: Form, conditions: tuple[Condition, ...]) -> Floats | No
     return columns if _determined(columns) else None
 
 
-def _solved(columns: Floats, target: Floats, weight: Floats, rates: int) -> tuple[Floats, float]:
-    """Coefficients, and weighted RMS of leave-one-out errors, exact for the linear part through the hat matrix."""
+def _solved(columns: Floats, target: Floats, weight: Floats, rates: int) -> tuple[Floats, float, Floats, Floats]:
+    """Coefficients; weighted RMS of leave-one-out errors, exact for the linear part; basis and weighted residual."""
     weighted, right = columns * weight[:, None], target * weight
     scale = np.linalg.norm(weighted, axis=0)
     q, triangle = np.linalg.qr(weighted / scale)
     along = q.T @ right
+    residual = right - q @ along
     spare = 1.0 - np.sum(q**2, axis=1)  # share of a value that the others know
     left_out = float("inf")
     if spare.min() > _RANK_LIMIT:  # else some value alone says what a term is: without it the form knows nothing
         penalty = target.size / (target.size - rates)
-        left_out = float(np.sqrt(np.sum(((right - q @ along) / spare) ** 2) / np.sum(weight**2)) * penalty)
-    return np.linalg.solve(triangle, along) / scale, left_out
+        left_out = float(np.sqrt(np.sum((residual / spare) ** 2) / np.sum(weight**2)) * penalty)
+    return np.linalg.solve(triangle, along) / scale, left_out, q, residual
 
 
 @lru_cache(maxsize=128)
-def _folds(conditions: tuple[Condition, ...]) -> dict[str, list[list[int]]]:
-    return fold_groups(conditions)
+def _folds(conditions: tuple[Condition, ...]) -> dict[str, tuple[list[NDArray[np.intp]], NDArray[np.intp]]]:
+    """Rows of the groups that are left out together, those of one size (M, size) at a time, and of all in order."""
+    kinds = fold_groups(conditions)
+    alike = {
+        kind: [np.array([g for g in groups if len(g) == size]) for size in {len(group) for group in groups}]
+        for kind, groups in kinds.items()
+    }
+    return {kind: (alike[kind], np.concatenate(groups)) for kind, groups in kinds.items()}
 
 
-def _fold_errors(basis: Floats, residual: Floats, groups: Sequence[Sequence[int]]) -> Floats:
+def _fold_errors(
+    basis: Floats, residual: Floats, groups: Sequence[NDArray[np.intp]], order: NDArray[np.intp]
+) -> Floats:
     """Magnitudes of errors at values left out in groups, exact for the linear part by the hat matrix."""
     errors = np.full(residual.size, np.inf)
-    for size in {len(group) for group in groups}:  # groups of one size at a time
-        rows = np.array([group for group in groups if len(group) == size])
+    for rows in groups:
         own = basis[rows]
-        spare = np.eye(size) - own @ own.transpose(0, 2, 1)
-        if size == 1:
-            share = spare[:, 0, 0]
+        if rows.shape[1] == 1:
+            share = 1.0 - np.sum(own[:, 0] ** 2, axis=1)
             apart = share > _RANK_LIMIT
             errors[rows[apart, 0]] = np.abs(residual[rows[apart, 0]] / share[apart])
             continue
+        spare = np.eye(rows.shape[1]) - own @ own.transpose(0, 2, 1)
         determined = np.linalg.eigvalsh(spare)[:, 0] > _RANK_LIMIT
         missed = np.linalg.solve(spare[determined], residual[rows[determined], None])
         errors[rows[determined]] = np.abs(missed[..., 0])
-    return errors[[i for group in groups for i in group]]
+    return errors[order]
 
 
 def _weights(uncertainty: ArrayLike | None, count: int) -> Floats:

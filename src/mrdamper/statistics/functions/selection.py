@@ -24,6 +24,7 @@ from mrdamper.statistics.functions.motion_hull import MotionHull
 Errors = Mapping[str, Floats]  # by kind of fold: the error of every unit left out, in one order for all models
 BEYOND = 1.2  # largest current [of the largest tested] up to which a function obeys physics
 _CLEAR = 2.0  # standard errors of a difference that no other kind of fold outweighs
+_ROUNDING = 1e-12  # relative difference of errors below which they are equal
 _SEVERAL = 5  # units of a kind from which its standard error is its own
 _MOTIONS = 0.05  # frequencies and amplitudes this close are one motion
 _FALL = 0.01  # fall of a yield force [of its largest value] below which it does not fall
@@ -67,7 +68,7 @@ def smaller_wins(smaller: Errors, larger: Errors) -> bool:
         if len(smaller[kind]) >= _SEVERAL
     )
     mean, variance = excess[worst]
-    return not clearly and over_kinds <= standard_error and mean <= math.sqrt(variance)
+    return not clearly and over_kinds <= standard_error and mean <= math.sqrt(variance) + _ROUNDING * means[worst]
 
 
 def _mean_and_variance(values: Floats) -> tuple[float, float]:
