@@ -274,6 +274,16 @@ def test_where_no_gain_moves_the_parameters_the_degrees_of_freedom_are_those_wit
     assert spread.dof == pytest.approx(dof, rel=0.1)  # a quantile of 200,000 draws
 
 
+def test_parameters_that_make_up_for_each_other_leave_no_variance_of_what_both_do():
+    """However differently their residuals show it: a factor on one of them alone would make variance from nothing."""
+    a = np.random.default_rng(6).standard_normal(600)
+    shown = np.column_stack([np.ones(600), a**2])
+    draws, within = Draws(np.zeros((600, 1, 2)), np.column_stack([a, -a]), shown), np.zeros((2, 2))
+    spread = _Spread(("c", "fy"), [], within, np.zeros(2), draws, Effects(), [], np.ones(2), np.ones((1, 2)))
+    assert spread.quantiles[1] < 1.5 < spread.quantiles[0]
+    assert np.ones(2) @ spread.covariance @ np.ones(2) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_draws_are_as_wide_as_refits_and_no_narrower_than_linearised_fits(monkeypatch):
     rng, names = np.random.default_rng(4), ("c", "fy")
     draws = Draws(np.zeros((600, 3, 2)), rng.standard_normal((600, 2)), np.ones((600, 2)))

@@ -26,7 +26,7 @@ from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Floats, Run, same_condition
 from mrdamper.identification.covariance import alike_groups, score_covariance
-from mrdamper.identification.intervals import dof_of_quantile, interval_about, relative_width, student, weaknesses
+from mrdamper.identification.intervals import dof_of_quantile, interval_about, relative_width, weaknesses
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 
 _MAX_RUN_SHARE = 0.6  # share of the information on a parameter from which one run mainly determines it
@@ -178,10 +178,8 @@ class _Spread:
 
     @cached_property
     def covariance(self) -> Floats:
-        """(P, P) of the parameters, or of their logarithms; smaller where a normal interval is wider than the draws."""
-        whole: Floats = self.within + self.draws.moved.T @ self.draws.moved / len(self.draws.moved)
-        shares: Floats = np.minimum(self.quantiles / student(_LEVEL, np.inf), 1.0)
-        return shares[:, None] * whole * shares
+        """(P, P) of the parameters, or of their logarithms."""
+        return self.within + self.draws.moved.T @ self.draws.moved / len(self.draws.moved)
 
     @property
     def dof(self) -> Floats:
