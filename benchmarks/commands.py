@@ -55,9 +55,9 @@ def process_rows(quick: bool) -> list[ProcessRow]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         records = _records(folder / "records.npz")
-        study = ["-m", "mrdamper.cli", "study", "--out"]
+        study = ["-m", "mrdamper", "study", "--out"]
         rows = [
-            _fresh("mrdamper --help", ["-m", "mrdamper.cli", "--help"], folder, repeats + 2),
+            _fresh("mrdamper --help", ["-m", "mrdamper", "--help"], folder, repeats + 2),
             _fresh("Python and NumPy alone", ["-c", "import numpy"], folder, repeats + 2),
             _fresh("identify() of 48 conditions", ["-c", _IDENTIFY, str(records)], folder, repeats + 2),
             _fresh("mrdamper study, caches filled", [*study, str(folder / "warm")], folder, 1 if quick else 2),

@@ -99,7 +99,7 @@ def cost(folder: Path, sizes: Sequence[int]) -> None:
         for workers, out in zip((1, 2), outs, strict=True):
             shutil.rmtree(out, ignore_errors=True)
             plan_of(records(folder, min(sizes)), out)
-            spent = took("mrdamper.cli", "fleet", str(source), "--out", str(out), "--workers", str(workers))
+            spent = took("mrdamper", "fleet", str(source), "--out", str(out), "--workers", str(workers))
             walls.setdefault(dampers, []).append(spent.wall)
             print(f"{dampers} dampers, {workers} workers: {spent.cpu:.2f} s of processor time = "
                   f"{1e3 * spent.cpu / dampers:.1f} ms each, {spent.wall:.1f} s of wall, {spent.memory:.0f} MB",
@@ -181,7 +181,7 @@ def kills(folder: Path, dampers: int, count: int, seed: int) -> None:
     seconds, rows = float((folder / "calm.seconds").read_text()), _kept(calm)
     shutil.rmtree(out, ignore_errors=True)
     rng, killed = random.Random(seed), dict.fromkeys(("supervisor", "worker", "between commit and roll-up"), 0)
-    command = [sys.executable, "-m", "mrdamper.cli", "fleet", str(source), "--out", str(out), "--workers", "2"]
+    command = [sys.executable, "-m", "mrdamper", "fleet", str(source), "--out", str(out), "--workers", "2"]
     while sum(killed.values()) < count:
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         for pause in _pauses(rng, _START_UP + seconds / count):

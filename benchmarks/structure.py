@@ -66,7 +66,7 @@ def top_level_names() -> list[str]:
         path.stem
         for path in PACKAGE.iterdir()
         if path.suffix == ".py" or (path.is_dir() and any(path.glob("*.py")))
-        if path.stem != "__init__"
+        if path.stem not in ("__init__", "__main__")
     )
 
 

@@ -28,7 +28,7 @@ def main() -> None:
     print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.1f} before; {GOALS}")
     document = model_document()
     server = subprocess.Popen(
-        [sys.executable, "-m", "mrdamper.cli", "serve", "--port", "0", "--no-browser"],
+        [sys.executable, "-m", "mrdamper", "serve", "--port", "0", "--no-browser"],
         stdout=subprocess.PIPE,
         text=True,
     )

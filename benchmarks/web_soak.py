@@ -39,7 +39,7 @@ class Server:
     """The app in a process of its own."""
 
     def __init__(self) -> None:
-        command = [sys.executable, "-m", "mrdamper.cli", "serve", "--port", "0", "--no-browser"]
+        command = [sys.executable, "-m", "mrdamper", "serve", "--port", "0", "--no-browser"]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
         self.base, _, self.token = self.process.stdout.readline().split()[2].partition("?token=")

@@ -29,7 +29,7 @@ def attack_bench(share: float) -> list[Count]:
     held, flat = Count("bench: no answer 500"), Count("bench: memory, descriptors, time")
     if not Path("/proc/self/statm").exists():
         return []
-    command = [sys.executable, "-m", "mrdamper.cli", "serve", "--port", "0", "--no-browser"]
+    command = [sys.executable, "-m", "mrdamper", "serve", "--port", "0", "--no-browser"]
     server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         assert server.stdout is not None

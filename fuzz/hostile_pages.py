@@ -94,7 +94,7 @@ def attack_pages(share: float) -> list[Count]:
                 save_dataset(hostile, root / "line" / part)
             for line in COMMANDS:
                 done = subprocess.run(
-                    [sys.executable, "-m", "mrdamper.cli", *line.split()], cwd=root, capture_output=True, check=False
+                    [sys.executable, "-m", "mrdamper", *line.split()], cwd=root, capture_output=True, check=False
                 )
                 said = done.stderr.decode(errors="replace").strip()
                 typed = done.returncode == 0 or (done.returncode == 2 and re.search(r"\[E_\w+\]$", said))

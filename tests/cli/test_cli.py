@@ -62,7 +62,7 @@ def test_every_command_has_one_uncut_line_in_a_terminal_of_80_columns():
 def test_a_process_ends_with_the_same_status_and_line():
     """The other tests here share one process."""
     done = subprocess.run(
-        [sys.executable, "-m", "mrdamper.cli", "identify", "--fix", "n"], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "mrdamper", "identify", "--fix", "n"], capture_output=True, text=True, check=False
     )
     assert done.returncode == 2
     assert done.stderr == mrdamper("identify", "--fix", "n").stderr
@@ -70,7 +70,7 @@ def test_a_process_ends_with_the_same_status_and_line():
 
 
 def test_a_process_says_its_version_and_survives_that_nobody_can_hear():
-    command = [sys.executable, "-m", "mrdamper.cli"]
+    command = [sys.executable, "-m", "mrdamper"]
     said = subprocess.run([*command, "--version"], capture_output=True, text=True, check=True).stdout
     assert said.startswith("mrdamper ")
     if Path("/dev/full").exists():
@@ -214,7 +214,7 @@ def test_a_signal_ends_a_command_with_its_number_and_one_line(name, code):
 def test_too_small_a_limit_of_memory_is_refused_at_once():
     """Under it, libraries for tables abort or sleep for ever."""
     done = subprocess.run(
-        ["bash", "-c", f"ulimit -v 1000000; exec {sys.executable} -m mrdamper.cli check"],
+        ["bash", "-c", f"ulimit -v 1000000; exec {sys.executable} -m mrdamper check"],
         capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
     assert done.returncode == 2
@@ -224,7 +224,7 @@ def test_too_small_a_limit_of_memory_is_refused_at_once():
 
 def test_a_reader_that_goes_away_is_no_fault():
     done = subprocess.run(
-        ["bash", "-c", f"{sys.executable} -m mrdamper.cli models --json | head -c 1"],
+        ["bash", "-c", f"{sys.executable} -m mrdamper models --json | head -c 1"],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.stderr == ""

@@ -77,7 +77,7 @@ def test_killed_while_the_plan_is_made_the_same_command_ends_with_the_same_bits(
 
 def _killed(source, out, rows):
     """Rows kept when the command was killed, which is when there were as many."""
-    command = [sys.executable, "-m", "mrdamper.cli", "fleet", str(source), "--out", str(out), "--workers", "2"]
+    command = [sys.executable, "-m", "mrdamper", "fleet", str(source), "--out", str(out), "--workers", "2"]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     while _kept(out) < rows and process.poll() is None:
         time.sleep(0.02)

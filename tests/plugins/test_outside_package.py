@@ -84,7 +84,7 @@ def call(site):
     def called(*arguments, installed=True, code=0):
         folders = [str(site)] * installed + [os.environ.get("PYTHONPATH", "")]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))}
-        command = [sys.executable, "-m", "mrdamper.cli", *map(str, arguments)]
+        command = [sys.executable, "-m", "mrdamper", *map(str, arguments)]
         done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
         assert done.returncode == code, done.stdout + done.stderr
         return done

@@ -27,7 +27,7 @@ from mrdamper.web.app import plotly_script
 def test_it_starts_answers_and_stops_cleanly(tmp_path, name):
     stop = getattr(signal, name)
     process = subprocess.Popen(
-        [sys.executable, "-m", "mrdamper.cli", "serve", "--port", "0", "--no-browser"],
+        [sys.executable, "-m", "mrdamper", "serve", "--port", "0", "--no-browser"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

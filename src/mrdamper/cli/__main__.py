@@ -1,5 +1,0 @@
-"""`python -m mrdamper.cli`."""
-
-from mrdamper.cli import main
-
-main()
