@@ -200,6 +200,14 @@ def test_no_door_and_no_argument_is_forgotten(tmp_path):
         assert wanted <= set(suits), name
 
 
+@pytest.mark.parametrize("name", [name for name in LONG if name != "import_files"])
+def test_arguments_of_the_wrong_kind_are_refused_before_anything_long_begins(name):
+    parameters = list(inspect.signature(getattr(mrdamper, name)).parameters)
+    with pytest.raises(InputError, match=f"^{parameters[0]} is <object .*; give it as") as refusal:
+        getattr(mrdamper, name)(**dict.fromkeys(parameters, object()))
+    assert refusal.value.code == "E_ARGUMENT"
+
+
 def test_a_folder_in_place_of_a_dataset_is_answered_with_what_reads_it():
     with pytest.raises(InputError, match=r"'rig/'; give it as Dataset, which mrdamper.load_dataset\(folder\) reads"):
         mrdamper.run_study("rig/")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mrdamper.data.atomic import require_writable
-from mrdamper.errors import InputError
+from mrdamper.errors import InputError, validate_arguments
 from mrdamper.fleet.engine import Submit, cluster_engine, local_engine, outcome
 from mrdamper.fleet.guard import JobLimits
 from mrdamper.fleet.item import Item, digest_of, hash_of
@@ -41,6 +41,7 @@ class Fleet:
     plan: Plan | None  # None if no damper could be identified
 
 
+@validate_arguments()
 def run_fleet(
     source: str | Path,
     out: str | Path,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Dataset, Run
-from mrdamper.errors import IdentificationError, InputError
+from mrdamper.errors import IdentificationError, InputError, validate_arguments
 from mrdamper.identification import Identification, conclude
 from mrdamper.identification.basis import Basis
 from mrdamper.identification.harmonic_balance import SineRecord, read_force
@@ -46,6 +46,7 @@ _NO_CURRENT = 0.02  # largest current of a test without current [A]
 _SENSITIVITY, _CHECK, _SEED, _RUN = 3.0, 1.5, 1.2, 0.5  # relative durations of the tasks, for the time left
 
 
+@validate_arguments()
 def reproduce(
     dataset: Dataset | None = None,
     options: PaperOptions | None = None,

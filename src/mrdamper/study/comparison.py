@@ -17,7 +17,7 @@ import numpy as np
 
 from mrdamper.data import Dataset, Displayable, Run
 from mrdamper.data.displayable import joined
-from mrdamper.errors import IdentificationError, InputError
+from mrdamper.errors import IdentificationError, InputError, validate_arguments
 from mrdamper.identification import Identification
 from mrdamper.identification.basis import Basis
 from mrdamper.physics.motion import analyse_motion
@@ -93,6 +93,7 @@ class Comparison(Displayable):
         return joined(self.rigs)
 
 
+@validate_arguments()
 def compare(
     dataset: Dataset,
     names: Sequence[str] = (),

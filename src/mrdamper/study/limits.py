@@ -6,7 +6,7 @@ import itertools
 import math
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -50,6 +50,7 @@ class Limits:
         E_LIMITS if they allow nothing, or look like another unit.
     """
 
+    read_by: ClassVar = "mrdamper.study.limits.Limits.read(file) or .of(damper)"
     current_A: tuple[float, float]
     frequency_Hz: tuple[float, float]
     amplitude_mm: tuple[float, float]
