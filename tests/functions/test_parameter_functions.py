@@ -1,9 +1,11 @@
 import numpy as np
+import pint
 import pytest
 
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, UnknownNameError
+from mrdamper.models import all_models
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.statistics.functions.fitting import choose_function, fit_function
 from mrdamper.statistics.functions.forms import FORMS, Form, ParameterFunction, features
@@ -25,6 +27,25 @@ def test_every_form_recovers_itself(form):
     fit = fit_function(form, MATRIX, values)
     np.testing.assert_allclose(fit.function(*features(MATRIX)), values, rtol=1e-4)
     assert fit.r2 == pytest.approx(1.0, abs=1e-6) or form.name == "constant"
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=lambda f: f.name)
+def test_coefficients_have_the_units_that_give_the_unit_of_the_parameter(form):
+    function = ParameterFunction(form.name, (1.0,) * len(form.terms), (2.0,) * len(form.rate_bounds))
+    units = [pint.Unit(unit) for unit in function.units("N s/m")]
+    for term, unit in zip(form.terms, units, strict=False):
+        power = term.frequency - (0 if term.power_f is None else 2.0)
+        product = unit * pint.Unit("A") ** term.current * pint.Unit("Hz") ** power * pint.Unit("m") ** term.amplitude
+        assert product == pint.Unit("N s/m")
+
+
+def test_units_of_logarithmic_functions_and_rates():
+    decaying = ParameterFunction("decaying-current", (1.0, 2.0), (3.0,), log=True)
+    assert decaying.units("m") == ["-", "ln(m)", "1/A"]
+    assert ParameterFunction("linear-current", (1.0, 2.0)).units("-") == ["1/A", "-"]
+    for kind in all_models().values():
+        known = {*kind.coordinates, *(info.name for info in kind.parameters())}
+        assert set(kind.map_forms()) <= known
 
 
 def test_logarithmic_functions_stay_positive():

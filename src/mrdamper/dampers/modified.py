@@ -120,11 +120,13 @@ class ModifiedModel(Damper):
 
     @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:
+        kind = self.parameters.model_type
+        units = {n: unit for n, (_, _, unit) in kind.coordinates.items()} | {i.name: i.unit for i in kind.parameters()}
         return {
-            f"{name}.{i}": FittedParameter(value, exponent=exponent)
-            for name, function in self.functions.items()
-            for i, (value, exponent) in enumerate(
-                zip((*function.coefficients, *function.rates), self._exponents(function), strict=True)
+            f"{name}.{i}": FittedParameter(value, unit=unit, exponent=exponent)
+            for name, f in self.functions.items()
+            for i, (value, unit, exponent) in enumerate(
+                zip((*f.coefficients, *f.rates), f.units(units[name]), self._exponents(f), strict=True)
             )
         }
 

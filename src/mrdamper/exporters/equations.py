@@ -23,7 +23,7 @@ def equations(damper: Damper) -> list[str]:
             "no equations to print", where=damper.title, remedy="export a damper with a model behind it"
         )
     model: Any = damper.model_at(damper.envelope.middle if damper.envelope.tested else NOWHERE)
-    symbols = {name: letter for name, (letter, _) in type(model).coordinates.items()}
+    symbols = {name: letter for name, (letter, *_) in type(model).coordinates.items()}
     symbols |= {info.name: info.symbol for info in model.parameters()}
     lines = [line.strip() for line in damper.equation.split(r",\quad")]
     lines += [f"{symbols[name]} = {function_text(function)}" for name, function in damper.functions.items()]

@@ -101,7 +101,7 @@ class Model(ABC):
     title: ClassVar[str]
     equation: ClassVar[str]
     source: ClassVar[str]
-    coordinates: ClassVar[Mapping[str, tuple[str, str]]] = {}  # what `build` takes instead: symbol, relation (LaTeX)
+    coordinates: ClassVar[Mapping[str, tuple[str, str, str]]] = {}  # what `build` takes instead: symbol, relation, unit
     integrated: ClassVar[bool] = False  # the state is stepped: following a motion costs a hundred times more
     # Linear parameter whose column the state is, where the search moves no other column; None: no such one.
     state_column: ClassVar[str | None] = None

@@ -42,10 +42,10 @@ class BoucWen(Model):
     )
     source: ClassVar[str] = "Wen 1976; Qian et al. 2024, Eq. 8"
     state_column: ClassVar[str | None] = "alpha"
-    coordinates: ClassVar[Mapping[str, tuple[str, str]]] = {
-        "yield_force": ("F_z", r"\alpha = F_z (\beta + \gamma)^{1/n}"),
-        "yield_displacement": ("x_z", r"\beta + \gamma = x_z^{-n}"),
-        "asymmetry": (r"\rho", r"\gamma - \beta = \rho (\beta + \gamma)"),
+    coordinates: ClassVar[Mapping[str, tuple[str, str, str]]] = {
+        "yield_force": ("F_z", r"\alpha = F_z (\beta + \gamma)^{1/n}", "N"),
+        "yield_displacement": ("x_z", r"\beta + \gamma = x_z^{-n}", "m"),
+        "asymmetry": (r"\rho", r"\gamma - \beta = \rho (\beta + \gamma)", "-"),
     }
 
     c: float = param("N s/m", "post-yield viscous damping", bounds=(0, np.inf), linear=True)

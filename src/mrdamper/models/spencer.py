@@ -42,10 +42,10 @@ class Spencer(Model):
         r"r = x - y"
     )
     source: ClassVar[str] = "Spencer et al. 1997"
-    coordinates: ClassVar[Mapping[str, tuple[str, str]]] = {
-        "c0": ("c_0", r"\nu_0 = c_0/c_1"),
-        "k0": ("k_0", r"\kappa_0 = k_0/c_1"),
-        "yield_force": ("F_z", "v_z = F_z/c_1"),
+    coordinates: ClassVar[Mapping[str, tuple[str, str, str]]] = {
+        "c0": ("c_0", r"\nu_0 = c_0/c_1", "N s/m"),
+        "k0": ("k_0", r"\kappa_0 = k_0/c_1", "N/m"),
+        "yield_force": ("F_z", "v_z = F_z/c_1", "N"),
     }
     integrated: ClassVar[bool] = True
 

@@ -51,6 +51,15 @@ class Term:
             value = value * f ** -rates[self.power_f]
         return value
 
+    def unit(self, of: str, rates: Sequence[float]) -> str:
+        """Write the unit of the coefficient of the term in a function of that unit."""
+        power = self.frequency - (0 if self.power_f is None else rates[self.power_f])
+        powers = {"A": self.current, "Hz": power, "m": self.amplitude}
+        sized = {name: name if abs(p) == 1 else f"{name}^{abs(p):.3g}" for name, p in powers.items() if p}
+        times = [text for name, text in sized.items() if powers[name] < 0]
+        over = "".join(f"/{text}" for name, text in sized.items() if powers[name] > 0)
+        return (" ".join([*times, *({of} - {"-"})]) or ("1" if over else "-")) + over
+
     def label(self, rates: Sequence[float]) -> str:
         """Write the term as text, with its rates filled in."""
         powers = {"I": self.current, "f": self.frequency, "A": self.amplitude}
@@ -189,6 +198,15 @@ class ParameterFunction:
         terms = zip(self.coefficients, form_named(self.form).terms, strict=True)
         text = " ".join(f"{value:+.4g} {term.label(self.rates)}".strip() for value, term in terms).lstrip("+")
         return f"exp({text})" if self.log else text
+
+    def units(self, unit: str) -> list[str]:
+        """Write the units of the coefficients and rates, for a parameter of that unit."""
+        terms = form_named(self.form).terms
+        constant, of = ("-" if unit == "-" else f"ln({unit})", "-") if self.log else (unit, unit)
+        named = {t.decay_I: "1/A" for t in terms} | {t.decay_f: "1/Hz" for t in terms} | {t.power_f: "-" for t in terms}
+        return [constant if t == _ONE else t.unit(of, self.rates) for t in terms] + [
+            named[i] for i in range(len(self.rates))
+        ]
 
     def turning_point(self, highest_current: float, frequency: float, amplitude: float) -> float | None:
         """Find the current [A] within 0...1.5 × the highest at which the parameter has an extremum, if any."""
