@@ -85,18 +85,12 @@ def of_study(study: Study) -> list[Told]:
     """What the README and the page of the model say of the bundled study."""
     rigs = {rig.rig: rig for rig in study.rigs}
     one, other = (rigs[name] for name in ("utfsm", "labcontrol"))
-    names = {
-        "play-bypass": "**play and bypass, global fit**",
-        "bouc-wen:joint": "modified Bouc–Wen, global fit",
-        "bouc-wen": "modified Bouc–Wen, individual fits",
-        "bingham:joint": "modified Bingham, global fit",
-        "paper": "modified Bouc–Wen, method of the paper (literal)",
-    }
     rows = []
-    for name, title in names.items():
+    for name in ("play-bypass", "bouc-wen:joint", "bouc-wen", "bingham:joint", "paper"):
         both = [next(c for c in rig.candidates if c.recipe.name == name) for rig in (one, other)]
         counts = " / ".join(dict.fromkeys(str(c.damper.parameter_count) for c in both))
         errors = [_median_worst(v) for c in both for v in (c.cross_validated, c.validation)]
+        title = f"**{both[0].title}**" if both[0] in (one.chosen, other.chosen) else both[0].title
         rows.append(f"| {title} | {counts} | {' | '.join(errors)} |")
     floors = [
         f"{100 * np.median([r.repeatability for r in rig.dataset if r.repeatability]):.1f}" for rig in (one, other)
@@ -145,13 +139,13 @@ def of_comparison(folder: Path) -> list[Told]:
 
 def of_both(study: Study) -> list[Told]:
     """Rows of docs/models.md that a study makes too: it follows some of the recipes of a comparison."""
-    titles = {name: recipe.title for name, recipe in catalogue().items()}
+    names = catalogue()
     tables = []
     for rig in study.rigs:
         rows = []
-        for c in (c for c in rig.candidates if c.recipe.name in titles):
+        for c in (c for c in rig.candidates if c.recipe.name in names):
             errors = [f"{100 * c.train.median():.1f}", _median_worst(c.cross_validated), _median_worst(c.validation)]
-            rows.append(f"| {titles[c.recipe.name]} | {' | '.join(['', *errors, str(c.damper.parameter_count), ''])} |")
+            rows.append(f"| {c.title} | {' | '.join(['', *errors, str(c.damper.parameter_count), ''])} |")
         tables.append(Table(_MODELS, _COMPARED, tuple(rows), f"### {rig.rig}", whole=False))
     return tables
 

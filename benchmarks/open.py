@@ -231,7 +231,7 @@ def evaluate(dataset: Dataset, names: Sequence[str] = (), jobs: int | None = Non
             errors = {kind: summary(values) for kind, values in left_out_errors(entry, rig.dataset).items()}
             errors |= validation_errors(own, forecasts)
             numbers, coverage = entry.damper.parameter_count, coverage_of(own, forecasts)
-            rows.append(Row(rig.rig, entry.recipe.title, False, errors, coverage, numbers, entry.seconds))
+            rows.append(Row(rig.rig, entry.title, False, errors, coverage, numbers, entry.seconds))
     return rows
 
 

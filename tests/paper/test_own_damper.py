@@ -247,7 +247,7 @@ def test_a_comparison_of_models_offers_the_method():
     fewer = matrix(motions=MOTIONS[1:5])
     (rig,) = compare(fewer, ["paper"], jobs=1).rigs
     entry = next(entry for entry in rig.entries if entry.recipe.name == "paper")
-    assert entry.recipe.title == "Method of Qian et al. 2024"
+    assert entry.title == "modified Bouc–Wen, paper method"
     assert entry.damper.functions["c"].form == "viscous-paper"
     assert any("the gas spring is unknown" in note for note in entry.recipe.notes)
     (known,) = compare(fewer, ["paper"], method=PaperOptions(gas=GAS), jobs=1).rigs

@@ -96,7 +96,7 @@ def test_the_recipe_holds_the_presets_and_names_what_the_paper_did_not_test(aski
     monkeypatch.setattr(PaperAssumptions, "of", classmethod(lambda cls, train, given: cls(given, notes=("origin",))))
     matrix = runs(*((I, f, A) for I in (0.0, 1.0, 2.0) for f in (0.5, 1.0, 2.0) for A in (0.01, 0.02)))
     recipe = PaperOptions(gas=gas, n=3.0, mass_law="power").recipe(matrix)
-    assert (recipe.name, recipe.pure, recipe.way, recipe.notes) == ("paper", True, "paper, literal", ("origin",))
+    assert (recipe.name, recipe.pure, recipe.way, recipe.notes) == ("paper", True, options._WAY, ("origin",))
     assert recipe.make.func is options.fit_paper_functions
     assert recipe.make.keywords == {"mass_law": "power"}
     assert (recipe.basis.gas, recipe.basis.fixed, recipe.basis.model) == (gas, (("n", 3.0),), "bouc-wen")

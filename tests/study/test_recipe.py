@@ -395,7 +395,7 @@ def test_every_recipe_says_what_it_is():
     assert not {"lugre", "spencer", "kwok"} & joint
     one, both, ali = known["dahl"], known["dahl:joint"], known["ali-type"]
     assert (one.way, both.way, one.title, both.title) == (
-        "individual fits", "global fit", "viscous and Dahl", "viscous and Dahl, global fit",
+        "individual fits", "global fit", "viscous and Dahl", "viscous and Dahl",
     )  # fmt: skip
     assert one.source == both.source == model_type("dahl").source
     assert "stepped, not closed" in known["spencer"].limits
@@ -414,7 +414,7 @@ def test_every_recipe_says_what_it_is():
     assert paper.basis.method.search == "genetic"
     assert known["kernel"].basis is None
     assert known["bouc-wen:paper"].basis.method == "paper"
-    assert known["bouc-wen:paper"].title.endswith("method paper")
+    assert known["bouc-wen:paper"].way.endswith("method paper")
     assert [r.name for r in recipes.recipes(("dahl", "ali-type"))] == ["dahl", "ali-type"]
     genetic = {"bouc-wen:paper", "bouc-wen:direct-genetic"}
     assert not genetic & {r.name for r in recipes.recipes()}

@@ -25,7 +25,7 @@ LITERAL, HALF, SAME_FORMS = "paper, literal", "paper, F0 half peak-to-peak", "co
 CONSISTENT, JOINT = "consistent", "joint"
 TRADITIONAL, SLOWEST = "traditional, nearest speed", "traditional, slowest motion"
 DIRECT, ALI = "direct genetic, nearest speed", "Ali-type (Spencer-based)"
-_TITLE, _SOURCE = "Method of Qian et al. 2024", "Qian et al. 2024"
+_WAY, _SOURCE = "paper method", "Qian et al. 2024"
 _LIMITS = "sines only; the parameter functions need the frequency and amplitude of a sine"
 
 
@@ -116,8 +116,7 @@ class PaperOptions(StudyMethod):
             name=self.name,
             basis=assumptions.basis(self.method()),
             make=partial(fit_paper_functions, mass_law=self.mass_law),
-            way="paper, literal",
-            title=_TITLE,
+            way=_WAY,
             source=_SOURCE,
             limits=_LIMITS,
             pure=True,
@@ -131,7 +130,7 @@ class PaperOptions(StudyMethod):
     def compared(self) -> Sequence[Recipe]:
         """Return the method itself, and Bouc–Wen by the genetic searches with functions as of other models."""
         searches = [replace(modified("bouc-wen", method), on_request=True) for method in ("paper", "direct-genetic")]
-        heading = Recipe("paper", None, fit_paper_functions, "paper, literal", _TITLE, _SOURCE, _LIMITS)
+        heading = Recipe("paper", None, fit_paper_functions, _WAY, source=_SOURCE, limits=_LIMITS)
         return [replace(heading, complete=self._recipe_beside_others), *searches]
 
     def _recipe_beside_others(self, train: Sequence[Run]) -> Recipe:

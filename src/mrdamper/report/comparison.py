@@ -86,7 +86,7 @@ def _rows(rig: RigComparison) -> list[dict[str, Any]]:
                 "rig": rig.rig,
                 "rank": rank,
                 "model": entry.recipe.name,
-                "title": entry.recipe.title,
+                "title": entry.title,
                 "per_run_nrmse_pp": _plain(entry.per_run),
                 "train_nrmse_pp": _plain(entry.train.median()),
                 "cv_nrmse_pp": _plain(entry.cross_validated.median()),
@@ -128,7 +128,7 @@ def _reason(entry: RecipeResult, entries: Sequence[RecipeResult]) -> str:
     ]
     if leaner and entry is not best:
         fewest = min(leaner, key=lambda e: e.damper.parameter_count)
-        text += f"; {fewest.recipe.title} is as accurate with {fewest.damper.parameter_count}"
+        text += f"; {fewest.title} is as accurate with {fewest.damper.parameter_count}"
     if math.isfinite(entry.per_run) and own > 1.5 * entry.per_run:
         text += f"; best possible fit of a single run: {100 * entry.per_run:.1f} %"
     return text
@@ -136,10 +136,10 @@ def _reason(entry: RecipeResult, entries: Sequence[RecipeResult]) -> str:
 
 def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[str, Any]:
     scores = {
-        e.recipe.title: (e.train.median(), e.cross_validated.median(), e.validation.median()) for e in rig.entries
+        e.title: (e.train.median(), e.cross_validated.median(), e.validation.median()) for e in rig.entries
     }
     runs = _shown(rig)
-    best = {entry.recipe.title: entry.damper for entry in rig.entries[:_OVERLAID]}
+    best = {entry.title: entry.damper for entry in rig.entries[:_OVERLAID]}
     figures = {"ranking": ranking(scores), "loops": overlaid_loops(runs, best)}
     first = rig.entries[0]
     return {
@@ -148,7 +148,7 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
         "refused": rig.refused,
         "not_identified": rig.not_identified,
         "verdict": (
-            f"{first.recipe.title} has the least cross-validated error: "
+            f"{first.title} has the least cross-validated error: "
             f"{100 * first.cross_validated.median():.1f} % of the "
             f"peak-to-peak force, among {len(rig.entries)} models."
         ),

@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import ClassVar
 
@@ -52,7 +52,7 @@ class Recipe:
     # makes the damper from runs and their identifications
     make: Callable[[Sequence[Run], Sequence[Identification]], FitResult] = field(compare=False)
     way: str = ""  # in words: "individual fits", "global fit"
-    title: str = ""  # for tables of many models
+    title: str = ""  # model or method without its way; `RecipeResult.title` has both
     source: str = ""  # where it was published
     limits: str = ""  # what it cannot do
     pure: bool = False  # identified from pure sines only; scored on every run all the same
@@ -303,8 +303,8 @@ def modified(name: str, method: str = "projection") -> Recipe:
         name if plain else f"{name}:{method}",
         Basis(name, method),
         fit_per_run,
-        "individual fits",
-        cls.title if plain else f"{cls.title}, method {method}",
+        "individual fits" if plain else f"individual fits, method {method}",
+        cls.title,
         cls.source,
         f"{stepped}parameter functions need the frequency and amplitude of a sine",
     )
@@ -312,32 +312,19 @@ def modified(name: str, method: str = "projection") -> Recipe:
 
 def jointly(name: str) -> Recipe:
     """Return a model whose parameter functions are fitted to all forces at once."""
-    apart, cls = modified(name), model_type(name)
-    title = f"{cls.title}, global fit"
-    return Recipe(f"{name}:joint", apart.basis, fit_functions_jointly, "global fit", title, cls.source, apart.limits)
+    return replace(modified(name), name=f"{name}:joint", make=fit_functions_jointly, way="global fit")
 
 
 def current_only(name: str) -> Recipe:
     """Return a model whose parameters follow the current alone, fitted to all forces at once."""
-    apart, cls = modified(name), model_type(name)
-    title = f"{cls.title}, functions of the current only"
-    return Recipe(
-        f"{name}:current", apart.basis, fit_current_laws, "current laws", title, cls.source, "the same at any motion"
-    )
+    apart, limits = modified(name), "the same at any motion"
+    return replace(apart, name=f"{name}:current", make=fit_current_laws, way="current laws", limits=limits)
 
 
 def play_and_bypass() -> Recipe:
     """Return the model whose one set of parameters holds for every condition."""
-    cls = model_type(JOINTLY)
-    return Recipe(
-        JOINTLY,
-        None,
-        fit_global_model,
-        "global fit",
-        cls.title,
-        cls.source,
-        "takes any motion and a current that varies",
-    )
+    cls, limits = model_type(JOINTLY), "takes any motion and a current that varies"
+    return Recipe(JOINTLY, None, fit_global_model, "global fit", cls.title, cls.source, limits)
 
 
 def conditioned(cls: Published) -> Recipe:

@@ -10,13 +10,13 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Run
 from mrdamper.physics.motion import centred_motion, equivalent_sine
-from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.figure import Figure, room_beside
 from mrdamper.report.plots.style import MEASURED, MM, PALETTE
 
 
 def ranking(scores: Mapping[str, tuple[float, float, float]]) -> Figure:
     """Draw the median error of every model, best first: identification, cross-validation, validation runs."""
-    figure = Figure(1, 1, 0.9 + 0.24 * len(scores), left=2.6, right=0.3)
+    figure = Figure(1, 1, 0.9 + 0.24 * len(scores), left=room_beside(scores), right=0.3)
     (axes,) = figure.axes
     rows = np.arange(len(scores))[::-1]
     marks = zip(

@@ -12,7 +12,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.data import Floats, Run, same_motion
 from mrdamper.physics.motion import equivalent_sine
-from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.figure import Figure, room_beside
 from mrdamper.report.plots.style import (
     MEASURED,
     MM,
@@ -115,7 +115,7 @@ def score_strip(validations: Mapping[str, Validation]) -> Figure:
 
     Errors beyond 25 % are arrows at the edge.
     """
-    figure = Figure(1, 1, 0.8 + 0.3 * len(validations), left=3.0)
+    figure = Figure(1, 1, 0.8 + 0.3 * len(validations), left=room_beside(validations))
     (axes,) = figure.axes
     for row, validation in enumerate(validations.values()):
         colour = PALETTE[1 + row % (len(PALETTE) - 2)]

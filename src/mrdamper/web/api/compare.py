@@ -74,7 +74,7 @@ def overlaid(rig: int, key: str, session: Current) -> Response:
     for number_, entry in enumerate(comparison.entries):
         curve, flags = predicted_on_run(entry.damper, row.run)
         arrays |= {f"model{number_}.{k}": v for k, v in curve.items()}
-        shown.append({"title": entry.recipe.title, "extrapolation": flags})
+        shown.append({"title": entry.title, "extrapolation": flags})
     return frame({"id": row.run.id, "condition": condition_on_screen(row.condition), "models": shown}, arrays)
 
 
@@ -132,7 +132,7 @@ def _entry(rig: RigComparison, entry: RecipeResult, key: str, keys: dict[str, st
     return {
         "damper": key,
         "name": entry.recipe.name,
-        "title": entry.recipe.title,
+        "title": entry.title,
         "source": entry.recipe.source,
         "limits": entry.recipe.limits,
         "numbers": entry.damper.parameter_count,
