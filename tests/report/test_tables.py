@@ -113,13 +113,13 @@ def test_left_out_and_held_out_errors_stand_in_their_own_rows():
         return Validation("x", (RunScore(name, "bench", Condition(0, 1, 0.01), scores_of(start), None, ()),))
 
     candidate = SimpleNamespace(
-        recipe=SimpleNamespace(model="dahl", way="global fit"),
+        recipe=SimpleNamespace(name="dahl:joint"),
         train=scored("fitted", 0.3), cross_validated=scored("left", 0.1), validation=scored("held", 0.2),
     )  # fmt: skip
-    study = SimpleNamespace(rigs=(SimpleNamespace(rig="bench", candidates=(candidate,)),))
+    study = SimpleNamespace(rigs=(SimpleNamespace(dataset=SimpleNamespace(name="bench"), candidates=(candidate,)),))
     rows = list(csv.DictReader(_validation_table(study).splitlines()))
-    told = [(r["rig"], r["model"], r["way"], r["set"], r["run_id"], float(r["nrmse_pp"])) for r in rows]
+    told = [(r["rig"], r["model"], r["set"], r["run_id"], float(r["nrmse_pp"])) for r in rows]
     assert told == [
-        ("bench", "dahl", "global fit", "cross-validation", "left", 0.1),
-        ("bench", "dahl", "global fit", "validation", "held", 0.2),
+        ("bench", "dahl:joint", "cross-validation", "left", 0.1),
+        ("bench", "dahl:joint", "validation", "held", 0.2),
     ]

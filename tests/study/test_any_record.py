@@ -6,6 +6,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.command import mrdamper
 
@@ -13,8 +14,10 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from benchmarks.virtual_dampers import DAMPERS
 from mrdamper.dampers.model_file import load_model
-from mrdamper.data import Dataset
+from mrdamper.data import Condition, Dataset, Run
+from mrdamper.errors import IdentificationError
 from mrdamper.rig_files.dataset_folder import save_dataset
+from mrdamper.study.workflow import run_study
 
 VIRTUAL = next(virtual for virtual in DAMPERS if virtual.name == "switched current")
 
@@ -32,3 +35,21 @@ def test_a_third_damper_from_the_command_line(tmp_path):
     assert (damper.coil.rise_s, damper.coil.fall_s) == pytest.approx((6e-3, 12e-3), rel=0.05)
     low, high = damper.uncertainty.interval(damper, "fy1", level=0.999)
     assert low < VIRTUAL.truth.fy1 < high
+
+
+def test_random_records_alone_are_fitted_by_laws_of_the_current_and_by_no_model_of_sines():
+    rng, t = np.random.default_rng(5), np.arange(800) / 200
+    runs = []
+    for current in (0.0, 0.0, 1.0, 1.0):
+        phases = rng.uniform(0, 2 * np.pi, 9)
+        x = 3e-3 * sum(np.sin(2 * np.pi * f * t + phase) for f, phase in enumerate(phases, start=1)) / 3
+        v = np.gradient(x, t)
+        force = (800 + 400 * current) * v + (50 + 300 * current) * np.sign(v) + 10
+        runs.append(Run(f"r{len(runs)}", t, x, force + rng.normal(0, 2, t.size), current))
+    study = run_study(Dataset(tuple(runs), "roads"), model="bingham")
+    assert {"bingham:current", "bouc-wen:current", "play-bypass"} <= {c.recipe.name for c in study.rigs[0].candidates}
+    assert study.table["rig"][0] == "roads"
+    model = study.model.model_at(Condition(1.0, 2.0, 0.005))
+    assert (model.c, model.fy) == (pytest.approx(1200, rel=0.05), pytest.approx(350, rel=0.05))
+    with pytest.raises(IdentificationError, match="kwok: identified from steady sines .* of which there are 0"):
+        run_study(Dataset(tuple(runs), "roads"), model="kwok")

@@ -52,7 +52,7 @@ def write_comparison(
         (work / "runs.csv").write_text(csv_text(run_rows(comparison)), encoding="utf-8")
         (work / "comparison.json").write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
-    took = {rig.rig: {entry.recipe.name: entry.seconds for entry in rig.entries} for rig in comparison.rigs}
+    took = {rig.dataset.name: {entry.recipe.name: entry.seconds for entry in rig.entries} for rig in comparison.rigs}
     record = ResultRecord(seconds={"in all": comparison.seconds, **took}, processes=comparison.jobs)
     written = publish(folder, "comparison.html", fill, record)
     progress("written", 1.0)
@@ -69,7 +69,7 @@ def run_rows(comparison: Comparison) -> list[dict[str, Any]]:
     rows = []
     for rig in comparison.rigs:
         for entry in rig.entries:
-            head = {"rig": rig.rig, "model": entry.recipe.name}
+            head = {"rig": rig.dataset.name, "model": entry.recipe.name}
             fits = [{"run_id": one.run_id, "nrmse_pp": one.scores.nrmse_pp} for one in entry.identifications]
             rows += [{**head, "set": "per run", **fit} for fit in fits]
             sets = {"train": entry.train, "cross-validation": entry.cross_validated, "validation": entry.validation}
@@ -83,7 +83,7 @@ def _rows(rig: RigComparison) -> list[dict[str, Any]]:
     for rank, entry in enumerate(rig.entries, start=1):
         rows.append(
             {
-                "rig": rig.rig,
+                "rig": rig.dataset.name,
                 "rank": rank,
                 "model": entry.recipe.name,
                 "title": entry.title,
@@ -143,7 +143,7 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
     figures = {"ranking": ranking(scores), "loops": overlaid_loops(runs, best)}
     first = rig.entries[0]
     return {
-        "rig": rig.rig or rig.dataset.name,
+        "rig": rig.dataset.name,
         "rows": _rows(rig),
         "refused": rig.refused,
         "not_identified": rig.not_identified,

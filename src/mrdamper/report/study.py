@@ -105,7 +105,7 @@ def write_study(
             forces += force_rows(chapters[-1]["measured"] or {})
         footer = f"{made_from(study.dataset)}."
         title = f"MR damper study: {', '.join(r.rig for r in study.rigs) or study.dataset.name}"
-        origin = provenance({rig.rig or rig.dataset.name: rig.dataset for rig in study.rigs})
+        origin = provenance({rig.dataset.name: rig.dataset for rig in study.rigs})
         page = render_page(
             "study.html.j2", head.title or title, footer, chapters=chapters, about=head, provenance=origin
         )
@@ -117,14 +117,14 @@ def write_study(
         if forces:
             (work / "forces.csv").write_text(csv_text(forces), encoding="utf-8")
         (work / "identifications.csv").write_text(
-            csv_text(identification_rows(_all_identifications(study))), encoding="utf-8"
+            csv_text(identification_rows(_all_identifications(study), study.dataset.name)), encoding="utf-8"
         )
         (work / "parameters.csv").write_text(_parameters_table(study), encoding="utf-8")
         (work / "validation.csv").write_text(_validation_table(study), encoding="utf-8")
-        covered = [{"rig": rig.rig, **rig.interval_coverage} for rig in study.rigs if rig.interval_coverage]
+        covered = [{"rig": rig.dataset.name, **rig.interval_coverage} for rig in study.rigs if rig.interval_coverage]
         (work / "coverage.csv").write_text(csv_text(covered), encoding="utf-8")
 
-    took = {rig.rig: {c.recipe.name: c.seconds for c in rig.candidates} for rig in study.rigs}
+    took = {rig.dataset.name: {c.recipe.name: c.seconds for c in rig.candidates} for rig in study.rigs}
     written = publish(folder, "report.html", fill, ResultRecord(seconds={"in all": study.seconds, **took}))
     progress("written", 1.0)
     return written
@@ -192,7 +192,7 @@ def _validation_table(study: Study) -> str:
     rows = []
     for rig in study.rigs:
         for candidate in rig.candidates:
-            head = {"rig": rig.rig, "model": candidate.recipe.model, "way": candidate.recipe.way}
+            head = {"rig": rig.dataset.name, "model": candidate.recipe.name}
             sets = {"cross-validation": candidate.cross_validated, "validation": candidate.validation}
             for name, validation in sets.items():
                 rows += [{**head, "set": name, **score_row(run)} for run in validation.runs]
@@ -243,7 +243,7 @@ def _shown(rig: RigStudy) -> list[Any]:
 def _measured(rig: RigStudy) -> dict[str, Characteristics]:
     """Characterise the tests without a model; empty where no run holds a steady cycle."""
     try:
-        return {rig.rig or rig.dataset.name: characterise(rig.dataset.runs)}
+        return {rig.dataset.name: characterise(rig.dataset.runs)}
     except IdentificationError:
         return {}
 
@@ -253,7 +253,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
     held = any(run.id in {loop.run_id for loop in rig.loops} for run in rig.dataset.split("validate"))
     return {
-        "rig": rig.rig or rig.dataset.name,
+        "rig": rig.dataset.name,
         "verdict": error_sentence(rig),
         "measured": facts_of_tests(measured, limits=limits) if (measured := _measured(rig)) else None,
         "choice": _choice(rig),
@@ -321,7 +321,7 @@ def _parameters_table(study: Study) -> str:
     """
     names = {"low": "low_95", "high": "high_95"}
     rows = [
-        {"rig": rig.rig}
+        {"rig": rig.dataset.name}
         | {names.get(k, k): "" if v != v else v for k, v in row.items() if k != "written"}
         | dict(zip(_CV_RANGE, rig.chosen.spread.get(row["name"], ("", "")), strict=True))
         for rig in study.rigs

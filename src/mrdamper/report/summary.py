@@ -88,7 +88,7 @@ def study_lines(study: Study, files: Sequence[str], *, verbose: bool = False) ->
 def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], int]:
     chosen = rig.chosen
     lines = [
-        f"{rig.rig or rig.dataset.name}: {chosen.title}, {chosen.damper.parameter_count} parameters, "
+        f"{rig.dataset.name}: {chosen.title}, {chosen.damper.parameter_count} parameters, "
         f"{len(chosen.identifications) or len(chosen.cross_validated.runs)} identification runs",
         f"  force error (median, worst run): {_errors('cross-validation', chosen.cross_validated)}; "
         f"{_errors('validation', chosen.validation)}",

@@ -14,13 +14,13 @@ from mrdamper.identification import Identification
 from mrdamper.study.validation import RunScore
 
 
-def identification_rows(identifications: Sequence[Identification]) -> list[dict[str, Any]]:
-    """One row an identification: condition, parameters, scores, standard errors, message."""
+def identification_rows(identifications: Sequence[Identification], dataset: str = "") -> list[dict[str, Any]]:
+    """One row an identification: condition, parameters, scores, standard errors, message; `dataset` for a rig unnamed."""
     rows = []
     for identification in identifications:
         row: dict[str, Any] = {
             "run_id": identification.run_id,
-            "rig": identification.rig,
+            "rig": identification.rig or dataset,
             "model": identification.model.name,
             "method": identification.method,
             "current_A": identification.condition.current_A,

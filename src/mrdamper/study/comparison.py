@@ -70,7 +70,7 @@ class RigComparison(Displayable):
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
         """A row a model, the smallest cross-validation error first."""
-        return table_of(self.rig, self.entries)
+        return table_of(self.dataset.name, self.entries)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -27,7 +27,6 @@ from mrdamper.data.displayable import joined
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError, validate_arguments
 from mrdamper.identification import refuse_clipped
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
-from mrdamper.models import all_models
 from mrdamper.physics.motion import analyse_motion, equivalent_sine
 from mrdamper.rig_files.quality.table import check_run, with_findings
 from mrdamper.statistics.functions.selection import mean_error, smaller_wins
@@ -41,6 +40,7 @@ from mrdamper.study.recipe import (
     Recipe,
     RecipeResult,
     StudyMethod,
+    catalogue,
     current_only,
     fit_and_score_all,
     jointly,
@@ -126,7 +126,7 @@ class RigStudy(Displayable):
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
         """A row a candidate, the chosen one first."""
-        return table_of(self.rig, self.candidates)
+        return table_of(self.dataset.name, self.candidates)
 
     @property
     def folds(self) -> Sequence[Mapping[str, tuple[float, float]]]:
@@ -311,8 +311,8 @@ def study_rig(
     methods = study_methods()
     if isinstance(model, str) and model in methods:
         model = methods[model]()
-    if not isinstance(model, StudyMethod) and model is not None and model not in all_models():
-        raise UnknownNameError.of("model", str(model)[:100], (*all_models(), *methods))
+    if not isinstance(model, StudyMethod) and model is not None and model not in catalogue():
+        raise UnknownNameError.of("model", str(model)[:100], (*catalogue(), *methods))
     method, model = (model, model.name) if isinstance(model, StudyMethod) else (None, model)
     rig = dataset.rigs[0]
     progress(f"{rig or 'rig'}: loops", 0.0)
@@ -333,18 +333,20 @@ def study_rig(
         kinds=True,
     )
     candidates = [with_unused_runs(c, everything) for c in candidates]
-    eligible = [c for c in candidates if model in (None, c.recipe.model)]
+    eligible = [c for c in candidates if model in (None, c.recipe.model, c.recipe.name)]
     if not eligible:
-        name, reason = next(iter(impossible.items()))
+        reasons = [f"{n}: {why}" for n, why in impossible.items() if model in (None, n, n.partition(":")[0])]
+        reasons += [f"{model}: identified from steady sines at constant current, of which there are {len(train)}"]
         raise IdentificationError(
-            f"no damper could be determined; {name}: {reason}",
+            f"no damper could be determined; {reasons[0]}",
             where=f"rig {rig}" if rig else dataset.name,
-            remedy="test more conditions, or leave this rig out of the dataset",
+            remedy="test more conditions, choose another --model, or leave this rig out of the dataset",
         )
     unphysical = {c.recipe.name: why for c in candidates if (why := gains_energy(c.damper))}
     eligible = [c for c in eligible if c.recipe.name not in unphysical] or eligible
     candidates = _chosen_first(candidates, eligible)
-    chosen = _with_uncertainty(candidates[0], train if candidates[0].recipe.basis else everything)
+    fitted = [dataset[one.run_id] for one in candidates[0].identifications]
+    chosen = _with_uncertainty(candidates[0], fitted or everything)
     candidates[0], sessions_note = _with_sessions(chosen, dataset)
     impossible |= unphysical
     return RigStudy(
@@ -561,14 +563,20 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
 def _steps(
     train: Sequence[Run], everything: Sequence[Run], method: StudyMethod | None, model: str | None
 ) -> list[tuple[Recipe, Sequence[Run]]]:
-    """Return the recipes of a study, and the runs each is followed on: sines run by run, everything at once."""
+    """Return the recipes of a study, and the runs each is followed on: sines run by run, everything at once.
+
+    Without sines, laws of the current alone are fitted to the records of constant current.
+    """
     pure = [run for run in train if analyse_motion(run).is_sine]  # published methods take no other
     if method is not None:
         return [(method.recipe(pure), train), *((modified(name), train) for name in STUDIED)]
     steps: list[tuple[Recipe, Sequence[Run]]] = []
     if len(train) > 1:
         steps += [(make(name), train) for name in STUDIED for make in (modified, jointly, current_only)]
-        steps += [(modified(name), train) for name in (model,) if name and name not in (*STUDIED, JOINTLY)]
+        others = {n: r for n, r in catalogue().items() if model == n or (model == r.model and not r.on_request)}
+        steps += [(r, train) for n, r in others.items() if n not in {JOINTLY, *(recipe.name for recipe, _ in steps)}]
+    elif len(held := [run for run in everything if not run.current_changes]) > 1:
+        steps += [(current_only(name), held) for name in STUDIED]
     if len(pure) > 2:
         steps += [(cls().beside_others().recipe(pure), train) for cls in study_methods().values()]
     return [*steps, (play_and_bypass(), everything)]

@@ -80,8 +80,8 @@ def _print(result: Comparison, rows: list[dict[str, Any]], name: str, verbose: b
     for note in shortened(notes, _NOTES, verbose):
         typer.echo(note, err=True)
     for rig in result.rigs:
-        print(f"{rig.rig or name}: nrmse_pp [%], median and largest")
-        head, *models = _ranking([row for row in rows if row["rig"] == rig.rig])
+        print(f"{rig.dataset.name}: nrmse_pp [%], median and largest")
+        head, *models = _ranking([row for row in rows if row["rig"] == rig.dataset.name])
         print("\n".join([head, *shortened(models, _ROWS // len(result.rigs), verbose)]))
     print(comparing.RANKING)
 

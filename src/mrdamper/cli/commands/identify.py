@@ -66,7 +66,7 @@ def identify(
         progress("identified", 1.0)
     for name, why in refused.items():
         typer.echo(f"not identified: {name}: {why}", err=True)
-    put(identification_rows(identifications), out, as_json, csv_text)
+    put(identification_rows(identifications, dataset.name), out, as_json, csv_text)
     doubts = [f"warning: run {one.run_id}: {doubt}" for one in identifications for doubt in one.doubts]
     for line in doubts[:_MAX_WARNINGS]:
         typer.echo(line, err=True)

@@ -129,7 +129,7 @@ def _not_identified(result: Study, verbose: bool) -> list[str]:
 def _summary(result, written: list[str]) -> dict:
     return {
         "rigs": {
-            rig.rig: {
+            rig.dataset.name: {
                 "chosen": rig.chosen.title,
                 "candidates": {
                     c.title: {
