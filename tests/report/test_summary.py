@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from mrdamper.report.page import plain
-from mrdamper.report.summary import study_lines
+from mrdamper.report.summary import omission_lines, study_lines
 
 
 def test_a_study_fits_a_terminal_and_its_details_follow_with_verbose(bundled_study):
@@ -18,6 +18,13 @@ def test_a_study_fits_a_terminal_and_its_details_follow_with_verbose(bundled_stu
         assert any(median in line for line in short)
         for name in rig.damper.fitted_parameters:
             assert any(line.startswith(f"  {name} = ") for line in full)
+
+
+def test_omitted_runs_stand_once_per_reason_and_those_that_other_models_use_apart(bundled_study):
+    rig = bundled_study.rigs[0]
+    used = rig.chosen.train.runs[0].run_id
+    lines = omission_lines(rig.candidates, {used: "no sine", "a": "clipped", "b": "clipped", "c": "clipped"}, 2)
+    assert lines == [f"no individual fit: {used} (no sine)", "not used: a, b and 1 more (clipped)"]
 
 
 def test_a_model_with_a_smaller_error_than_the_chosen_one_has_a_reason(bundled_study):

@@ -16,6 +16,7 @@ from benchmarks.virtual_dampers import DAMPERS
 from mrdamper.dampers.model_file import load_model
 from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError
+from mrdamper.report.study import _parameters_table
 from mrdamper.rig_files.dataset_folder import save_dataset
 from mrdamper.study.workflow import run_study
 
@@ -49,7 +50,8 @@ def test_random_records_alone_are_fitted_by_laws_of_the_current_and_by_no_model_
     study = run_study(Dataset(tuple(runs), "roads"), model="bingham")
     assert {"bingham:current", "bouc-wen:current", "play-bypass"} <= {c.recipe.name for c in study.rigs[0].candidates}
     assert study.table["rig"][0] == "roads"
+    assert _parameters_table(study).splitlines()[1].startswith("roads,c.0,")
     model = study.model.model_at(Condition(1.0, 2.0, 0.005))
     assert (model.c, model.fy) == (pytest.approx(1200, rel=0.05), pytest.approx(350, rel=0.05))
-    with pytest.raises(IdentificationError, match="kwok: identified from steady sines .* of which there are 0"):
+    with pytest.raises(IdentificationError, match=r"kwok: identified from steady sines .* of which there are 0"):
         run_study(Dataset(tuple(runs), "roads"), model="kwok")

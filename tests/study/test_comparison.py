@@ -138,7 +138,8 @@ def test_genetic_entries_take_part_only_when_asked():
 
 def test_a_shortened_run_says_the_same(dataset):
     run = synthetic_run(Condition(0.5, 1.0, 0.01), model=truth(Condition(0.5, 1.0, 0.01)), cycles=8)
-    short = shortened(run)
+    short = shortened(replace(run, further={"temperature_C": np.full(run.time.size, 20.0)}))
+    assert short.further == {}
     assert short.time.size < run.time.size / 3
     whole, part = identify(run).model, identify(short).model
     assert part.yield_force == pytest.approx(whole.yield_force, rel=5e-3)

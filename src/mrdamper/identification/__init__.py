@@ -118,7 +118,7 @@ def refuse_clipped(run: Run, clipped: bool = False) -> None:
         raise IdentificationError(
             "a channel is cut off at its extreme (W_CLIPPED)",
             where=f"run {run.id}",
-            remedy="record it again with a wider range, or identify with clipped=True (--clipped)",
+            remedy="record it again with a wider range, or identify it alone with --clipped (clipped=True)",
         )
 
 

@@ -17,6 +17,7 @@ from mrdamper.data.encoding import csv_text, file_names
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.comparison import overlaid_loops, ranking
 from mrdamper.report.plots.style import save_figure
+from mrdamper.report.summary import omission_lines
 from mrdamper.report.tables import score_row
 from mrdamper.study.comparison import RANKING, Comparison, RigComparison
 from mrdamper.study.recipe import Progress, RecipeResult
@@ -135,9 +136,7 @@ def _reason(entry: RecipeResult, entries: Sequence[RecipeResult]) -> str:
 
 
 def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[str, Any]:
-    scores = {
-        e.title: (e.train.median(), e.cross_validated.median(), e.validation.median()) for e in rig.entries
-    }
+    scores = {e.title: (e.train.median(), e.cross_validated.median(), e.validation.median()) for e in rig.entries}
     runs = _shown(rig)
     best = {entry.title: entry.damper for entry in rig.entries[:_OVERLAID]}
     figures = {"ranking": ranking(scores), "loops": overlaid_loops(runs, best)}
@@ -146,7 +145,7 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
         "rig": rig.dataset.name,
         "rows": _rows(rig),
         "refused": rig.refused,
-        "not_identified": rig.not_identified,
+        "omissions": omission_lines(rig.entries, rig.not_identified, len(rig.not_identified)),
         "verdict": (
             f"{first.title} has the least cross-validated error: "
             f"{100 * first.cross_validated.median():.1f} % of the "

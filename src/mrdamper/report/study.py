@@ -32,7 +32,7 @@ from mrdamper.report.plots.model import BAND_LEVEL, parameter_curves, predicted_
 from mrdamper.report.plots.reversal import force_since_reversal
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.report.plots.style import Picture
-from mrdamper.report.summary import error_sentence
+from mrdamper.report.summary import error_sentence, omission_lines
 from mrdamper.report.tables import identification_rows, score_row
 from mrdamper.study.parallel import IN_PROCESS, Processes
 from mrdamper.study.recipe import Progress, RecipeResult, StudyMethod
@@ -265,9 +265,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         "limitations": by_group([*limitations(chosen, rig.loops), Limitation("Prediction", _scatter(rig))]),
         "loops": rig.loops,
         "contradictions": rig.contradictions,
-        "not_identified": {
-            name: why for name, why in rig.not_identified.items() if name not in {c.run_id for c in rig.contradictions}
-        },
+        "omissions": omission_lines(rig.candidates, rig.omitted, len(rig.omitted)),
         "identifications": mapped.identifications if mapped else (),
         "parameter_names": _free_names(mapped.identifications[0]) if mapped else (),
         "mapped": mapped,

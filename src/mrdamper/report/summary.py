@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from mrdamper.dampers.uncertainty import table
+from mrdamper.errors import listed
 from mrdamper.report.limitations import limitations
 from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import Validation, peak_band
@@ -62,6 +63,15 @@ def error_sentence(rig: RigStudy) -> str:
         f"±{100 * intervals.half_width:.0f} %, and {intervals.inside} of the {intervals.runs} measured peak forces "
         "lie inside it."
     )
+
+
+def omission_lines(results: Sequence[RecipeResult], reasons: Mapping[str, str], most: int) -> list[str]:
+    """List the runs that are not fitted on their own, and those that are not used at all; a line per reason."""
+    used = {score.run_id for r in results for v in (r.train, r.cross_validated, r.validation) for score in v.runs}
+    groups: dict[tuple[str, str], list[str]] = {}
+    for run, why in reasons.items():
+        groups.setdefault(("no individual fit" if run in used else "not used", why), []).append(run)
+    return [f"{what}: {listed(runs, most)} ({why})" for (what, why), runs in groups.items()]
 
 
 def study_lines(study: Study, files: Sequence[str], *, verbose: bool = False) -> list[str]:

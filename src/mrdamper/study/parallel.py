@@ -172,6 +172,7 @@ def shortened(run: Run) -> Run:
         force=cut.force[pick],
         current=cut.current[pick],
         velocity=None,
+        further={},
         window=window,
         segments=(),
     )

@@ -119,6 +119,12 @@ class RigStudy(Displayable):
     contradictions: tuple[Contradiction, ...] = ()
 
     @property
+    def omitted(self) -> dict[str, str]:
+        """Runs that are not identified though they contradict no other, and the reasons."""
+        excluded = {one.run_id for one in self.contradictions}
+        return {run: why for run, why in self.not_identified.items() if run not in excluded}
+
+    @property
     def headline(self) -> str:
         """Rig, chosen model and its errors."""
         return headline_of(self.rig, self.chosen)
@@ -361,7 +367,9 @@ def _require_runs(sines: Sequence[Run], usable: Sequence[Run], unusable: Mapping
         raise IdentificationError(
             "no identification run passes the checks",
             where=where,
-            remedy="check the split column of runs.csv" if not unusable else next(iter(unusable.values())),
+            remedy="check the split column of runs.csv"
+            if not unusable
+            else "run {}: {}".format(*next(iter(unusable.items()))),
         )
     if len(usable) == len(sines) < 2:
         raise IdentificationError(
@@ -467,8 +475,13 @@ def runs_for_global_fit(runs: Iterable[Run], clipped: bool = False) -> tuple[lis
             equivalent_sine(run)  # refuses a run that does not move
             runs_used.append(run)
         except InputError as error:
-            refused[run.id] = str(error)
+            refused[run.id] = _reason(error, run)
     return runs_used, refused
+
+
+def _reason(error: InputError, run: Run) -> str:
+    """State an error of a run whose name stands beside it: runs of one reason are listed together."""
+    return str(error).removeprefix(f"run {run.id}: ")
 
 
 def without_contradictions(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, tuple[Contradiction, ...]]:
@@ -495,7 +508,7 @@ def accepted_runs(dataset: Iterable[Run]) -> tuple[list[Run], dict[str, str]]:
         if twin is not None:
             refused[run.id] = f"the same samples as run {twin}: a test counts once [E_TWICE]"
         elif error is not None:
-            refused[run.id] = str(error)
+            refused[run.id] = _reason(error, run)
         else:
             kept.append(run)
     refused |= _of_another_size(kept)
@@ -528,7 +541,7 @@ def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
             like = ", as if in mA" if what == "current" and size > 50 * usual else like
             if size > most * usual or (what != "current" and size < usual / most):
                 reasons[name] = (
-                    f"run {name}: {what} of {size:.3g} {unit}, {usual:.3g} {unit} in the other runs{like}; "
+                    f"{what} of {size:.3g} {unit}, {usual:.3g} {unit} in the other runs{like}; "
                     "state its unit when it is imported, or take it out of the dataset [E_OTHER_SIZE]"
                 )
     return reasons
@@ -551,7 +564,7 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
                     remedy=f"record at least {_MIN_SAMPLES_PER_CYCLE}",
                 )
         except InputError as error:
-            refused[run.id] = str(error)
+            refused[run.id] = _reason(error, run)
             continue
         if sine.is_sine and analyse_motion(run).distortion < _MAX_DISTORTION:
             sines.append(run)

@@ -73,9 +73,14 @@ def compare(
 
 
 def _print(result: Comparison, rows: list[dict[str, Any]], name: str, verbose: bool) -> None:
+    from mrdamper.report.summary import omission_lines
     from mrdamper.study import comparison as comparing
 
-    notes = [f"not identified: {run}: {why}" for rig in result.rigs for run, why in rig.not_identified.items()]
+    notes = [
+        line
+        for rig in result.rigs
+        for line in omission_lines(rig.entries, rig.not_identified, len(rig.dataset) if verbose else 3)
+    ]
     notes += [f"not determined: {model}: {why}" for rig in result.rigs for model, why in rig.refused.items()]
     for note in shortened(notes, _NOTES, verbose):
         typer.echo(note, err=True)

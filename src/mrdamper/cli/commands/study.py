@@ -11,12 +11,11 @@ import typer
 
 from mrdamper.cli.output import parse_gas, parse_pairs
 from mrdamper.cli.progress import in_two, progress_on_stderr
-from mrdamper.errors import IdentificationError, InputError, UnknownNameError, listed
+from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from mrdamper.data import Dataset
     from mrdamper.study.recipe import StudyMethod
-    from mrdamper.study.workflow import Study
 
 app = typer.Typer()
 
@@ -52,7 +51,7 @@ def study(
     from mrdamper.data.atomic import require_writable
     from mrdamper.report.about import load_about, load_limits
     from mrdamper.report.study import study_and_draw, write_study
-    from mrdamper.report.summary import study_lines
+    from mrdamper.report.summary import omission_lines, study_lines
     from mrdamper.rig_files.dataset_folder import load_dataset
     from mrdamper.study.parallel import several
 
@@ -71,11 +70,11 @@ def study(
             dataset, studying, model=chosen, keep=keep, also=also, limits=bands, processes=processes
         )
         written = write_study(result, out, writing, about=head, limits=bands, also=also, drawn=drawn, paper=page_size)
-    for line in _not_identified(result, verbose):
-        typer.echo(line, err=True)
     for rig in result.rigs:
-        for note in rig.chosen.recipe.notes:
-            typer.echo(f"note: {note}", err=True)
+        lines = [f"excluded: {one.run_id}: {one}" for one in rig.contradictions]
+        lines += omission_lines(rig.candidates, rig.omitted, len(dataset) if verbose else 3)
+        for line in [*lines, *(f"note: {note}" for note in rig.chosen.recipe.notes)]:
+            typer.echo(line, err=True)
     if as_json:
         print(json.dumps(_summary(result, [str(p) for p in written]), indent=1))
         return
@@ -110,20 +109,6 @@ def _paper_size(name: str) -> str:
     if name.lower() not in PAPERS:
         raise UnknownNameError.of("paper size", name, PAPERS)
     return name.lower()
-
-
-def _not_identified(result: Study, verbose: bool) -> list[str]:
-    """List the runs without an individual fit, one line per reason."""
-    reasons: dict[str, list[str]] = {}
-    excluded = [f"excluded: {one.run_id}: {one}" for rig in result.rigs for one in rig.contradictions]
-    for rig in result.rigs:
-        aside = {one.run_id for one in rig.contradictions}
-        for run, reason in rig.not_identified.items():
-            if run not in aside:
-                reasons.setdefault(reason, []).append(run)
-    return excluded + [
-        f"no individual fit: {listed(runs, len(runs) if verbose else 3)} ({reason})" for reason, runs in reasons.items()
-    ]
 
 
 def _summary(result, written: list[str]) -> dict:
