@@ -55,6 +55,12 @@ def whole(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100 else number(value, 3)
 
 
+def median_worst(median: float | None, worst: float | None) -> str:
+    """Write an error as per cent and the largest in parentheses; a dash where there is none."""
+    text = percent(median)
+    return text if text == "–" else f"{text} ({percent(worst)})"
+
+
 def percent(share: float | None, digits: int = 1) -> str:
     """Format a share in per cent; a dash where there is none."""
     return "–" if share is None or not np.isfinite(share) else f"{100 * share:.{digits}f}"
@@ -72,6 +78,7 @@ _ENVIRONMENT.globals |= {
     "number": number,
     "plain": plain,
     "whole": whole,
+    "median_worst": median_worst,
     "percent": percent,
     "mm": lambda v: 1e3 * v,
 }

@@ -368,10 +368,10 @@ def _choice(rig: RigStudy) -> str:
 
 
 def _tests(rig: RigStudy) -> str:
-    others = len(rig.dataset) - len(rig.loops)
-    more = (
-        f"{others} {'record' if others == 1 else 'records'} of other motion or of a varying current" if others else ""
-    )
+    used = {run.run_id for scores in (rig.chosen.cross_validated, rig.chosen.validation) for run in scores.runs}
+    others, unused = len(used - {loop.run_id for loop in rig.loops}), len({run.id for run in rig.dataset} - used)
+    records = f"{others} {'record' if others == 1 else 'records'} of other motion or of a varying current"
+    more = " and ".join([records] * (others > 0) + [f"{unused} not used"] * (unused > 0))
     if not rig.loops:
         return f"Tests: {more}; no steady sine at constant current."
     conditions = [loop.condition for loop in rig.loops]

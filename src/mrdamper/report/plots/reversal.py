@@ -42,7 +42,7 @@ def force_since_reversal(runs: Sequence[Run], damper: Damper) -> Figure:
 
 
 def _means(run: Run, damper: Damper, bins: Floats) -> Floats:
-    """Rows: measured, predicted; mean in each bin, NaN where no sample fell."""
+    """Rows: measured, predicted; mean in each bin, linearly interpolated where a fast run has no sample."""
     prediction = damper.predict(run)
     path, inside = prediction.motion.path, run.in_window
     direction, distance = path.direction[inside], path.distance[inside]
@@ -54,5 +54,6 @@ def _means(run: Run, damper: Damper, bins: Floats) -> Floats:
         valid = index < bins.size - 1
         total = np.bincount(index[valid], centred[valid], minlength=bins.size - 1)
         count = np.bincount(index[valid], minlength=bins.size - 1)
-        rows.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+        full = np.flatnonzero(count)
+        rows.append(np.interp(np.arange(count.size), full, total[full] / count[full], np.nan, np.nan))
     return np.array(rows)
