@@ -24,6 +24,7 @@ from mrdamper.models import Scale
 from mrdamper.models.play_bypass import PlayBypass, play_position
 from mrdamper.physics.motion import random_motion, sine, sweep
 from mrdamper.physics.motion.lag import first_order_lag
+from mrdamper.physics.motion.sines import extreme_strokes
 from mrdamper.physics.simulation import simulate, steady_loop
 from mrdamper.statistics.levenberg_marquardt import Minimum
 from mrdamper.statistics.stop_reason import StopReason
@@ -264,7 +265,8 @@ def test_scales_and_ranges_are_those_of_the_runs(runs, problem):
     assert joint._envelope([sine_, other]) == wider != plain
     assert joint._envelope([sine_]) == Envelope.of([sine_.condition])
     extent = np.array([[sine_.lowest, sine_.highest]])
-    rough = Envelope.of([sine_.condition]).with_motion(sine_.motion.current, extent, sine_.motion.velocity)
+    conditions = [sine_.condition, *extreme_strokes(sine_.motion)]
+    rough = Envelope.of(conditions).with_motion(sine_.motion.current, extent, sine_.motion.velocity)
     assert joint._envelope([replace(sine_, is_sine=False)]) == rough
 
 

@@ -16,7 +16,9 @@ from mrdamper.physics.motion import (
     sweep,
     triangle,
 )
+from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.harmonics import fit_harmonics
+from mrdamper.physics.motion.sines import extreme_strokes
 
 
 def record(frequency, amplitude, cycles, per_cycle, phase=0.3, offset=0.0, drift=0.0, noise=0.0):
@@ -168,3 +170,18 @@ def test_windows_taken_in_blocks_are_the_windows_of_all(monkeypatch, uneven):
     monkeypatch.setattr(measured, "_CELLS", 1000)
     for one, other in zip(smooth(time, signal), whole, strict=True):
         assert one == pytest.approx(other, rel=1e-9, abs=1e-9)
+
+
+def test_the_extreme_strokes_of_a_record_are_half_cycles_of_its_motions_and_its_noise_is_none():
+    pieces = [sine(Condition(0.5, f, A), 3, int(400 / f)) for f, A in ((1.0, 0.02), (2.0, 0.005), (8.0, 0.001))]
+    x = np.concatenate([piece.displacement for piece in pieces])
+    t = np.arange(x.size) / 400
+    x += 1e-6 * np.random.default_rng(1).standard_normal(x.size)
+    v = np.gradient(x, t)
+    strokes = extreme_strokes(Excitation(t, x, v, np.gradient(v, t), np.full(t.size, 0.5)))
+    assert min(s.frequency_Hz for s in strokes) == pytest.approx(1.0, rel=0.05)
+    assert max(s.frequency_Hz for s in strokes) == pytest.approx(8.0, rel=0.05)
+    assert max(s.amplitude_m for s in strokes) == pytest.approx(0.02, rel=0.01)
+    assert min(s.amplitude_m for s in strokes) == pytest.approx(0.001, rel=0.05)
+    assert [s.current_A for s in strokes] == pytest.approx([0.5] * len(strokes))
+    assert extreme_strokes(Excitation(t[:9], t[:9], t[:9], t[:9], t[:9])) == []

@@ -29,6 +29,7 @@ from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
 from mrdamper.models.recorded import force_tangents
 from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.motion.sines import extreme_strokes
 from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares, newton_refine
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.statistics.stop_reason import StopReason
@@ -506,9 +507,10 @@ class JointProblem:
 
 
 def _envelope(parts: Sequence[RunRows]) -> Envelope:
-    """Ranges of the sines at one current, and every sample of the others."""
-    envelope = Envelope.of([part.condition for part in parts])
+    """Ranges of the sines at one current, and every sample and the extreme strokes of the others."""
     others = [part for part in parts if part.changes or not part.is_sine]
+    strokes = [stroke for part in others if not part.is_sine for stroke in extreme_strokes(part.motion)]
+    envelope = Envelope.of([*(part.condition for part in parts), *strokes])
     extent = np.array([[part.lowest, part.highest] for part in others])
     for part in others:
         envelope = envelope.with_motion(part.motion.current, extent, part.motion.velocity)

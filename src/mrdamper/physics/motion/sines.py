@@ -16,6 +16,9 @@ from mrdamper.physics.motion.measured import measured_motion
 SINE_DISTORTION_LIMIT = 0.05  # above it a motion is no sine for harmonic balance
 STRAY_LIMIT = 0.3  # of the RMS displacement; what no harmonic explains: above it another motion runs beside the sine
 _MEASURED_HARMONICS = 7  # harmonics a measured motion is described by
+_MIN_STROKES = 4  # of a record, below which they show no range
+_MIN_STROKE_SAMPLES = 8  # of a stroke whose duration is counted
+_MIN_STROKE_RATIO = 0.02  # of a stroke that is no noise over the longest [-]
 _MIN_DISPLACEMENT_M = 1e-9  # a displacement that moves less does not move [m]
 
 
@@ -103,6 +106,29 @@ def equivalent_sine(run: Run) -> EquivalentSine:
     rms_x, rms_v = float(np.std(motion.displacement)), float(np.std(motion.velocity))
     condition = Condition(abs(run.mean_current), rms_v / (2 * np.pi * rms_x), float(np.sqrt(2) * rms_x))
     return EquivalentSine(condition, float(np.mean(motion.displacement)), False)
+
+
+def extreme_strokes(motion: Excitation) -> list[Condition]:
+    """Return the slowest, fastest, shortest and longest strokes of a record as half cycles of sines.
+
+    Strokes that are short of samples or far shorter than the longest are noise; of the frequencies the middle 90 %
+    count. The current is the mean of the stroke.
+    """
+    path = motion.path
+    samples = np.bincount(path.stroke)
+    currents = np.bincount(path.stroke, np.abs(motion.current)) / np.maximum(samples, 1)
+    begins = motion.time[np.searchsorted(path.stroke, np.arange(1, samples.size))]
+    frequencies = 0.5 / np.maximum(np.diff(begins), np.finfo(float).tiny)
+    points = np.column_stack([currents[1:-1], frequencies, np.array(path.lengths[1:]) / 2])
+    shortest = 0.5 * _MIN_STROKE_RATIO * max(path.lengths, default=0)
+    points = points[(samples[1:-1] >= _MIN_STROKE_SAMPLES) & (points[:, 2] > shortest)]
+    if len(points) < _MIN_STROKES:
+        return []
+    low, high = np.percentile(points[:, 1], (5, 95))
+    points = points[(points[:, 1] >= low) & (points[:, 1] <= high)]
+    f, A = np.log(points[:, 1:]).T
+    picks = {int(end(values)) for values in (f, A, f + A, f - A) for end in (np.argmin, np.argmax)}
+    return [Condition(*points[i].tolist()) for i in sorted(picks)]
 
 
 @once_per_run
