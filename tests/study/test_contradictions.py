@@ -7,9 +7,11 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
-from mrdamper.data import Run
+from mrdamper.data import Dataset, Run
+from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
 from mrdamper.study.contradictions.evidence import AssumedScatter, Evidence
 from mrdamper.study.contradictions.explanations import completed_matrix_odds
@@ -96,6 +98,19 @@ def test_the_run_and_its_cause_are_named(cases, name, value):
     assert {one.run_id for one in found} == folder.wrong
     assert {one.cause for one in found} <= set(folder.causes)
     assert [one.value for one in found] == pytest.approx([value] * len(found), rel=0.1, abs=0.01)
+
+
+def test_a_stated_current_is_corrected_in_the_dataset_and_a_measured_one_by_another_test(cases, tmp_path):
+    measured = cases["open coil"].runs
+    assert {one.remedy for one in find_contradictions(measured)} == {"repeat the test"}
+    stated = [replace(run, current=run.mean_current) for run in measured]
+    (found,) = find_contradictions(stated)
+    run, current = re.search(r"set current_A of (\S+) to (\S+) in runs.csv of the dataset", found.remedy).groups()
+    save_dataset(Dataset(tuple(stated)), tmp_path / "rig")
+    table = pl.read_csv(tmp_path / "rig" / "runs.csv", infer_schema=False)
+    corrected = pl.when(pl.col("run_id") == run).then(pl.lit(current)).otherwise(pl.col("current_A"))
+    table.with_columns(current_A=corrected).write_csv(tmp_path / "rig" / "runs.csv")
+    assert not find_contradictions(load_dataset(tmp_path / "rig").runs)
 
 
 @pytest.mark.parametrize(
