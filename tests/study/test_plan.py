@@ -21,6 +21,7 @@ from mrdamper.rig_files.motion_file import load_motion
 from mrdamper.study.first_matrix import first_matrix
 from mrdamper.study.limits import Limits
 from mrdamper.study.plan import ExperimentDesign, _slopes, least_informative_runs, plan_tests
+from mrdamper.study.proposal import PlanRow
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from benchmarks.planning import designs, reckoned
@@ -283,6 +284,8 @@ def test_hours_that_hold_no_record_and_models_that_know_nothing_are_refused(damp
     for hours in (0.001, 5.0 / 60, float("nan"), -1.0):
         with pytest.raises(InputError, match="E_LIMITS"):
             plan_tests(damper, LIMITS, hours)
+    with pytest.raises(InputError, match="E_ARGUMENT"):
+        plan_tests(damper, LIMITS, "two")
     with pytest.raises(InputError, match="E_CERTAINTY"):
         plan_tests(joint_damper(), LIMITS, 1.0)
 
@@ -338,3 +341,11 @@ def test_conditions_of_a_plan_have_three_digits_and_stay_inside_the_limits():
     assert {c.current_A for c in found} == {0.0, 0.533, 1.07, 1.6}
     assert {c.frequency_Hz for c in found} == {0.5, 1.0, 2.0, 4.0}
     assert {round(1e3 * c.amplitude_m, 9) for c in found} == {5.004, 6.76, 9.14, 12.3}
+
+
+def test_the_table_of_a_plan_has_conditions_without_the_digits_of_a_measurement():
+    item = SimpleNamespace(
+        session=1, condition=Condition(0.5, 1.000000000006847, 0.0104), minutes=3.1, before=0.1, after=0.05, reason=""
+    )
+    row = PlanRow.of(1, item, "plan_01.csv")
+    assert (row.frequency_Hz, row.amplitude_mm) == (1.0, 10.4)

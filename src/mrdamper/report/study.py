@@ -251,7 +251,7 @@ def _measured(rig: RigStudy) -> dict[str, Characteristics]:
 def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limit]) -> dict[str, Any]:
     chosen, mapped = rig.chosen, (_mapped(rig) or (None, None))[0]
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
-    held = any(run.id in {loop.run_id for loop in rig.loops} for run in rig.dataset.split("validate"))
+    held = all(run.split == "validate" for run in _shown(rig))
     return {
         "rig": rig.dataset.name,
         "verdict": error_sentence(rig),
@@ -273,7 +273,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         "predicted_caption": (
             "Validation runs, last cycle of the steady window; none was used for identification."
             if held
-            else "Identification runs, last cycle of the steady window; the dataset has no validation runs."
+            else "Identification runs, last cycle of the steady window; no validation run is a steady sine."
         )
         + (
             f" Dotted: {100 * BAND_LEVEL:.0f} % prediction interval {scope(chosen.damper, BAND_LEVEL)}."

@@ -21,7 +21,7 @@ from mrdamper.dampers.prediction import Prediction
 from mrdamper.dampers.slopes import force_slopes
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition, Floats
-from mrdamper.errors import InputError, UnknownNameError, validate_arguments
+from mrdamper.errors import InputError, UnknownNameError, numbers, validate_arguments
 from mrdamper.identification.intervals import student
 from mrdamper.physics.motion import sine
 from mrdamper.study.limits import Limits
@@ -39,7 +39,7 @@ _LEVEL = 0.9  # of bands
 _SEED = 20240813
 
 
-@validate_arguments()
+@validate_arguments("hours")
 def plan_tests(
     damper: Damper,
     limits: Limits,
@@ -78,6 +78,7 @@ def plan_tests(
     >>> len(proposals) > 0
     True
     """
+    (hours,) = numbers(hours)
     conditions = limits.candidates(hours)
     reckoning = ExperimentDesign.of(damper, limits, conditions, about, progress)
     progress("choosing records", 0.9)

@@ -73,6 +73,7 @@ class PlanRow:
         """Take the row of a record whose motion stands in a file."""
         c, (before, after) = item.condition, (None if math.isnan(b) else b for b in (item.before, item.after))
         return cls(
-            order, item.session, file, c.current_A, c.frequency_Hz, 1e3 * c.amplitude_m, round(item.minutes, 2),
+            order, item.session, file, c.current_A, float(f"{c.frequency_Hz:.6g}"),
+            float(f"{1e3 * c.amplitude_m:.6g}"), round(item.minutes, 2),
             before, after, item.reason,
         )  # fmt: skip

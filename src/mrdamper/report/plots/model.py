@@ -139,14 +139,11 @@ def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
     steps = levels([run.mean_current for run in runs])
     colours = current_colours(steps)
     for step, run in zip(steps, runs, strict=True):
-        sine = equivalent_sine(run)
-        if not sine.is_sine:
-            continue
         prediction = damper.predict(run)
         inside = run.in_window
         motion = prediction.motion.part(inside)
         error = 100 * (prediction.force - run.force)[inside] / np.ptp(run.force[inside])
-        omega = 2 * np.pi * sine.condition.frequency_Hz
+        omega = 2 * np.pi * equivalent_sine(run).condition.frequency_Hz
         phase = np.degrees(np.arctan2(motion.displacement, motion.velocity / omega)) % 360
         colour = colours[step]
         for axes, key, bins in (
