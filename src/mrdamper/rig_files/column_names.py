@@ -69,6 +69,7 @@ class Header(NamedTuple):
         return self.role or (by_unit if by_unit and says_nothing(self.name) else None)
 
 
+@lru_cache(maxsize=4096)
 def split_name(header: str, unit: str = "") -> Header:
     """Name and unit of a column whose header may hold both: `force_N`, `Force [kN]`, `Kraft in kN`."""
     if len(header) > _LONGEST_NAME:

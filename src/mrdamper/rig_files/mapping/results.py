@@ -171,8 +171,10 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
     ]
     rows = [[cell.strip('"').strip() for cell in cells] for cells in split]
     for at, row in enumerate(rows):
-        columns = [i for i, cell in enumerate(row) if cell and _is_current(cell)]
-        if len(row) < 2 or not columns or sum(map(bool, row)) < 2:
+        if sum(map(bool, row)) < 2:  # most lines are one cell where another character separates them
+            continue
+        columns = [i for i, cell in enumerate(row) if cell and not _NUMBER.fullmatch(cell) and _is_current(cell)]
+        if not columns:
             continue
         below = at + 1
         unit = ""
