@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from statistics import NormalDist
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -405,7 +404,7 @@ def _factors(units: Sequence[Sequence[StandardizedErrors]], quantity: Quantity) 
     """Quantiles of the scores over those of a normal distribution, at the levels that can be reached."""
     reach = len(units) / (len(units) + 1)
     return tuple(
-        min(_quantile(units, quantity, level) / NormalDist().inv_cdf((1 + level) / 2), _MAX_FACTOR)
+        min(_quantile(units, quantity, level) / student(level, np.inf), _MAX_FACTOR)
         for level in LEVELS
         if level <= reach
     )
