@@ -29,7 +29,7 @@ _IN_NAME = re.compile(
 )
 _NEXT_NUMBER = re.compile(r"_A_[0-9.]+(?:_|\.[a-z]{2,4}$|$)")  # 2_A_20: the name of the next number
 _NEGATIVE = re.compile(r"[=:]\s*[-−]$")  # a dash elsewhere may stand between two parts of a name
-_NUMERIC_CELL = re.compile(r"[,;]\s*\"?[+-]?[0-9.]+\"?\s*$")
+_NUMERIC_CELL = re.compile(r"[,;]\s*\"?[+-]?[0-9.]+\"?\s*(?:[,;]|$)")
 _LINE = re.compile(
     r"^[\s#%/\"]*(?P<key>[^:=;\t]{1,60}?)[\s\"]*(?:[:=;\t]|(?<![0-9]),|,(?![0-9]+(?![0-9.])))[\s:=;,\t\"]*(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)"
     r"[\s;,\t\"]*[\[(]?(?P<unit>(?:1/)?(?:[^\W\d_]|/){0,9}(?:-1)?)[\])]?[\s;,\t\"]*$"

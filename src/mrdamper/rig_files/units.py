@@ -73,7 +73,7 @@ def _from_table(text: str) -> Unit | None:
 
 def _normal(text: str) -> str:
     """One writing for the many of m/s²: m/s^2, m s-2, m_s2, m/s**2, m·s⁻²."""
-    text = " ".join(text.strip().split())
+    text = " ".join(text.strip().rstrip(".").split())
     for old, new in (("µ", "u"), ("μ", "u"), ("²", "2"), ("³", "3"), ("⁻¹", "-1"), ("⁻", "-"), ("**", "^"), ("º", "°")):
         text = text.replace(old, new)
     text = text.replace("^", "").replace("_per_", "/").replace(" per ", "/").replace("° ", "°")
