@@ -73,12 +73,10 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, togeth
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
-    tree = _with_own_axes(_tests_of_rows(_spread({key: _object_in(value) for key, value in tree.items()})))
+    tree = _with_own_axes(_tests_of_rows(_with_rows(_spread({key: _object_in(value) for key, value in tree.items()}))))
     stated = next((v for key, v in tree.items() if key.casefold() in KEYS["unit"] and isinstance(v, Mapping)), {})
-    node.units = {
-        **node.units,
-        **{key: u for key, u in stated.items() if isinstance(u, str) and is_unit(u)},
-    }
+    own = {key[:-5]: unit for key, unit in tree.items() if key.casefold().endswith("_unit")} | dict(stated)
+    node.units = {**node.units, **{key: u for key, u in own.items() if isinstance(u, str) and is_unit(u)}}
     sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= _FEWEST_SAMPLES}
     for key, value in _paired(tree, node.units).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
@@ -170,6 +168,26 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     rest = {k: v for k, v in tree.items() if k != key and k not in vectors and k not in words}
     own = [{key: matrices[i], **words, **{k: float(v[i]) for k, v in vectors.items()}} for i in range(count)]
     return {**rest, **{f"{key}_{i}": node for i, node in enumerate(own, 1)}}
+
+
+def _with_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return arrays over several conditions and samples, force[current, frequency, time], with a row a test.
+
+    Every dimension has a vector of its length, the samples' a time, and no two are of one length.
+    """
+    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf"}
+    shapes = {key: tuple(n for n in array.shape if n != 1) for key, array in numeric.items()}
+    deep = [key for key, shape in shapes.items() if len(shape) > 2]
+    shape = shapes[deep[0]] if deep else ()
+    axes = {n: [key for key, own in shapes.items() if own == (n,)] for n in shape}
+    timed = [n for n, keys in axes.items() if any(split_name(key).role == "time" for key in keys)]
+    if len({shapes[key] for key in deep}) != 1 or len(axes) < len(shape) or not all(axes.values()) or len(timed) != 1:
+        return tree
+    outer = [n for n in shape if n != timed[0]]
+    rows = {key: np.moveaxis(np.squeeze(numeric[key]), shape.index(timed[0]), -1) for key in deep}
+    rows = {key: array.reshape(-1, timed[0]) for key, array in rows.items()}
+    at = dict(zip(outer, np.indices(outer).reshape(len(outer), -1), strict=True))
+    return {**tree, **rows, **{key: np.reshape(numeric[key], -1)[at[n]] for n in outer for key in axes[n]}}
 
 
 def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
