@@ -15,7 +15,7 @@ from mrdamper.rig_files.coil_current import with_stated_current
 from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.conditions import CELL, LARGEST_STATED, quantity_in_cell
 from mrdamper.rig_files.record import Record
-from mrdamper.rig_files.text.short import decoded
+from mrdamper.rig_files.text.stream import decoded
 from mrdamper.rig_files.vocabulary import words
 
 NAME = "tests.csv"

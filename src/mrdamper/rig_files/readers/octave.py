@@ -11,7 +11,7 @@ from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import damaged, whole
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
-from mrdamper.rig_files.text.short import decoded
+from mrdamper.rig_files.text.stream import decoded
 
 _MARKS = (b"# Created by Octave", b"# name: ")
 

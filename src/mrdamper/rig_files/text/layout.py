@@ -96,6 +96,8 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     if width > MOST_COLUMNS:
         raise source.refuse("E_TOO_MANY_COLUMNS", f"{width} columns", "is one sample one line?", line=first + 1)
     rows = _rows(lines[first:], separator, width, trailing)
+    if not any(map(str.strip, lines[:first])) and width > _TELLING and _counts(rows[0]) and "." in "".join(rows[-1]):
+        first, rows = first + 1, rows[1:]  # 0, 1, 2: numbers of the columns
     stated = (match[1] for line in lines[:first] if (match := _DECIMAL.fullmatch(line.strip())))
     decimal = form.decimal or next(stated, None) or _decimal(rows, source, first)
     if _counts(row[0] for row in rows):

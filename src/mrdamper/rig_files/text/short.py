@@ -5,24 +5,18 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping
+from itertools import permutations
 from pathlib import Path
 from typing import Any
+
+from mrdamper.rig_files.text.stream import decoded
+from mrdamper.rig_files.units import is_unit
 
 _LARGEST = 2**18  # bytes
 _RULE = re.compile(r"[\s|:+=-]*")  # below the names of columns of a table in Markdown
 _PAIR = re.compile(r"""\s*["']?(?P<key>[^:"'{}\[\]#,]{1,60}?)["']?\s*:\s+["']?(?P<value>[^"'{},#]*?)["']?\s*""")
 _ITEM = re.compile(r"\s*-\s+(?=\S)")
 _DEEPEST, _FEWEST_TESTS = 6, 2
-
-
-def decoded(content: bytes) -> str:
-    """Return a text in UTF-8, UTF-16 with its mark, or what spreadsheets write without being asked."""
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return content.decode("utf-16", "replace")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("cp1252", "replace")
 
 
 def short_lines(path: Path) -> list[str]:
@@ -90,6 +84,10 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
     elif unit:
         words = [key, *(str(value) for value in lower.values() if isinstance(value, (str, int, float)))]
         yield "; ".join(dict.fromkeys(words))
+    lists = [value for value in lower.values() if isinstance(value, list) and all(isinstance(i, str) for i in value)]
+    for names, its in permutations(lists, 2):  # columns: [time, load], units: [s, N]
+        if len(names) == len(its) and all(map(is_unit, its)):
+            yield from (f"{i}={name};{own}" for i, (name, own) in enumerate(zip(names, its, strict=True), 1))
     own = next((lower[name] for name in ("units", "unit") if isinstance(lower.get(name), dict)), units)
     for name, value in node.items():
         if isinstance(value, (dict, list)):

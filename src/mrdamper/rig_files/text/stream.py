@@ -159,19 +159,30 @@ def _encoding(source: Source, head: bytes, form: FileForm) -> tuple[str, int]:
             raise source.refuse(
                 "E_PROFILE", f"no encoding is called {form.encoding!r}", "use utf-8, utf-16 or cp1252"
             ) from error
+    return _detected(head), 0
+
+
+def decoded(content: bytes) -> str:
+    """Return a whole short text, in the encoding of its mark or that in which most of its words name channels."""
+    mark, encoding = next((known for known in _BOMS if content.startswith(known[0])), (b"", ""))
+    return content[len(mark) :].decode(encoding or _detected(content), "replace")
+
+
+def _detected(head: bytes) -> str:
+    """Name of the encoding of a text without a byte order mark."""
     start = head[:2048]
     if len(start) >= 8:
         odd, even = start[1::2].count(0) / len(start[1::2]), start[::2].count(0) / len(start[::2])
         if odd > 0.95 and even < 0.05:
-            return "utf-16-le", 0
+            return "utf-16-le"
         if even > 0.95 and odd < 0.05:
-            return "utf-16-be", 0
+            return "utf-16-be"
     # A character may be cut at the end of the head; only that is forgiven.
     try:
         codecs.getincrementaldecoder("utf-8")().decode(head, final=len(head) < _HEAD)
     except UnicodeDecodeError:
-        return _not_unicode(head), 0
-    return "utf-8", 0
+        return _not_unicode(head)
+    return "utf-8"
 
 
 def _not_unicode(head: bytes) -> str:
