@@ -23,6 +23,7 @@ from mrdamper.rig_files.vocabulary import words
 
 _FRACTIONS = {"millisekunden": "ms"}
 _DATES = words("date")
+_CYCLE = re.compile(r"(?i)(?:cycle|zyklus|ciclo|cykl|цикл|サイクル|循环)s?(?:[ ._]*(?:count|number|no|nr|#)\.?)?$")
 _AXIS_UNIT = re.compile(
     r"(?i)^[\s\"]*(?P<axis>[xyz])[ _-]?axis[ _-]?unit\"?\s*[;,:=\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s;,\"]*$"
 )
@@ -117,9 +118,29 @@ def with_time_stated(table: RawTable) -> RawTable:
     Parts: a clock of whole seconds and thousandths; a clock of a day and its date.
     """
     times = table.columns("time") or [i for i in table.columns(dimension="time") if not table.names[i]]
+    times = times or table.columns(dimension="time")
+    table = _with_cycles(table, times[0]) if len(times) == 1 else table
+    times = times if len(times) > 1 else table.columns("time")
     if len(times) == 1:
         return _with_samples_counted(_with_date(_with_fractions(table, times[0]), times[0]), times[0])
     return table if times else _with_crank(table)
+
+
+def _with_cycles(table: RawTable, clock: int) -> RawTable:
+    """Return a clock that begins again with every cycle that a column counts going on: no test begins there."""
+    counters = [i for i, name in enumerate(table.names) if i != clock and _CYCLE.match(name.strip())]
+    values = table.try_read(clock, *counters[:1]) if len(counters) == 1 and table.source.size <= _LARGEST else None
+    steps = {i: np.diff(column) for i, column in values.items()} if values else {}
+    falls = steps[clock] < 0 if steps else np.zeros(0, dtype=bool)
+    if not falls.any() or not np.array_equal(steps[counters[0]], falls.astype(float)):
+        return table
+
+    def going_on(values: Mapping[int, Floats]) -> Floats:
+        steps = np.diff(values[clock])
+        return np.concatenate([[0.0], np.cumsum(np.where(steps < 0, np.median(steps), steps))])
+
+    note = Finding("W_CHOSEN", f"{table.names[clock]!r} begins again in every cycle: time goes on over them")
+    return table.computed(clock, (clock,), going_on).named({clock: ("time", table.headers[clock].unit)}).noted(note)
 
 
 def _with_fractions(table: RawTable, clock: int) -> RawTable:

@@ -12,6 +12,7 @@ from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, InputError
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.columns import candidates_of, column_called
+from mrdamper.rig_files.conditions import stated_rate
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding
 
@@ -27,20 +28,22 @@ _CLEAR, _POOR = 0.5, 0.2  # share of the force that velocity explains: of a damp
 
 
 def with_unit_of_time(table: RawTable) -> RawTable:
-    """Return the table with the unit of its time, where only one agrees with the frequency that the file states."""
+    """Return the table with the unit of its time, where only one agrees with the frequency or rate the file states."""
     times, moved = table.columns("time"), table.columns("displacement")
     if len(times) != 1 or len(moved) != 1 or table.headers[times[0]].unit or table.source.size > _LARGEST:
         return table
-    stated = set(stated_frequencies(table))
+    rates = {v for key, v, unit in table.quantities if unit.dimension == "frequency" and stated_rate([(key, v, unit)])}
+    stated = set(stated_frequencies(table)) - rates or {*rates}
     values = table.try_read(times[0], moved[0]) if len(stated) == 1 else None
     if values is None:
         return table
-    measured = frequency_of(values[times[0]], values[moved[0]])
-    frequency = stated.pop()
+    steps, frequency = np.diff(values[times[0]]), stated.pop()
+    measured = 1 / np.median(steps) if frequency in rates else frequency_of(values[times[0]], values[moved[0]])
     units = [u for u, f in _CLOCK_UNITS.items() if measured and abs(measured / f - frequency) < _AGREE * frequency]
     if len(units) != 1:
         return table
-    text = f"the unit of time is {units[0]}: so the motion has the {frequency:g} Hz that the file states"
+    what = "samples are taken at" if frequency in rates else "motion has"
+    text = f"the unit of time is {units[0]}: so the {what} the {frequency:g} Hz that the file states"
     return table.named({times[0]: (table.names[times[0]], units[0])}).noted(Finding("W_UNITS", text))
 
 
