@@ -319,3 +319,96 @@ def test_the_day_of_a_test_is_that_of_its_own_lines(tmp_path, lines, note):
     (record,) = import_files([tmp_path / "a_0.5A.csv"]).records
     assert note.items() <= record.provenance.items()
     assert bool(note) == bool({"recorded_at", "session"} & set(record.provenance))
+
+
+@pytest.mark.parametrize(
+    ("head", "scale"),
+    [
+        (['"Sample Rate","500.000","Hz","","Duration","3.000","s"', "Time [s],Displacement [mm],Force [N]"], 1),
+        (["Sampling frequency: 500 Hz", "Time,Displacement [mm],Force [N]"], 1e3),
+        (["Time [s],Stroke (in.),Force [N]"], 1),
+        (["Var1,Var2,Var3"], 1),
+    ],
+    ids=["another number of the line is no step", "only ms agree with the rate", "in.", "a README of the folder above"],
+)
+def test_names_and_units_are_read_as_a_careful_reader_does(head, scale, tmp_path):
+    if "Var1" in head[0]:
+        (tmp_path / "README.txt").write_text("Var1: time (s)\nVar2: displacement (mm)\nVar3: force (N)\n")
+    folder = tmp_path / "0.5 A"
+    folder.mkdir()
+    table(folder / "a.csv", head, scale * T, X / (25.4 if "in." in head[0] else 1), force(0.5))
+    expect(folder, 0.5)
+
+
+def test_cycles_that_a_column_counts_are_one_test(tmp_path):
+    names = "Cycle,Time in cycle [s],Displacement [mm],Force [N]"
+    table(tmp_path / "a_0.5A.csv", [names], np.floor(T + 1e-6), np.round(T % 1, 6) % 1, X, force(0.5))
+    expect(tmp_path, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "encoding"),
+    [
+        ("README.txt", "t01-t02: 0 A\nt03 - t03: 0.5 A\n", "utf-8"),
+        ("plan.csv", "試験番号,電流(A)\nt01,0\nt02,0\nt03,0.5\n", "cp932"),
+        ("levels.csv", "Level,Current (A)\nL1,0\nL2,0.5\n", "utf-8"),
+    ],
+    ids=["ranges", "another encoding", "codes in a table"],
+)
+def test_currents_of_a_list_beside_the_files(name, text, encoding, tmp_path):
+    for n, current in enumerate((0.0, 0.0, 0.5), 1):
+        stem = f"L{1 if n < 3 else 2}_{'abc'[n - 1]}" if name == "levels.csv" else f"t{n:02d}"
+        table(tmp_path / f"{stem}.csv", ["Time [s],Displacement [mm],Force [N]"], T, X, force(current) + 0.001 * n)
+    (tmp_path / name).write_text(text, encoding)
+    assert [record.current[0] for record in import_files([tmp_path]).records] == [0.0, 0.0, 0.5]
+
+
+def test_lists_in_a_json_file_name_columns_that_a_row_of_numbers_heads(tmp_path):
+    table(tmp_path / "a.csv", ["0,1,2"], T, X, force(0.5))
+    says = '{"columns": ["time", "displacement", "force"], "units": ["s", "mm", "N"], "coil": {"current_A": 0.5}}'
+    (tmp_path / "a.json").write_text(says)
+    expect(tmp_path, 0.5)
+
+
+def test_numbered_keys_may_begin_with_the_channel(tmp_path):
+    head = ["Ch1Name=Displacement", "Ch1Unit=mm", "Ch2Name=Load", "Ch2Unit=N", "SampleRate=500 Hz"]
+    table(tmp_path / "a_0.5A.dat", head, X, force(0.5))
+    expect(tmp_path, 0.5)
+
+
+def test_variables_have_the_units_that_others_named_after_them_hold(tmp_path):
+    stated = {"time_unit": "s", "position_unit": "mm", "load_unit": "N", "current_unit": "A"}
+    savemat(tmp_path / "a.mat", {"time": T, "position": X, "load": force(0.5), "current": 0.5, **stated})
+    expect(tmp_path, 0.5)
+
+
+def test_dimensions_of_an_array_beside_vectors_are_conditions(tmp_path):
+    currents, phases = np.array([0.0, 0.5]), np.array([1.0, 1.0, 1.0])
+    motion = np.broadcast_to(X, (2, 3, T.size)) + np.arange(3)[:, None]
+    loads = np.stack([[force(i) + 0.01 * n for n in range(3)] for i in currents])
+    stated = "time [s], x [mm], F [N], I [A], phase [1]"
+    np.savez(tmp_path / "a.npz", time=T, x=motion, F=loads, I=currents, phase=phases, columns=stated)
+    assert [record.current[0] for record in import_files([tmp_path]).records] == [0, 0, 0, 0.5, 0.5, 0.5]
+
+
+@pytest.mark.parametrize("profile", ['column = "amps"\nunit = "A"\n', 'unit = "mA"\n'])
+def test_a_profile_gives_a_number_beside_the_columns_its_unit(profile, tmp_path):
+    name, value = ("amps", 0.5) if "amps" in profile else ("current", 500)
+    savemat(tmp_path / "a.mat", {"time_s": T, "position_mm": X, "load_N": force(0.5), name: value})
+    assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_CURRENT_MISSING"]
+    records = import_files([tmp_path], parse_profile(f"[channels.current]\n{profile}")).records
+    assert [record.current[0] for record in records] == [0.5]
+
+
+def test_arrays_of_a_folder_have_the_current_of_its_description_once_the_unit_of_time_is_stated(tmp_path):
+    for name, values in (("time", T), ("displacement_mm", X), ("force_N", force(0.5))):
+        np.save(tmp_path / f"{name}.npy", values)
+    (tmp_path / "meta.yaml").write_text("current_A: 0.5\n")
+    assert "E_UNITS_MISSING" in {r.error.code for r in import_files([tmp_path]).refusals}
+    records = import_files([tmp_path], parse_profile('[channels.time]\nunit = "s"\n')).records
+    assert [record.current[0] for record in records] == [0.5]
+
+
+def test_the_remedy_for_a_channel_a_file_names_its_files(tmp_path):
+    table(tmp_path / "C1--t--0.txt", ["Time,Ampl"], T, X)
+    assert "file = " in import_files([tmp_path]).refusals[0].error.remedy

@@ -40,7 +40,7 @@ def current_of(
     the channel, E_RANGE if one is no coil current.
     """
     where, source = printable(table.source.name), profile.current
-    statements = _statements(table, path)
+    statements = _statements(table, path, profile)
     if source is not None and source.value is not None:
         _refuse_contradiction(source.value, channel, statements, where)
         return source.value, {"current_from": "profile"}
@@ -122,9 +122,12 @@ def _refuse_contradiction(value: float, channel: Floats | None, statements: list
         raise ColumnError(problem, where=where, remedy=remedy, code="E_CURRENT_CONTRADICTS")
 
 
-def _statements(table: RawTable, path: Path) -> list[Statement]:
+def _statements(table: RawTable, path: Path, profile: Profile) -> list[Statement]:
     """Every current that stands beside the columns, the surest place first."""
-    held = held_current_of(table)
+    channel = profile.channel("current")
+    number = table.constants.get(str(channel.column))
+    named = {} if number is None else {f"current [{channel.unit or 'A'}]": (channel.scale or 1.0) * number}
+    held = held_current_of(replace(table, constants=named) if named else table, channel.unit or "")
     statements = [] if held is None else [Statement(held, table.stated_in or "a number in the file")]
     lines = [line for line in table.remarks if line not in table.titles]
     statements += stated_by_lines(lines, table.decimal)
@@ -163,9 +166,15 @@ def _folders(table: RawTable, path: Path) -> list[Statement]:
     return []
 
 
-def held_current_of(table: RawTable) -> float | None:
-    """Coil current [A] that a file holds as one number beside its columns, `current_A = 0.5`; None if it does not."""
-    named = [(split_name(name), value) for name, value in table.constants.items() if np.isfinite(value)]
+def held_current_of(table: RawTable, unit: str = "") -> float | None:
+    """Coil current [A] that a file holds as one number beside its columns, `current_A = 0.5`; None if it does not.
+
+    A number without a unit counts in the one that a profile gives it.
+    """
+    headers = {
+        name: header if (header := split_name(name)).unit else split_name(name, unit) for name in table.constants
+    }
+    named = [(headers[name], value) for name, value in table.constants.items() if np.isfinite(value)]
     named = [(header, value) for header, value in named if names_condition(header.name, "current")]
     measured = [(header, value) for header, value in named if header.role == "current"]
     stated = measured or named  # a set point, I_set_A = 0.5, where nothing else names a current

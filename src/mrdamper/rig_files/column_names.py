@@ -33,7 +33,7 @@ _RATE_GROUP = re.compile(
 _FUSED = re.compile(r"[ _.:-]+")
 
 
-_BY_UNIT = MappingProxyType({"length": "displacement", "force": "force"})
+_BY_UNIT = MappingProxyType({"length": "displacement", "force": "force", "current": "current"})
 
 
 class Header(NamedTuple):

@@ -33,6 +33,10 @@ from mrdamper.rig_files.units import SI
 _FEWEST_ROWS = 50  # of a record
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")  # short ones
 _CODE = re.compile(r"\s*([A-Za-z]{1,6}[0-9]{1,3})\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")
+_RANGE = re.compile(
+    r"\s*(?P<word>[^\W\d]*)[\s._]*(?P<a>[0-9]{1,4})\s*(?:-|–|\.\.|to|bis)\s*(?P=word)[\s._]*(?P<b>[0-9]{1,4})\s*[:=]\s*"
+    r"(?P<number>[0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(?P<unit>m?A)\s*$"
+)
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
 
 
@@ -58,8 +62,6 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
             if len(tables) != 1:
                 return None
             table, alone = completed(tables[0]), len(tables[0].names) == 1
-            if alone and not table.headers[0].name:
-                table = table.named({0: split_name(path.stem)})
             assigned = partly_assigned(table, profile)
             raw = table.read([entry.column for entry in assigned.values()])
             channels = {role: rescale(raw.values[e.column], e.factor, e.offset) for role, e in assigned.items()}
@@ -122,8 +124,12 @@ def _together(parts: Sequence[Part]) -> RawTable | None:
         whole = {"displacement", "force"} <= set(columns) and len(columns) == len(tables)
         if not whole or len({values.size for values in columns.values()}) > 1:
             return None
-        units = [SI[role] for role in columns]
-        return array_table(tables[0].source, list(columns), units, list(columns.values()).__getitem__)
+        units, folder = [SI[role] for role in columns], parts[0].test
+        texts = sorted({*folder.iterdir()} - {part.path for part in parts}) if folder.is_dir() else []
+        lines = [line for path in texts if path.suffix.lower() in TEXTS for line in short_lines(path)]
+        return array_table(
+            tables[0].source, list(columns), units, list(columns.values()).__getitem__, remarks=lines[:_FEWEST_ROWS]
+        )
     clocks = [_arrays(table)[table.names.index("time")] for table in tables]
     moving = [time for time, table in zip(clocks, tables, strict=True) if {"displacement", "force"} & {*table.names}]
     span = clocks[0][-1] - clocks[0][0]
@@ -168,14 +174,35 @@ def currents_beside(
         return [(by_test[i], f"{path.name}, {results.title}") for i in range(len(tests))]
     lines = short_lines(path) if path.suffix.lower() in TEXTS else []
     matches = [match for line in lines if (match := _CODE.match(line))]
-    codes = {match[1].casefold(): amperes(match[2], match[3]) for match in matches}
-    if len(codes) < 2 or len(codes) < len(matches):
-        return None
+    stated = [(match[1].casefold(), amperes(match[2], match[3])) for match in matches]
+    listed = list(zip(*results.cells, strict=True))[1:2] if results else []  # Level, Current (A): L1, 0.35
+    stated = stated or [
+        (code.casefold(), value)
+        for column in listed
+        for code, value in zip(column, results.current if results else (), strict=True)
+        if re.fullmatch("[A-Za-z]{1,6}[0-9]{1,3}", code)
+    ]
+    codes = dict(stated)
+    if len(codes) < 2 or len(codes) < len(stated):
+        return _by_ranges(path, lines, tests)
     words = [re.split(r"[^0-9A-Za-z]+", file.stem.casefold()) for file, _ in tests]
-    stated = [[code for code in codes if code in parts] for parts in words]
-    if any(len(own) != 1 for own in stated):
+    own = [[code for code in codes if code in parts] for parts in words]
+    if any(len(of_test) != 1 for of_test in own):
         return None
-    return [(codes[code], f"{path.name}, {code.upper()}") for (code,) in stated]
+    return [(codes[code], f"{path.name}, {code.upper()}") for (code,) in own]
+
+
+def _by_ranges(
+    path: Path, lines: Sequence[str], tests: Sequence[tuple[Path, Record]]
+) -> list[tuple[float, str]] | None:
+    """Return the current [A] of every test by lines for the numbers in the names of files: test01-test04: 0.5 A."""
+    matches = [match for line in lines if (match := _RANGE.match(line))]
+    ranges = [(range(int(m["a"]), int(m["b"]) + 1), amperes(m["number"], m["unit"]), m[0].strip()) for m in matches]
+    numbers = [re.findall("[0-9]+", file.stem) for file, _ in tests]
+    if len(ranges) < 2 or any(len(own) != 1 for own in numbers) or len({*map(tuple, numbers)}) < len(numbers):
+        return None
+    own = [[(value, f"{path.name}, {line}") for of, value, line in ranges if int(n) in of] for (n,) in numbers]
+    return [of_test[0] for of_test in own] if all(len(of_test) == 1 for of_test in own) else None
 
 
 def within_times(tests: Sequence[tuple[Path, Record]], results: Results | None) -> list[tuple[Path, Record]]:

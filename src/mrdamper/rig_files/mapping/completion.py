@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -51,14 +52,13 @@ _LABVIEW = ("Delta_X", "X_Dimension")
 _COLON = re.compile(r"^([^:]+):\s+([^\s:]{1,12})$")  # force: N
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
 _INDEXED = re.compile(
-    r"^\s*(?P<what>desc|name|label|units?|scale)[A-Za-z]*[._ ]*(?:chan(?:nel)?|ch)[._ ]*(?P<number>[0-9]{1,3})"
-    r"\s*[=:]\s*(?P<value>.+?)\s*$",
+    r"^\s*(?:(?P<what>desc|name|label|units?|scale)[A-Za-z]*[._ ]*)?(?:chan(?:nel)?|ch)[._ ]*(?P<number>[0-9]{1,3})"
+    r"[._ ]*(?(what)|(?P<after>desc|name|label|units?|scale)[A-Za-z]*)\s*[=:]\s*(?P<value>.+?)\s*$",
     re.IGNORECASE,
 )
-NUMBERED = re.compile(r"(?i)(?:(?:ch(?:annel)?|kanal|canal|voie|canale)?[ ._]?|[a-z]\w*\[)([0-9]{1,3})\]?")
-_CHANNEL_IS = re.compile(
-    r"(?i)(?<!\w)(?:ch(?:annel)?|kanal|canal|voie|canale)[ ._]?(?P<number>[0-9]{1,3})\s*[:=]\s*(?P<what>[^;|\t]{2,60})"
-)
+_NUMBERS = r"(?:ch(?:annel)?|kanal|canal|voie|canale|var(?:iable)?|col(?:umn)?)"  # what counts columns
+NUMBERED = re.compile(rf"(?i)(?:{_NUMBERS}?[ ._]?|[a-z]\w*\[)([0-9]{{1,3}})\]?")
+_CHANNEL_IS = re.compile(rf"(?i)(?<!\w){_NUMBERS}" + r"[ ._]?(?P<number>[0-9]{1,3})\s*[:=]\s*(?P<what>[^;|\t]{2,60})")
 _SENSES = {1: tuple(words("tension_stems")), -1: tuple(words("compression_stems"))}
 _COUNTED = [  # force positive in compression; Force (compression positive)
     re.compile(r"(?i)(?P<what>[^\W\d_]+(?:(?: and| und| et| y| e|) [^\W\d_]+)?)" + rest)
@@ -80,8 +80,11 @@ _LONGEST_LINE, _LONGEST_CONDITIONS = 300, 4000
 def completed(table: RawTable) -> RawTable:
     """Add the names, units and scales that the file states above, below or beside its row of names."""
     table = _with_x_values(_with_values_for_all(table))
-    if not any(table.names):
+    if not any(name.strip("0123456789") for name in table.names):
         table = _with_listed_names(table)
+    if table.names == ("",):  # a channel a file: force_N.txt
+        header = split_name(Path(table.source.name).stem)
+        table = table.named({0: header}) if header.role else table
     if not any(table.names):
         return table
     table = _with_numbered_channels(_without_shared_path(table))
@@ -226,7 +229,7 @@ def _with_listed_names(table: RawTable) -> RawTable:
     if {*texts["name"]} != {*width}:
         texts = {"name": {}, "unit": {}, "scal": {}}
         for match in filter(None, (_INDEXED.match(line[:_LONGEST_LINE]) for line in table.remarks)):
-            what = match["what"].casefold()[:4].replace("desc", "name").replace("labe", "name")
+            what = (match["what"] or match["after"]).casefold()[:4].replace("desc", "name").replace("labe", "name")
             texts[what][int(match["number"])] = match["value"]
     if any(i not in texts["name"] or not is_unit(texts["unit"].get(i, "")) for i in width):
         return table
@@ -284,12 +287,14 @@ def _with_titles(table: RawTable) -> RawTable:
 def _with_listed_units(table: RawTable) -> RawTable:
     """Units that lines above the columns state: Weg in mm, Kraft in N; X-Unit: ms; a channel and its unit in cells."""
     bare = [i for i, header in enumerate(table.headers) if header.name and not header.unit]
-    wanted, times = {table.names[i].strip().casefold(): i for i in bare}, table.columns("time")
+    names = {i: name for i, name in enumerate((*table.names, *table.constants)) if i in bare or i >= len(table.names)}
+    wanted, times = {name.strip().casefold(): i for i, name in names.items()}, table.columns("time")
     behind: dict[int, set[str]] = {}
     listed: dict[int, set[str]] = {}
-    for line in table.remarks if bare else ():
+    for line in table.remarks if names else ():
         cells = [cell.strip(' "') for cell in re.split(r"[,;|\t]", line[:_LONGEST_LINE].lstrip("#%/ "))]
-        for header in (split_name(_COLON.sub(r"\1 [\2]", cell)) for cell in cells):
+        told = [*cells, cells[0].partition(": ")[2]]  # columns: time [s], load [N]
+        for header in (split_name(_COLON.sub(r"\1 [\2]", cell)) for cell in told):
             i = wanted.get(header.name.strip().casefold())
             if i is not None and header.dimension and header.dimension == DIMENSION.get(header.role or ""):
                 behind.setdefault(i, set()).add(header.unit)
@@ -298,12 +303,15 @@ def _with_listed_units(table: RawTable) -> RawTable:
             behind.setdefault(times[0], set()).add(match["unit"])
         named = [wanted[cell.casefold()] for cell in cells if cell.casefold() in wanted]
         if len(named) == 1:
-            role = table.headers[named[0]].role
+            role = role_of(names[named[0]])
             units = [bare_cell for cell in cells if is_unit(bare_cell := cell.strip("[]()"))]
             units = [unit for unit in units if role is None or split_name("", unit).dimension == DIMENSION[role]]
             listed.setdefault(named[0], set()).update(units[:1])
     stated = {**(listed if sum(map(bool, listed.values())) > 1 else {}), **behind}
-    return table.named({i: (table.names[i], own.pop()) for i, own in stated.items() if len(own) == 1})
+    units = {i: own.pop() for i, own in stated.items() if len(own) == 1}
+    of_name = {names[i]: unit for i, unit in units.items()}
+    constants = {f"{name} [{of_name[name]}]" if name in of_name else name: v for name, v in table.constants.items()}
+    return replace(table, constants=constants).named({i: (names[i], units[i]) for i in bare if i in units})
 
 
 def _with_clocks_and_weights(table: RawTable) -> RawTable:
