@@ -58,7 +58,7 @@ WRONG = {
     "no TOML": ("rig = ", "profile"),
     "unknown key": ("rigg = 1", "unknown key rigg"),
     "unknown channel": ('[channels.forze]\nunit = "N"', "no channel is called 'forze'"),
-    "unit of another thing": ('[channels.force]\nunit = "mm"', "'mm' is no unit of force"),
+    "unit of another thing": ('[channels.force]\nunit = "mm"', "'mm' is no unit of force (force); known are N, "),
     "no unit": ('[channels.force]\nunit = "blub"', "'blub' is no unit of force"),
     "sign of two": ("[channels.force]\nsign = 2", "channels.force.sign"),
     "scale of zero": ('[channels.force]\nunit = "N"\nscale = 0', "scale of zero"),

@@ -363,6 +363,30 @@ def test_currents_of_a_list_beside_the_files(name, text, encoding, tmp_path):
     assert [record.current[0] for record in import_files([tmp_path]).records] == [0.0, 0.0, 0.5]
 
 
+def test_settings_within_a_list_of_files_state_their_currents(tmp_path):
+    for n, current in enumerate((0.0, 0.5), 1):
+        table(tmp_path / f"{'ab'[n - 1]}.csv", ["Time [s],Displacement [mm],Force [N]"], T, X, force(current))
+    says = '{"file": "b.csv", "set": {"current_A": 0.5}}, {"file": "a.csv", "set": {"current_A": 0}}'
+    (tmp_path / "manifest.json").write_text(f'{{"files": [{says}]}}')
+    expect(tmp_path, 0.0, 0.5)
+
+
+def test_rows_of_arrays_with_units_of_their_own_are_tests(tmp_path):
+    currents = np.array([0.0, 0.25, 0.5])
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        stacked = {"displacement": (np.stack([X] * 3), "mm"), "force": (np.stack([force(i) for i in currents]), "N")}
+        for name, (values, unit) in {"time": (T, "s"), "coil_current": (1e3 * currents, "mA"), **stacked}.items():
+            file.create_dataset(name, data=values).attrs["units"] = unit
+    expect(tmp_path, *currents)
+
+
+@pytest.mark.parametrize("name", ["Time of day", "Uhrzeit"])
+def test_a_time_of_day_and_a_current_in_wide_letters_are_read(name, tmp_path):
+    rows = [f"11:59:{58 + t:06.3f} AM,{x:.4f},{f:.3f}" for t, x, f in zip(T[:900], X, force(0.5), strict=False)]
+    (tmp_path / "\uff10\uff0e\uff15\uff21.csv").write_text("\n".join([f"{name},Displacement [mm],Force [N]", *rows]))
+    expect(tmp_path, 0.5)
+
+
 def test_lists_in_a_json_file_name_columns_that_a_row_of_numbers_heads(tmp_path):
     table(tmp_path / "a.csv", ["0,1,2"], T, X, force(0.5))
     says = '{"columns": ["time", "displacement", "force"], "units": ["s", "mm", "N"], "coil": {"current_A": 0.5}}'

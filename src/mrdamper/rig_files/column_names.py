@@ -88,7 +88,7 @@ def split_name(header: str, unit: str = "") -> Header:
     # The longest tail that is a unit: velocity_m_s before velocity_m and s.
     for place in _FUSED.finditer(text):
         tail = text[place.end() :]
-        if place.start() and is_unit(tail):
+        if place.start() and is_unit(tail) and not text[: place.start()].endswith(" of"):  # time of day
             return Header(text[: place.start()].strip(), tail)
     name, slash, tail = text.partition("/")
     if slash and name and is_unit(tail) and not is_unit(text):

@@ -7,6 +7,7 @@ other are refused, not chosen from.
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -77,7 +78,7 @@ def currents_in(text: str) -> tuple[float, ...]:
     `1200mA`, `1.2 A`, `0p4A`, `0x25A`, `-0.3A-`, `I0.4A`; 0_5A may be five or half an ampere and states
     none, nor does what stands beside a fuse, a supply or a limit.
     """
-    text = text[:255]
+    text = unicodedata.normalize("NFKC", text[:255])
     if re.search(r"(?<![0-9])[0-9]_[0-9]+ ?m?A(?![A-Za-z0-9])", text) or _LABELLED_RATING.search(text):
         return ()
     # 04A may be four or 0.4 amperes; 0400mA is padded.

@@ -21,6 +21,7 @@ from mrdamper.rig_files.file_form import NAME, FileForm, Table
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 from mrdamper.rig_files.strict_toml import load_toml, parse_toml
 from mrdamper.rig_files.units import DIMENSION, parse_unit
+from mrdamper.rig_files.vocabulary import TABLES
 
 _HELP = "mrdamper init profile shows the keys"
 
@@ -178,7 +179,8 @@ class Profile(Table):
                 raise ValueError(f"only the displacement is integrated, not the {name}")
             unit, dimension = parse_unit(channel.unit or ""), "velocity" if channel.integrate else DIMENSION[name]
             if channel.unit and (unit is None or unit.dimension != dimension):
-                raise ValueError(f"{channel.unit!r} is no unit of {dimension} ({name})")
+                known = ", ".join(TABLES["units"].get(dimension, ()))
+                raise ValueError(f"{channel.unit!r} is no unit of {dimension} ({name}); known are {known}")
         return channels
 
     def of_file(self, name: str) -> tuple[str, Profile]:

@@ -32,7 +32,7 @@ def with_unit_of_time(table: RawTable) -> RawTable:
     times, moved = table.columns("time"), table.columns("displacement")
     if len(times) != 1 or len(moved) != 1 or table.headers[times[0]].unit or table.source.size > _LARGEST:
         return table
-    rates = {v for key, v, unit in table.quantities if unit.dimension == "frequency" and stated_rate([(key, v, unit)])}
+    rates = {q.value for q in table.quantities if q.unit.dimension == "frequency" and stated_rate([q])}
     stated = set(stated_frequencies(table)) - rates or {*rates}
     values = table.try_read(times[0], moved[0]) if len(stated) == 1 else None
     if values is None:

@@ -73,9 +73,15 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, togeth
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
-    tree = _with_own_axes(_tests_of_rows(_with_rows(_spread({key: _object_in(value) for key, value in tree.items()}))))
+    tree = _spread({key: _object_in(value) for key, value in tree.items()})
+    keys = {"name", "unit", "data"}
+    channels = {key: value for key, value in tree.items() if isinstance(value, Mapping) and {*value} == keys}
+    arrays = {**tree, **{key: value["data"] for key, value in channels.items()}}
+    rows = _tests_of_rows(_with_rows(arrays))
+    tree = _with_own_axes(tree if rows is arrays else rows)
     stated = next((v for key, v in tree.items() if key.casefold() in KEYS["unit"] and isinstance(v, Mapping)), {})
     own = {key[:-5]: unit for key, unit in tree.items() if key.casefold().endswith("_unit")} | dict(stated)
+    own |= {key: channel["unit"] for key, channel in channels.items()}
     node.units = {**node.units, **{key: u for key, u in own.items() if isinstance(u, str) and is_unit(u)}}
     sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= _FEWEST_SAMPLES}
     for key, value in _paired(tree, node.units).items():
