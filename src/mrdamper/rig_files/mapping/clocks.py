@@ -118,11 +118,11 @@ def with_time_stated(table: RawTable) -> RawTable:
     Parts: a clock of whole seconds and thousandths; a clock of a day and its date.
     """
     times = table.columns("time") or [i for i in table.columns(dimension="time") if not table.names[i]]
-    times = times or table.columns(dimension="time")
-    table = _with_cycles(table, times[0]) if len(times) == 1 else table
-    times = times if len(times) > 1 else table.columns("time")
-    if len(times) == 1:
-        return _with_samples_counted(_with_date(_with_fractions(table, times[0]), times[0]), times[0])
+    clocks = times or table.columns(dimension="time")
+    going_on = _with_cycles(table, clocks[0]) if len(clocks) == 1 else table
+    if len(times) == 1 or going_on is not table:
+        clock = clocks[0]
+        return _with_samples_counted(_with_date(_with_fractions(going_on, clock), clock), clock)
     return table if times else _with_crank(table)
 
 

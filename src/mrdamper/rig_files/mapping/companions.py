@@ -32,10 +32,9 @@ from mrdamper.rig_files.units import SI
 
 _FEWEST_ROWS = 50  # of a record
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")  # short ones
-_CODE = re.compile(r"\s*([A-Za-z]{1,6}[0-9]{1,3})\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")
-_RANGE = re.compile(
-    r"\s*(?P<word>[^\W\d]*)[\s._]*(?P<a>[0-9]{1,4})\s*(?:-|–|\.\.|to|bis)\s*(?P=word)[\s._]*(?P<b>[0-9]{1,4})\s*[:=]\s*"
-    r"(?P<number>[0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(?P<unit>m?A)\s*$"
+_CODE = re.compile(  # I1 = 0.3 A; test01-test04: 0.5 A
+    r"\s*([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?\s*(?:=|:|->)"
+    r"\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$"
 )
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
 
@@ -173,36 +172,24 @@ def currents_beside(
     if results and len(by_test) == len(tests):
         return [(by_test[i], f"{path.name}, {results.title}") for i in range(len(tests))]
     lines = short_lines(path) if path.suffix.lower() in TEXTS else []
-    matches = [match for line in lines if (match := _CODE.match(line))]
-    stated = [(match[1].casefold(), amperes(match[2], match[3])) for match in matches]
-    listed = list(zip(*results.cells, strict=True))[1:2] if results else []  # Level, Current (A): L1, 0.35
-    stated = stated or [
-        (code.casefold(), value)
-        for column in listed
-        for code, value in zip(column, results.current if results else (), strict=True)
-        if re.fullmatch("[A-Za-z]{1,6}[0-9]{1,3}", code)
+    rows = zip(results.cells, results.current, strict=True) if results else ()  # Level, Current (A): L1, 0.35
+    lines += [f"{cells[1]}: {value:g} A" for cells, value in rows if len(cells) > 1]
+    matches = [match for line in dict.fromkeys(lines) if (match := _CODE.match(line))]
+    stated = [
+        (f"{match[1].casefold()}{number}", amperes(match[4], match[5]))
+        for match in matches
+        for number in range(int(match[2]), int(match[3] or match[2]) + 1)
     ]
     codes = dict(stated)
     if len(codes) < 2 or len(codes) < len(stated):
-        return _by_ranges(path, lines, tests)
-    words = [re.split(r"[^0-9A-Za-z]+", file.stem.casefold()) for file, _ in tests]
+        return None
+    words = [
+        re.split(r"[^0-9A-Za-z]+", re.sub(r"(?<=[A-Za-z])0+(?=[0-9])", "", file.stem.casefold())) for file, _ in tests
+    ]
     own = [[code for code in codes if code in parts] for parts in words]
     if any(len(of_test) != 1 for of_test in own):
         return None
     return [(codes[code], f"{path.name}, {code.upper()}") for (code,) in own]
-
-
-def _by_ranges(
-    path: Path, lines: Sequence[str], tests: Sequence[tuple[Path, Record]]
-) -> list[tuple[float, str]] | None:
-    """Return the current [A] of every test by lines for the numbers in the names of files: test01-test04: 0.5 A."""
-    matches = [match for line in lines if (match := _RANGE.match(line))]
-    ranges = [(range(int(m["a"]), int(m["b"]) + 1), amperes(m["number"], m["unit"]), m[0].strip()) for m in matches]
-    numbers = [re.findall("[0-9]+", file.stem) for file, _ in tests]
-    if len(ranges) < 2 or any(len(own) != 1 for own in numbers) or len({*map(tuple, numbers)}) < len(numbers):
-        return None
-    own = [[(value, f"{path.name}, {line}") for of, value, line in ranges if int(n) in of] for (n,) in numbers]
-    return [of_test[0] for of_test in own] if all(len(of_test) == 1 for of_test in own) else None
 
 
 def within_times(tests: Sequence[tuple[Path, Record]], results: Results | None) -> list[tuple[Path, Record]]:

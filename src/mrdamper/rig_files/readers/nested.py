@@ -176,13 +176,18 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**rest, **{f"{key}_{i}": node for i, node in enumerate(own, 1)}}
 
 
+def _numeric(tree: Mapping[str, Any]) -> tuple[dict[str, Array], dict[str, tuple[int, ...]]]:
+    """Return the arrays of numbers of a node, and their shapes without dimensions of one."""
+    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf"}
+    return numeric, {key: tuple(n for n in array.shape if n != 1) for key, array in numeric.items()}
+
+
 def _with_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return arrays over several conditions and samples, force[current, frequency, time], with a row a test.
 
     Every dimension has a vector of its length, the samples' a time, and no two are of one length.
     """
-    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf"}
-    shapes = {key: tuple(n for n in array.shape if n != 1) for key, array in numeric.items()}
+    numeric, shapes = _numeric(tree)
     deep = [key for key, shape in shapes.items() if len(shape) > 2]
     shape = shapes[deep[0]] if deep else ()
     axes = {n: [key for key, own in shapes.items() if own == (n,)] for n in shape}
@@ -201,8 +206,7 @@ def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
 
     Two tables of K rows and N samples or more, one of times or N samples of it, and else only N or K numbers each.
     """
-    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf"}
-    shapes = {key: tuple(n for n in array.shape if n != 1) for key, array in numeric.items()}
+    numeric, shapes = _numeric(tree)
     tables = [key for key, shape in shapes.items() if len(shape) == 2]
     if len(tables) < 2 or len({shapes[key] for key in tables}) > 1:
         return tree

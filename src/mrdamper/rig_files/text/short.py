@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping
-from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -87,8 +86,8 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
         words = [key, *(str(value) for value in lower.values() if isinstance(value, (str, int, float)))]
         yield "; ".join(dict.fromkeys(words))
     lists = [value for value in lower.values() if isinstance(value, list) and all(isinstance(i, str) for i in value)]
-    for names, its in permutations(lists, 2):  # columns: [time, load], units: [s, N]
-        if len(names) == len(its) and all(map(is_unit, its)):
+    for its in [own for own in lists if own and all(map(is_unit, own))]:  # columns: [time, load], units: [s, N]
+        for names in [other for other in lists if other is not its and len(other) == len(its)]:
             yield from (f"{i}={name};{own}" for i, (name, own) in enumerate(zip(names, its, strict=True), 1))
     own = next((lower[name] for name in ("units", "unit") if isinstance(lower.get(name), dict)), units)
     for name, value in node.items():
