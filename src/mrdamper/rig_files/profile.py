@@ -179,8 +179,8 @@ class Profile(Table):
                 raise ValueError(f"only the displacement is integrated, not the {name}")
             unit, dimension = parse_unit(channel.unit or ""), "velocity" if channel.integrate else DIMENSION[name]
             if channel.unit and (unit is None or unit.dimension != dimension):
-                known = ", ".join(TABLES["units"].get(dimension, ()))
-                raise ValueError(f"{channel.unit!r} is no unit of {dimension} ({name}); known are {known}")
+                units = ", ".join(TABLES["units"].get(dimension, ()))
+                raise ValueError(f"{channel.unit!r} is no unit of {dimension} ({name}); known are {units}")
         return channels
 
     def of_file(self, name: str) -> tuple[str, Profile]:

@@ -164,7 +164,7 @@ def _encoding(source: Source, head: bytes, form: FileForm) -> tuple[str, int]:
 
 def decoded(content: bytes) -> str:
     """Return a whole short text, in the encoding of its mark or that in which most of its words name channels."""
-    mark, encoding = next((known for known in _BOMS if content.startswith(known[0])), (b"", ""))
+    mark, encoding = next((entry for entry in _BOMS if content.startswith(entry[0])), (b"", ""))
     return content[len(mark) :].decode(encoding or _detected(content), "replace")
 
 
