@@ -340,6 +340,17 @@ def test_names_and_units_are_read_as_a_careful_reader_does(head, scale, tmp_path
     expect(folder, 0.5)
 
 
+def test_the_nearest_readme_states_the_scale(tmp_path):
+    (tmp_path / "README.txt").write_text("LVDT: 10 mm/V\n")
+    folder = tmp_path / "0.5 A"
+    folder.mkdir()
+    table(folder / "a.csv", ["Time [s],LVDT [V],Force [N]"], T, X / 10, force(0.5))
+    expect(folder, 0.5)
+    table(folder / "a.csv", ["Time [s],LVDT [V],Force [N]"], T, X / 5, force(0.5))
+    (folder / "README.txt").write_text("LVDT: 5 mm/V\n")
+    expect(folder, 0.5)
+
+
 def test_cycles_that_a_column_counts_are_one_test(tmp_path):
     names = "Cycle,Time in cycle [s],Displacement [mm],Force [N]"
     table(tmp_path / "a_0.5A.csv", [names], np.floor(T + 1e-6), np.round(T % 1, 6) % 1, X, force(0.5))
@@ -366,7 +377,8 @@ def test_currents_of_a_list_beside_the_files(name, text, encoding, tmp_path):
 def test_settings_within_a_list_of_files_state_their_currents(tmp_path):
     for n, current in enumerate((0.0, 0.5), 1):
         table(tmp_path / f"{'ab'[n - 1]}.csv", ["Time [s],Displacement [mm],Force [N]"], T, X, force(current))
-    says = '{"file": "b.csv", "set": {"current_A": 0.5}}, {"file": "a.csv", "set": {"current_A": 0}}'
+    says = '{"file": "b.csv", "set": {"current_A": 0.5}, "limits": {"current_A": 3}},'
+    says += '{"file": "a.csv", "set": {"current_A": 0}, "limits": {"current_A": 3}}'
     (tmp_path / "manifest.json").write_text(f'{{"files": [{says}]}}')
     expect(tmp_path, 0.0, 0.5)
 

@@ -34,10 +34,12 @@ def with_notes(table: RawTable, path: Path) -> RawTable:
     """Add the names, units and scales that short texts beside the file state, where the table lacks them."""
     if not scaled_columns(table) and not _lacks_names_or_units(table):
         return table
-    above = [p for p in path.parent.parent.glob("*") if _README.fullmatch(p.name)]
-    readme = [p for p in path.parent.iterdir() if _README.fullmatch(p.name) or p.suffix.lower() in _STRUCTURES]
-    listing = [p for p in path.parent.iterdir() if p.suffix.lower() in _TEXTS and p.stat().st_size <= _LARGEST_LIST]
-    texts = sorted(p for p in {*above, *readme, *listing} if p.is_file() and p != path and p.suffix.lower() in _READ)
+    files = list(path.parent.iterdir())
+    readme = [p for p in files if _README.fullmatch(p.name)]
+    readme = readme or [p for p in path.parent.parent.glob("*") if _README.fullmatch(p.name)]
+    readme += [p for p in files if p.suffix.lower() in _STRUCTURES]
+    listing = [p for p in files if p.suffix.lower() in _TEXTS and p.stat().st_size <= _LARGEST_LIST]
+    texts = sorted(p for p in {*readme, *listing} if p.is_file() and p != path and p.suffix.lower() in _READ)
     lines = [line for text in texts if len(own := short_lines(text)) <= _MOST for line in own]
     return replace(table, remarks=(*table.remarks, *filter(None, map(_of_channels, lines))))
 

@@ -70,7 +70,9 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
     """Yield what a node states as lines: "current: 400 mA", "x; displacement; mm", "time: s", rows of a table."""
     units = units or {}
     if isinstance(node, list) and len(node) >= _FEWEST_TESTS and all(isinstance(item, dict) for item in node):
-        inner = [[pair for v in item.values() if isinstance(v, dict) for pair in v.items()] for item in node]
+        inner = [
+            [(f"{k} {n}", v) for k, of in item.items() if isinstance(of, dict) for n, v in of.items()] for item in node
+        ]
         node = [{**item, **dict(pairs)} for item, pairs in zip(node, inner, strict=True)]
         plain = [name for name in node[0] if all(isinstance(item.get(name), (str, int, float)) for item in node)]
         yield "\t".join(f"{name} [{units[name]}]" if isinstance(units.get(name), str) else name for name in plain)
