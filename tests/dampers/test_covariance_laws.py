@@ -284,7 +284,7 @@ def test_parameters_that_make_up_for_each_other_leave_no_variance_of_what_both_d
     assert np.ones(2) @ spread.covariance @ np.ones(2) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_draws_are_as_wide_as_refits_and_no_narrower_than_linearised_fits(monkeypatch):
+def test_intervals_are_as_wide_as_refits_and_no_narrower_than_linearised_fits(monkeypatch):
     rng, names = np.random.default_rng(4), ("c", "fy")
     draws = Draws(np.zeros((600, 3, 2)), rng.standard_normal((600, 2)), np.ones((600, 2)))
     spread = _Spread(names, [], np.eye(2), np.ones(2), draws, Effects(), [], np.ones(2), np.ones((3, 2)))
@@ -297,10 +297,10 @@ def test_draws_are_as_wide_as_refits_and_no_narrower_than_linearised_fits(monkey
         return start + factor * starts + np.concatenate([np.zeros((1, 2)), departures])
 
     def widened():
-        moved = spread.curved(joint_damper(), [None] * 3).draws.moved
-        factors = moved / draws.moved
-        assert factors == pytest.approx(np.broadcast_to(factors[0], factors.shape))
-        return factors[0]
+        curved = spread.curved(joint_damper(), [None] * 3)
+        assert curved.covariance == pytest.approx(spread.covariance)  # of the force: it hardly changes along the curve
+        assert curved.interval_factor == pytest.approx(np.sqrt((1 + curved.wider**2) / 2), rel=0.1)
+        return curved.wider
 
     monkeypatch.setattr("mrdamper.dampers.covariance.refitted", refits)
     departures, factor = np.zeros((16, 2)), 1.5

@@ -61,11 +61,14 @@ def test_a_certainty_is_saved_bit_by_bit(damper):
         "one_sided",
     ):
         assert getattr(back, name) == getattr(damper.uncertainty, name)
+    assert back.standard_errors == pytest.approx(damper.uncertainty.standard_errors)
     assert sum(back.information.values()) == pytest.approx(1.0)
     assert "covariance" not in json.loads(dump_model(joint_damper()))
 
 
-@pytest.mark.parametrize("damage", [{"parameters": ["x"]}, {"matrix": [[1.0]]}, {"degrees_of_freedom": []}])
+@pytest.mark.parametrize(
+    "damage", [{"parameters": ["x"]}, {"matrix": [[1.0]]}, {"degrees_of_freedom": []}, {"interval_factors": [1.0]}]
+)
 def test_a_covariance_that_does_not_fit_is_refused(damper, damage):
     document = json.loads(dump_model(damper))
     document["covariance"] |= damage

@@ -36,7 +36,7 @@ def test_units_and_provenance_are_inside(damper):
     document = json.loads(dump_model(damper))
     assert document["units"]["force"] == "N"
     assert document["provenance"] == {"dataset": "=cmd()"}
-    assert document["version"] == "1.5"
+    assert document["version"] == "1.6"
 
 
 def change(document, path, value):

@@ -26,7 +26,7 @@ from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Floats, Run, same_condition
 from mrdamper.identification.covariance import alike_groups, score_covariance
-from mrdamper.identification.intervals import dof_of_quantile, interval_about, relative_width, weaknesses
+from mrdamper.identification.intervals import dof_of_quantile, interval_about, relative_width, student, weaknesses
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 
 _MAX_RUN_SHARE = 0.6  # share of the information on a parameter from which one run mainly determines it
@@ -106,7 +106,7 @@ def estimate_uncertainty(
         effects.gain, effects.offset, effects.session_dof, effects.run_gain, effects.run_offset, effects.run_dof,
         words=(*words, *_rest_on_one_run(spread.names, parts, spread.information)),
         information=dict(zip([p.run.id for p in parts], _shares(spread.information), strict=True)),
-        effective=spread.effective(samples),
+        effective=spread.effective(samples), interval_factor=spread.interval_factor,
     )  # fmt: skip
     uncertainty = _with_model_error(uncertainty, parts, spread.slopes, cross_validated, away, other_sessions)
     return replace(damper, uncertainty=uncertainty)
@@ -128,6 +128,7 @@ class _Spread:
     rests: Sequence[Floats]
     textbook: Floats
     information: Floats
+    wider: Floats | float = 1.0  # (P,) factor on changes by draws for what their linearisation omits
 
     @classmethod
     def of(
@@ -146,10 +147,10 @@ class _Spread:
         )  # fmt: skip
 
     def curved(self, damper: Damper, parts: Sequence[RunResiduals]) -> _Spread:
-        """Widen the draws by what their linearisation omits, of one model of a damper.
+        """Widen the intervals by what the linearisation of the draws omits, of one model of a damper.
 
         Some draws are fitted without linearisation. By the mean absolute change of a parameter over that of the
-        linearised fits to the same draws, but no less, all draws are widened: one fit far off is no rule.
+        linearised fits to the same draws, but no less, its interval is widened: one fit far off is no rule.
         """
         moved = self.draws.moved
         if damper.one_model is None or not moved.any():
@@ -159,8 +160,21 @@ class _Spread:
         starts = np.concatenate([np.zeros((1, len(self.names))), moved[some]])
         fits = refitted(damper, parts, self.rests, self.names, shifts, starts)
         linear = np.maximum(np.mean(np.abs(moved[some]), axis=0), np.finfo(float).tiny)
-        wider = np.maximum(np.mean(np.abs(fits[1:] - fits[0]), axis=0) / linear, 1.0)
-        return replace(self, draws=replace(self.draws, moved=wider * moved))
+        return replace(self, wider=np.maximum(np.mean(np.abs(fits[1:] - fits[0]), axis=0) / linear, 1.0))
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """(P, P) of the parameters, or of their logarithms, linearised.
+
+        Parameters that make up for each other lie on a curve of nearly the same force: a factor on one of them alone
+        would make a variance of the force from nothing.
+        """
+        return self.within + self.draws.moved.T @ self.draws.moved / len(self.draws.moved)
+
+    @cached_property
+    def _variance(self) -> Floats:
+        """(P,) variances of the parameters, wider where they are curved."""
+        return np.diag(self.within) + self.wider**2 * np.mean(self.draws.moved**2, axis=0)
 
     @cached_property
     def quantiles(self) -> Floats:
@@ -169,17 +183,18 @@ class _Spread:
         The scatter of sessions that the residuals of a draw show depends on the gains that move its parameters: the
         ratio is not distributed as Student's [bootstrap-t: Hall 1988, Ann. Stat. 16, 927].
         """
-        rng, moved, within = np.random.default_rng(_SEED), self.draws.moved, np.diag(self.within)
+        rng, moved, within = np.random.default_rng(_SEED), self.wider * self.draws.moved, np.diag(self.within)
         free = 2 / np.maximum(self.doubt, 1e-9)
         error = moved + np.sqrt(within) * rng.standard_normal(moved.shape)
         variance = within * rng.chisquare(free, moved.shape) / free + self.draws.shown * np.mean(moved**2, axis=0)
         ratio = np.abs(error) / np.sqrt(np.maximum(variance, np.finfo(float).tiny))
         return np.array([float(np.quantile(column, _LEVEL)) for column in ratio.T])
 
-    @cached_property
-    def covariance(self) -> Floats:
-        """(P, P) of the parameters, or of their logarithms."""
-        return self.within + self.draws.moved.T @ self.draws.moved / len(self.draws.moved)
+    @property
+    def interval_factor(self) -> Floats:
+        """(P,) factor on standard errors: of curved parameters, and where a normal interval holds more than a share."""
+        variance = np.maximum(np.diag(self.covariance), np.finfo(float).tiny)
+        return np.sqrt(self._variance / variance) * np.minimum(self.quantiles / student(_LEVEL, np.inf), 1.0)
 
     @property
     def dof(self) -> Floats:
@@ -188,7 +203,7 @@ class _Spread:
 
     def effective(self, samples: int) -> dict[str, float]:
         """Return independent samples behind each parameter, of those that there are."""
-        variance = np.maximum(np.diag(self.covariance), np.finfo(float).tiny)
+        variance = np.maximum(self._variance, np.finfo(float).tiny)
         return dict(zip(self.names, np.minimum(self.textbook / variance, samples).tolist(), strict=True))
 
 

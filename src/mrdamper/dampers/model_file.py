@@ -30,7 +30,7 @@ from mrdamper.models import model_parts
 
 FORMAT = "mrdamper-model"
 _PACKAGE = "package of the model"  # key of the provenance
-MAJOR, MINOR = 1, 5
+MAJOR, MINOR = 1, 6
 _MAX_FILE_BYTES = 64_000_000  # bytes of a file
 _KIND = "a model.json written by mrdamper"
 _MAX_DEVIATION = 1e4  # standard deviation of a parameter over its size, or of its logarithm
@@ -120,6 +120,7 @@ class _Covariance(_SavedPart):
     runs: _Session | None = None  # since 1.5
     calibration: Calibration | None = None  # since 1.5
     growth: Growth = Growth()  # since 1.5
+    interval_factors: tuple[float, ...] = ()  # on the standard errors; since 1.6
 
 
 class _Document(_SavedPart):
@@ -323,6 +324,7 @@ def _describe_uncertainty(uncertainty: Uncertainty | None) -> _Covariance | None
         words=uncertainty.words,
         taught=dict(uncertainty.information),
         effective=dict(uncertainty.effective),
+        interval_factors=tuple(np.broadcast_to(uncertainty.interval_factor, len(uncertainty.names)).tolist()),
         sessions=uncertainty.sessions,
         runs=_Session(
             gain=uncertainty.run_gain, offset_N=uncertainty.run_offset, degrees_of_freedom=uncertainty.run_dof
@@ -337,12 +339,14 @@ def _with_uncertainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
     size, session, model = len(saved.parameters), saved.session, saved.model_error
     square = len(saved.matrix) == size and all(len(row) == size for row in saved.matrix)
     matrix = np.array(saved.matrix, dtype=float).reshape(size, size) if square else np.zeros((0, 0))
-    lengths = len(saved.logarithmic) == len(saved.degrees_of_freedom) == size
+    factors = np.array(saved.interval_factors or size * (1.0,))
+    lengths = len(saved.logarithmic) == len(saved.degrees_of_freedom) == len(factors) == size
     named = all(name in damper.fitted_parameters for name in (*saved.parameters, *saved.one_sided, *saved.unknown))
     if (
         not (square and lengths and named)
         or not np.allclose(matrix, matrix.T, rtol=1e-6)
         or np.any(np.diag(matrix) < 0)
+        or np.any(factors <= 0)
     ):
         raise ModelFileError("covariance: it does not fit the damper", where=where, remedy="write the model again")
     for name, log, variance in zip(saved.parameters, saved.logarithmic, np.diag(matrix).tolist(), strict=True):
@@ -356,7 +360,7 @@ def _with_uncertainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
         saved.parameters, saved.logarithmic, matrix, np.array(saved.degrees_of_freedom), saved.one_sided, saved.unknown,
         session.gain, session.offset_N, session.degrees_of_freedom, runs.gain, runs.offset_N, runs.degrees_of_freedom,
         model.force, model.peak, model.energy, model.left_out, saved.words, saved.taught,
-        saved.effective, saved.sessions, saved.calibration, saved.growth,
+        saved.effective, factors, saved.sessions, saved.calibration, saved.growth,
     )  # fmt: skip
     return replace(damper, uncertainty=uncertainty)
 

@@ -85,6 +85,8 @@ class Uncertainty(Displayable):
         Share of each run in the information on the parameters.
     effective : mapping of str to float
         Independent samples that would give each parameter's standard error, without sessions and correlated noise.
+    interval_factor : (P,) array, or float
+        Factor on the standard error in the interval of a parameter: curvature widens intervals, and moves no force.
     """
 
     names: tuple[str, ...]
@@ -106,6 +108,7 @@ class Uncertainty(Displayable):
     words: tuple[str, ...] = ()
     information: Mapping[str, float] = field(default_factory=dict[str, float])
     effective: Mapping[str, float] = field(default_factory=dict[str, float])
+    interval_factor: Floats | float = 1.0
     sessions: Sessions | None = None
     calibration: Calibration | None = None
     growth: Growth = field(default_factory=Growth)
@@ -123,7 +126,7 @@ class Uncertainty(Displayable):
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
         """Standard error of each parameter, or of its logarithm, and the degrees of freedom behind it."""
-        errors = np.sqrt(np.diag(self.covariance)).tolist()
+        errors = self.standard_errors.tolist()
         names, logs, dof = list(self.names), list(self.logs), self.dof.tolist()
         return {"parameter": names, "logarithm": logs, "standard_error": errors, "degrees_of_freedom": dof}
 
@@ -142,12 +145,17 @@ class Uncertainty(Displayable):
         """Standard deviation of the offset of a run in a future session [N]."""
         return math.hypot(self.offset, self.run_offset)
 
+    @property
+    def standard_errors(self) -> Floats:
+        """(P,) of the parameters, or of their logarithms."""
+        return self.interval_factor * np.sqrt(np.diag(self.covariance))
+
     def ends(self, damper: Damper, name: str, level: float = 0.95) -> tuple[float, float] | None:
         """Return the ends of a parameter's interval; None where it is at a bound or not identifiable."""
         if name not in self.names or name in self.unknown:
             return None
         i = self.names.index(name)
-        own, error = damper.fitted_parameters[name], float(np.sqrt(self.covariance[i, i]))
+        own, error = damper.fitted_parameters[name], float(self.standard_errors[i])
         return interval_about(own.value, error, self.dof[i], level, self.logs[i], own.exponent)
 
     def interval(self, damper: Damper, name: str, level: float = 0.95) -> tuple[float, float]:
@@ -190,7 +198,7 @@ def uncertainty_warnings(damper: Damper) -> list[str]:
         if ends is None:
             continue
         apart.append(i)
-        error = float(np.sqrt(uncertainty.covariance[i, i]))
+        error = float(uncertainty.standard_errors[i])
         if uncertainty.logs[i] and error > _MAX_RELATIVE_ERROR:
             wide.append((name, f"{ends[1] / ends[0]:.2g}"))
         elif not uncertainty.logs[i] and error > _MAX_RELATIVE_ERROR * abs(numbers[name].value):
