@@ -138,7 +138,9 @@ def test_from_drop_to_report(page, small_rig, tmp_path, shoot):
     page.locator("section[aria-label='Force over velocity'] .js-line").first.wait_for(state="attached")
     assert page.locator("#view tbody tr").count() == 2
     shoot(page, "4-compared")
-    page.get_by_role("button", name="Explore Bingham", exact=True).click()  # how sure it is is worked out now
+    page.get_by_role(
+        "button", name="Explore modified Bingham, individual fits", exact=True
+    ).click()  # how sure it is is worked out now
     page.get_by_text("% prediction interval").wait_for()
     open_tab(page, "Compare")
 
