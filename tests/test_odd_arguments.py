@@ -208,6 +208,13 @@ def test_arguments_of_the_wrong_kind_are_refused_before_anything_long_begins(nam
     assert refusal.value.code == "E_ARGUMENT"
 
 
+@pytest.mark.parametrize("paths", [None, 3, [3], [], object()])
+def test_what_is_no_path_is_not_imported(paths):
+    with pytest.raises(InputError, match="give it as a path or several") as refusal:
+        mrdamper.import_files(paths)
+    assert refusal.value.code == "E_ARGUMENT"
+
+
 def test_a_folder_in_place_of_a_dataset_is_answered_with_what_reads_it():
     with pytest.raises(InputError, match=r"'rig/'; give it as Dataset, which mrdamper.load_dataset\(folder\) reads"):
         mrdamper.run_study("rig/")

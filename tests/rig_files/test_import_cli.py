@@ -152,6 +152,12 @@ def test_a_profile_that_cannot_be_read_stops_at_once(folder, tmp_path):
     assert done.exception.code == "E_PROFILE"
 
 
+def test_one_path_is_read_as_several_are(tmp_path):
+    write(tmp_path, "0A.csv", text())
+    ways = (tmp_path, str(tmp_path), [tmp_path / "0A.csv"], tmp_path.glob("*.csv"))
+    assert [[record.id for record in import_files(way).records] for way in ways] == [["0A"]] * 4
+
+
 def test_one_record_under_several_currents_is_refused(tmp_path):
     for name in ("0A.csv", "0.5A.csv"):
         write(tmp_path, name, text())

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data import Dataset
-from mrdamper.errors import ColumnError, CombinedError, InputError
+from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, with_stated_current
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.folder import files_in, unpacked
@@ -87,8 +87,9 @@ def first_file(paths: Sequence[str | Path]) -> Iterator[Path]:
         yield files_in(given)[0][0]
 
 
+@validate_arguments("paths")
 def import_files(
-    paths: Iterable[str | Path],
+    paths: str | Path | Iterable[str | Path],
     profile: Profile | str | Path | None = None,
     *,
     tests: str | Path | TestsTable | None = None,
@@ -98,7 +99,7 @@ def import_files(
 
     Parameters
     ----------
-    paths : iterable of path
+    paths : path or iterable of path
         Of a folder, every file with a suffix of a known format is read, in the order of names.
     profile : Profile or path, optional
         For all of them.
@@ -110,7 +111,8 @@ def import_files(
     Raises
     ------
     InputError
-        If the profile or the table of tests cannot be read, or a folder holds no rig's file.
+        If the profile or the table of tests cannot be read, or a folder holds no rig's file; E_ARGUMENT if `paths`
+        are no paths.
 
     Examples
     --------
@@ -123,7 +125,10 @@ def import_files(
     ['test_0.5A']
     """
     profile = profile_of(profile)
-    with unpacked(paths) as given:
+    several = [paths] if isinstance(paths, (str, Path)) else [*paths] if is_a(paths, Iterable) else []
+    if not several or not all(is_a(path, (str, Path)) for path in several):
+        raise InputError(f"paths is {shown(paths)}", remedy="give it as a path or several", code="E_ARGUMENT")
+    with unpacked(several) as given:
         beside = [path / TESTS for path in given if (path / TESTS).is_file()]
         lists = [path for path in beside if not names_tests(path)]  # a laboratory's own, under the same name
         tests = next((path for path in beside if path not in lists), None) if tests is None else tests
