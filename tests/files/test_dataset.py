@@ -96,6 +96,7 @@ def rows(*lines):
 
 
 GOOD = rows("a,0,0,0", "a,1,1,1", "a,2,0,0", "a,3,1,1")
+WITH_CURRENT = GOOD.replace("force_N", "force_N,current_A").replace("0,0\n", "0,0,0.5\n").replace("1,1\n", "1,1,0.5\n")
 
 
 @pytest.mark.parametrize(
@@ -118,6 +119,7 @@ GOOD = rows("a,0,0,0", "a,1,1,1", "a,2,0,0", "a,3,1,1")
         (HEADER + "a,1\n", GOOD.replace("a,1,1,1", "a,1,1,"), NonFiniteError, "1 values"),
         (HEADER + "a,1\n", GOOD.replace("a,2,", "a,1,"), TimeOrderError, "at sample 2"),
         (HEADER + "a,1\na,1\n", GOOD, RunError, "two runs are called a"),
+        (HEADER + "a,1\n", WITH_CURRENT, ColumnError, "current_A is 1 A, and 0.5 A in the samples; if the samples"),
         ("run_id,current_A,split\na,1,test\n", GOOD, RunError, "use train or validate"),
     ],
 )
@@ -130,6 +132,13 @@ def test_bad_folders_are_refused_with_place_and_remedy(tmp_path, runs, samples, 
         load_dataset(tmp_path)
     assert text in str(caught.value)
     assert "[E_" in str(caught.value)
+
+
+@pytest.mark.parametrize("cell", ["0.5", "-0.51", ""])
+def test_a_current_of_the_samples_may_stand_in_the_table_too(tmp_path, cell):
+    (tmp_path / "runs.csv").write_text(f"{HEADER}a,{cell}\n")
+    (tmp_path / "samples.csv").write_text(WITH_CURRENT)
+    np.testing.assert_array_equal(load_dataset(tmp_path)["a"].current, 0.5)
 
 
 def test_a_missing_folder_is_named(tmp_path):

@@ -19,6 +19,7 @@ from mrdamper.data.arrays import chunks, drop_pages
 from mrdamper.data.atomic import path_of, write_file, write_folder
 from mrdamper.data.encoding import csv_text, csv_value
 from mrdamper.errors import ColumnError, DatasetError, OutputError, shown, validate_arguments
+from mrdamper.rig_files.conditions import contradicted
 from mrdamper.rig_files.dataset_samples import OPTIONAL, REQUIRED, SAMPLE_FILES, Channels, missing_column, read_samples
 from mrdamper.rig_files.readers.base import MOST_COLUMNS
 
@@ -211,9 +212,14 @@ def run_of(row: Mapping[str, str | None], samples: Channels, path: Path) -> Run:
         return value
 
     channels = {n: values for n, values in samples.items() if n in REQUIRED or not np.isnan(values).all()}
-    current = channels.get("current_A", number("current_A"))
+    stated, current = number("current_A"), channels.get("current_A")
     if current is None:
-        current = _driven(channels, number, where)
+        current = _driven(channels, number, where) if stated is None else stated
+    elif stated is not None and (mean := contradicted(current, stated)) is not None:
+        raise ColumnError(
+            f"current_A is {stated:g} A, and {mean:g} A in the samples", where=where, code="E_CURRENT_CONTRADICTS",
+            remedy="if the samples are wrong, remove their current_A; else leave the cell of runs.csv empty",
+        )  # fmt: skip
     start, end = number("steady_t0_s"), number("steady_t1_s")
     frequency, amplitude = number("nominal_frequency_Hz"), number("nominal_amplitude_m")
     nominal = None
