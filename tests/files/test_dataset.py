@@ -1,4 +1,5 @@
 import gzip
+from dataclasses import replace
 
 import numpy as np
 import polars as pl
@@ -40,6 +41,21 @@ def test_round_trip_keeps_every_bit(tmp_path):
         assert dict(a.notes) == dict(b.notes)
     np.testing.assert_array_equal(before["b"].velocity, after["b"].velocity)
     assert after["a"].velocity is None
+
+
+def test_a_constant_current_is_corrected_in_the_table_of_runs_beside_a_measured_one(tmp_path, bundled):
+    still, other = (replace(run, id=name) for run, name in zip(list(bundled)[:2], "ab", strict=True))
+    still = replace(still, current=np.full(still.time.size, 1.0))
+    measured = replace(other, current=1.0 + 0.01 * np.sin(other.time))
+    save_dataset(Dataset((still, measured)), tmp_path / "ds")
+    np.testing.assert_array_equal(load_dataset(tmp_path / "ds")["b"].current, measured.current)
+    table = tmp_path / "ds" / "runs.csv"
+    lines = table.read_text().splitlines()
+    at = lines[0].split(",").index("current_A")
+    cells = lines[1].split(",")
+    cells[at] = "0.5"
+    table.write_text("\n".join([lines[0], ",".join(cells), *lines[2:]]) + "\n")
+    assert load_dataset(tmp_path / "ds")["a"].current_A == 0.5
 
 
 def test_records_too_long_for_one_table_are_stored_with_the_channels_of_each(tmp_path, monkeypatch):

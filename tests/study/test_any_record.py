@@ -63,3 +63,6 @@ def test_random_records_alone_are_fitted_by_laws_of_the_current_and_by_no_model_
     assert (model.c, model.fy) == (pytest.approx(1200, rel=0.05), pytest.approx(350, rel=0.05))
     with pytest.raises(IdentificationError, match=r"kwok: identified from steady sines .* of which there are 0"):
         run_study(Dataset(tuple(runs), "roads"), model="kwok")
+    kernel = run_study(Dataset(tuple(runs), "roads"), model="kernel").rigs[0].chosen  # takes any record, as in compare
+    assert kernel.recipe.name == "kernel"
+    assert kernel.validation.median() < 0.2

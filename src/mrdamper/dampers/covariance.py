@@ -149,8 +149,9 @@ class _Spread:
     def curved(self, damper: Damper, parts: Sequence[RunResiduals]) -> _Spread:
         """Widen the intervals by what the linearisation of the draws omits, of one model of a damper.
 
-        Some draws are fitted without linearisation. By the mean absolute change of a parameter over that of the
-        linearised fits to the same draws, but no less, its interval is widened: one fit far off is no rule.
+        Some draws are fitted without linearisation. Each interval is widened by the mean absolute change of its
+        parameter in these fits over that in the linearised fits to the same draws, and never narrowed. Means of
+        absolute values, since one fit far off would determine a mean square.
         """
         moved = self.draws.moved
         if damper.one_model is None or not moved.any():
@@ -167,7 +168,7 @@ class _Spread:
         """(P, P) of the parameters, or of their logarithms, linearised.
 
         Parameters that make up for each other lie on a curve of nearly the same force: a factor on one of them alone
-        would make a variance of the force from nothing.
+        would give the force a variance that it does not have.
         """
         return self.within + self.draws.moved.T @ self.draws.moved / len(self.draws.moved)
 
@@ -192,7 +193,10 @@ class _Spread:
 
     @property
     def interval_factor(self) -> Floats:
-        """(P,) factor on standard errors: of curved parameters, and where a normal interval holds more than a share."""
+        """(P,) factor on standard errors, above one for curved parameters.
+
+        Below one where a normal interval would hold more than its share of the draws.
+        """
         variance = np.maximum(np.diag(self.covariance), np.finfo(float).tiny)
         return np.sqrt(self._variance / variance) * np.minimum(self.quantiles / student(_LEVEL, np.inf), 1.0)
 
@@ -203,7 +207,7 @@ class _Spread:
 
     def effective(self, samples: int) -> dict[str, float]:
         """Return independent samples behind each parameter, of those that there are."""
-        variance = np.maximum(self._variance, np.finfo(float).tiny)
+        variance = np.maximum(self.interval_factor**2 * np.diag(self.covariance), np.finfo(float).tiny)
         return dict(zip(self.names, np.minimum(self.textbook / variance, samples).tolist(), strict=True))
 
 
@@ -231,13 +235,13 @@ def _identifiable(
 ) -> tuple[_Spread, set[str]]:
     """Return the covariance of parameters whose intervals span less than three decades, and those whose do not.
 
-    One parameter after the other is held, the widest first, until the intervals of the others are
-    bounded; all that were too wide beside free ones are not identifiable.
+    One parameter after the other is held, the widest first, until the intervals of the others are bounded; all that
+    were too wide beside free ones are not identifiable. Curvature is not counted here.
     """
     wide: set[str] = set()
     while True:
         spread = _Spread.of(names, parts, slopes, inverse)
-        errors = np.sqrt(np.diag(spread.covariance))
+        errors = spread.interval_factor * np.sqrt(np.diag(spread.covariance))
         ends = [
             interval_about(own[n].value, float(e), float(d), _LEVEL, own[n].log, own[n].exponent)
             for n, e, d in zip(names, errors, spread.dof, strict=True)

@@ -78,8 +78,8 @@ def _current_distances(current: Floats, levels: Floats, changing: bool) -> tuple
     outside = np.maximum(np.maximum(levels[0] - current, current - levels[-1]) / largest - _CURRENT_TOLERANCE, 0)
     if changing:  # a record passes through all currents between its ends
         return np.zeros_like(outside), outside**2
-    if levels.size == 1:
-        levels = np.array([0.0, largest])  # no current counts as the other level
+    if levels.size == 1:  # the spacing is the distance of the level from no current
+        return np.zeros_like(outside), outside * (outside + 1)
     after = np.clip(np.searchsorted(levels, current), 1, levels.size - 1)
     lower, upper = levels[after - 1], levels[after]
     between = np.maximum((current - lower) * (upper - current), 0) / largest**2

@@ -72,7 +72,8 @@ class ModifiedModel(Damper):
 
     @property
     def title(self) -> str:
-        return f"modified {self.parameters.model_type.title}"
+        title = self.parameters.model_type.title
+        return title if "modified" in title else f"modified {title}"
 
     @property
     def parameter_count(self) -> int:

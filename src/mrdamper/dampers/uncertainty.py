@@ -86,7 +86,8 @@ class Uncertainty(Displayable):
     effective : mapping of str to float
         Independent samples that would give each parameter's standard error, without sessions and correlated noise.
     interval_factor : (P,) array, or float
-        Factor on the standard error in the interval of a parameter: curvature widens intervals, and moves no force.
+        Factor on the standard error of each parameter, for curvature (above one) and few sessions (below one).
+        Prediction intervals of the force do not use it.
     """
 
     names: tuple[str, ...]

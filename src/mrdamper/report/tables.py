@@ -15,7 +15,7 @@ from mrdamper.study.validation import RunScore
 
 
 def identification_rows(identifications: Sequence[Identification], dataset: str = "") -> list[dict[str, Any]]:
-    """One row an identification: condition, parameters, scores, message; `dataset` for a rig unnamed."""
+    """One row an identification: condition, parameters, scores, message; `dataset` where a run names no rig."""
     rows = []
     for identification in identifications:
         row: dict[str, Any] = {

@@ -309,10 +309,9 @@ def _samples(dataset: Dataset) -> Iterator[pl.DataFrame]:
     """Tables of at most some hundred thousand samples, in order, each of one run."""
     import polars as pl
 
-    varying = any(_varies(run.current) for run in dataset)
     for run in dataset:
         channels = {"time_s": run.time, "displacement_m": run.displacement, "force_N": run.force}
-        if varying:
+        if _varies(run.current):  # a constant one stands in runs.csv alone, where it can be corrected
             channels["current_A"] = run.current
         if run.velocity is not None:
             channels["velocity_m_s"] = run.velocity

@@ -52,7 +52,7 @@ class Recipe:
     # makes the damper from runs and their identifications
     make: Callable[[Sequence[Run], Sequence[Identification]], FitResult] = field(compare=False)
     way: str = ""  # in words: "individual fits", "global fit"
-    title: str = ""  # model or method without its way; `RecipeResult.title` has both
+    title: str = ""  # label of the method in a reproduction; `RecipeResult.title` stands in tables
     source: str = ""  # where it was published
     limits: str = ""  # what it cannot do
     pure: bool = False  # identified from pure sines only; scored on every run all the same
@@ -205,7 +205,7 @@ def fit_and_score_all(
 
     Returns
     -------
-    scored : list of Scored
+    scored : list of RecipeResult
     refused : mapping of recipe name to reason
         Recipes whose damper cannot be determined from these runs.
     """

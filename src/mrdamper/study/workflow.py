@@ -260,8 +260,8 @@ def run_study(
     progress : callable
         Told what is being done and the share done, 0...1.
     model : str or StudyMethod, optional
-        Choose the best candidate of this model instead of the best of all; or follow this published
-        method with its options ("paper" with its defaults).
+        Choose the best candidate of this model, or the recipe of this name ("bouc-wen:joint"), instead of the best of
+        all; or follow this published method with its options ("paper" with its defaults).
     keep : sequence of str
         Runs that are used although they contradict the others.
     processes : Processes
@@ -270,7 +270,7 @@ def run_study(
     Raises
     ------
     UnknownNameError
-        If no candidate is of that model.
+        If there is no such model, recipe or method.
     IdentificationError
         If a rig has too few runs to identify anything from.
     ContradictionError
@@ -578,18 +578,22 @@ def _steps(
 ) -> list[tuple[Recipe, Sequence[Run]]]:
     """Return the recipes of a study, and the runs each is followed on: sines run by run, everything at once.
 
-    Without sines, laws of the current alone are fitted to the records of constant current.
+    With fewer than two sines, laws of the current alone are fitted to the records of constant current.
     """
     pure = [run for run in train if analyse_motion(run).is_sine]  # published methods take no other
     if method is not None:
         return [(method.recipe(pure), train), *((modified(name), train) for name in STUDIED)]
     steps: list[tuple[Recipe, Sequence[Run]]] = []
+    named = [
+        r for n, r in catalogue().items() if n != JOINTLY and (model == n or (model == r.model and not r.on_request))
+    ]
     if len(train) > 1:
         steps += [(make(name), train) for name in STUDIED for make in (modified, jointly, current_only)]
-        others = {n: r for n, r in catalogue().items() if model == n or (model == r.model and not r.on_request)}
-        steps += [(r, train) for n, r in others.items() if n not in {JOINTLY, *(recipe.name for recipe, _ in steps)}]
+        there = {recipe.name for recipe, _ in steps}
+        steps += [(recipe, train) for recipe in named if recipe.basis is not None and recipe.name not in there]
     elif len(held := [run for run in everything if not run.current_changes]) > 1:
         steps += [(current_only(name), held) for name in STUDIED]
     if len(pure) > 2:
         steps += [(cls().beside_others().recipe(pure), train) for cls in study_methods().values()]
+    steps += [(recipe, everything) for recipe in named if recipe.basis is None]
     return [*steps, (play_and_bypass(), everything)]

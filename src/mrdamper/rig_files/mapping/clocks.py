@@ -119,10 +119,10 @@ def with_time_stated(table: RawTable) -> RawTable:
     """
     times = table.columns("time") or [i for i in table.columns(dimension="time") if not table.names[i]]
     clocks = times or table.columns(dimension="time")
-    going_on = _with_cycles(table, clocks[0]) if len(clocks) == 1 else table
-    if len(times) == 1 or going_on is not table:
+    joined = _with_cycles(table, clocks[0]) if len(clocks) == 1 else table
+    if len(times) == 1 or joined is not table:
         clock = clocks[0]
-        return _with_samples_counted(_with_date(_with_fractions(going_on, clock), clock), clock)
+        return _with_samples_counted(_with_date(_with_fractions(joined, clock), clock), clock)
     return table if times else _with_crank(table)
 
 
@@ -135,12 +135,12 @@ def _with_cycles(table: RawTable, clock: int) -> RawTable:
     if not falls.any() or not np.array_equal(steps[counters[0]], falls.astype(float)):
         return table
 
-    def going_on(values: Mapping[int, Floats]) -> Floats:
+    def joined(values: Mapping[int, Floats]) -> Floats:
         steps = np.diff(values[clock])
         return np.concatenate([[0.0], np.cumsum(np.where(steps < 0, np.median(steps), steps))])
 
-    note = Finding("W_CHOSEN", f"{table.names[clock]!r} begins again in every cycle: time goes on over them")
-    return table.computed(clock, (clock,), going_on).named({clock: ("time", table.headers[clock].unit)}).noted(note)
+    note = Finding("W_CHOSEN", f"{table.names[clock]!r} restarts in every cycle: the cycles are joined to one clock")
+    return table.computed(clock, (clock,), joined).named({clock: ("time", table.headers[clock].unit)}).noted(note)
 
 
 def _with_fractions(table: RawTable, clock: int) -> RawTable:

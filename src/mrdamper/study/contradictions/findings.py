@@ -100,14 +100,14 @@ def _current(run: Run, e: Trial) -> tuple[str, str]:
     if e.unit == "mA":
         return (
             f"its current of {_amperes(tested)} looks like {1e3 * e.value:.4g} mA",
-            f'[channels.current] unit = "mA" in a profile of its own, or {stated_current(run, e.value)}',
+            corrected_unit(run, e.value),
         )
     why = "an open coil, or no supply" if e.value == 0 else "a partly open coil, or another current than written down"
     if e.value > tested:
         why = "another current than written down"
     return (
         f"its force is that of {_amperes(e.value)}, not of {_amperes(tested)}: {why}",
-        f"{stated_current(run, e.value)}, or repeat the test" if np.ptp(run.current) == 0 else "repeat the test",
+        _repeated(run, e.value),
     )
 
 
@@ -151,7 +151,7 @@ def _shifted(run: Run, e: Trial) -> tuple[str, str]:
     return (
         f"its current is that of another row of tests.csv, as those of other runs are: its force is that of "
         f"{_amperes(e.value)}, not of {_amperes(abs(run.mean_current))}",
-        f"in tests.csv, set current_A of {_file(run)} to {e.value:.3g}",
+        _repeated(run, e.value),
     )
 
 
@@ -163,9 +163,23 @@ def _specimen(run: Run) -> str:
     return f"in tests.csv, give {_file(run)} another specimen"
 
 
-def stated_current(run: Run, current: float) -> str:
+def _stated_current(run: Run, current: float) -> str:
     """State how the current of a run without a current channel is corrected; an import again would read the old one."""
     return f"set current_A of {run.id} to {current:.3g} in runs.csv of the dataset"
+
+
+def corrected_unit(run: Run, current: float) -> str:
+    """State how a current that was written in milliamperes is corrected, measured or stated."""
+    return _stated_current(run, current) if _is_stated(run) else _own_profile(run, '[channels.current] unit = "mA"')
+
+
+def _repeated(run: Run, current: float) -> str:
+    return f"{_stated_current(run, current)}, or repeat the test" if _is_stated(run) else "repeat the test"
+
+
+def _is_stated(run: Run) -> bool:
+    """Tell that the current is no channel, which would vary."""
+    return float(np.ptp(run.current)) == 0
 
 
 def _file(run: Run) -> str:

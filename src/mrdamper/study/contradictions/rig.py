@@ -12,7 +12,7 @@ from mrdamper.data import Run
 from mrdamper.errors import InputError
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.contradictions.copies import find_copies
-from mrdamper.study.contradictions.findings import Contradiction, describe, describe_copy, stated_current
+from mrdamper.study.contradictions.findings import Contradiction, corrected_unit, describe, describe_copy
 from mrdamper.study.contradictions.search import Search
 from mrdamper.study.contradictions.tracks import Track, tracks_of
 
@@ -120,7 +120,7 @@ def _in_amperes(tracks: Sequence[Track], keep: Collection[str]) -> tuple[list[Tr
             kept.append(track)
             continue
         text = f"its current of {size:.4g} A is {size / usual:.3g} times that of the others: it looks like milliamperes"
-        remedy = stated_current(run, size / 1e3)
+        remedy = corrected_unit(run, size / 1e3)
         kept.append(replace(track, current=track.current / 1e3))
         contradictions[run.id] = Contradiction(run.id, "current", size / 1e3, float("inf"), text, remedy)
     return kept, contradictions
