@@ -241,7 +241,7 @@ def _identifiable(
     wide: set[str] = set()
     while True:
         spread = _Spread.of(names, parts, slopes, inverse)
-        errors = spread.interval_factor * np.sqrt(np.diag(spread.covariance))
+        errors: Floats = spread.interval_factor * np.sqrt(np.diag(spread.covariance))
         ends = [
             interval_about(own[n].value, float(e), float(d), _LEVEL, own[n].log, own[n].exponent)
             for n, e, d in zip(names, errors, spread.dof, strict=True)

@@ -244,9 +244,9 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
         fixed |= dict.fromkeys(("displacement", "force"), ", unit and scale (unit per volt)")
     if len(table.names) == 2 and len(missing) > 1:  # a channel a file
         fixed = {r: f'{fixed.get(r, "")}, and file = "...{{run}}..." where each file has one channel,' for r in missing}
-    found = f"(found {shown})"
+    beside = f"(found {shown})"
     return [
-        _refusal(ColumnError, table, f"no column is known to be {r} {found}", remedy.format(r, fixed.get(r, "")))
+        _refusal(ColumnError, table, f"no column is known to be {r} {beside}", remedy.format(r, fixed.get(r, "")))
         for r in missing
     ]
 
