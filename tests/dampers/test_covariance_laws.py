@@ -10,7 +10,7 @@ from support.dampers import joint_damper
 from mrdamper.dampers.bands import band
 from mrdamper.dampers.calibration import Calibration, PredictedRun, StandardizedErrors, model_error
 from mrdamper.dampers.concatenated_runs import JointResiduals
-from mrdamper.dampers.covariance import _determined, _representative, _Spread, _within, estimate_uncertainty
+from mrdamper.dampers.covariance import _determined, _Spread, _within, estimate_uncertainty
 from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.envelope import UNTESTED
 from mrdamper.dampers.joint import JointDamper, JointProblem
@@ -320,7 +320,8 @@ def test_intervals_are_as_wide_as_refits_and_no_narrower_than_linearised_fits(mo
 def test_representative_draws_have_no_mean_and_the_mean_squares_of_all(count):
     for seed in range(5):
         moved = np.random.default_rng(seed).standard_normal((600, count)) * np.logspace(-3, 3, count)
-        chosen, unit = _representative(moved), np.sqrt(np.mean(moved**2, axis=0))
+        draws = Draws(np.zeros((600, 1, 2)), moved, np.ones(moved.shape))
+        chosen, unit = draws.representative(16), np.sqrt(np.mean(moved**2, axis=0))
         assert len(chosen) == 16
         assert np.mean(moved[chosen], axis=0) / unit == pytest.approx(np.zeros(count), abs=0.2)
         assert np.mean(moved[chosen] ** 2, axis=0) == pytest.approx(unit**2, rel=0.25)

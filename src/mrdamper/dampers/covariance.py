@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import (
@@ -32,7 +31,6 @@ from mrdamper.statistics.metrics import dissipated_power, peak_force
 _MAX_RUN_SHARE = 0.6  # share of the information on a parameter from which one run mainly determines it
 _MIN_EIGENVALUE = 1e-10  # of the largest of the scaled normal matrix, below which a direction is not determined
 _REFITS = 16  # draws of gains and offsets that are fitted without linearisation
-_EXCHANGES = 3  # rounds in which each of these draws is exchanged
 _SEED = 20261124  # of errors within the runs that are drawn beside those of sessions
 _MIN_RETAINED = 0.05  # share of the information on a direction that a fit without a condition has at least
 _LEVEL = 0.95  # of the intervals by which a parameter is identifiable or not
@@ -156,7 +154,7 @@ class _Spread:
         moved = self.draws.moved
         if damper.one_model is None or not moved.any():
             return self
-        some = _representative(moved)
+        some = self.draws.representative(_REFITS)
         shifts = np.concatenate([np.zeros((1, len(parts), 2)), self.draws.shifts[some]])
         starts = np.concatenate([np.zeros((1, len(self.names))), moved[some]])
         fits = refitted(damper, parts, self.rests, self.names, shifts, starts)
@@ -171,11 +169,6 @@ class _Spread:
         would give the force a variance that it does not have.
         """
         return self.within + self.draws.moved.T @ self.draws.moved / len(self.draws.moved)
-
-    @cached_property
-    def _variance(self) -> Floats:
-        """(P,) variances of the parameters, wider where they are curved."""
-        return np.diag(self.within) + self.wider**2 * np.mean(self.draws.moved**2, axis=0)
 
     @cached_property
     def quantiles(self) -> Floats:
@@ -198,7 +191,8 @@ class _Spread:
         Below one where a normal interval would hold more than its share of the draws.
         """
         variance = np.maximum(np.diag(self.covariance), np.finfo(float).tiny)
-        return np.sqrt(self._variance / variance) * np.minimum(self.quantiles / student(_LEVEL, np.inf), 1.0)
+        curved = np.diag(self.within) + self.wider**2 * np.mean(self.draws.moved**2, axis=0)
+        return np.sqrt(curved / variance) * np.minimum(self.quantiles / student(_LEVEL, np.inf), 1.0)
 
     @property
     def dof(self) -> Floats:
@@ -209,20 +203,6 @@ class _Spread:
         """Return independent samples behind each parameter, of those that there are."""
         variance = np.maximum(self.interval_factor**2 * np.diag(self.covariance), np.finfo(float).tiny)
         return dict(zip(self.names, np.minimum(self.textbook / variance, samples).tolist(), strict=True))
-
-
-def _representative(moved: Floats) -> NDArray[np.intp]:
-    """(`_REFITS`,) draws of which the mean is near zero and the mean square near that of all, by exchanges.
-
-    Sixteen draws at random may be a third larger or smaller than all.
-    """
-    unit: Floats = moved / np.maximum(np.sqrt(np.mean(moved**2, axis=0)), np.finfo(float).tiny)
-    table = np.concatenate([unit, unit**2 - 1], axis=1)
-    chosen = np.arange(_REFITS)
-    for at in [*range(_REFITS)] * _EXCHANGES:
-        others = table[np.delete(chosen, at)].sum(axis=0)
-        chosen[at] = np.argmin(np.sum((others + table) ** 2, axis=1))
-    return chosen
 
 
 def _identifiable(

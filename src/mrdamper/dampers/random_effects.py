@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.dampers.run_residuals import RunResiduals
 from mrdamper.data import SESSIONS_NEEDED, Floats
@@ -26,6 +27,7 @@ _ITERATIONS = 4  # of the variances at which the quadratic forms are of least va
 _MAX_SHOWN = 128  # gains and offsets up to which those of draws are iterated: time grows with the cube of their number
 _MIN_SHARE = 1e-4  # of the largest variance, with which every other one counts in these forms
 _DRAWS, _ROUNDS, _SEED = 600, 4, 20240813  # draws of gains and offsets; rounds of weights, as in the joint fit
+_EXCHANGES = 3  # rounds in which each of some representative draws is exchanged
 _MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
 
 
@@ -50,6 +52,19 @@ class Draws:
     shifts: Floats  # (D, R, 2) gains and offsets of the runs [-, N]
     moved: Floats  # (D, P) change of the parameters
     shown: Floats  # (D, P) variance of the parameters that the residuals of a draw would show, over that of the draws
+
+    def representative(self, count: int) -> NDArray[np.intp]:
+        """Draws of which the mean change is near zero and the mean square near that of all, by exchanges.
+
+        Sixteen draws at random may be a third larger or smaller than all.
+        """
+        unit: Floats = self.moved / np.maximum(np.sqrt(np.mean(self.moved**2, axis=0)), np.finfo(float).tiny)
+        table = np.concatenate([unit, unit**2 - 1], axis=1)
+        chosen = np.arange(count)
+        for at in [*range(count)] * _EXCHANGES:
+            others = table[np.delete(chosen, at)].sum(axis=0)
+            chosen[at] = np.argmin(np.sum((others + table) ** 2, axis=1))
+        return chosen
 
 
 class GainsAndOffsets:

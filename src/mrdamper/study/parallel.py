@@ -90,7 +90,7 @@ def _quietly(function: Callable[[T, Progress], R], item: T) -> R:
 
 
 def identify_each(tasks: Iterable[tuple[Basis, Run]], processes: Processes, progress: Progress) -> IdentificationCache:
-    """Identify every basis from its run, the runs one by one."""
+    """Make the individual fits: every basis from its run."""
     bases: dict[str, tuple[Run, list[Basis]]] = {}
     for basis, run in tasks:
         bases.setdefault(run.id, (run, []))[1].append(basis)

@@ -93,7 +93,7 @@ class RecipeResult:
     seconds: float  # spent on identification and the fit over conditions
     # train runs predicted without their fold, by kind of fold (`cross_validation.folds_by_kind`)
     by_kind: Mapping[str, Validation] = field(default_factory=dict[str, Validation])
-    # lowest and highest value of a parameter that holds everywhere, each condition left out in turn
+    # lowest and highest value of a parameter that holds everywhere, over leave-one-condition-out fits
     spread: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
 
     @property

@@ -367,9 +367,7 @@ def _require_runs(sines: Sequence[Run], usable: Sequence[Run], unusable: Mapping
         raise IdentificationError(
             "no identification run passes the checks",
             where=where,
-            remedy="check the split column of runs.csv"
-            if not unusable
-            else "run {}: {}".format(*next(iter(unusable.items()))),
+            remedy=next((f"run {n}: {why}" for n, why in unusable.items()), "check the split column of runs.csv"),
         )
     if len(usable) == len(sines) < 2:
         raise IdentificationError(

@@ -127,7 +127,7 @@ def with_time_stated(table: RawTable) -> RawTable:
 
 
 def _with_cycles(table: RawTable, clock: int) -> RawTable:
-    """Return a clock that begins again with every cycle that a column counts going on: no test begins there."""
+    """Join a clock that restarts in every cycle, where a column counts the cycles: no test begins there."""
     counters = [i for i, name in enumerate(table.names) if i != clock and _CYCLE.match(name.strip())]
     values = table.try_read(clock, *counters[:1]) if len(counters) == 1 and table.source.size <= _LARGEST else None
     steps = {i: np.diff(column) for i, column in values.items()} if values else {}

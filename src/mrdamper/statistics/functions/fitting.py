@@ -27,8 +27,8 @@ class FunctionFit:
 
     function: ParameterFunction
     r2: float  # share of the variance it explains (in the logarithm, where the parameter is logarithmic)
-    # RMS error at a condition left out of the fit, over the parameter's spread: under 1 the function knows more than
-    # the mean does; infinite where a term rests on one condition alone
+    # RMS cross-validation error at omitted conditions, over the parameter's spread: below 1 the function predicts
+    # better than the mean; infinite where one condition alone determines a term
     left_out: float
     # forms that were no candidates, and why
     refused: Mapping[str, str] = field(default_factory=dict[str, str], compare=False)
@@ -252,7 +252,7 @@ def _solved(columns: Floats, target: Floats, weight: Floats, rates: int) -> tupl
 
 @lru_cache(maxsize=128)
 def _folds(conditions: tuple[Condition, ...]) -> dict[str, tuple[list[NDArray[np.intp]], NDArray[np.intp]]]:
-    """Rows of the groups that are left out together, those of one size (M, size) at a time, and of all in order."""
+    """Rows of the folds by kind, those of one size in one array (M, size), and the rows of all folds in order."""
     kinds = fold_groups(conditions)
     alike = {
         kind: [np.array([g for g in groups if len(g) == size]) for size in {len(group) for group in groups}]

@@ -178,7 +178,7 @@ def _repeated(run: Run, current: float) -> str:
 
 
 def _is_stated(run: Run) -> bool:
-    """Tell that the current is no channel, which would vary."""
+    """Tell if the current is a stated number: a measured one varies."""
     return float(np.ptp(run.current)) == 0
 
 
