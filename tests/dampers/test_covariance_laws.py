@@ -368,6 +368,24 @@ def test_a_record_that_is_no_sine_enters_from_where_it_has_moved_by_its_amplitud
     assert part.measured == pytest.approx(np.interp(part.prediction.motion.time[part.picked], time, run.force))
 
 
+def slopes_of(parts):
+    """Derivatives of the force by c, fy and f0 at the samples of each run."""
+    speeds = [part.prediction.motion.velocity[part.picked] for part in parts]
+    return [np.column_stack([v, np.sign(v), np.ones(v.size)]) for v in speeds]
+
+
+def error_factors(parts, conditions):
+    """Variance of the error of the form in a fit without the condition of each run, over that in the fit of all."""
+    columns = slopes_of(parts)
+    normal, factors = normal_matrix(columns, parts), []
+    for condition in conditions:
+        own = [k for k, other in enumerate(conditions) if other == condition]
+        force = np.concatenate([parts[k].predicted * parts[k].weight for k in own])
+        table = np.concatenate([parts[k].weighted(columns[k]) for k in own])
+        factors.append(1 / (1 - force @ table @ np.linalg.solve(normal, table.T @ force) / (force @ force)))
+    return factors
+
+
 def test_the_model_error_of_cross_validation_takes_the_place_of_the_residuals():
     runs = runs_of(noise=0.002)
     damper = fitted(runs)
@@ -386,14 +404,14 @@ def test_the_model_error_of_cross_validation_takes_the_place_of_the_residuals():
     assert known.force > 1.3 * inside.force
     assert known.covariance == pytest.approx(inside.covariance)
     assert (inside.left_out, inside.calibration) == (0, None)
-    # The intervals of these very runs hold the share that the level states, whatever the size of the error.
-    made = replace(damper, uncertainty=known)
-    shares = []
-    for run, prediction in zip(runs, seen, strict=True):
+    # The intervals hold their share of errors as the fit to all conditions has them, whatever the size of the error.
+    made, shares = replace(damper, uncertainty=known), []
+    factors = error_factors([RunResiduals.of(damper, run) for run in runs], CONDITIONS)
+    for run, prediction, factor in zip(runs, seen, factors, strict=True):
         around = band(made, damper.predict(run), 0.8)
         half = np.interp(np.arange(prediction.predicted.size), [0, prediction.predicted.size], [0, run.time.size])
         width = (around.high - around.low)[half.astype(int)] / 2
-        shares.append(np.mean(np.abs(prediction.measured - prediction.predicted) <= width))
+        shares.append(np.mean(np.abs(prediction.measured - prediction.predicted) <= width * np.sqrt(factor)))
     assert np.mean(shares) == pytest.approx(0.8, abs=0.1)
     # Twice the error is a model error of twice the size, and the factor of the calibration stays.
     wide = [replace(p, measured=p.predicted + 2 * (p.measured - p.predicted)) for p in seen]
@@ -435,8 +453,7 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
     assert known.run_gain == pytest.approx(np.sqrt(error.gain**2 - 2 / 3 * known.gain**2))
     assert known.run_offset == pytest.approx(np.sqrt(error.offset**2 - 2 / 3 * known.offset**2))
     shares, scores, parts = [], [], [RunResiduals.of(damper, run) for run in runs]
-    columns = [np.column_stack([v, np.sign(v), np.ones(v.size)]) for p in parts
-               for v in [p.prediction.motion.velocity[p.picked]]]  # fmt: skip
+    columns, forms = slopes_of(parts), error_factors(parts, conditions)
     normal = normal_matrix(columns, parts)
     for part, condition in zip(parts, conditions, strict=True):
         # Without its condition a fit has (N - N_c)⁻¹ N of the covariance.
@@ -451,13 +468,15 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
         swing = (slopes[predicted.argmax()] - slopes[predicted.argmin()]) / np.ptp(predicted)
         share = np.mean(np.sum(slopes @ covariance * slopes, axis=1)) / (np.ptp(predicted) / 2) ** 2
         shares.append([share, *(d @ covariance @ d for d in (swing, np.array(lost) / power))])
-    shares[6] = np.median(shares, axis=0)
-    for own, prediction in zip(shares, seen, strict=True):
+    shares[6], forms[6] = np.median(shares, axis=0), np.median(forms)
+    assert 1.1 < min(forms) < max(forms) < 3
+    for own, form, prediction in zip(shares, forms, seen, strict=True):
         grown = [known.growth.variance(name, prediction.distance) for name in ("force", "peak", "energy")]
         share, of_peak, of_energy = np.add(own, grown)
-        gain, offset, half = error.gain**2, error.offset**2, prediction.half
-        force = np.sqrt(gain * prediction.predicted**2 + offset + (share + known.force**2) * half**2)
-        peak, energy = np.sqrt(of_peak + gain + known.peak**2), np.sqrt(of_energy + gain + known.energy**2)
+        gain = 2 / 3 * known.gain**2 + form * known.run_gain**2
+        offset, half = 2 / 3 * known.offset**2 + form * known.run_offset**2, prediction.half
+        force = np.sqrt(gain * prediction.predicted**2 + offset + (share + form * known.force**2) * half**2)
+        peak, energy = (np.sqrt(v + gain + form * e**2) for v, e in ((of_peak, known.peak), (of_energy, known.energy)))
         scores.append(StandardizedErrors.of(prediction, force, peak, energy))
     expected = Calibration.of(seen, scores)
     for name in ("force", "peak", "energy", "coverage"):

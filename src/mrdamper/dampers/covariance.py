@@ -314,12 +314,23 @@ def _by_parameters(part: RunResiduals, slopes: Floats, covariance: Floats) -> Fl
     return relative_variances(even, covariance, steady.predicted, steady.velocity, steady.time)
 
 
+@dataclass(frozen=True, eq=False)
+class _WithoutCondition:
+    """Variances of the prediction of a run by a fit without its condition."""
+
+    by_parameters: Floats  # (3,) relative, of the force, the peak and the energy
+    of_form: float  # over that of the error of the form
+
+
 def _without_their_condition(
     parts: Sequence[RunResiduals], slopes: Sequence[Floats], covariance: Floats
-) -> dict[str, Floats]:
-    """Relative variances (3,) of the force, peak and energy of each run by parameters of fits without its condition.
+) -> dict[str, _WithoutCondition]:
+    """Return the variances of each run.
 
     Of N the normal matrix and N_c the share of a condition in it, these fits have (I - N⁻¹ N_c)⁻¹ of the covariance.
+    Their error of the form is larger than that of the fit to all conditions: of independent errors of one variance, the
+    residual of a point of leverage h has 1 - h, and that of a fit without the point 1 / (1 - h) [Cook and Weisberg
+    1982, Residuals and Influence in Regression, section 2.2]. The leverage of a condition is taken along its force.
     """
     normal = normal_matrix(slopes, parts)
     scale = np.sqrt(np.diag(normal))
@@ -328,13 +339,16 @@ def _without_their_condition(
     sines = [k for k, part in enumerate(parts) if part.stretches[0].frequency is not None]
     folds = [[sines[i] for i in group] for group in same_condition([parts[k].prediction.condition for k in sines])]
     folds += [[k] for k in range(len(parts)) if k not in sines]
-    variances = dict[str, Floats]()
+    variances = dict[str, _WithoutCondition]()
     for fold in folds:
-        share = root.T @ normal_matrix([slopes[k] for k in fold], [parts[k] for k in fold]) @ root
-        taken, axes = np.linalg.eigh(share)
+        tables = np.concatenate([parts[k].weighted(slopes[k]) for k in fold]) @ root
+        force = np.concatenate([parts[k].weight * parts[k].predicted for k in fold])
+        taken, axes = np.linalg.eigh(tables.T @ tables)
         without = root @ (axes / np.sqrt(np.maximum(1 - taken, _MIN_RETAINED))) @ axes.T @ back
+        leverage = float(np.sum((force @ tables) ** 2) / np.maximum(force @ force, np.finfo(float).tiny))
         for k in fold:
-            variances[parts[k].run.id] = _by_parameters(parts[k], slopes[k], without @ covariance @ without.T)
+            by_parameters = _by_parameters(parts[k], slopes[k], without @ covariance @ without.T)
+            variances[parts[k].run.id] = _WithoutCondition(by_parameters, 1 / max(1 - leverage, _MIN_RETAINED))
     return variances
 
 
@@ -370,14 +384,19 @@ def _with_model_error(
         run_dof=max(len(cross_validated) - 1.0, 1.0),
         growth=Growth.of([*cross_validated, *away], error, own),
     )
-    own = _without_their_condition(parts, slopes, uncertainty.covariance)
-    usual = np.median(list(own.values()), axis=0)
-    gain, offset = (getattr(uncertainty, f"run_{name}") ** 2 + of_sessions[name] for name in ("gain", "offset"))
+    fits = _without_their_condition(parts, slopes, uncertainty.covariance)
+    usual = _WithoutCondition(
+        np.median([fit.by_parameters for fit in fits.values()], axis=0),
+        float(np.median([fit.of_form for fit in fits.values()])),
+    )
     scores: list[StandardizedErrors] = []
     for run in cross_validated:
-        shares = zip(QUANTITIES, own.get(run.run_id, usual), strict=True)
+        fit = fits.get(run.run_id, usual)
+        shares = zip(QUANTITIES, fit.by_parameters, strict=True)
         grown = {q: share + uncertainty.growth.variance(q, run.distance) for q, share in shares}
-        force = gain * run.predicted**2 + offset + (grown["force"] + uncertainty.force**2) * run.half**2
-        peak, energy = (np.sqrt(grown[q] + gain + getattr(uncertainty, q) ** 2) for q in ("peak", "energy"))
+        form = {q: fit.of_form * getattr(uncertainty, q) ** 2 for q in (*QUANTITIES, "run_gain", "run_offset")}
+        gain, offset = (form[f"run_{name}"] + of_sessions[name] for name in ("gain", "offset"))
+        force = gain * run.predicted**2 + offset + (grown["force"] + form["force"]) * run.half**2
+        peak, energy = (np.sqrt(grown[q] + gain + form[q]) for q in ("peak", "energy"))
         scores.append(StandardizedErrors.of(run, np.sqrt(force), float(peak), float(energy)))
     return replace(uncertainty, calibration=Calibration.of(cross_validated, scores))
