@@ -81,6 +81,7 @@ def _facts(
     readable = [(v.reference, place[v.causality].format(v.name)) for v in variables]
     serial = [("real", f"program.{member}") for member in traced.tape.starts]
     serial += [("real", where) for _, where in readable if where != "time"] + [("real", "due"), ("real", "time")]
+    serial += [("int", "program.samples"), ("int", "phase")]
     return {
         "name": word,
         "upper": word.upper(),
@@ -99,7 +100,8 @@ def _facts(
         "held": [(name, repr(float(value))) for name, value in zip(traced.outputs, start, strict=True)],
         "readable": readable,
         "settable": [(v.reference, f"set.{v.name}") for v in variables if v.causality == "input"],
-        "serial": [*serial, ("int", "program.samples"), ("int", "phase")],
+        "serial": serial,
+        "serial_count": len(serial),
     }
 
 
