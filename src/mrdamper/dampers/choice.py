@@ -82,9 +82,7 @@ class JointChoice:
 
 
 @on_one_blas_thread
-def identify_jointly(
-    runs: Sequence[Run], progress: Callable[[str, float], None] = lambda what, share: None
-) -> JointChoice:
+def identify_jointly(runs: Sequence[Run]) -> JointChoice:
     """Identify one damper from all runs, with the terms selected by cross-validation.
 
     Parameters
@@ -101,20 +99,16 @@ def identify_jointly(
     fixed = _undetermined(runs)
     problem = JointProblem(runs, MODEL, fixed)
     laws = _level_laws(problem)
-    progress("one model, steady ends first", 0.0)
     ends = [part.steady_end() for part in problem.parts]
     searched = sorted({name for law in laws for name in law.names})
     short = JointProblem(runs, MODEL, fixed, free=(*SEARCHED, *searched), parts=ends)
     fit = short.search(rounds=2, most_steps=15, settled=_COARSE_TOLERANCE)
     short, fit, tried = _lost_motion(short, fit)
     second = fit.second
-    progress("how the force rises with current", 0.3)
     law, fit, more, current = _level_law(short, fit, laws)
     tried = (*tried, *more)
-    progress("whole records", 0.5)
     problem = problem.with_free((*SEARCHED, *law.names), {**short.fixed, **dict(law.held)})
     fit = problem.fit(start=problem.from_point(fit), rounds=2, most_steps=8, settled=_COARSE_TOLERANCE / 10)
-    progress("which terms the tests show", 0.8)
     evidence = CrossValidation.of(problem, fit)
     chosen, more = evidence.choose([t for t in TERMS if not problem.fixed.keys() & set(t.names)])
     final, best = problem, fit
@@ -135,7 +129,6 @@ def identify_jointly(
     ):  # what one step promised, the search did not keep: terms earn their place here too
         final, best = problem, fit
     best = final.fit(start=best.point, rounds=1, settled=_COARSE_TOLERANCE / 10, to_the_last_digit=True)
-    progress("one model for all runs", 1.0)
     left_out = CrossValidation.of(final, best).everything()
     left_out = _means({**left_out, **current, **CrossValidation.of(final, best, _by_session).everything()})
     tried = (*tried, *more)

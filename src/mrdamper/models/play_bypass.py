@@ -234,9 +234,9 @@ def _seated(velocity: Floats, vh: float, fading: Floats, along: Floats) -> Float
     return fading * speed / (speed + vh) * along
 
 
-def play_step(tape: Tape, path: Any, limit: Any, start: float = 0.0) -> Any:
+def play_step(tape: Tape, path: Any, limit: Any) -> Any:
     """`play_position` for one sample."""
-    held = tape.remember("play", start)
+    held = tape.remember("play")
     turned = held
     for turn in path.turns:
         turned = tape.select(turn == 0.0, turned, np.clip(turned + turn, -limit, limit))
@@ -246,24 +246,24 @@ def play_step(tape: Tape, path: Any, limit: Any, start: float = 0.0) -> Any:
 
 
 @streamed(play_step)
-def play_position(path: Path, limit: float, start: float = 0.0) -> Floats:
+def play_position(path: Path, limit: float) -> Floats:
     """Position δ of a stop operator along a path: it moves with the motion and stops at ±limit.
 
     [Brokate and Sprekels 1996; recalled] Within a stroke δ rises with the distance until it
     stops, so samples are independent; only the reversals follow one another.
     """
-    return _stopped(path, limit, start)
+    return _stopped(path, limit)
 
 
 @memoize_per_path
-def _stopped(path: Path, limit: float, start: float) -> Floats:
+def _stopped(path: Path, limit: float) -> Floats:
     turned = path.first_direction * np.where(np.arange(len(path.lengths)) % 2, -1.0, 1.0) * path.lengths
-    at_start = np.concatenate([[start], _clipped_sums(turned, limit, start)])
+    at_start = np.concatenate([[0.0], _clipped_sums(turned, limit)])
     return path.direction * np.minimum((path.direction * at_start[path.stroke]) + path.distance, limit)
 
 
-def _clipped_sums(moves: Floats, limit: float, start: float) -> Floats:
-    """δ after each of some moves, δ → clip(δ + move, ±limit).
+def _clipped_sums(moves: Floats, limit: float) -> Floats:
+    """δ after each of some moves from 0, δ → clip(δ + move, ±limit).
 
     Two such maps one after the other are a third, clip(δ + a, low, high): spans of 1, 2, 4, ... are
     joined until every one forgets where it began.
@@ -277,4 +277,4 @@ def _clipped_sums(moves: Floats, limit: float, start: float) -> Floats:
         )
         a[later] = a[:-span] + a[later]
         span *= 2
-    return np.clip(start + a, low, high)
+    return np.clip(a, low, high)

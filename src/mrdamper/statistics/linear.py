@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]  # as in `data`, which this room does without
 _WELL_APART = 1e-4  # smallest pivot of equilibrated columns at which the normal equations keep their digits
+_RANK_LIMIT = 1e-10  # singular value over the largest below which a direction is rounding
 _MIN_RELATIVE_PIVOT = 1e-5  # pivot over the largest below which a column is explained by the others
 
 _ROWS_PER_BLOCK = 50_000  # rows of a table that are factored at a time
@@ -54,14 +55,14 @@ def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None
     return np.asarray(np.linalg.lstsq(columns / scale, right, rcond=rank_limit)[0], dtype=float) / scale
 
 
-def project_out_columns(columns: Floats, right: Floats, rank_limit: float = 1e-10) -> Floats:
+def project_out_columns(columns: Floats, right: Floats) -> Floats:
     """Subtract from (N,) or (N, D) right sides the part the columns explain; arguments as `solve_linear`."""
     scale = np.linalg.norm(columns, axis=0)
     basis, triangle = np.linalg.qr(columns / np.where(scale > 0, scale, 1.0))
     pivots = np.abs(np.diag(triangle))
-    if pivots.min(initial=1.0) <= rank_limit * pivots.max(initial=1.0):  # one column more is rounding
+    if pivots.min(initial=1.0) <= _RANK_LIMIT * pivots.max(initial=1.0):  # one column more is rounding
         turned, sizes, _ = np.linalg.svd(triangle)
-        basis = basis @ turned[:, sizes > rank_limit * sizes[0]]
+        basis = basis @ turned[:, sizes > _RANK_LIMIT * sizes[0]]
     return right - basis @ (basis.T @ right)
 
 
@@ -204,16 +205,16 @@ def nonnegative_least_squares(table: Floats, right: Floats) -> tuple[Floats, flo
 
 def solve_lower_triangle(triangle: NDArray[np.floating[Any]], right: Floats) -> Floats:
     """Solve with a matrix of which the lower triangle alone is looked at."""
-    solution, failed = _lapack("trtrs", triangle.dtype.char)(triangle, right, lower=True)
+    solution, failed = _triangle_routine(triangle.dtype.char)(triangle, right, lower=True)
     if failed:
         raise np.linalg.LinAlgError("the triangle is singular")
     return solution
 
 
 @cache
-def _lapack(name: str, dtype: str) -> Any:
+def _triangle_routine(dtype: str) -> Any:
     """Return a routine of LAPACK: around such small matrices SciPy's checks take ten times as long as the work."""
-    routine = import_module("scipy.linalg").get_lapack_funcs(name, dtype=np.dtype(dtype))
+    routine = import_module("scipy.linalg").get_lapack_funcs("trtrs", dtype=np.dtype(dtype))
     _limit(_holds)  # SciPy brings a library of its own, which no hold that began before knows
     return routine
 

@@ -16,6 +16,9 @@ from mrdamper.statistics.levenberg_marquardt import Minimum
 from mrdamper.statistics.linear import Floats
 from mrdamper.statistics.stop_reason import StopReason
 
+_MOST_STEPS = 40
+_TOLERANCE = 1e-9  # part of the sum of squares that the last step promises
+
 Evaluation = tuple[Floats, Floats]  # residual, its derivative
 
 
@@ -24,10 +27,8 @@ def least_squares_in_one(
     start: float,
     lower: float,
     upper: float,
-    most_steps: int = 40,
-    tolerance: float = 1e-9,
 ) -> Minimum | None:
-    """Minimise |residual(u)|² between two bounds, until a step promises less than `tolerance` of it.
+    """Minimise |residual(u)|² between two bounds, until a step promises next to nothing of it.
 
     Parameters
     ----------
@@ -45,7 +46,7 @@ def least_squares_in_one(
     low, high = -math.inf, math.inf  # places whose gradient points up to, and back to, the minimum
     u, before, best, evaluations = start, None, None, 0
     ending = StopReason.STEPS_SPENT
-    for _ in range(most_steps):
+    for _ in range(_MOST_STEPS):
         value = evaluate(u)
         evaluations += 1
         if value is None:
@@ -60,7 +61,7 @@ def least_squares_in_one(
         if (u <= lower and gradient > 0) or (u >= upper and gradient < 0):
             ending = StopReason.AT_BOUNDS
             break
-        if gradient**2 <= tolerance * cost * curvature:
+        if gradient**2 <= _TOLERANCE * cost * curvature:
             ending = StopReason.SETTLED
             break
         target = min(max(u - gradient / curvature, lower), upper)

@@ -460,12 +460,12 @@ def _runs(candidate: RecipeResult, kind: str) -> Sequence[RunScore]:
     return candidate.by_kind[kind].runs if kind in candidate.by_kind else ()
 
 
-def runs_for_global_fit(runs: Iterable[Run], clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
+def runs_for_global_fit(runs: Iterable[Run]) -> tuple[list[Run], dict[str, str]]:
     """Return the runs that a global model accepts, any motion and current, and the reasons for excluding the others."""
     runs_used, refused = list[Run](), dict[str, str]()
     for run in runs:
         try:
-            refuse_clipped(with_findings(run), clipped)
+            refuse_clipped(with_findings(run))
             if np.ptp(run.force[run.in_window]) == 0:
                 raise IdentificationError(
                     "the force does not change", where=f"run {run.id}", remedy="check the channel"

@@ -14,6 +14,7 @@ from mrdamper.report.plots.figure import Axes, Figure
 from mrdamper.report.plots.style import KN, MM, MOST_NAMED, current_colours, levels, motion_name, speed_colours, thin
 
 _BESIDE = 0.07  # inches between the marks of two currents
+_MOST_MOTIONS = 5  # of the loops at one current
 
 
 def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
@@ -106,13 +107,13 @@ def _over_current(loops: Sequence[LoopAnalysis]) -> dict[float, LoopAnalysis]:
     return dict(sorted({steps[i]: loops[i] for i in best}.items()))
 
 
-def _over_motion(loops: Sequence[LoopAnalysis], most: int = 5) -> list[LoopAnalysis]:
+def _over_motion(loops: Sequence[LoopAnalysis]) -> list[LoopAnalysis]:
     """Motions at the current with the most tests, slow to fast."""
     steps = levels([loop.condition.current_A for loop in loops])
     common = max(sorted(set(steps)), key=steps.count)
     chosen = [loop for step, loop in zip(steps, loops, strict=True) if step == common]
     chosen.sort(key=lambda loop: loop.condition.peak_velocity)
-    picks = np.unique(np.linspace(0, len(chosen) - 1, min(most, len(chosen))).round().astype(int))
+    picks = np.unique(np.linspace(0, len(chosen) - 1, min(_MOST_MOTIONS, len(chosen))).round().astype(int))
     return [chosen[i] for i in picks]
 
 

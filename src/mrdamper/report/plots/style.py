@@ -45,11 +45,11 @@ def levels(currents: Sequence[float]) -> list[float]:
     return current_levels([abs(current) for current in currents])
 
 
-def speed_colours(figure: Figure, speeds: Sequence[float], text: str = "Peak velocity (m/s)") -> dict[float, str]:
-    """One colour a value on a scale that is drawn in the right margin: for more values than a list can name."""
+def speed_colours(figure: Figure, speeds: Sequence[float]) -> dict[float, str]:
+    """One colour a peak velocity on a scale that is drawn in the right margin: for more values than a list can name."""
     low, high = min(speeds), max(speeds)
     high = high if high > low else low + 1
-    figure.add_scale(text, low, high, [_shade(share) for share in np.linspace(0, 1, 64)])
+    figure.add_scale("Peak velocity (m/s)", low, high, [_shade(share) for share in np.linspace(0, 1, 64)])
     return {speed: _shade((speed - low) / (high - low)) for speed in speeds}
 
 

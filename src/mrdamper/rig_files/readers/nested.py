@@ -87,13 +87,13 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     for key, value in _paired(tree, node.units).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
             if split_name(key).role is not None or len(value) in sizes:
-                node.columns += _across(key, "", np.array([word[:_MOST_TEXT] for word in value]))
+                node.columns += _across(key, np.array([word[:_MOST_TEXT] for word in value]))
             elif value:
                 node.lists.append(value)
         elif isinstance(value, list):
             inner += _items(key, value, node)
         elif isinstance(value, Array):
-            node.columns += _across(key, "", value)
+            node.columns += _across(key, value)
         elif isinstance(value, Mapping):
             channel = _channel(key, value)
             if channel:
@@ -281,7 +281,7 @@ def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[s
     node.columns += [
         column
         for i, array in enumerate(arrays, 1)
-        for column in _across(f"{key}_{i}" if len(arrays) > 1 else key, "", array)
+        for column in _across(f"{key}_{i}" if len(arrays) > 1 else key, array)
     ]
     return nodes
 
@@ -332,9 +332,7 @@ def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
     name = _title(stated or key)
     if split_name(name).role is None and split_name(key).role is not None:
         name = key
-    columns = [
-        _Column(c.name, unit if parse_unit(unit) else "", c.array, c.part, name) for c in _across(name, "", data)
-    ]
+    columns = [_Column(c.name, unit if parse_unit(unit) else "", c.array, c.part, name) for c in _across(name, data)]
     stated_step = stated_clock({key: value for key, value in says.items() if isinstance(value, float)})
     if time is None and stated_step is not None:
         step, start, clock = stated_step
@@ -388,10 +386,10 @@ def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
             node.remarks.append(f"{key}: {value}"[:_MOST_TEXT])
 
 
-def _across(key: str, unit: str, array: Array) -> list[_Column]:
+def _across(key: str, array: Array) -> list[_Column]:
     if array.dtype.kind == "O":
-        return [_Column(key, unit, array)]
-    return [_Column(name, unit, array, part) for name, part in expand(key, array.shape)]
+        return [_Column(key, "", array)]
+    return [_Column(name, "", array, part) for name, part in expand(key, array.shape)]
 
 
 def _table(source: Source, node: _Node, title: str) -> RawTable:

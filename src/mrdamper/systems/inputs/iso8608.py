@@ -18,6 +18,7 @@ REFERENCE = 0.1  # cycles/m
 LOWEST, HIGHEST = 0.011, 2.83  # cycles/m, of the classification
 _CLASSES = {"a": 16e-6, "b": 64e-6, "c": 256e-6, "d": 1024e-6, "e": 4096e-6}
 _POINTS_A_WAVE = 24  # of the shortest
+_FADE_IN = 0.5  # s
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,7 @@ class Road(Input):
         return share * self.speed_m_s * self.profile(distance, 1) + slope * self.profile(distance)
 
 
-def _fade(time: Floats, over: float = 0.5) -> tuple[Floats, Floats]:
-    phase = np.clip(time / over, 0.0, 1.0) * np.pi
-    return 0.5 * (1 - np.cos(phase)), np.where((time > 0) & (time < over), 0.5 * np.pi / over * np.sin(phase), 0.0)
+def _fade(time: Floats) -> tuple[Floats, Floats]:
+    phase = np.clip(time / _FADE_IN, 0.0, 1.0) * np.pi
+    fading = (time > 0) & (time < _FADE_IN)
+    return 0.5 * (1 - np.cos(phase)), np.where(fading, 0.5 * np.pi / _FADE_IN * np.sin(phase), 0.0)
