@@ -124,9 +124,8 @@ def identify_jointly(runs: Sequence[Run]) -> JointChoice:
         final = JointProblem(runs, MODEL, fixed, free=final.free, coil=coil, parts=final.parts)
         best = final.fit(start=final.from_point(best), rounds=1, settled=_COARSE_TOLERANCE / 10)
     left_out, before = (CrossValidation.of(p, f).everything() for p, f in ((final, best), (problem, fit)))
-    if not smaller_wins(
-        left_out, before
-    ):  # what one step promised, the search did not keep: terms earn their place here too
+    # What one step promised, the search may not keep: terms earn their place here too.
+    if not smaller_wins(left_out, before):
         final, best = problem, fit
     best = final.fit(start=best.point, rounds=1, settled=_COARSE_TOLERANCE / 10, to_the_last_digit=True)
     left_out = CrossValidation.of(final, best).everything()

@@ -83,9 +83,8 @@ def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed:
     sampler = emcee.EnsembleSampler(count, size, logarithm, moves=moves)
     sampler.random_state = np.random.RandomState(seed).get_state()
     sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
-    kept: Floats = np.asarray(
-        sampler.get_chain(discard=int(_BURN_IN_SHARE * steps)), dtype=float
-    )  # (steps, walkers, P)
+    # (steps, walkers, P)
+    kept: Floats = np.asarray(sampler.get_chain(discard=int(_BURN_IN_SHARE * steps)), dtype=float)
     time = float(np.max(emcee.autocorr.integrated_time(kept, tol=0)))
     rhat = split_rhat(kept)
     if not (len(kept) > _MIN_AUTOCORRELATION_TIMES * time and rhat <= _MAX_RHAT):

@@ -308,20 +308,14 @@ def once_per_run(function: Callable[[K], T]) -> Callable[[K], T]:
 
 _MAX_CURRENT_SAMPLES = 2_000_000  # samples of a current looked at
 _BLOCKS = 64  # stretches of a record whose mean currents are compared
-_MAX_TREND_A, _MAX_RELATIVE_TREND = (
-    0.01,
-    0.03,
-)  # a current may differ by so much from begin to end: [A], and of its mean
-_MAX_WANDER_A, _MAX_RELATIVE_WANDER = (
-    0.016,
-    0.01,
-)  # RMS of its slow part: a rectifier's or a chopper's ripple, seen at a slow rate
+# A current may differ by so much from begin to end: [A], and of its mean.
+_MAX_TREND_A, _MAX_RELATIVE_TREND = 0.01, 0.03
+# RMS of its slow part: a rectifier's or a chopper's ripple, seen at a slow rate.
+_MAX_WANDER_A, _MAX_RELATIVE_WANDER = 0.016, 0.01
 _MAX_RMS_A, _MAX_RELATIVE_RMS = 0.03, 0.02  # RMS of all of it
 _LEVEL_STEP = 5e-3  # step of currents in a test plan [A]
-_LEVEL_TOLERANCE_A, _LEVEL_TOLERANCE = (
-    5e-4,
-    2e-3,
-)  # measured means may differ from a level by so much: [A], and of the mean
+# Measured means may differ from a level by so much: [A], and of the mean.
+_LEVEL_TOLERANCE_A, _LEVEL_TOLERANCE = 5e-4, 2e-3
 _MAX_RESOLUTION_A = 0.1  # [A]: a channel of such steps flickers by half a step
 _WHITE_NOISE_FACTOR = 4  # times as much where it has no memory from sample to sample: no coil follows that
 _VON_NEUMANN_RATIO = 1.0  # von Neumann's ratio: two for white noise, near zero for a current that keeps its levels
@@ -367,9 +361,8 @@ def held_current(current: Floats) -> tuple[float, str]:
     trend = abs(float(np.mean(current[: size // 3]) - np.mean(current[size - size // 3 :])))
     total = float(np.std(current))
     white = float(np.mean(np.diff(current) ** 2)) > _VON_NEUMANN_RATIO * total**2
-    allowed = (_MAX_RMS_A + _MAX_RELATIVE_RMS * abs(mean)) * (_WHITE_NOISE_FACTOR if white else 1) + 0.5 * _resolution(
-        current
-    )
+    noise = (_MAX_RMS_A + _MAX_RELATIVE_RMS * abs(mean)) * (_WHITE_NOISE_FACTOR if white else 1)
+    allowed = noise + 0.5 * _resolution(current)
     steady = (
         trend <= _MAX_TREND_A + _MAX_RELATIVE_TREND * abs(mean) + 4 * float(np.sqrt(6 * within / size))
         and wander <= _MAX_WANDER_A + _MAX_RELATIVE_WANDER * abs(mean)

@@ -120,9 +120,8 @@ def compiled_outputs(
         Samples whose outputs are wanted, and those at which the memory starts anew.
     """
     given = tuple(map(float, values.values()))
-    programs = _PROGRAMS.setdefault(
-        (*key, *values), []
-    )  # values are given by position: another order is another program
+    # Values are given by position: another order is another program.
+    programs = _PROGRAMS.setdefault((*key, *values), [])
     for record in programs:
         if (derived := record.prepare(given)) is not None:
             break

@@ -19,10 +19,8 @@ _DIFFERENCE_STEP = 1e-6  # forward difference, relative to the width of the box
 _STIFFEST = 1e12  # damping at which no step is left to try
 _CURVED = 1e-7  # difference of gradients, relative to the width of the box
 _NEIGHBOURHOOD = 2e-2  # of the box: where a search ended, its minimum is nearer
-_STEP_TOLERANCE, _ROUNDING_STEP = (
-    1e-13,
-    1e-10,
-)  # of the box: the end, and where rounding may keep steps from shrinking on
+_STEP_TOLERANCE = 1e-13  # of the box: the end
+_ROUNDING_STEP = 1e-10  # of the box: rounding may keep steps from shrinking on
 _FLAT_CURVATURE = 1e-12  # share of the largest curvature
 _POLISHING = 25  # steps
 _WORTHLESS = 1e-3  # share of the tolerated gain below which a step is not even tried
@@ -163,9 +161,8 @@ def newton_refine(gradient: Callable[[Floats], Floats], point: Floats, lower: Fl
     width = upper - lower
     free = (point > lower) & (point < upper)
     first = gradient(point)
-    shares = np.where(
-        point + _CURVED * width > upper, -_CURVED, _CURVED
-    )  # steps that stay inside, in widths of the box
+    # Steps that stay inside, in widths of the box.
+    shares = np.where(point + _CURVED * width > upper, -_CURVED, _CURVED)
     pairs = zip(np.diag(shares * width), shares, strict=True)
     curvature = np.stack([(gradient(point + step) - first) * width / share for step, share in pairs])
     curvature = (curvature + curvature.T)[np.ix_(free, free)] / 2
