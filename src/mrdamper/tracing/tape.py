@@ -51,25 +51,16 @@ class TracedLoop:
 
 
 class Tape:
-    """Record of the operations of traced code.
-
-    Attributes
-    ----------
-    parameters, inputs, memory : dict of str to Expression
-        In the order they appeared.
-    updates : dict of str to Expression
-        What each memory becomes after the sample.
-    guards : list of (Expression, bool)
-        Questions that were settled while tracing, with their answers.
-    """
+    """Record of the operations of traced code."""
 
     def __init__(self) -> None:
+        # in the order they appeared
         self.parameters: dict[str, Expression] = {}
         self.inputs: dict[str, Expression] = {}
         self.memory: dict[str, Expression] = {}
         self.starts: dict[str, float] = {}
-        self.updates: dict[str, Any] = {}
-        self.guards: list[tuple[Expression, bool]] = []
+        self.updates: dict[str, Any] = {}  # what each memory becomes after the sample
+        self.guards: list[tuple[Expression, bool]] = []  # questions settled while tracing, and their answers
         self.tables: list[LookupTable] = []
         self._known: dict[tuple[Any, ...], Expression] = {}
         self._previous: dict[int, Any] = {}

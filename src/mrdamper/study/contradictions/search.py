@@ -77,23 +77,12 @@ _NO_PROPOSAL = JointExplanation({}, -np.inf)
 
 
 class Search:
-    """Runs of a rig, compared with each other.
-
-    Parameters
-    ----------
-    tracks : sequence of Track
-
-    Attributes
-    ----------
-    found : dict of int to Explanation
-        Runs that contradict the others, by position.
-    differing : dict of int to float
-        Gains of the runs left, if so many differ that none can be called wrong.
-    """
+    """Runs of a rig, compared with each other."""
 
     def __init__(self, tracks: Sequence[Track]) -> None:
         self.tracks = list(tracks)
-        self.found: dict[int, Explanation] = {}
+        self.found: dict[int, Explanation] = {}  # runs that contradict the others, by position
+        # gains of the runs left, by position, if so many differ that none can be called wrong
         self.differing: dict[int, float] = {}
         self.evidence = Evidence(tracks)
         self._products = self.evidence.products(tracks)
