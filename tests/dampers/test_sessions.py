@@ -69,7 +69,7 @@ def test_check_runs_join_the_own_tests_and_replace_those_of_their_name():
 def test_a_run_of_no_session_is_scored_as_it_is():
     runs, readings = days(4)
     alone, odd = replace(runs[0], id="alone", notes={}), reading(1.2, 30.0)
-    assert known_errors([*runs, alone], [*readings, odd])[-1] == odd.error(1.0, 0.0)
+    assert known([*runs, alone], [*readings, odd])[-1] == odd.error(1.0, 0.0)
 
 
 def test_sessions_share_what_they_share_without_a_clock():
@@ -153,13 +153,17 @@ def days(count=6):
     return runs, readings
 
 
+def known(runs, readings):
+    return known_errors(Sessions.of(runs, readings, readings), runs, readings)
+
+
 def test_other_runs_of_the_day_take_most_of_a_day_away():
     runs, readings = days()
     unknown = [each.error(1.0, 0.0) for each in readings]
-    assert np.mean(known_errors(runs, readings)) < 0.6 * np.mean(unknown)
+    assert np.mean(known(runs, readings)) < 0.6 * np.mean(unknown)
     shuffled = [replace(r, notes={"session": f"{i % 6} {i // 6}"}) for i, r in enumerate(runs[:12])]
     with pytest.raises(InputError, match="every session holds one run") as caught:
-        known_errors(shuffled, readings[:12])
+        known(shuffled, readings[:12])
     assert caught.value.code == "E_SESSION"
 
 
@@ -195,6 +199,6 @@ def test_a_check_run_corrects_its_day_only_and_the_scores_say_so():
 def test_a_clock_that_cannot_be_is_refused(notes, said):
     runs = [replace(recorded(str(i), "2024-05-01"), notes=note) for i, note in enumerate(notes)]
     with pytest.raises(InputError, match=said) as caught:
-        known_errors(runs, [reading(1.0)] * len(runs))
+        known(runs, [reading(1.0)] * len(runs))
     assert caught.value.code == "E_CLOCK"
     assert f"run {len(runs) - 1}" in str(caught.value)  # the last: it comes back to a session that had ended

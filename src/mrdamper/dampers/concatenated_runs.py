@@ -213,7 +213,7 @@ class JointResiduals:
         self.share = np.concatenate([part.share for part in parts])
         self.unit = np.sqrt(self.share) / np.repeat([part.scale for part in parts], [p.target.size for p in parts])
         self.information = np.sqrt([part.information for part in parts])
-        self.weights = self.information
+        self.weights, self.bounds = self.information, bounds_of(problem.linear)
         self._seen: tuple[Excitation, Excitation] | None = None
         self._columns_at: tuple[Floats, Model, Floats, Floats] | None = None
         self._solved: tuple[Floats, LinearSolution] | None = None
@@ -274,12 +274,13 @@ class JointResiduals:
         linear, factor = self.problem.linear, self.factor
         reduced, base, columns = self.linear_columns(point)
         columns, right = columns * factor[:, None], (self.target - base) * factor
-        solution, held = solve_bounded(columns, right, *bounds_of(linear))
+        solution, held = solve_bounded(columns, right, *self.bounds)
         residual = columns @ solution - right
         errors = np.sqrt(np.bincount(self.owner, residual**2)) / self.weights
         model = replace(reduced, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
         stopped = tuple(i.name for i, h in zip(linear, held, strict=True) if h)
-        self._solved = point, LinearSolution(model, residual, errors, stopped, columns[:, ~held])
+        free = columns[:, ~held] if stopped else columns
+        self._solved = point, LinearSolution(model, residual, errors, stopped, free)
         return self._solved[1]
 
     def solved_residual(self, point: Floats) -> Floats:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import ClassVar, Self
 
 import numpy as np
@@ -273,7 +274,7 @@ def fit_modified_jointly(
     model_type = type(identifications[0].model)
     conditions = [i.condition for i in identifications]
     inertia = ("m",) if "m" not in model_type.map_forms() and _tells_inertia(model_type, conditions) else ()
-    data = condense(runs, model_type, inertia)
+    data = _condensed(tuple(runs), model_type, inertia)
     shapes = np.array([_coordinate(i, data.shape) if data.shape else 1.0 for i in identifications])
     chosen = choose_forms(data, _candidates(data, any_motion), shapes, _dissipating(model_type))
     forms, joint = chosen.forms, chosen.fit
@@ -294,6 +295,9 @@ def fit_modified_jointly(
     at_bounds = tuple(dict.fromkeys((*joint.at_bounds, *functions_at_bounds(joint.parameters, data.conditions))))
     fit = ModifiedFit(model(data, joint.parameters), fits, values, data.conditions, at_bounds, chosen.refused)
     return fit, refit
+
+
+_condensed = lru_cache(maxsize=2)(condense)  # functions of the motion are tried on it, and of the current alone
 
 
 def _candidates(data: Condensed, any_motion: bool) -> dict[str, list[str | Law]]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -60,6 +61,11 @@ class Condensed:
     gram: Floats
     # (R, K, L+1, L+1) their second derivatives along the ladder, counted in rungs, as a cubic spline has them
     bend: Floats
+
+    @cached_property
+    def folds(self) -> dict[str, list[list[int]]]:
+        """Runs left out together in the choice of forms, by kind of fold."""
+        return fold_groups(self.conditions)
 
     def only(self, rows: Sequence[int]) -> Condensed:
         """Return the same for some of the runs."""
@@ -457,10 +463,10 @@ def choose_forms(
     dissipating : mapping of str to str, optional
         Unit of the coordinates that must not be negative: forms that break a law of physics are refused.
     """
-    folds = fold_groups(data.conditions)
+    start = tuple(shape_values.tolist())
     options = {name: _supported(laws, data.conditions) for name, laws in candidates.items()}
     forms: dict[str, str | Law] = {name: laws[0] for name, laws in options.items()}
-    fit, errors = _tried(data, forms, folds, shape_values)
+    fit, errors = _tried(data, tuple(forms.items()), start)
     refused: dict[str, str] = {}
     for _ in range(_PASSES):
         before = dict(forms)
@@ -469,7 +475,7 @@ def choose_forms(
                 if law == forms[name]:
                     continue
                 try:
-                    trial, other = _tried(data, {**forms, name: law}, folds, shape_values)
+                    trial, other = _tried(data, tuple({**forms, name: law}.items()), start)
                 except IdentificationError:
                     continue  # the tests cannot tell this form's terms apart
                 larger = _size(law) >= _size(forms[name])
@@ -513,13 +519,12 @@ def _broken(fit: JointFunctionFit, name: str, conditions: Sequence[Condition], d
     return broken_law(function, conditions, dissipating[name]) if function and name in dissipating else ""
 
 
+@lru_cache(maxsize=1024)  # of all forms and of those over the current alone, and in the second pass, many are the same
 def _tried(
-    data: Condensed,
-    forms: Mapping[str, str | Law],
-    folds: Mapping[str, Sequence[Sequence[int]]],
-    shape_values: Floats,
+    data: Condensed, items: tuple[tuple[str, str | Law], ...], shape_values: tuple[float, ...]
 ) -> tuple[JointFunctionFit, dict[str, Floats]]:
     """Return a fit with some forms, and its errors by kind of fold."""
+    forms = dict(items)
     for name in data.linear:
         if not law_of(forms[name])[1] and _form(forms[name]).terms:
             require_determined(law_of(forms[name])[0], data.conditions)
@@ -528,7 +533,7 @@ def _tried(
         start = fit_function(law_of(forms[data.shape])[0], data.conditions, shape_values, log=True).function
     fit = fit_jointly(data, forms, start, reweightings=2, most_steps=5, polish=False)
     errors: dict[str, Floats] = {}
-    for kind, groups in folds.items():
+    for kind, groups in data.folds.items():
         members = [i for group in groups for i in group]
         errors[kind] = leave_out_errors(data, fit, groups, forms)[members]
     return fit, errors

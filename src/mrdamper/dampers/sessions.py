@@ -301,15 +301,13 @@ def gain_offset_of(damper: Damper, run: Run) -> GainOffset:
     return GainOffset.of(run.force[inside], damper.predict(run).force[inside])
 
 
-def known_errors(runs: Sequence[Run], left_out: Sequence[GainOffset]) -> Floats:
+def known_errors(sessions: Sessions, runs: Sequence[Run], left_out: Sequence[GainOffset]) -> Floats:
     """(R,) nrmse_pp of runs predicted without their condition, corrected by the other runs of their session.
 
-    Raises
-    ------
-    InputError
-        As `Sessions.of`.
+    The sessions are those of these runs; their gains and offsets are replaced by those of the same predictions.
     """
-    sessions = Sessions.of(runs, left_out, left_out)
+    gains, offsets = tuple(r.gain for r in left_out), tuple(r.offset for r in left_out)
+    sessions = replace(sessions, gains=gains, offsets=offsets)
     errors: list[float] = []
     for run, reading in zip(runs, left_out, strict=True):
         correction = sessions.expected(RecordingTime.of(run), without=run.id)

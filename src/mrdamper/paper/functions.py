@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -56,9 +57,13 @@ def fit_paper_functions(
     }
     fit = paper_functions(identifications, mass_law, about)
 
+    @cache  # folds that differ only in runs without identification are one
+    def fitted(kept: frozenset[int]) -> Damper:
+        return paper_functions([identifications[i] for i in sorted(kept)], mass_law).damper
+
     def refit(rows: Sequence[int]) -> Damper:
-        kept = {runs[i].id for i in rows}
-        return paper_functions([i for i in identifications if i.run_id in kept], mass_law).damper
+        ids = {runs[i].id for i in rows}
+        return fitted(frozenset(n for n, one in enumerate(identifications) if one.run_id in ids))
 
     return FitResult(fit.damper, refit, fit)
 

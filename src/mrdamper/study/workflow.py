@@ -410,7 +410,7 @@ def _with_sessions(chosen: RecipeResult, dataset: Dataset) -> tuple[RecipeResult
     readings = [score.reading for score in left_out if score.reading is not None]
     try:
         sessions = Sessions.of(runs, readings, [own[score.run_id] for score in left_out])  # type: ignore[misc]
-        error = float(np.median(known_errors(runs, readings)))
+        error = float(np.median(known_errors(sessions, runs, readings)))
     except InputError as reason:
         return chosen, str(reason)
     if damper.uncertainty is None:

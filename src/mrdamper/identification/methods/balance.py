@@ -95,6 +95,7 @@ class _Balanced:
         self.problem, self.record, self.project = problem, record, project
         self.motion = record.motion
         self.linear = [i for i in problem.model_type.parameters() if i.linear and i.name in problem.free]
+        self.bounds = bounds_of(self.linear)
         self.measured = project(record.force)
         self._once: tuple[Floats, Floats] | None = None
 
@@ -104,7 +105,7 @@ class _Balanced:
         bare = self.problem.model_type.build({**self.problem.fixed, **point, **zero})
         base, forces = self._table(bare, steady_state(bare, self.record))
         columns, right = self.project(forces), self.measured - self.project(base)
-        solution, held = solve_bounded(columns, right, *bounds_of(self.linear))
+        solution, held = solve_bounded(columns, right, *self.bounds)
         names = [i.name for i in self.linear]
         model = replace(bare, **dict(zip(names, solution.tolist(), strict=True)))
         return model, columns @ solution - right, tuple(n for n, h in zip(names, held, strict=True) if h)
