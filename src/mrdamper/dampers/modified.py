@@ -297,7 +297,9 @@ def fit_modified_jointly(
     return fit, refit
 
 
-_condensed = lru_cache(maxsize=2)(condense)  # functions of the motion are tried on it, and of the current alone
+@lru_cache(maxsize=2)  # functions of the motion are tried on them, and functions of the current alone
+def _condensed(runs: tuple[Run, ...], model_type: type[Model], inertia: tuple[str, ...]) -> Condensed:
+    return condense(runs, model_type, inertia)
 
 
 def _candidates(data: Condensed, any_motion: bool) -> dict[str, list[str | Law]]:

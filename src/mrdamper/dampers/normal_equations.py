@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -364,11 +365,14 @@ class _ShapeSearch:
         size = np.linalg.norm(columns, axis=0) / np.sqrt(columns.shape[0])
         self.scale = np.where(size > 0, size, 1.0)  # of runs at 0 A alone, a column over the current is zero
         self.columns = columns / self.scale
-        self._last: tuple[bytes, Floats, Floats, Floats, _Solution] | None = None
+        self._tables: tuple[bytes, Floats, Floats, Floats] = b"", columns, columns, columns
+        self._solved: _Solution | None = None
 
     def weighted(self, weights: Floats) -> _ShapeSearch:
-        """Return the same with other weights."""
-        return _ShapeSearch(self.design, self.start, weights)
+        """Return the same with other weights, which do not touch the tables of the last point."""
+        other = copy(self)
+        other.weights, other._solved = weights, None
+        return other
 
     def shape_values(self, u: Floats) -> Floats:
         """(R,) values of the shape coordinate."""
@@ -401,11 +405,13 @@ class _ShapeSearch:
         return self.residual(u) @ self.slopes(u)
 
     def _at(self, u: Floats) -> tuple[Floats, Floats, Floats, _Solution]:
-        if self._last is None or self._last[0] != u.tobytes():
+        if self._tables[0] != u.tobytes():
             gram, slope = self.design.data.at(self.shape_values(u))
             table, factor = self.design.table(gram)
-            self._last = u.tobytes(), slope, factor, table, _solve(table, self.weights)
-        return self._last[1:]
+            self._tables, self._solved = (u.tobytes(), slope, factor, table), None
+        if self._solved is None:
+            self._solved = _solve(self._tables[-1], self.weights)
+        return *self._tables[1:], self._solved
 
 
 def _solve(table: Floats, weights: Floats) -> _Solution:
