@@ -122,6 +122,13 @@ def test_a_long_table_is_factored_block_by_block_as_at_once(monkeypatch):
     assert not FixedColumns.of(table[:, [0, 1, 1]], right).independent
 
 
+@pytest.mark.parametrize("size", [1, 2, 5, 48])
+def test_a_triangle_times_its_inverse_is_one(size):
+    triangle = np.tril(np.random.default_rng(size).standard_normal((size, size))) + 3 * np.eye(size)
+    inverse = linear.inverse_of_triangle(triangle)
+    np.testing.assert_allclose(triangle @ inverse, np.eye(size), atol=1e-12)
+
+
 def test_a_bound_sends_the_search_the_general_way():
     """A force that falls with velocity would need a negative damping."""
     run = synthetic_run(

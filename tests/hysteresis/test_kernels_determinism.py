@@ -50,27 +50,6 @@ def test_the_number_of_threads_is_given_back():
     assert set(on_one_blas_thread(blas)()) == {1}
 
 
-LATE = """
-import numpy as np
-from threadpoolctl import threadpool_info
-from mrdamper.statistics.linear import one_blas_thread, solve_lower_triangle
-def threads():
-    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
-with one_blas_thread():
-    with one_blas_thread():
-        solve_lower_triangle(np.eye(2), np.ones(2))
-    print(threads())
-print(threads())
-"""
-
-
-@pytest.mark.skipif(importlib.util.find_spec("threadpoolctl") is None, reason="threads are held by threadpoolctl")
-def test_a_library_that_is_loaded_inside_the_block_is_held_too():
-    environment = {**os.environ, "OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"}
-    done = subprocess.run([sys.executable, "-c", LATE], capture_output=True, text=True, check=True, env=environment)
-    assert done.stdout.split() == ["{1}", "{2}"]
-
-
 def test_without_the_library_nothing_is_held_and_nothing_fails(monkeypatch):
     from mrdamper.statistics import linear
 

@@ -8,8 +8,8 @@ in another order, which changes the last bits of a result: everything runs on on
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Generator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Generator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache, cached_property, wraps
 from importlib import import_module
@@ -203,23 +203,15 @@ def nonnegative_least_squares(table: Floats, right: Floats) -> tuple[Floats, flo
     return solution, float(np.linalg.norm(table @ solution - right))
 
 
-def solve_lower_triangle(triangle: NDArray[np.floating[Any]], right: Floats) -> Floats:
-    """Solve with a matrix of which the lower triangle alone is looked at."""
-    solution, failed = _triangle_routine(triangle.dtype.char)(triangle, right, lower=True)
-    if failed:
-        raise np.linalg.LinAlgError("the triangle is singular")
-    return solution
-
-
-@cache
-def _triangle_routine(dtype: str) -> Any:
-    """Return a routine of LAPACK: around such small matrices SciPy's checks take ten times as long as the work."""
-    routine = import_module("scipy.linalg").get_lapack_funcs("trtrs", dtype=np.dtype(dtype))
-    _limit(_holds)  # SciPy brings a library of its own, which no hold that began before knows
-    return routine
-
-
-_holds: list[ExitStack] = []  # blocks of `one_blas_thread` that are not at their end
+def inverse_of_triangle(triangle: NDArray[np.floating[Any]]) -> Floats:
+    """Invert a lower triangle, half by half: NumPy takes it for any matrix, and SciPy is slow to import."""
+    half = len(triangle) // 2
+    inverse = np.zeros(triangle.shape)
+    inverse[:half, :half], inverse[half:, half:] = (
+        np.linalg.inv(part) for part in (triangle[:half, :half], triangle[half:, half:])
+    )
+    inverse[half:, :half] = -inverse[half:, half:] @ (triangle[half:, :half] @ inverse[:half, :half])
+    return inverse
 
 
 @contextmanager
@@ -230,19 +222,9 @@ def one_blas_thread() -> Generator[None]:
     MKL_NUM_THREADS=1) before Python starts for results that agree to the last bit between machines
     of different numbers of cores.
     """
-    with ExitStack() as hold:
-        _limit([hold])
-        _holds.append(hold)
-        try:
-            yield
-        finally:
-            _holds.remove(hold)
-
-
-def _limit(holds: Sequence[ExitStack]) -> None:
-    """Hold the libraries that are loaded now to one thread, to the ends of some blocks."""
-    if holds and (controller := _controller("scipy.linalg" in sys.modules)) is not None:
-        holds[0].enter_context(controller.limit(limits=1, user_api="blas"))
+    controller = _controller("scipy.linalg" in sys.modules)
+    with controller.limit(limits=1, user_api="blas") if controller else nullcontext():
+        yield
 
 
 def on_one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:

@@ -19,7 +19,7 @@ from typing import TypeVar
 import numpy as np
 
 from mrdamper.data import Floats, current_levels
-from mrdamper.statistics.linear import solve_lower_triangle
+from mrdamper.statistics.linear import inverse_of_triangle
 from mrdamper.study.contradictions.tracks import Track
 
 _YIELDS = (0.015, 0.06, 0.2, 0.6)  # yield displacements of the stop operators, relative to the median amplitude
@@ -200,33 +200,40 @@ class Evidence:
         self._acceleration = float(np.median([np.max(np.abs(t.acceleration)) for t in tracks])) or 1.0
         self.nodes = _nodes(tracks)
         self._shares: dict[float, Floats] = {}
-        self._priors: dict[tuple[float, float], Posterior] = {}
+        self._priors: dict[tuple[float, float], tuple[Floats, Posterior]] = {}
 
     @property
     def prior(self) -> Posterior:
         """Coefficients before any run."""
+        return self._course[1]
+
+    @property
+    def _course(self) -> tuple[Floats, Posterior]:
+        """(K, K) root of the covariance of a coefficient at the nodes, and the coefficients before any run."""
         course = self.spread.saturation, self.spread.bend
         if course not in self._priors:
-            root = _outer(_root_covariance(self.nodes, *course), np.eye(_ELEMENTS))
-            self._priors[course] = Posterior(np.zeros(len(root)), root, self)
+            nodes = _root_covariance(self.nodes, *course)
+            root = _outer(nodes, np.eye(_ELEMENTS))
+            self._priors[course] = nodes, Posterior(np.zeros(len(root)), root, self)
         return self._priors[course]
 
     def posterior(self, members: Sequence[Moments]) -> Posterior:
         """Coefficients determined by runs."""
-        gram, moment = self.total(members)
-        prior = self.prior.root
-        factor = np.linalg.cholesky(prior.T @ gram @ prior + _identity(len(moment)))
-        root = solve_lower_triangle(factor, prior.T).T
-        return Posterior(root @ (root.T @ moment), root, self)
+        gram, moment = self._scaled(members)
+        inverse = inverse_of_triangle(np.linalg.cholesky(gram))
+        spread = _along_nodes(self._course[0], inverse.T)
+        return Posterior(spread @ (inverse @ moment), spread, self)
 
     def log_evidence(self, members: Sequence[Moments]) -> float:
         """Logarithm of the evidence that runs follow one model."""
-        gram, moment = self.total(members)
-        prior = self.prior.root
-        factor = np.linalg.cholesky(prior.T @ gram @ prior + _identity(len(moment)))
-        half = solve_lower_triangle(factor, prior.T @ moment)
+        gram, moment = self._scaled(members)
+        # The last row of the factor is what the others solve for: no eigenvalue of the products is below one.
+        bordered = np.zeros((len(moment) + 1, len(moment) + 1))
+        bordered[:-1, :-1], bordered[-1, :-1], bordered[-1, -1] = gram, moment, 1 + moment @ moment
+        factor = np.linalg.cholesky(bordered)
+        half, diagonal = factor[-1, :-1], factor.diagonal()[:-1]
         power = sum(member.power for member in members)
-        return float(0.5 * (half @ half) - np.sum(np.log(np.diag(factor))) - 0.5 * power)
+        return float(0.5 * (half @ half) - np.sum(np.log(diagonal)) - 0.5 * power)
 
     def weigh(self, runs: Sequence[RowProducts], expected: Posterior) -> list[Moments]:
         """Weighted products of runs; the gain of a run multiplies the force that is expected of it."""
@@ -291,29 +298,34 @@ class Evidence:
         """(N, K) shares of the nodes at currents [A]."""
         return np.column_stack([np.interp(current, self.nodes, hat) for hat in np.eye(self.nodes.size)])
 
-    def total(self, members: Sequence[Moments]) -> tuple[Floats, Floats]:
-        """Return sums of the moments of runs over all nodes."""
-        size = self.nodes.size * _ELEMENTS
-        gram, moment = np.zeros((size, size)), np.zeros(size)
-        blocks = gram.reshape(self.nodes.size, _ELEMENTS, self.nodes.size, _ELEMENTS)
-        for member in members:
-            if member.over is None:
-                gram += member.gram
-                moment += member.moment
+    def _scaled(self, members: Sequence[Moments]) -> tuple[Floats, Floats]:
+        """Return sums of the moments of runs over all nodes in units of the prior, which adds one to the products."""
+        root, count = self._course[0], self.nodes.size
+        gram, moment = np.zeros((count * _ELEMENTS, count * _ELEMENTS)), np.zeros(count * _ELEMENTS)
+        if changing := [member for member in members if member.over is None]:
+            gram = _along_nodes(root.T, sum((member.gram for member in changing), gram))
+            gram = _along_nodes(root.T, gram.T)
+            moment = _along_nodes(root.T, sum((member.moment for member in changing), moment))
         constant = [(member.over, member) for member in members if member.over is not None]
         if constant:
-            over = np.array([shares for shares, _ in constant])
+            over = np.array([shares for shares, _ in constant]) @ root
             grams, moments, _ = _stacked([member for _, member in constant])
             pairs = (over[:, :, None] * over[:, None, :]).reshape(len(over), -1)
-            summed = (pairs.T @ grams.reshape(len(grams), -1)).reshape(*blocks.shape[::2], *blocks.shape[1::2])
-            blocks += summed.transpose(0, 2, 1, 3)
+            summed = (pairs.T @ grams.reshape(len(grams), -1)).reshape(count, count, _ELEMENTS, _ELEMENTS)
+            gram += summed.transpose(0, 2, 1, 3).reshape(gram.shape)
             moment += (over.T @ moments).ravel()
+        gram.flat[:: len(gram) + 1] += 1
         return gram, moment
 
 
 def model_error(run: RowProducts) -> float:
     """Return standard deviation of the model error of a run, before the factor of all runs."""
     return run.misfit * math.sqrt((_MISFIT * run.size) ** 2 + _MIN_MISFIT**2 * min(1.0, run.size))
+
+
+def _along_nodes(matrix: Floats, array: Floats) -> Floats:
+    """Multiply the coefficients at the nodes, the rows of an array (P, ...), by a matrix (K, K)."""
+    return (matrix @ array.reshape(len(matrix), -1)).reshape(array.shape)
 
 
 def _outer(a: Floats, b: Floats) -> Floats:
