@@ -11,6 +11,7 @@ from support.rig_records import chirp_record, clean_record, codes_of, random_rec
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.quality.table import record_of
+from mrdamper.rig_files.record import Record
 
 
 @pytest.fixture
@@ -126,6 +127,28 @@ def test_clipping_is_noticed_on_real_coarse_records(bundled):
             continue
         top = np.quantile(run.force, 0.875)
         assert "W_CLIPPED" in codes_of(record_of(replace(run, force=np.minimum(run.force, top)))), run.id
+
+
+@pytest.mark.parametrize("noise", [0.0, 3.0])
+@pytest.mark.parametrize(
+    "force",
+    [
+        pytest.param(lambda v: 1000 * np.tanh(v / 0.02), id="hyperbolic tangent"),
+        pytest.param(lambda v: 1000 * np.tanh(v / 0.002), id="steep hyperbolic tangent"),
+        pytest.param(lambda v: 1000 * np.sign(v), id="Coulomb friction"),
+        pytest.param(lambda v: 1000 * np.tanh(v / 0.02) + 200 * v, id="with little damping"),
+    ],
+)
+def test_a_plateau_of_the_damper_is_not_clipping(force, noise):
+    """Calculated forces repeat one value on it; clipped in full motion, they have corners."""
+    time = np.arange(2000) / 500
+    velocity = 0.02 * np.pi * np.cos(2 * np.pi * time)
+    rng = np.random.default_rng(0)
+    for limit, codes in ((np.inf, []), (1100.0, ["W_CLIPPED"])):
+        own = force(velocity) if limit == np.inf else force(velocity) + 3000 * velocity
+        values = np.clip(own + noise * rng.standard_normal(time.size), -limit, limit)
+        record = Record("plateau", time, 0.01 * np.sin(2 * np.pi * time), values)
+        assert [code for code in codes_of(record) if code == "W_CLIPPED"] == codes, limit
 
 
 def test_freezing_is_noticed():

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from mrdamper.data import Floats, once_per_run
+from mrdamper.rig_files.quality.cycles import steady_cycles
 from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
 from mrdamper.rig_files.record import Finding
 
@@ -25,6 +26,7 @@ _LEVELS = 6  # resolution steps it must have missed
 _COARSE = 1e-5  # a resolution step of this share of the range shows in a force that is held by friction
 _LEAP = 0.03  # of the range: a channel that leaves a flat top with such a step was not clipped but frozen
 _NEAR = 100  # samples on either side from which the noise is taken
+_ROUNDING = 1e-9  # of the channel's range: less is no noise
 _CHANCE = 1e-4  # that noise repeats itself as often anywhere in the record
 _MOST = 20_000  # stretches looked at
 _CHUNK = 1_000_000  # samples looked at together
@@ -64,18 +66,27 @@ def _samples(stretches: np.ndarray) -> int:
 def flat_tops(view: View, name: str) -> dict[float, np.ndarray]:
     """Flat tops of a channel by their level: at least five equal samples at an end of its range."""
     channel = _channels(view)[name]
+    kinks = channel.smooth or _scatters(view)  # else a force has plateaus of its own, or `flattened` finds their corners
     tops = {}
     if not len(channel.equal):
         return tops
     for level in (channel.high, channel.low):
         at = channel.equal[(channel.values[channel.equal[:, 0]] == level) & ~channel.leaps(channel.equal)]
         if len(at) and channel.piled_up(level):
-            at = at[channel.odd(at) | ((at[:, 0] > 0) & (at[:, 1] < channel.values.size))]
+            at = at[channel.odd(at, kinks=kinks) | ((at[:, 0] > 0) & (at[:, 1] < channel.values.size))]
         else:
-            at = at[channel.odd(at)]
+            at = at[channel.odd(at, kinks=kinks)]
         if len(at):
             tops[level] = at
     return tops
+
+
+def _scatters(view: View) -> bool:
+    """Check that the force differs from cycle to cycle: calculated forces do not."""
+    cycles = steady_cycles(view)
+    if cycles is None or len(cycles.starts) == 1:
+        return True
+    return float(np.sqrt(np.mean(cycles.force.rest**2))) > _COARSE * cycles.force.span
 
 
 def frozen_stretches(view: View, name: str) -> np.ndarray:
@@ -134,12 +145,13 @@ class _Channel:
     def span(self) -> float:
         return self.high - self.low
 
-    def odd(self, stretches: np.ndarray, sure: np.ndarray | bool = False) -> np.ndarray:
+    def odd(self, stretches: np.ndarray, sure: np.ndarray | bool = False, kinks: bool = True) -> np.ndarray:
         """(K,) mask of the stretches that are sure, or that neither motion nor noise makes."""
         if not len(stretches):
             return np.zeros(0, dtype=bool)
         fine = self.level < _COARSE * self.span
-        frozen_ones = sure | (self._kink(stretches) if self.smooth or fine else np.zeros(len(stretches), dtype=bool))
+        kinks = kinks and (self.smooth or fine)
+        frozen_ones = sure | (self._kink(stretches) if kinks else np.zeros(len(stretches), dtype=bool))
         if fine or not self.smooth:
             for i in np.flatnonzero(~frozen_ones):
                 frozen_ones[i] = self._too_quiet(*stretches[i].tolist())
@@ -196,7 +208,7 @@ class _Channel:
             return False
         # Below the resolution, a slow plateau of a coarse channel is as quiet.
         return all(
-            sample_noise(side) > max(self.level, 0.02 * float(np.median(np.abs(step))))
+            sample_noise(side) > max(self.level, 0.02 * float(np.median(np.abs(step))), _ROUNDING * self.span)
             for side, step in zip(sides, steps, strict=True)
         )
 

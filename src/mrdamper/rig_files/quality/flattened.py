@@ -1,9 +1,10 @@
 """Channels cut off before noise or a filter: no two samples are equal, but the mean cycle has a flat top.
 
 From the flat top's edges on, a smooth extreme goes down as a parabola: at a depth four times as large
-it is twice as wide. A cut-off one is hardly wider. A force may have a plateau of its own, which ends
-where the motion turns; a plateau that begins and ends in full motion is none of a damper's. A motion may
-dwell, but then the force does not go on.
+it is twice as wide. A cut-off one is hardly wider, and has corners: the width grows with the depth. A force
+may have a plateau of its own, which ends where the motion turns, or with a shoulder, as a hyperbolic tangent
+of the velocity has it: the width grows with the logarithm of the depth. A motion may dwell, but then the
+force does not go on.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ _DEEPEST = 0.02  # of it: deeper, where noise asks for that, the steep sides of 
 _FORCE_WIDER, _WIDER, _WIDER_ONE_SIDED = 1.45, 1.3, 1.47  # times as wide there: a parabola 2, bundled rigs 1.57, 1.34
 _ROUND = 1.75  # times as wide: an end that is not cut off
 _LEVEL = 1.25  # times as wide: a plateau on which the force does not depend on velocity
+_SHOULDER = 0.75  # phases, of which the width grows from the depth to twice it: a narrower one cannot be told
+_CORNER = 1.3  # times as much as from twice to four times the depth: a corner 2, a parabola 1.4, a shoulder 1
 _WIDTH = (0.04, 0.6)  # of the cycle
 _REST = 0.05  # of the peak velocity: slower, a displacement rests
 _DWELL = 0.022  # of the cycle, beyond what a sine has
@@ -41,6 +44,7 @@ class Top(NamedTuple):
     wider: float  # at four times the depth, the side that is more so
     edges: tuple[int, int]  # phases, the first may be negative
     beyond: float  # estimate of what is cut off
+    shoulders: bool  # instead of corners, at both edges
 
 
 def cut_off_before_noise(view: View) -> Iterator[Finding]:
@@ -121,13 +125,16 @@ def _top(loop: Floats, depth: float) -> Top:
     level = float(np.mean(np.sort(loop)[-4:]))
     middle = int(np.argmax(loop))
     turned = np.roll(loop, POINTS // 2 - middle)  # the top in the middle
-    left, right = _reach(turned[POINTS // 2 :: -1], level - depth), _reach(turned[POINTS // 2 :], level - depth)
-    far_left = _reach(turned[POINTS // 2 :: -1], level - 4 * depth)
-    far_right = _reach(turned[POINTS // 2 :], level - 4 * depth)
+    sides = turned[POINTS // 2 :: -1], turned[POINTS // 2 :]
+    reach = np.array([[_reach(side, level - times * depth) for times in (1, 2, 4)] for side in sides])
+    left, right = reach[:, 0]
     half = max(0.5 * (left + right), 0.5)
-    wider = 1 + max(far_left - left, far_right - right) / half
-    slope = 3 * depth / max(0.5 * (far_left + far_right) - half, 0.25)
-    return Top(level, 2 * half / POINTS, wider, (round(middle - left), round(middle + right)), 0.5 * slope * half)
+    wider = 1 + float(np.max(reach[:, 2] - reach[:, 0])) / half
+    slope = 3 * depth / max(0.5 * float(np.sum(reach[:, 2])) - half, 0.25)
+    near, far = np.diff(reach).T
+    shoulders = bool(np.all((near > _SHOULDER) & (far < _CORNER * near)))
+    edges = round(middle - left), round(middle + right)
+    return Top(level, 2 * half / POINTS, wider, edges, 0.5 * slope * half, shoulders)
 
 
 def _reach(values: Floats, level: float) -> float:
@@ -143,6 +150,8 @@ def _reach(values: Floats, level: float) -> float:
 
 def _is_cut_off(top: Top, speed: Floats, one_sided: bool) -> bool:
     """Tell an end of the force that is cut off from a plateau of the damper's own."""
+    if top.shoulders:
+        return False
     start, stop = top.edges
     edges = speed[np.array(top.edges) % POINTS]
     if top.wider < _LEVEL and (one_sided or float(np.min(edges)) > _STILL_MOVES * float(np.max(speed))):
