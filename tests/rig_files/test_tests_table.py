@@ -151,6 +151,28 @@ def test_files_are_added_to_a_dataset_and_never_twice(dataset, rig, tmp_path):
     assert (dataset / "LICENCE.txt").read_text() == "ours"
 
 
+def test_a_file_read_otherwise_replaces_its_test_with_what_the_table_beside_it_states(tmp_path):
+    """The remedy of E_FORCE_SCALE and of a wrong sign: the file on its own with a profile, and --add."""
+    (tmp_path / "rig").mkdir()
+    names = [f"t0{number}.csv" for number in range(3)]
+    for number, name in enumerate(names):
+        write(tmp_path / "rig", name, text(rows(seed=number)))
+    write(tmp_path / "rig", "tests.csv", "file,current_A,split\n" + "".join(f"{name},0.5,train\n" for name in names))
+    assert run("import", tmp_path / "rig", "--out", tmp_path / "data").exit_code == 0
+    before = load_dataset(tmp_path / "data")
+    profile = write(tmp_path, "lbf.toml", '[channels.force]\nunit = "lbf"\n')
+    again = ("import", tmp_path / "rig" / "t01.csv", "--out", tmp_path / "data", "--add")
+    assert "read in the same way" in str(run(*again).exception)
+    done = run(*again, "--profile", profile)
+    assert done.exit_code == 0, done.output
+    assert "replaced: t01" in done.output and "(3 runs, 0 of them new)" in done.output
+    after = load_dataset(tmp_path / "data")
+    assert [one.id for one in after] == [one.id for one in before]
+    assert np.allclose(after["t01"].force, 4.4482216 * before["t01"].force)
+    assert np.array_equal(after["t02"].force, before["t02"].force)
+    assert after["t01"].mean_current == 0.5
+
+
 @pytest.mark.parametrize(
     ("options", "held"),
     [

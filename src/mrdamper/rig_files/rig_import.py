@@ -104,7 +104,7 @@ def import_files(
     profile : Profile or path, optional
         For all of them.
     tests : TestsTable or path, optional
-        Table of tests; default: `tests.csv` of the folder, if it holds one.
+        Table of tests; default: `tests.csv` of the folder, also that of single files.
     progress : callable
         Is told the file and the share done.
 
@@ -129,7 +129,8 @@ def import_files(
     if not several or not all(is_a(path, (str, Path)) for path in several):
         raise InputError(f"paths is {shown(paths)}", remedy="give it as a path or several", code="E_ARGUMENT")
     with unpacked(several) as given:
-        beside = [path / TESTS for path in given if (path / TESTS).is_file()]
+        folders = dict.fromkeys(path if path.is_dir() else path.parent for path in given)
+        beside = [folder / TESTS for folder in folders if (folder / TESTS).is_file()]
         lists = [path for path in beside if not names_tests(path)]  # a laboratory's own, under the same name
         tests = next((path for path in beside if path not in lists), None) if tests is None else tests
         table = tests if tests is None or isinstance(tests, TestsTable) else load_tests(tests)
@@ -143,7 +144,7 @@ def import_files(
             intake.read(path, given=path in given)
         used = intake.join(texts)
         left_out = [path for path in left_out if path not in used]
-        if table is not None:
+        if table is not None and (table.path not in beside or table.path.parent in given):  # else some of its tests
             table.require_found(intake.met)
         profile.require_matches([*intake.met, *((path, "") for path in files)])
         refusals = intake.refusals or ([] if intake.tests() else intake.notes)

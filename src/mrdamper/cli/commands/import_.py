@@ -20,7 +20,7 @@ from mrdamper.cli.progress import progress_on_stderr
 from mrdamper.errors import InputError, OutputError, listed
 
 if TYPE_CHECKING:
-    from mrdamper.data import Dataset
+    from mrdamper.data import Dataset, Run
     from mrdamper.rig_files.profile import Profile
     from mrdamper.rig_files.record import Record, Refusal
     from mrdamper.rig_files.rig_import import ImportResult
@@ -84,12 +84,12 @@ def import_(
             settings, result = _asked(files, settings, result, tests)
     wrong = bool(result.refusals) and not skip_refused
     written = bool(result.records) and not wrong and out is not None
-    total = _write_dataset(result, settings, out, add) if written and out is not None else 0
+    total, new = _write_dataset(result, settings, out, add) if written and out is not None else (0, 0)
     if as_json:
         print(json.dumps(_summary(result, out if written else None), indent=1, ensure_ascii=False))
     else:
-        _print(result, out if written else None, total, dry=dry, verbose=verbose)
-    if not dry and (wrong or not result.records):
+        _print(result, out if written else None, total, new, dry=dry, verbose=verbose)
+    if not result.records or (wrong and not dry):
         raise typer.Exit(2)
 
 
@@ -173,37 +173,51 @@ def _alternatives(columns: tuple[str, ...]) -> str:
     )  # fmt: skip
 
 
-def _write_dataset(result: ImportResult, profile: Profile, out: Path, add: bool) -> int:
-    """Write or add; the number of runs in the dataset then."""
+def _write_dataset(result: ImportResult, profile: Profile, out: Path, add: bool) -> tuple[int, int]:
+    """Write or add; the number of runs in the dataset then, and of those that were not there."""
     from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
     from mrdamper.rig_files.profile import Profile, profile_text
     from mrdamper.rig_files.rig_import import to_dataset
 
     dataset = to_dataset(result.records, out.name)
     if add:
-        dataset = _joined(load_dataset(out), dataset)
+        before = load_dataset(out)
+        dataset = _joined(before, dataset)
         save_dataset(dataset, out, replace=True)
-        return len(dataset)
+        return len(dataset), len(dataset) - len(before)
     extra = {"rig.toml": profile_text(profile)} if profile != Profile() else None
     save_dataset(dataset, out, extra_files=extra)
-    return len(dataset)
+    return len(dataset), len(dataset)
 
 
 def _joined(old: Dataset, new: Dataset) -> Dataset:
-    """Both datasets' runs, told apart by their names; a file that was imported before is refused."""
+    """Both datasets' runs, told apart by their names; a test of the same file replaces one that was read otherwise."""
     from mrdamper.data import Dataset
     from mrdamper.rig_files.record import unique_names
 
-    stored = {(run.notes.get("sha256"), run.id) for run in old if run.notes.get("sha256")}
-    again = [run.id for run in new if (run.notes.get("sha256"), run.id) in stored]
-    if again:
+    stored = {(run.notes["sha256"], run.id): run for run in old if run.notes.get("sha256")}
+    again = {run.id: run for run in new if (run.notes.get("sha256"), run.id) in stored}
+    same = [run.id for run in again.values() if _reads_alike(run, stored[run.notes["sha256"], run.id])]
+    if same:
         raise OutputError(
-            f"{len(again)} of the tests are there already: {listed(again, 5)}",
-            where=f"dataset {old.name}", remedy="give the new files only",
+            f"there already, read in the same way: {listed(same, 5)}",
+            where=f"dataset {old.name}", remedy="give new files only, or a profile that reads these otherwise",
         )  # fmt: skip
-    names = unique_names((run.id for run in new), (run.id for run in old))
-    added = (run if name == run.id else replace(run, id=name) for run, name in zip(new, names, strict=True))
-    return Dataset((*old.runs, *added), old.name)
+    if again:
+        typer.echo(f"read otherwise than before and replaced: {listed([*again], 5)}", err=True)
+    kept = [replace(again[run.id], split=run.split) if run.id in again else run for run in old]
+    fresh = [run for run in new if run.id not in again]
+    names = unique_names((run.id for run in fresh), (run.id for run in old))
+    added = (run if name == run.id else replace(run, id=name) for run, name in zip(fresh, names, strict=True))
+    return Dataset((*kept, *added), old.name)
+
+
+def _reads_alike(one: Run, other: Run) -> bool:
+    """Tell if two readings of a file gave the same samples."""
+    import numpy as np
+
+    channels = ("time", "displacement", "force", "current")
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in channels)
 
 
 def _print_tree(files: list[Path], settings: Profile) -> None:
@@ -242,7 +256,7 @@ def _asked(
     return settings, result
 
 
-def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = False, verbose: bool = False) -> None:
+def _print(result: ImportResult, out: Path | None, total: int, new: int, *, dry: bool, verbose: bool) -> None:
     columns = {record.provenance["columns"] for record in result.records}
     if dry and result.records:
         print("Taken for tests:")
@@ -270,11 +284,12 @@ def _print(result: ImportResult, out: Path | None, total: int, *, dry: bool = Fa
         print(
             "a profile answers once for all files: mrdamper import FILE --write-profile rig.toml, "
             "correct rig.toml, import with --profile rig.toml"
-        )
+            + ("; if it is for the refused files only, import the others with --skip-refused, then these on their own "
+               "with --profile rig.toml --add" if result.records else "")
+        )  # fmt: skip
     tests = {record.provenance.get("file", "") for record in result.records}
     if out is not None:
-        more = f", {len(result.records)} of them new" if total > len(result.records) else ""
-        whence = more or f" from {len(tests)} file{'s' * (len(tests) != 1)}"
+        whence = f", {new} of them new" if total > new else f" from {len(tests)} file{'s' * (len(tests) != 1)}"
         print(f"dataset: {out} ({total} runs{whence})")
     elif dry:
         would = _tests(len(result.records))
