@@ -54,7 +54,10 @@ def test_the_commands_of_the_page_do_what_it_says(place):
         expected = 2 if "nothing written" in printed else 0
         assert done.exit_code == expected, (arguments, done.output)
         for line in printed.splitlines():
-            if line.startswith(("dataset: ", "table of ", "my-rig: ", "  force error ")) or "validation runs: " in line:
+            if (
+                line.startswith(("dataset: ", "table of ", "my-rig: ", "  force error ", "further models"))
+                or "validation runs: " in line
+            ):
                 assert line in done.output, (arguments, done.output)
         if "--write-tests" in arguments:
             table = place / "no-current" / "tests.csv"
@@ -66,3 +69,9 @@ def test_the_commands_of_the_page_do_what_it_says(place):
     assert set(tried) == {"import", "check", "split", "study"}
     assert [run.current_A for run in load_dataset("lab")] == [0.0] * 3 + [0.5] * 3 + [1.0] * 4
     assert (place / "result" / "report.html").is_file()
+    ranked = [*done.output.splitlines()[-1].partition(": mrdamper ")[2].split(), "--models", "kwok"]
+    assert "hyperbolic tangent" in CliRunner().invoke(application(), ranked).output
+    scored = CliRunner().invoke(application(), ["validate", "result/model.json", "my-rig"])
+    assert "8 of 8 runs have the names of the model's identification runs" in scored.output
+    bundled = CliRunner().invoke(application(), ["validate", "result/model.json"])
+    assert "give a dataset folder after the model" in str(bundled.exception)

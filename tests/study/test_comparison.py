@@ -113,7 +113,10 @@ def test_the_files_agree_with_each_other(compared, tmp_path):
     assert [float(row["cv_nrmse_pp"]) for row in table] == [row["cv_nrmse_pp"] for row in rows]
     page = written[0].read_text(encoding="utf-8")
     for row in summary_rows(compared):
-        assert row["reason"]
+        leaner = [r for r in rows if r["cv_nrmse_pp"] <= row["cv_nrmse_pp"] and r["parameters"] < row["parameters"]]
+        fewest = min(leaner, key=lambda r: r["parameters"], default=None)
+        stated = fewest and f" has {100 * fewest['cv_nrmse_pp']:.1f} % with {fewest['parameters']}"
+        assert (stated or "% in cross-validation with") in row["reason"]
         assert row["limits"]
         assert row["source"] in page.replace("&amp;", "&")
     assert 'src="http' not in page

@@ -129,7 +129,8 @@ def _reason(entry: RecipeResult, entries: Sequence[RecipeResult]) -> str:
     ]
     if leaner and entry is not best:
         fewest = min(leaner, key=lambda e: e.damper.parameter_count)
-        text += f"; {fewest.title} is as accurate with {fewest.damper.parameter_count}"
+        error = 100 * fewest.cross_validated.median()
+        text += f"; {fewest.title} has {error:.1f} % with {fewest.damper.parameter_count}"
     if math.isfinite(entry.per_run) and own > 1.5 * entry.per_run:
         text += f"; best possible fit of a single run: {100 * entry.per_run:.1f} %"
     return text

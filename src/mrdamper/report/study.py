@@ -364,7 +364,10 @@ def _choice(rig: RigStudy) -> str:
         text += f"; next {best.title}, {best.damper.parameter_count} parameters, {error:.1f} %"
     titles = {other.recipe.name: other.title for other in others}
     refused = "".join(f" Not eligible: {titles[name]}, {why}." for name, why in rig.refused.items() if name in titles)
-    return f"{text}. Within one standard error of the best, the model with the fewest parameters is chosen.{refused}"
+    return (
+        f"{text}. Within one standard error of the best, the model with the fewest parameters is chosen.{refused} "
+        "Further models, such as the hyperbolic tangent, are fitted and ranked by mrdamper compare."
+    )
 
 
 def _tests(rig: RigStudy) -> str:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 WARNINGS = {
     "combination": "current, frequency and amplitude lie in their tested ranges, but not their combination",
-    "not a sine": "the motion is not sinusoidal; frequency and amplitude are estimated along it",
+    "not a sine": "the motion is no sine, as the tested ones are; its frequency and amplitude are estimates",
     "sampling": "fewer than two samples within the yield displacement after a reversal; increase the sampling rate",
 }
 

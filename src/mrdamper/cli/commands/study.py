@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -79,7 +80,9 @@ def study(
         print(json.dumps(_summary(result, [str(p) for p in written]), indent=1))
         return
     models = ", ".join(str(path) for path in written if path.name.startswith("model"))
-    files = [f"model: {models}", f"report: {written[0]}"]
+    where = f" {shlex.quote(str(data))}" if data else ""
+    further = f"further models (hyperbolic tangent, LuGre, published ones): mrdamper compare{where} --out comparison"
+    files = [f"model: {models}", f"report: {written[0]}", further]
     print("\n".join(study_lines(result, files, verbose=verbose)))
 
 

@@ -53,7 +53,11 @@ def validate(
     student(level, 1.0)  # refuses a level that is none
     require_writable(out)
     damper = load_model(model)
-    whole = _rig(load_dataset(data), rig, damper.rig)
+    dataset = load_dataset(data)
+    if data is None and rig is None and damper.rig not in dataset.rigs:
+        remedy = "give a dataset folder after the model, or a bundled rig as --rig NAME"
+        raise InputError("the bundled tests are not those of this model's rig", where=str(model), remedy=remedy)
+    whole = _rig(dataset, rig, damper.rig)
     name = whole.rigs[0] or whole.name
     runs = [run for run in whole if split in (None, run.split)]
     if not runs:
@@ -77,6 +81,14 @@ def validate(
         for run in validation.runs
     }
     put([{**score_row(run), **peaks[run.run_id]} for run in validation.runs], out, as_json, csv_text)
+    fitted = damper.uncertainty.information if damper.uncertainty else {}
+    known = [run for run in validation.runs if run.run_id in fitted and by_id[run.run_id].split == "train"]
+    if known:
+        typer.echo(
+            f"note: {len(known)} of {len(validation.runs)} runs have the names of the model's identification runs: if "
+            "they are these, their errors are those of the fit; --split validate omits them",
+            err=True,
+        )
     _print_summary(damper, validation, name, peaks.values(), level)
 
 
