@@ -16,6 +16,22 @@ from mrdamper.study.parallel import IN_PROCESS
 from mrdamper.systems.structure import Link, System
 
 
+def test_a_refused_argument_is_stated_in_a_line_with_what_is_wanted():
+    joint = joint_damper()
+    cases = (
+        (lambda: mrdamper.validate(joint, joint), "give it as Iterable[Run]"),
+        (lambda: mrdamper.plan_tests(joint), "= ...); see help(plan_tests)"),
+        (lambda: Condition(0.5, 2.0, 6.130609100440717), "amplitude is 6.13061 m"),
+    )
+    for call, text in cases:
+        with pytest.raises(InputError) as refusal:
+            call()
+        assert text in str(refusal.value)
+        assert "\n" not in str(refusal.value)
+        assert "\\x0a" not in str(refusal.value)
+        assert " at 0x" not in str(refusal.value)
+
+
 class Frame:
     """A table of another library: neither a number nor a sequence of them."""
 

@@ -52,7 +52,7 @@ def test_a_name_that_does_not_exist_is_an_attribute_error():
         ("predict", "; did you mean Prediction?"),
         ("load_modl", "; did you mean load_model?"),
         ("run_sudy", "; did you mean run_study?"),
-        ("dataset", "; did you mean Dataset?"),
+        ("dataset", "; did you mean Dataset or load_dataset or save_dataset?"),
         ("BoucWenn", "; did you mean BoucWen?"),
     ):
         with pytest.raises(AttributeError) as refusal:

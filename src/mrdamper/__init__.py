@@ -98,13 +98,13 @@ def __getattr__(name: str) -> Any:
 
 
 def _near(name: str, classes: list[str]) -> str:
-    """Return the public names that begin so, or whose spelling is near, as the end of an error message."""
+    """Return the public names that begin or end so, or whose spelling is near, as the end of an error message."""
     spelled = {public.lower(): public for public in (*_HOME, *(c for c in classes if c[:1].isupper()))}
     close = importlib.import_module("difflib").get_close_matches(name.lower(), spelled, n=2, cutoff=0.85)
     near = [
         public
         for lower, public in spelled.items()
-        if lower in close or (len(name) > 3 and lower.startswith(name.lower()))
+        if lower in close or (len(name) > 3 and (lower.startswith(name.lower()) or lower.endswith(f"_{name.lower()}")))
     ]
     return f"; did you mean {' or '.join(near)}?" if near else ""
 

@@ -108,6 +108,7 @@ def validate_arguments(*but: str) -> Callable[[Function], Function]:
                 bound = signature.bind(*given, **named).arguments
             except TypeError as error:
                 wanted = re.sub(r": '([^']*)'", r": \1", str(signature).replace("(self, ", "(").partition(" -> ")[0])
+                wanted = re.sub(r"<function .*? at 0x\w+>", "...", wanted)
                 raise InputError(
                     f"{function.__qualname__}: {error}",
                     remedy=f"call {function.__name__}{wanted}; see help({function.__qualname__})",
@@ -141,7 +142,8 @@ def _require_fit(name: str, value: object, kind: object) -> None:
     except (TypeError, ValueError, OverflowError):  # hostile objects, ragged arrays, numbers beyond all floats
         fits = False
     if not fits:
-        wanted = getattr(kind, "__name__", str(kind)).replace("typing.", "")
+        # A class by its name, several or what they hold without their modules: Iterable[Run].
+        wanted = kind.__name__ if isinstance(kind, type) and not get_args(kind) else re.sub(r"\b\w+\.", "", str(kind))
         hint = f", which {reader} reads" if (reader := getattr(kind, "read_by", "")) else ""
         raise InputError(f"{name} is {shown(value)}", remedy=f"give it as {wanted}{hint}", code="E_ARGUMENT")
 
@@ -223,9 +225,9 @@ def series(**given: Any) -> tuple[NDArray[np.float64], ...]:
 
 
 def shown(value: object) -> str:
-    """Whatever a user gave, in a few characters; a number of thousands of digits has no text."""
+    """Whatever a user gave, in the first line of a few characters; a number of thousands of digits has no text."""
     try:
-        return f"{value!r:.60}"
+        return f"{value:.6g}" if isinstance(value, float) else f"{value!r}".partition("\n")[0][:60]
     except ValueError:
         return "a number of thousands of digits"
 
@@ -310,7 +312,7 @@ class UnknownNameError(InputError):
     @classmethod
     def of(cls, kind: str, name: str, names: Iterable[str]) -> UnknownNameError:
         """Build the error with the near matches as the remedy."""
-        names = sorted(names)
+        names = sorted(set(names))
         near = get_close_matches(name, names, n=3, cutoff=0.5)
         remedy = f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(names)}"
         return cls(f"no {kind} is called {name!r}", remedy=remedy)

@@ -121,6 +121,15 @@ def test_a_gap_in_the_motion_and_coarse_sampling_are_said(model, tmp_path):
     assert "[E_TIME_GAP]" in done.stderr
 
 
+def test_a_current_that_replaces_a_column_is_stated(model, tmp_path):
+    time = np.arange(200) / 100
+    columns = np.column_stack([time, 0.01 * np.sin(6 * time), np.full(200, 0.3)])
+    np.savetxt(tmp_path / "m.csv", columns, delimiter=",", header="time_s,displacement_m,current_A", comments="")
+    given = mrdamper("predict", model, "--motion", tmp_path / "m.csv", "--current", "0.8")
+    assert "note: --current 0.8 replaces the column current_A" in given.stderr
+    assert "replaces" not in mrdamper("predict", model, "--motion", tmp_path / "m.csv").stderr
+
+
 def test_validate_scores_the_models_rig(model):
     done = mrdamper("validate", model, "--split", "validate", "--json")
     assert done.returncode == 0, done.stderr

@@ -88,6 +88,7 @@ def test_correlations_are_stated_once_per_group_of_parameters():
         (5.0, (4.0, 6.0), "N", "5 ± 1 N"),
         (-727.4, (-837.8, -617.0), "N s/m", "-730 ± 110 N s/m"),
         (-3456789.0, None, "Pa", "-3.457e+06 Pa"),
+        (-84e4, (-384e4, 216e4), "N/m^3", "-8.4e+05 ± 3.0e+06 N/m^3"),
         (0.5, None, "m", "500 mm"),
     ],
 )

@@ -160,12 +160,14 @@ def test_a_file_read_otherwise_replaces_its_test_with_what_the_table_beside_it_s
     write(tmp_path / "rig", "tests.csv", "file,current_A,split\n" + "".join(f"{name},0.5,train\n" for name in names))
     assert run("import", tmp_path / "rig", "--out", tmp_path / "data").exit_code == 0
     before = load_dataset(tmp_path / "data")
+    assert repr(import_files([tmp_path / "rig"])) == "<import: tests accepted: 3, refused: 0>"
     profile = write(tmp_path, "lbf.toml", '[channels.force]\nunit = "lbf"\n')
     again = ("import", tmp_path / "rig" / "t01.csv", "--out", tmp_path / "data", "--add")
     assert "read in the same way" in str(run(*again).exception)
     done = run(*again, "--profile", profile)
     assert done.exit_code == 0, done.output
-    assert "replaced: t01" in done.output and "(3 runs, 0 of them new)" in done.output
+    assert "replaced: t01" in done.output
+    assert "(3 runs, 0 of them new)" in done.output
     after = load_dataset(tmp_path / "data")
     assert [one.id for one in after] == [one.id for one in before]
     assert np.allclose(after["t01"].force, 4.4482216 * before["t01"].force)

@@ -177,7 +177,7 @@ def no_band(damper: Damper) -> str:
     if not damper.fitted_parameters:
         return "no band: the uncertainty of a model of this kind is not known"
     if damper.uncertainty is None:
-        return "no band: the model was saved without its covariance"
+        return "no band: the model was saved without its covariance; mrdamper study --model NAME saves it"
     return "no band: its runs are too few to show how runs differ; test more conditions, on another day too"
 
 

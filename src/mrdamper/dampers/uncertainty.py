@@ -201,7 +201,7 @@ def uncertainty_warnings(damper: Damper) -> list[str]:
         apart.append(i)
         error = float(uncertainty.standard_errors[i])
         if uncertainty.logs[i] and error > _MAX_RELATIVE_ERROR:
-            wide.append((name, f"{ends[1] / ends[0]:.2g}"))
+            wide.append((name, written(float(f"{ends[1] / ends[0]:.2g}"), None)))
         elif not uncertainty.logs[i] and error > _MAX_RELATIVE_ERROR * abs(numbers[name].value):
             about = written(numbers[name].value, ends, numbers[name].unit)
             weak.append((name, about))

@@ -21,6 +21,7 @@ _SERIES_DEGREES_OF_FREEDOM = 1000.0  # degrees of freedom from which the series 
 _MOST_DEGREES_OF_FREEDOM, _HALVINGS = 1e6, 30  # that a quantile is looked for in, and steps of bisection
 _NODES = 80  # of Gauss and Legendre's rule
 _MAX_NEWTON_STEPS = 200  # of Newton's method
+_EXPONENT = 1e6  # from this number on, numbers are written with an exponent
 _LOPSIDED = 0.1  # of an interval's half width: shifted by less, it is written with ±
 
 
@@ -106,15 +107,18 @@ def written(value: float, ends: tuple[float, float] | None, unit: str = "") -> s
     half = (high - low) / 2
     if half == 0:
         return f"{_plain(value, 6)} ± 0 {unit}".strip()
-    digits = math.floor(math.log10(max(abs(value), half))) - math.floor(math.log10(half)) + 2
+    largest = max(abs(value), half)
+    digits = math.floor(math.log10(largest)) - math.floor(math.log10(half)) + 2
     if abs(high + low - 2 * value) > _LOPSIDED * half:
         return f"{_plain(value, digits)} ({_plain(low, digits)} to {_plain(high, digits)}) {unit}".strip()
+    if largest >= _EXPONENT:  # both with an exponent
+        return f"{value:.{digits - 1}e} ± {half:.1e} {unit}".strip()
     return f"{_plain(value, digits)} ± {_plain(half, 2)} {unit}".strip()
 
 
 def _plain(value: float, digits: int) -> str:
     """Write a number to some digits, without an exponent below a million."""
-    return f"{float(f'{value:.{digits}g}'):.10g}" if abs(value) < 1e6 else f"{value:.{digits}g}"
+    return f"{float(f'{value:.{digits}g}'):.10g}" if abs(value) < _EXPONENT else f"{value:.{digits}g}"
 
 
 def weaknesses(

@@ -46,6 +46,7 @@ def load_motion(path: str | Path, current: float | None = None) -> Run:
         force=np.zeros(table.height),
         current=columns.get("current_A", np.array(current)),
         excitation="motion",
+        notes={} if "current_A" in wanted or "current_A" not in table.columns else {"replaced": "the column current_A"},
     )
 
 

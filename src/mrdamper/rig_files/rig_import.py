@@ -9,10 +9,12 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mrdamper.data import Dataset
+from mrdamper.data.displayable import Displayable
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, with_stated_current
 from mrdamper.rig_files.file_records import records_of_file
@@ -48,13 +50,32 @@ _MAY_BE_PARTS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class ImportResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class ImportResult(Displayable):
     """Result of the import of a set of files."""
 
     records: tuple[Record, ...]  # accepted, with their findings, in the order of the files
     refusals: tuple[Refusal, ...] = ()
     left_out: tuple[str, ...] = ()  # files of the folders that are no rig's: of other kinds, or texts without a table
+
+    @property
+    def headline(self) -> str:
+        """Numbers of accepted and refused tests."""
+        return f"import: tests accepted: {len(self.records)}, refused: {len(self.refusals)}"
+
+    @property
+    def details(self) -> list[str]:
+        """The refusals."""
+        return [f"refused: {refusal.error}" for refusal in self.refusals]
+
+    @property
+    def table(self) -> dict[str, list[Any]]:
+        """The accepted tests."""
+        return {
+            "run_id": [record.id for record in self.records],
+            "samples": [record.time.size for record in self.records],
+            "findings": [" ".join(finding.code for finding in record.findings) for record in self.records],
+        }
 
 
 def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> Record:

@@ -102,7 +102,10 @@ def _predict(
 
         if frequency is not None or amplitude is not None:
             raise InputError("--motion together with --frequency or --amplitude", remedy="give one of them")
-        return damper.predict(load_motion(motion, current))
+        run = load_motion(motion, current)
+        if replaced := run.notes.get("replaced"):
+            typer.echo(f"note: --current {current:g} replaces {replaced} of {motion}", err=True)
+        return damper.predict(run)
     if current is None or frequency is None or amplitude is None:
         raise InputError("no condition", remedy="give --current A --frequency Hz --amplitude mm, or --motion FILE")
     return damper.predict(Condition(current, frequency, 1e-3 * amplitude))

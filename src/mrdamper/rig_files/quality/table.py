@@ -101,7 +101,7 @@ def row(quality: Quality) -> dict[str, Any]:
         "rig": quality.record.rig,
         "current_A": _rounded(quality.current, 4),
         "frequency_Hz": None if condition is None else _rounded(condition.frequency_Hz, 4),
-        "amplitude_mm": None if condition is None else _rounded(1e3 * condition.amplitude_m, 4),
+        "amplitude_mm": None if condition is None else float(f"{1e3 * condition.amplitude_m:.4g}"),
         "cycles": _rounded(quality.cycles, 2),
         "sample_rate_Hz": _rounded(quality.sample_rate_Hz, 1),
         "repeatability_percent": _rounded(100 * quality.repeatability, 2),
