@@ -109,3 +109,21 @@ def test_what_the_design_of_the_tests_cannot_show_is_stated_first(conditions, sa
     assert said is None or entries[0].text.startswith(said)
     others = limitations(replace(scored(fit), train=Validation("train", runs)), loops[1:])
     assert not any(one.text.startswith(design[:2]) for one in others)  # a record of other motion varies the rest
+
+
+def test_tests_at_different_temperatures_are_a_limitation():
+    fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 0.1)
+    ids = ("a", "b", "c")
+    scores = Scores(0.02, *5 * (0.0,))
+    runs = tuple(RunScore(name, "rig", Condition(0.5, 1.0, 0.01), scores, None, ()) for name in ids)
+    train = replace(scored(fit), train=Validation("train", runs))
+
+    def sentences(*temperatures):
+        tests = [SimpleNamespace(id=n, notes={"temperature_C": t}) for n, t in zip(ids, temperatures, strict=True)]
+        return [one.text for one in limitations(train, (), tests) if "°C" in one.text]
+
+    assert sentences("23.5", "", "41.02") == [
+        "Tests at 24 to 41 °C: the temperature is no input of the model, and its effect counts as scatter between runs."
+    ]
+    assert sentences("23.5", "25", "26") == []
+    assert sentences("", "cold", "n/a") == []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.prediction import NOT_A_SINE
 from mrdamper.dampers.uncertainty import uncertainty_warnings
-from mrdamper.data import Floats
+from mrdamper.data import Floats, Run
 from mrdamper.errors import listed
 from mrdamper.identification import Identification
 from mrdamper.identification.loop_analysis import LoopAnalysis
@@ -32,6 +32,7 @@ _MAX_CORRELATION = 0.85  # correlation coefficient of tested frequencies and amp
 _MIN_LEVELS = 4  # number of tested currents
 _MAX_RUNS = 4  # number of runs named in one sentence
 _SAME_CURRENT_A = 0.01  # difference of currents that are one level [A]
+_SAME_TEMPERATURE_K = 5.0  # difference of temperatures that are one [K]
 _SAME_MOTION = 0.05  # relative difference of frequencies or amplitudes that are one
 
 
@@ -43,11 +44,12 @@ class Limitation:
     text: str
 
 
-def limitations(scored: RecipeResult, loops: Sequence[LoopAnalysis]) -> list[Limitation]:
+def limitations(scored: RecipeResult, loops: Sequence[LoopAnalysis], runs: Iterable[Run] = ()) -> list[Limitation]:
     """List the limitations of a model and of the tests it was identified from, the most harmful first."""
     entries = {
         PREDICTION: [
             *_design(loops, [run.run_id for run in scored.train.runs]),
+            *_temperature(runs, {run.run_id for run in scored.train.runs}),
             *_prediction(scored.cross_validated, scored.validation),
         ],
         TESTS: _tests(loops),
@@ -121,6 +123,18 @@ def _design(loops: Sequence[LoopAnalysis], identified: Sequence[str]) -> list[st
             "the dependence on frequency and amplitude is not identifiable."
         )
     return sentences
+
+
+def _temperature(runs: Iterable[Run], identified: Collection[str]) -> list[str]:
+    """State the temperatures of the identification runs where they differ."""
+    noted = [run.notes.get("temperature_C", "") for run in runs if run.id in identified]
+    values = [float(note) for note in noted if re.fullmatch(r"-?[0-9.]+", note)]
+    if not values or max(values) - min(values) < _SAME_TEMPERATURE_K:
+        return []
+    return [
+        f"Tests at {min(values):.0f} to {max(values):.0f} °C: the temperature is no input of the model, "
+        "and its effect counts as scatter between runs."
+    ]
 
 
 def _prediction(cross_validated: Validation, validation: Validation) -> list[str]:

@@ -262,7 +262,9 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         "candidates": rig.candidates,
         "folds": rig.folds,
         "floor": float(np.median(floors)) if floors else None,
-        "limitations": by_group([*limitations(chosen, rig.loops), Limitation("Prediction", _scatter(rig))]),
+        "limitations": by_group(
+            [*limitations(chosen, rig.loops, rig.dataset), Limitation("Prediction", _scatter(rig))]
+        ),
         "loops": rig.loops,
         "contradictions": rig.contradictions,
         "omissions": omission_lines(rig.candidates, rig.omitted, len(rig.omitted)),

@@ -118,7 +118,7 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
         )
     if verbose:
         lines += [f"  {row['name']} = {row['written']}" for row in table(rig.damper)]
-    entries = limitations(chosen, rig.loops)
+    entries = limitations(chosen, rig.loops, rig.dataset)
     listed = entries if verbose else entries[:shown]
     if listed:
         more = len(entries) - len(listed)
