@@ -298,7 +298,9 @@ def test_what_is_known_badly_is_told_number_by_number():
     assert f"95 % interval of fy spans a factor of {factor:.2g}" in said(covariance=logs, logs=(True, True))
     assert "interval of c spans" not in said(covariance=logs, logs=(True, True))
     assert "fy" not in said(covariance=np.diag([0.1, 3.1**2]), logs=(True, True)).replace("fy0", "")
-    assert "c ended at" in said(names=("fy",), logs=(False,), covariance=np.eye(1), dof=np.ones(1), one_sided=("c",))
+    one = {"logs": (False,), "covariance": np.eye(1), "dof": np.ones(1)}
+    assert "c ended at a limit of what was searched; its" in said(names=("fy",), one_sided=("c",), **one)
+    assert "c, fy ended at a limit of what was searched; their" in said(names=("fy",), one_sided=("c", "fy"), **one)
 
 
 SPREAD = RunScatter(0.03, 0.02, 0.01, 2.0)

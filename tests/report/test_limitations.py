@@ -8,6 +8,7 @@ import pytest
 from support.dampers import joint_damper
 
 from mrdamper.dampers.joint import JointFit, LocalMinimum
+from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition
 from mrdamper.report.limitations import RANGE, by_group, limitations
 from mrdamper.statistics.metrics import Scores
@@ -60,6 +61,10 @@ def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
     sentences = texts(fit)
     assert any("4.5 times the median" in s for s in sentences)
     assert any("(interval one-sided): d (" in s for s in sentences)
+    known = Uncertainty((), (), np.zeros((0, 0)), np.zeros(0), gain=0.0, offset=0.0, one_sided=("d",))
+    stated = replace(fit.damper, uncertainty=known)
+    known = [one.text for one in limitations(replace(scored(fit), damper=stated), ())]
+    assert [s.startswith("d (") for s in known if "one-sided" in s] == [True]  # once
     calm = replace(fit, nrmse_pp=np.array([0.02, 0.02, 0.03]), at_bounds=())
     assert not any("times the median" in s or "bound" in s for s in texts(calm))
 

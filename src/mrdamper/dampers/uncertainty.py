@@ -179,8 +179,12 @@ def uncertainty_warnings(damper: Damper) -> list[str]:
     if uncertainty is None:
         return ["The uncertainty of the parameters is not known: the model was saved without it."]
     numbers = damper.fitted_parameters
+    ended: dict[str, list[str]] = {}
+    for name in uncertainty.one_sided:
+        ended.setdefault(_limit(numbers[name]), []).append(name)
     sentences = [
-        f"{name} ended at {_limit(numbers[name])}; its interval is one-sided." for name in uncertainty.one_sided
+        f"{', '.join(names)} ended at {limit}; {('its interval is', 'their intervals are')[len(names) > 1]} one-sided."
+        for limit, names in ended.items()
     ]
     sentences += [f"{text}." for text in uncertainty.words]
     mentioned = " ".join(uncertainty.words)

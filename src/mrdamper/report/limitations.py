@@ -12,7 +12,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.prediction import NOT_A_SINE
-from mrdamper.dampers.uncertainty import uncertainty_warnings
+from mrdamper.dampers.uncertainty import Uncertainty, uncertainty_warnings
 from mrdamper.data import Floats, Run
 from mrdamper.errors import listed
 from mrdamper.identification import Identification
@@ -54,8 +54,8 @@ def limitations(scored: RecipeResult, loops: Sequence[LoopAnalysis], runs: Itera
         ],
         TESTS: _tests(loops),
         MODEL: [
-            *(_joint(scored.fit) if isinstance(scored.fit, JointFit) else ()),
-            *(_functions(scored.fit) if isinstance(scored.fit, ModifiedFit) else ()),
+            *(_joint(scored.fit, scored.damper) if isinstance(scored.fit, JointFit) else ()),
+            *(_functions(scored.fit, scored.damper) if isinstance(scored.fit, ModifiedFit) else ()),
         ],
         PARAMETERS: [
             *(uncertainty_warnings(scored.damper) if scored.damper.uncertainty else ()),
@@ -163,7 +163,7 @@ def _prediction(cross_validated: Validation, validation: Validation) -> list[str
     return sentences
 
 
-def _functions(fit: ModifiedFit) -> list[str]:
+def _functions(fit: ModifiedFit, damper: Damper) -> list[str]:
     sentences = []
     middle = fit.conditions[len(fit.conditions) // 2]
     highest = fit.damper.envelope.current_A[1]
@@ -179,15 +179,15 @@ def _functions(fit: ModifiedFit) -> list[str]:
                 f"The function of {name} predicts other conditions no better than its mean "
                 f"(cross-validated error {fitted.left_out:.2f} of the spread)."
             )
-    if fit.at_bounds:
-        sentences.append(f"Parameter functions at a bound of the search: {', '.join(fit.at_bounds)}.")
+    if names := _held(fit.at_bounds, damper):
+        sentences.append(f"Parameter functions at a bound of the search: {', '.join(names)}.")
     levels = len({round(c.current_A, 3) for c in fit.conditions})
     if 1 < levels < _MIN_LEVELS:
         sentences.append(f"Only {levels} currents were tested: the form between them is an assumption.")
     return sentences
 
 
-def _joint(fit: JointFit) -> list[str]:
+def _joint(fit: JointFit, damper: Damper) -> list[str]:
     sentences = []
     if not fit.ending.converged:
         sentences.append(f"The global fit did not converge: the search {fit.ending}.")
@@ -201,9 +201,16 @@ def _joint(fit: JointFit) -> list[str]:
     ratio = float(np.max(fit.nrmse_pp) / np.median(fit.nrmse_pp))
     if ratio > 2:
         sentences.append(f"Largest fitting error of a run: {ratio:.1f} times the median.")
-    if fit.at_bounds:
-        sentences.append(f"Parameters at a bound of the search (interval one-sided): {', '.join(fit.at_bounds)}.")
+    if names := _held(fit.at_bounds, damper):
+        sentences.append(f"Parameters at a bound of the search (interval one-sided): {', '.join(names)}.")
     return sentences
+
+
+def _held(at_bounds: Sequence[str], damper: Damper) -> list[str]:
+    """List the parameters at bounds that the uncertainty of the damper does not state as such."""
+    uncertainty: Uncertainty | None = damper.uncertainty
+    stated = {name.partition(".")[0] for name in uncertainty.one_sided} if uncertainty else set[str]()
+    return [name for name in at_bounds if name not in stated]
 
 
 def _identifications(identifications: Sequence[Identification]) -> list[str]:
