@@ -289,12 +289,50 @@ def test_a_current_of_the_profile_is_compared_with_a_channel_that_the_profile_do
         "displacement and force positive in compression",
         "Weg und Kraft positiv bei Druck",
         "displacement positive in compression, force positive in compression",
+        "Signs: compressive load positive and bump stroke positive",
+        "Convention of the rig: extension negative",
+        "Усилие и перемещение положительны при сжатии",
     ],
 )
 def test_a_line_that_counts_both_channels_positive_in_compression_changes_both_signs(tmp_path, line):
     table(tmp_path / "a_0.5A.csv", [f"# {line}", "time [s],displacement [mm],force [N]"], T, -X, -force(0.5))
     (record,) = import_files([tmp_path / "a_0.5A.csv"]).records
     assert record.displacement == pytest.approx(1e-3 * X, abs=1e-8)
+    assert record.force == pytest.approx(force(0.5), abs=1e-2)
+
+
+def test_a_velocity_counts_as_the_displacement_does(tmp_path):
+    head = ["# compression positive", "time [s],displacement [mm],force [N],velocity [mm/s]"]
+    table(tmp_path / "a_0.5A.csv", head, T, -X, -force(0.5), -np.gradient(X, T))
+    (record,) = import_files([tmp_path]).records
+    assert record.velocity is not None
+    assert record.velocity == pytest.approx(1e-3 * np.gradient(X, T), abs=1e-6)
+
+
+def test_a_sign_of_the_profile_is_that_of_the_column_whatever_a_line_states(tmp_path):
+    lines = ["# ram extended = positive = specimen compressed", "# load cell: compression positive"]
+    table(tmp_path / "a_0.5A.csv", [*lines, "time [s],displacement [mm],force [N]"], T, -X, -force(0.5))
+    (refused,) = import_files([tmp_path]).refusals
+    assert (refused.error.code, "[channels.displacement] sign = -1" in refused.error.remedy) == (
+        "E_SIGN_CONVENTION",
+        True,
+    )
+    for also in ("", "[channels.force]\nsign = -1"):
+        profile = parse_profile(f"[channels.displacement]\nsign = -1\n{also}")
+        (record,) = import_files([tmp_path], profile).records
+        assert record.displacement == pytest.approx(1e-3 * X, abs=1e-8)
+        assert record.force == pytest.approx(force(0.5), abs=1e-2)
+
+
+def test_where_a_line_gives_the_sense_of_one_channel_the_sign_of_the_other_is_asked_for(tmp_path):
+    table(
+        tmp_path / "a_0.5A.csv", ["# force: compression positive", "time [s],stroke [mm],force [N]"], T, -X, -force(0.5)
+    )
+    (refused,) = import_files([tmp_path]).refusals
+    assert (refused.error.code, "set [channels.displacement] sign = -1" in refused.error.remedy) == (
+        "E_DISSIPATION_SIGN", True,
+    )  # fmt: skip
+    (record,) = import_files([tmp_path], parse_profile("[channels.displacement]\nsign = -1")).records
     assert record.force == pytest.approx(force(0.5), abs=1e-2)
 
 

@@ -25,14 +25,15 @@ from mrdamper.rig_files.column_names import (
 )
 from mrdamper.rig_files.conditions import rate_in_name, stated_rate
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
-from mrdamper.rig_files.record import OPTIONAL, REQUIRED
+from mrdamper.rig_files.record import OPTIONAL, REQUIRED, SIGN_CHANGED
 from mrdamper.rig_files.units import DIMENSION, Unit, parse_unit
 from mrdamper.rig_files.vocabulary import words
 
 if TYPE_CHECKING:
-    from mrdamper.rig_files.profile import Channel, Profile
+    from mrdamper.rig_files.profile import Profile
 
 ROLES = (*REQUIRED, *OPTIONAL)
+_DERIVED = ("velocity", "acceleration")  # of the displacement
 _MOST_RESTARTS = 0.05  # of the samples of a clock that counts within steps
 _TOTAL = re.compile(r"total|absolut|gesamt|cumulat|kumul", re.IGNORECASE)
 _INDEX = words("sample")
@@ -84,7 +85,7 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
         try:
             if role in REQUIRED and not isinstance(channel.column, int):
                 _refuse_two_values(table, column)
-            entry = _convert(table, role, column, channel)
+            entry = _convert(table, role, column, profile)
         except InputError as error:
             problems.append(error)
             continue
@@ -102,7 +103,7 @@ def partly_assigned(table: RawTable, profile: Profile) -> dict[str, Assigned]:
     for role in ROLES:
         with contextlib.suppress(InputError):
             column = _stated_or_chosen(table, role, profile, [e.column for e in assigned.values()])
-            if column is not None and (entry := _convert(table, role, column, profile.channel(role))) is not None:
+            if column is not None and (entry := _convert(table, role, column, profile)) is not None:
                 assigned[role] = entry
     return assigned
 
@@ -257,8 +258,19 @@ def _ambiguous(table: RawTable, role: str, names: Sequence[str]) -> RigFileError
     return table.source.refuse("E_AMBIGUOUS", f"{shown} may both be the {role}", remedy, line=table.line)
 
 
-def _convert(table: RawTable, role: str, column: int, channel: Channel) -> Assigned | None:
-    header = table.headers[column]
+def sign_of(table: RawTable, profile: Profile, role: str) -> int | None:
+    """Return the sign of a channel by the profile, else by a line of the file; 0 if it is unclear, None if unstated.
+
+    Velocity and acceleration count as the displacement does.
+    """
+    channel = profile.channel(role)
+    if "sign" in channel.model_fields_set:
+        return channel.sign
+    return table.senses.get(role) if role not in _DERIVED else sign_of(table, profile, "displacement")
+
+
+def _convert(table: RawTable, role: str, column: int, profile: Profile) -> Assigned | None:
+    header, channel, sign = table.headers[column], profile.channel(role), sign_of(table, profile, role)
     unit = channel.unit or header.unit
     unit = "degF" if unit == "F" and role == "temperature" else unit
     uncalibrated = channel.scale is None and header.dimension in ("voltage", "count")  # no unit makes them newtons
@@ -271,7 +283,7 @@ def _convert(table: RawTable, role: str, column: int, channel: Channel) -> Assig
     if not channel.unit:
         _refuse_two_units(table, role, column, unit)
     name = table.names[column]
-    if "sign" not in channel.model_fields_set and role in ("displacement", "force") and names_compression(name):
+    if not sign and role in SIGN_CHANGED and (sign == 0 or names_compression(name)):
         raise _refusal(
             ColumnError,
             table,
@@ -280,8 +292,9 @@ def _convert(table: RawTable, role: str, column: int, channel: Channel) -> Assig
             "E_SIGN_CONVENTION",
         )
     si = parse_unit(unit) or Unit("", 1.0)
-    shift = 0.0 if channel.integrate else channel.sign * (si.factor * channel.offset + si.offset)
-    factor = channel.sign * (channel.scale or 1.0) * si.factor
+    sign = sign or 1
+    shift = 0.0 if channel.integrate else sign * (si.factor * channel.offset + si.offset)
+    factor = sign * (channel.scale or 1.0) * si.factor
     return Assigned(column, header.name, unit, factor, shift + 0.0, 1e-3 * channel.delay_ms)
 
 

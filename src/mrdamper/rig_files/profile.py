@@ -236,7 +236,7 @@ def profile_text(profile: Profile) -> str:
     sections = {"file": profile.file.model_dump(exclude_none=True, exclude_defaults=True)}
     for name, channel in profile.channels.items():
         says = channel.model_dump(exclude_none=True, exclude_defaults=True)
-        sections[f"channels.{name}"] = {**says, "sign": channel.sign}
+        sections[f"channels.{name}"] = says | ({"sign": channel.sign} if "sign" in channel.model_fields_set else {})
     for name in ("current", "correction"):
         table = getattr(profile, name)
         sections[name] = {} if table is None else table.model_dump(exclude_none=True, exclude_unset=True)

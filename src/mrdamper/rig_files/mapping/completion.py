@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from mrdamper.rig_files.column_names import (
 from mrdamper.rig_files.conditions import currents_in, without_currents
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_nanoseconds
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.record import SIGN_CHANGED, Finding
 from mrdamper.rig_files.text.layout import LISTED, X_VALUE, cells_of
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.text.tokens import looks_numeric, number
@@ -60,14 +61,9 @@ _NUMBERS = r"(?:ch(?:annel)?|kanal|canal|voie|canale|var(?:iable)?|col(?:umn)?)"
 NUMBERED = re.compile(rf"(?i)(?:{_NUMBERS}?[ ._]?|[a-z]\w*\[)([0-9]{{1,3}})\]?")
 _CHANNEL_IS = re.compile(rf"(?i)(?<!\w){_NUMBERS}" + r"[ ._]?(?P<number>[0-9]{1,3})\s*[:=]\s*(?P<what>[^;|\t]{2,60})")
 _SENSES = {1: tuple(words("tension_stems")), -1: tuple(words("compression_stems"))}
-_COUNTED = [  # force positive in compression; Force (compression positive)
-    re.compile(r"(?i)(?P<what>[^\W\d_]+(?:(?: and| und| et| y| e|) [^\W\d_]+)?)" + rest)
-    for rest in (
-        r":? (?:is |are )?posit?iv[eo]? (?:in|for|on|bei|für|en) (?P<sense>[^\W\d_]+)",
-        r"[ ,:(]{1,3}(?P<sense>[^\W\d_]+) (?:is )?posit?iv[eo]?\b",
-    )
-]
-_AND = re.compile(r"(?i) (?:and|und|et|y|e) ")
+_POLARITIES = {1: tuple(words("positive_stems")), -1: tuple(words("negative_stems"))}
+_WORD = re.compile(r"[^\W\d_]+")
+_MOVES = {"velocity": "displacement"}  # counts as
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _ZERO = re.compile(r"(?i)\bzero (?:is )?at ([+-]?[0-9]{1,10})(?![.,]?[0-9])")
 _FULL_SCALE = re.compile(  # sections of a header: Name=Stroke, FullScale=75, Unit=mm
@@ -125,24 +121,45 @@ def _sign_of(label: str, remarks: Sequence[str]) -> int:
     """1 for tension, -1 for compression, by the word itself or by a line that explains it; 0 if neither says."""
     explained = re.compile(rf"(?<!\w){re.escape(label)}\s*[=:]\s*([^\W\d]+)")
     words = [label, *(match[1] for line in remarks for match in explained.finditer(line))]
-    signs = {sign for sign, stems in _SENSES.items() for word in words if word.casefold().startswith(stems)}
+    signs = {_sign(_SENSES, word) for word in words} - {0}
     return signs.pop() if len(signs) == 1 else 0
 
 
 def _with_stated_signs(table: RawTable) -> RawTable:
-    """Displacement and force as tension counts positive, where a line states that compression does."""
+    """Return the table with the senses in which lines count displacement and force: force positive in compression.
+
+    A line of one sense holds for all that it names, else each of its clauses does. Where a line names no channel, it
+    holds for those that no other states.
+    """
     stated: dict[str, set[int]] = {}
     for line in table.remarks:
-        matches = next(filter(None, (list(form.finditer(line[:_LONGEST_LINE])) for form in _COUNTED)), [])
-        for match in matches:
-            for what in _AND.split(match["what"]):
-                stated.setdefault(role_of(what) or "", set()).add(_sign_of(match["sense"], ()))
-    for role in ("displacement", "force"):
-        columns = table.columns(role)
-        if stated.get(role) == {-1} and len(columns) == 1:
-            text = f"the sign of column {table.names[columns[0]]!r} is changed: the file counts compression positive"
-            table = _scaled(table, columns[0], *table.headers[columns[0]], -1.0, text)
-    return table
+        whole = line[:_LONGEST_LINE]
+        for clause in re.split(r"[,;|\t]", whole) if len(_counted(whole)) > 1 else [whole]:
+            roles = {
+                _MOVES.get(role := role_of(word) or "", role)
+                for word in _WORD.findall(clause)
+                if not _sign(_SENSES, word)
+            }
+            for role in roles & {*SIGN_CHANGED} or {""}:
+                stated.setdefault(role, set()).update(_counted(clause))
+    others = stated.get("", set()) - {1} and stated[""]
+    senses = {role: sum(own) for role in SIGN_CHANGED if (own := stated.get(role) or others)}
+    changed = [Finding("W_SCALE", f"{SIGN_CHANGED[role]}: the file counts compression positive") for role in senses
+               if senses[role] == -1]  # fmt: skip
+    return replace(table, senses=senses).noted(*changed)
+
+
+def _counted(clause: str) -> set[int]:
+    """Return the senses that a clause counts positive: 1 for tension, -1 for compression."""
+    words = _WORD.findall(clause)
+    senses, polarities = ([sign for w in words if (sign := _sign(of, w))] for of in (_SENSES, _POLARITIES))
+    paired = zip(senses, polarities, strict=True) if len(senses) == len(polarities) else product(senses, polarities)
+    return {sense * polarity for sense, polarity in paired}
+
+
+def _sign(stems: Mapping[int, tuple[str, ...]], word: str) -> int:
+    """Return 1 or -1 where a word begins with one of its stems, else 0."""
+    return next((sign for sign, of in stems.items() if word.casefold().startswith(of)), 0)
 
 
 def _keyed_cells(table: RawTable, longest: int = _LONGEST_LINE) -> Iterator[tuple[str, list[str]]]:
