@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from mrdamper.errors import InputError
 from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import import_files, read_run, read_runs
@@ -284,3 +285,58 @@ def test_texts_that_hold_no_usable_object_are_texts(tmp_path):
     for text in ("{broken", '{"a": 1' + "0" * 400 + "}", '{"a": [1, 2], "b": null}'):
         np.savez(tmp_path / "run_0.5A.npz", **arrays, units=np.array(text))
         assert currents(import_files([tmp_path]).records) == [0.5]
+
+
+FOLDERS = (
+    '[channels.displacement]\nfile = "{run}/wire.csv"\ncolumn = "position"\nunit = "mm"\n'
+    '[channels.force]\nfile = "{run}/cell.csv"\ncolumn = "load"\nunit = "N"\n'
+)
+
+
+def test_a_profile_joins_files_of_one_name_in_a_folder_for_each_test(tmp_path):
+    for amperes in (0.0, 0.5):
+        folder = tmp_path / f"run {amperes} A"
+        folder.mkdir()
+        (folder / "wire.csv").write_text("time [s],number,position\n" + rows(T, np.arange(T.size), X))
+        (folder / "cell.csv").write_text("time [s],load\n" + rows(T, force(amperes)))
+    assert currents(import_files([tmp_path], parse_profile(FOLDERS)).records) == [0.0, 0.5]
+    with pytest.raises(InputError, match="no file is called 'wire_"):
+        import_files([tmp_path], parse_profile(FOLDERS.replace("{run}/wire", "wire_{run}")))
+
+
+def test_a_file_of_a_profile_without_its_channel_or_a_time_is_refused_with_what_it_lacks(tmp_path):
+    for folder in (tmp_path / "1", tmp_path / "2"):
+        folder.mkdir()
+        (folder / "wire.csv").write_text("clock,position\n" + rows(T, X))
+        (folder / "cell.csv").write_text("time [s],load cell\n" + rows(T, force(0.5)))
+    refusals = import_files([tmp_path], parse_profile(FOLDERS)).refusals
+    assert {("channels.time" in r.error.remedy, "no column 'load'" in r.error.found) for r in refusals} == {
+        (True, False),
+        (False, True),
+    }
+
+
+@pytest.mark.parametrize("line", ["Stage {}: sine 1 Hz, coil at {} A", "stage {} = {} A", "* Stage {}) {} A, 10 mm"])
+def test_a_text_that_lists_the_stages_of_a_record_gives_each_its_current(tmp_path, line):
+    both = (np.r_[T, T + 9], np.r_[X, X], np.r_[force(0.2), force(0.8)], np.repeat([1, 2], T.size))
+    (tmp_path / "night.csv").write_text("time [s],stroke [mm],load [N],Stage\n" + rows(*both))
+    (tmp_path / "schedule.txt").write_text(
+        "Schedule\n" + "".join(line.format(*of) + "\n" for of in ((1, 0.2), (2, 0.8)))
+    )
+    assert currents(import_files([tmp_path]).records) == [0.2, 0.8]
+
+
+def test_a_text_that_a_profile_leaves_out_states_nothing(tmp_path):
+    (tmp_path / "a.csv").write_text("time [s],stroke [mm],load [N]\n" + rows(T, X, force(0.5)))
+    (tmp_path / "wrong.txt").write_text("Coil current: 0.9 A\n")
+    assert currents(import_files([tmp_path]).records) == [0.9]
+    profile = parse_profile('[file]\nleave_out = ["wrong*"]\n[current]\nvalue = 0.5')
+    assert currents(import_files([tmp_path], profile).records) == [0.5]
+
+
+def test_sentences_between_commas_are_no_heading(tmp_path):
+    (tmp_path / "a_0.5A.csv").write_text("time [s],stroke [mm],load [N]\n" + rows(T, X, force(0.5)))
+    prose = "The stroke is that of the actuator, the load that of the cell below, and the current was not measured.\n"
+    (tmp_path / "remarks.txt").write_text(prose)
+    found = import_files([tmp_path])
+    assert (currents(found.records), found.refusals, found.left_out) == ([0.5], (), ("remarks.txt",))

@@ -97,12 +97,17 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
     return assigned
 
 
-def partly_assigned(table: RawTable, profile: Profile) -> dict[str, Assigned]:
-    """Return the channels of a table that is no whole test, as far as they are known beyond doubt."""
+def partly_assigned(table: RawTable, profile: Profile, needed: Collection[str] = ()) -> dict[str, Assigned]:
+    """Return the channels of a table that is no whole test, as far as they are known beyond doubt.
+
+    Raises as `assign` where one that is needed is not known.
+    """
     assigned: dict[str, Assigned] = {}
     for role in ROLES:
-        with contextlib.suppress(InputError):
+        with contextlib.nullcontext() if role in needed else contextlib.suppress(InputError):
             column = _stated_or_chosen(table, role, profile, [e.column for e in assigned.values()])
+            if column is None and role in needed:
+                CombinedError.raise_from(_missing(table, dict.fromkeys({*REQUIRED} - {role}, 0), profile))
             if column is not None and (entry := _convert(table, role, column, profile)) is not None:
                 assigned[role] = entry
     return assigned
@@ -229,7 +234,7 @@ def column_called(table: RawTable, column: str | int, what: str, key: str = "") 
 def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> list[InputError]:
     """Return a refusal for every channel that no column is known to be."""
     missing = [r for r in REQUIRED if r not in columns and not (r == "time" and rate_of(table, profile))]
-    if missing and not any(table.names):
+    if missing and not columns and not any(table.names):
         what = f"{len(table.names)} columns without names or units"
         remedy = (
             'name them in a profile, with their units: [file] names = ["time [s]", "displacement [mm]", "force [N]"]'
@@ -243,8 +248,9 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
     if volts:  # a column alone would not do
         shown += f"; {', '.join(volts)} in volts without a scale"
         fixed |= dict.fromkeys(("displacement", "force"), ", unit and scale (unit per volt)")
-    if len(table.names) == 2 and len(missing) > 1:  # a channel a file
-        fixed = {r: f'{fixed.get(r, "")}, and file = "...{{run}}..." where each file has one channel,' for r in missing}
+    if (len(table.names) == 2 and len(missing) > 1) or {*columns} & {*SIGN_CHANGED, "current"}:  # several files
+        each = ', and file = "...{run}..." where each file has one channel,'
+        fixed |= {role: fixed.get(role, "") + each for role in missing if role != "time"}
     beside = f"(found {shown})"
     return [
         _refusal(ColumnError, table, f"no column is known to be {r} {beside}", remedy.format(r, fixed.get(r, "")))

@@ -37,8 +37,8 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
     """
     with raw_tables(path, profile.file) as every:
         if len(every) == 1:
-            every = [with_description(every[0], path)]
-        every = [with_notes(table, path) for table in every]
+            every = [with_description(every[0], path, profile)]
+        every = [with_notes(table, path, profile) for table in every]
         tables, problems = tables_of_tests(test_tables(every, profile), profile)
         tables, computed = _without_computed(tables)
         records: list[Record] = []

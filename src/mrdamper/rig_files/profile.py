@@ -50,7 +50,7 @@ class Channel(Table):
         How late the channel is, where it is known [ms].
     file : str, optional
         Name of the files that hold the channel, where each file holds other channels of a test, with
-        {run} where the test's name or number stands and * for anything: `C1--*--{run}.csv`.
+        {run} where the test's name or number stands and * for anything: `C1--*--{run}.csv`, `{run}/force.csv`.
     integrate : bool
         The displacement's column holds the velocity, of which the displacement is the integral, from zero on.
     """
@@ -183,17 +183,27 @@ class Profile(Table):
                 raise ValueError(f"{channel.unit!r} is no unit of {dimension} ({name}); known are {units}")
         return channels
 
-    def of_file(self, name: str) -> tuple[str, Profile]:
-        """Return the test that a file of some channels belongs to, and its profile; an empty name for other files."""
+    def of_file(self, path: Path) -> tuple[str, Profile]:
+        """Return the test that a file of some channels belongs to, and its profile; an empty name for other files.
+
+        A pattern with folders is compared with as many of the path's.
+        """
         stated = {role: channel for role, channel in self.channels.items() if channel.file is not None}
-        matches = {role: re.fullmatch(_as_expression(c.file or ""), name[:255]) for role, c in stated.items()}
+        patterns = {role: c.file or "" for role, c in stated.items()}
+        names = {role: "/".join(path.parts[-1 - pattern.count("/") :]) for role, pattern in patterns.items()}
+        matches = {role: re.fullmatch(_as_expression(p), names[role][:255]) for role, p in patterns.items()}
         runs = {match["run"] for match in matches.values() if match}
         channels = {role: c for role, c in self.channels.items() if role not in stated or matches[role]}
         own = self.model_copy(update={"channels": channels}) if stated else self
         return runs.pop() if len(runs) == 1 else "", own
 
     def require_matches(self, tests: Sequence[tuple[Path, str]]) -> None:
-        """Refuse patterns of the table of currents that match no file and no test."""
+        """Refuse patterns of the table of currents and of the channels' files that match no file and no test."""
+        for role, channel in self.channels.items():
+            only = Profile(channels={role: channel})
+            if channel.file is not None and not any(only.of_file(path)[0] for path, _ in tests):
+                remedy = "write the files' name, with folders where it has slashes, and {run} for what names the test"
+                raise ProfileError(f"no file is called {channel.file!r}", where=f"[channels.{role}]", remedy=remedy)
         source = self.current or CurrentSource(value=0.0)
         absent = set(source.values).difference(*(source.fitting(path, test) for path, test in tests))
         if absent:

@@ -196,7 +196,7 @@ class _Intake:
         """Read a file, and check the tests in it whose current is known."""
         self._order[path] = len(self._order)
         self._given |= {path} if given else set()
-        run, profile = self._profile.of_file(path.name)
+        run, profile = self._profile.of_file(path)
         if run:
             self._shares[path] = run, profile
             return
@@ -293,16 +293,22 @@ class _Intake:
 
     def _join_channels(self, others: list[Path], texts: Sequence[Path]) -> set[Path]:
         """Join channels of several files, and currents that other files state; the files that were used."""
-        parts = [part_of(path, self._profile.of_file(path.name)[1]) for path in others]
-        parts += [part_of(path, own, run) for path, (run, own) in self._shares.items()]
+        refused: list[Path] = []
+        parts = [part_of(path, self._profile.of_file(path)[1]) for path in others]
+        for path, (run, own) in self._shares.items():
+            try:
+                parts.append(part_of(path, own, run))
+            except InputError as error:
+                refused.append(path)
+                self.refusals.append(Refusal(str(path), error))
         wanted = {part.key: part.table.names for part in parts if part is not None}
         whole = [path for path, _ in self._pending if number_of(path) in wanted]
         whole += [  # the displacement that is measured is surer than the integral
             path for path, record in self.tests()
             if is_integrated(record) and "displacement" in wanted.get(number_of(path), ())
         ]  # fmt: skip
-        parts += [part_of(path, self._profile.of_file(path.name)[1]) for path in dict.fromkeys(whole)]
-        used: set[Path] = set()
+        parts += [part_of(path, self._profile.of_file(path)[1]) for path in dict.fromkeys(whole)]
+        used = {*refused}
         for group, records in joined_files([part for part in parts if part is not None], self._profile):
             paths = {part.path for part in group}
             used |= paths
@@ -338,7 +344,7 @@ class _Intake:
         """Return the tests without a current, apart for those of a file that a column numbers as results do."""
         tests: list[tuple[Path, Record]] = []
         for path in dict.fromkeys(path for path, _ in self._pending):
-            numbered = tests_by(path, results, self._profile.of_file(path.name)[1])
+            numbered = tests_by(path, results, self._profile.of_file(path)[1])
             tests += [(path, test) for test in numbered] or [test for test in self._pending if test[0] == path]
         return tests
 

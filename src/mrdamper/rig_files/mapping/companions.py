@@ -55,17 +55,22 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
 
     None if it has none, or several tables. Parts of one test have one `run`, or the same numbers in their names;
     files of one column lie in one folder and have one name beside the channel's: run7_force_N.txt, run7_time_s.txt.
+
+    Raises `InputError` if the file of a `run` lacks a channel that the profile says is in it, or a time.
     """
     try:
         with raw_tables(path, profile.file) as tables:
             if len(tables) != 1:
                 return None
             table, alone = completed(tables[0]), len(tables[0].names) == 1
-            assigned = partly_assigned(table, profile)
+            stated = [role for role, channel in profile.channels.items() if channel.file]
+            assigned = partly_assigned(table, profile, ["time", *stated] if run and not alone else ())
             raw = table.read([entry.column for entry in assigned.values()])
             channels = {role: rescale(raw.values[e.column], e.factor, e.offset) for role, e in assigned.items()}
             current = None if alone else current_of(table, profile, path, channels.get("current"), slice(None))[0]
     except InputError:
+        if run:
+            raise
         return None
     if not alone and "time" in channels:
         there = np.isfinite(channels["time"])
@@ -175,11 +180,11 @@ def currents_beside(
     rows = zip(results.cells, results.current, strict=True) if results else ()  # Level, Current (A): L1, 0.35
     lines += [f"{cells[1]}: {value:g} A" for cells, value in rows if len(cells) > 1]
     matches = [match for line in dict.fromkeys(lines) if (match := _CODE.match(line))]
-    stated = [
+    stated = {
         (f"{match[1].casefold()}{number}", amperes(match[4], match[5]))
         for match in matches
         for number in range(int(match[2]), int(match[3] or match[2]) + 1)
-    ]
+    }
     codes = dict(stated)
     if len(codes) < 2 or len(codes) < len(stated):
         return None

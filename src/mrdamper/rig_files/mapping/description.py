@@ -12,6 +12,8 @@ from xml.etree import ElementTree
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_by_lines
 from mrdamper.rig_files.mapping.completion import NUMBERED, scaled_columns, states_scale
+from mrdamper.rig_files.mapping.results import numbered_tests
+from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED
 from mrdamper.rig_files.text.short import short_lines
@@ -30,7 +32,7 @@ _README = re.compile(
 )
 
 
-def with_notes(table: RawTable, path: Path) -> RawTable:
+def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Add the names, units and scales that short texts beside the file state, where the table lacks them."""
     if not scaled_columns(table) and not _lacks_names_or_units(table):
         return table
@@ -39,7 +41,8 @@ def with_notes(table: RawTable, path: Path) -> RawTable:
     readme = readme or [p for p in path.parent.parent.glob("*") if _README.fullmatch(p.name)]
     readme += [p for p in files if p.suffix.lower() in _STRUCTURES]
     listing = [p for p in files if p.suffix.lower() in _TEXTS and p.stat().st_size <= _LARGEST_LIST]
-    texts = sorted(p for p in {*readme, *listing} if p.is_file() and p != path and p.suffix.lower() in _READ)
+    texts = [p for p in {*readme, *listing} if p.is_file() and p != path and p.suffix.lower() in _READ]
+    texts = sorted(p for p in texts if not profile.leaves_out(p.name))
     lines = [line for text in texts if len(own := short_lines(text)) <= _MOST for line in own]
     return replace(table, remarks=(*table.remarks, *filter(None, map(_of_channels, lines))))
 
@@ -59,11 +62,13 @@ def _of_channels(line: str) -> str:
     return line if states_scale(line) or (any(map(is_unit, units)) and not stated_by_lines([line], ".")) else ""
 
 
-def with_description(table: RawTable, path: Path) -> RawTable:
+def with_description(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Return the table with what the text or XML file of its name, or the only other file of its folder, states."""
     other = _only_other(path)
+    other = None if other is None or profile.leaves_out(other.name) else other
     beside = [path.with_suffix(suffix) for suffix in (*_STRUCTURES, *_TEXTS)]
-    named = [p for p in beside if p != path and p.is_file() and (p.suffix in _STRUCTURES or is_description(p))]
+    named = [p for p in beside if p != path and p.is_file() and not profile.leaves_out(p.name)]
+    named = [p for p in named if (p.suffix in _STRUCTURES or is_description(p))]
     if named or (other is not None and is_description(other)):
         lines = short_lines(named[0] if named else other)  # type: ignore[arg-type]
         return replace(table, remarks=(*table.remarks, *lines))
@@ -93,7 +98,7 @@ def _unit(attributes: dict[str, str]) -> str:
 def is_description(path: Path) -> bool:
     """Tell if a file is a short text that states quantities or lists channels, and no record: Coil_Current, 0.5, A."""
     lines = short_lines(path) if path.suffix.lower() in _TEXTS and path.is_file() else []
-    if sum(bool(line.strip()) for line in lines) >= _FEWEST_ROWS:
+    if sum(bool(line.strip()) for line in lines) >= _FEWEST_ROWS or numbered_tests(lines):
         return False
     listed = [line for line in lines if _of_channels(line).startswith("channel ")]
     return len(listed) > 1 or bool(stated_by_lines(lines, "."))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.rig_files.column_names import names_condition, split_name, words_of
+from mrdamper.rig_files.column_names import COIL, holds, names_condition, split_name, words_of
 from mrdamper.rig_files.conditions import contradicts, currents_in, quantity_in_cell
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of
@@ -22,6 +22,7 @@ _QUANTITY = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s*(m?A)")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
+_LISTED_TEST = re.compile(r"[\s#%*\"-]*(?P<name>[^\W\d_][^\d:=]{0,30}?)[\s_.#-]*(?P<number>[0-9]{1,6})\s*[:=;,\t)]")
 _STARTS, _ENDS = words("start"), words("end")
 _NUMBERED = words("run") | words("run_number") | {"step", "schritt", "#"}
 _SPECIMEN = re.compile(
@@ -106,7 +107,20 @@ def results_in(lines: Sequence[str]) -> Results | None:
             columns[results.current, results.cells] = results
         if columns:
             break
-    return next(iter(columns.values())) if len(columns) == 1 else None
+    return (
+        next(iter(columns.values())) if len(columns) == 1 else None if columns else numbered_tests(lines[:_MOST_LINES])
+    )
+
+
+def numbered_tests(lines: Iterable[str]) -> Results | None:
+    """Return the tests that lines list by their numbers, with one current each: Step 3: sine, 2 Hz, coil at 0.4 A."""
+    stated = [(match, currents_in(line)) for line in lines if (match := _LISTED_TEST.match(line[:_LONGEST_LINE]))]
+    rows = [(m["name"].strip(), m["number"], of[0]) for m, of in stated if len(of) == 1 and not holds(m["name"], COIL)]
+    numbers = {(name.casefold(), int(number)) for name, number, _ in rows}
+    if len(numbers) < _FEWEST_ROWS or len(numbers) < len(rows) or len({name for name, _ in numbers}) > 1:
+        return None
+    cells = tuple((str(i), f"{name}{number}", number) for i, (name, number, _) in enumerate(rows, 1))
+    return Results(tuple(row[2] for row in rows), cells, "a line for each test", ("", "", rows[0][0]))
 
 
 def with_results(tables: list[RawTable]) -> list[RawTable]:
@@ -239,7 +253,7 @@ def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:
 def _key(text: str) -> str:
     """Return a name as it is compared: no case, spaces, or leading zeros of a plain number."""
     text = re.sub(r"\.(csv|txt|dat|asc|tra|mat|xlsx?|h5|tdms|json|parquet)$", "", text.casefold().strip())
-    text = re.sub(r"[\s_]+", " ", text).removesuffix(".0")
+    text = re.sub(r"(?<=[0-9])\.0+$", "", re.sub(r"[\s_]+", " ", text))
     return str(int(text)) if text.isascii() and text.isdigit() else text
 
 

@@ -38,6 +38,7 @@ _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are si
 _UNIT_KEYS, _NOTES, _SCALES = words("unit"), words("notes"), words("scale") | {"offset"}
 _MOST_LEVELS = 4  # lines of headings
 _TELLING = 2  # columns whose names tell what they are
+_LONGEST_HEADING = 6  # words
 _WORD = re.compile(r"(?:[^\W\d_]-)?[^\W\d_]{3,}")  # also x-axis
 _NAME_AND_UNIT = re.compile(r"[^\s\[(<{]+(?:\s*\[[^\[\]]*\]|\s*\([^()]*\))?")
 _QUANTITY = re.compile(
@@ -500,8 +501,9 @@ def _keyed_lines(cells: Mapping[int, Sequence[str]], roles: Mapping[int, int]) -
 
 
 def _names_columns(line: str, separator: str) -> bool:
-    cells = cells_of(line, separator)
-    return len([cell for cell in cells if cell]) >= 3 and not any(looks_numeric(cell) for cell in cells if cell)
+    """Tell if a line heads columns: three names or more, no number and no sentence."""
+    cells = [cell for cell in cells_of(line, separator) if cell]
+    return len(cells) >= 3 and not any(looks_numeric(cell) or len(cell.split()) > _LONGEST_HEADING for cell in cells)
 
 
 def _fields(line: str, separator: str, width: int) -> list[str]:
