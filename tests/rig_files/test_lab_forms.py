@@ -340,3 +340,17 @@ def test_sentences_between_commas_are_no_heading(tmp_path):
     (tmp_path / "remarks.txt").write_text(prose)
     found = import_files([tmp_path])
     assert (currents(found.records), found.refusals, found.left_out) == ([0.5], (), ("remarks.txt",))
+
+
+def test_lines_above_the_first_part_of_a_file_hold_for_all_of_its_parts(tmp_path):
+    head = "; rig B\n; coil current = 0.3 A\n"
+    parts = [f"; part {n}, started {n}:00\ntime [s],stroke [mm],load [N]\n" + rows(T, X, force(0.3, n)) for n in (1, 2)]
+    (tmp_path / "a.csv").write_text(head + "".join(parts))
+    assert currents(import_files([tmp_path]).records) == [0.3, 0.3]
+
+
+def test_a_number_before_a_letter_that_is_no_current_of_a_coil_is_a_code(tmp_path):
+    (tmp_path / "specimen_4411_A.csv").write_text(
+        "Current: 0.5 A\ntime [s],stroke [mm],load [N]\n" + rows(T, X, force(0.5))
+    )
+    assert currents(import_files([tmp_path]).records) == [0.5]

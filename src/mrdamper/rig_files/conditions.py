@@ -84,6 +84,7 @@ def currents_in(text: str) -> tuple[float, ...]:
     # 04A may be four or 0.4 amperes; 0400mA is padded.
     stated = [match for match in _IN_NAME.finditer(text) if match[2] or not re.fullmatch("0[1-9]+", match[1])]
     stated = [match for match in stated if not _NEXT_NUMBER.match(text, match.end(1))]
+    stated = [m for m in stated if m[0] != f"{m[1]}_A" or amperes(m[1], "A") <= LARGEST_STATED]  # damper_7731_A: a code
     signs = [-1.0 if _NEGATIVE.search(text[: match.start()]) else 1.0 for match in stated]
     currents = [sign * amperes(match[1], f"{match[2]}A") + 0.0 for sign, match in zip(signs, stated, strict=True)]
     return tuple(dict.fromkeys(currents))

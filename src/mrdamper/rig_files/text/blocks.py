@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mrdamper.rig_files.conditions import stated_by_lines, stated_in_titles
 from mrdamper.rig_files.text.layout import SPACES, Layout, is_comment, is_footer, split, units_in
@@ -17,6 +17,7 @@ _STATED = re.compile(
     rb"(?m)^[ \t]*(?:[#%\"A-Za-z]|//)[^\n]*[0-9] ?(?:m?A|amp)[^\n]*"
 )  # a line that may state a current
 _WORD = re.compile(r"[^\W\d_]{2,}")
+_NUMBERS = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)*")
 _TITLE_LINES = 20  # among which rows follow such a line
 _LOOK_BACK = 64 * 1024  # bytes of remarks there may be above a repeated header
 
@@ -62,11 +63,21 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
         at += len(chunk)
         tail = chunk[-_LOOK_BACK:]
     blocks.append(Block(begin, stop, begin_line, remarks))
-    blocks = [block for block in blocks if block.stop > block.start]
+    blocks = [_with_head(block, layout) for block in blocks if block.stop > block.start]
     if not worded:
         return blocks
     cut = (part for block in blocks for part in _cut_at_currents(stream, layout, block))
     return [block for block in cut if block.stop > block.start]
+
+
+def _with_head(block: Block, layout: Layout) -> Block:
+    """Return a block with the lines of the file that stand above the first one repeated in the block's own remarks."""
+    if not block.remarks:
+        return block
+    first, *shapes = (_NUMBERS.sub("0", line.strip()) for line in (block.remarks[0], *layout.remarks))
+    head = layout.remarks[: shapes.index(first)] if first in shapes else ()
+    head = tuple(line for line in head if not _currents([line])) if _currents(block.remarks) else head
+    return replace(block, remarks=(*head, *block.remarks))
 
 
 def _cut_at_currents(stream: TextStream, layout: Layout, block: Block) -> list[Block]:
