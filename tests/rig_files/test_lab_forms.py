@@ -354,3 +354,71 @@ def test_a_number_before_a_letter_that_is_no_current_of_a_coil_is_a_code(tmp_pat
         "Current: 0.5 A\ntime [s],stroke [mm],load [N]\n" + rows(T, X, force(0.5))
     )
     assert currents(import_files([tmp_path]).records) == [0.5]
+
+
+def test_clocks_beside_each_other_belong_to_the_channels_of_as_many_samples(tmp_path):
+    slow = T[::50]
+    head = "Clock A [s]\tClock B [s]\tHousing [degC]\tStroke [mm]\tLoad [N]\n"
+    cells = [
+        f"{slow[i]:.4f}\t{T[i]:.4f}\t{20 + 0.1 * i:.2f}" if i < slow.size else f"\t{T[i]:.4f}\t" for i in range(T.size)
+    ]
+    body = zip(cells, X, force(0.5), strict=True)
+    (tmp_path / "a_0.5A.txt").write_text(head + "".join(f"{c}\t{x:.5f}\t{f:.4f}\n" for c, x, f in body))
+    (record,) = import_files([tmp_path]).records
+    assert np.ptp(record.time) == pytest.approx(np.ptp(T), abs=1e-3)
+    assert np.ptp(record.displacement) == pytest.approx(0.020, rel=1e-3)
+
+
+def test_one_step_of_all_channels_in_lines_of_another_language_is_the_step_of_time(tmp_path):
+    head = "Signal;Weg;Kraft\nX-Einheit;ms;ms\nX-Delta;5,0;5,0\nEinheit;mm;N\n"
+    body = zip(X, force(0.5), strict=True)
+    (tmp_path / "a_0.5A.csv").write_text(head + "".join(f";{x:.5f};{f:.4f}\n".replace(".", ",") for x, f in body))
+    (record,) = import_files([tmp_path]).records
+    assert np.median(np.diff(record.time)) == pytest.approx(0.005)
+
+
+def test_a_row_of_notes_states_the_current_of_every_column(tmp_path):
+    rows_of = rows(T, X, force(0.2), T, X, force(0.8), separator="\t").splitlines()
+    head = "Name\tt\tx\tF\tt\tx\tF\nUnit\ts\tmm\tN\ts\tmm\tN\nNotes\t0.2 A\t0.2 A\t0.2 A\t0.8 A\t0.8 A\t0.8 A\n"
+    (tmp_path / "both.txt").write_text(head + "".join(f"{i}\t{row}\n" for i, row in enumerate(rows_of)))
+    assert currents(import_files([tmp_path]).records) == [0.2, 0.8]
+
+
+@pytest.mark.parametrize("line", ["Damper: B  Amps: 0.5  Bath: 20 C", "AMPERES = 0.5"])
+def test_a_unit_written_out_names_its_quantity(tmp_path, line):
+    head = f"{line}\nScan rate: 200 scans/sec\nstroke,load\ninches,newtons\n"
+    (tmp_path / "a.csv").write_text(head + rows(X / 25.4, force(0.5)))
+    (record,) = import_files([tmp_path]).records
+    assert (currents([record]), np.ptp(record.displacement)) == ([0.5], pytest.approx(0.02, rel=1e-3))
+    assert np.median(np.diff(record.time)) == pytest.approx(0.005)
+
+
+def test_a_time_of_a_netcdf_table_may_be_the_same_for_some_conditions(tmp_path):
+    netcdf_file = pytest.importorskip("scipy.io").netcdf_file
+    shape = {"amplitude": 2, "sample": T.size, "coil_current": 3}
+    loads = np.array([[force(i), 2 * force(i)] for i in (0.0, 0.4, 0.8)])
+    with netcdf_file(tmp_path / "t.nc", "w") as file:
+        for name, size in shape.items():
+            file.createDimension(name, size)
+        for name, unit, dimensions, values in (
+            ("coil_current", "A", ("coil_current",), np.array([0.0, 0.4, 0.8])),
+            ("amplitude", "mm", ("amplitude",), np.array([10.0, 20.0])),
+            ("time", "s", ("sample", "amplitude"), np.column_stack([T, T])),
+            ("displacement", "mm", ("amplitude", "sample"), np.stack([X, 2 * X])),
+            ("force", "N", ("coil_current", "amplitude", "sample"), loads),
+        ):
+            variable = file.createVariable(name, "d", dimensions)
+            variable[:], variable.units = values, unit
+    records = read_runs(tmp_path / "t.nc")
+    assert currents(records) == [0.0, 0.0, 0.4, 0.4, 0.8, 0.8]
+    assert [round(1e3 * np.ptp(record.displacement)) for record in records] == [20, 40] * 3
+
+
+def test_a_number_of_hdf5_beside_the_channels_has_the_unit_of_its_attribute(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "t.h5", "w") as file:
+        for group, amperes in (("a", 0.2), ("b", 0.8)):
+            for name, unit, values in (("time", "s", T), ("stroke", "mm", X), ("load", "N", force(amperes))):
+                file.create_dataset(f"{group}/raw/{name}", data=values).attrs["units"] = unit
+            file.create_dataset(f"{group}/set/coil_current", data=1e3 * amperes).attrs["units"] = "mA"
+    assert currents(import_files([tmp_path]).records) == [0.2, 0.8]

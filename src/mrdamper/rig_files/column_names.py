@@ -93,7 +93,8 @@ def split_name(header: str, unit: str = "") -> Header:
     if slash and name and is_unit(tail) and not is_unit(text):
         return Header(name.strip(), tail.strip())
     match = _BRACKETED.match(text)
-    return Header(match["name"].strip() or text if match else text, "")
+    own = parse_unit(text) if len(text) > 3 and is_unit(text) else None  # Amps, Newtons
+    return Header(match["name"].strip() or text if match else text, text if own and own.dimension in _BY_UNIT else "")
 
 
 def words_of(name: str) -> list[str]:

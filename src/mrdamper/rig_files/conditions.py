@@ -47,7 +47,7 @@ _RATE = re.compile(
 )
 _STEP = re.compile(
     r"^dt$|^d_t$|^delta[ _]?[tx]|^[dΔ] ?[tx]$|sampl|abtast|time ?step|step ?time|zeitschritt|increment|échantillon"
-    r"|muestreo|^[hx][ _]?(?:resolution|interval|increment|step)$",
+    r"|muestreo|^[hx][ _-]?(?:resolution|interval|increment|step|delta)$",
     re.IGNORECASE,
 )
 _SHARE = re.compile(

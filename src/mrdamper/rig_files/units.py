@@ -80,7 +80,7 @@ def _normal(text: str) -> str:
     if "/" not in text:
         text = re.sub(r"^([A-Za-z]{1,2})[ ·⋅*.]?s-([12])$", lambda m: f"{m[1]}/s{m[2].replace('1', '')}", text)
         text = re.sub(r"^([a-z]{1,2})_s([2]?)$", r"\1/s\2", text)
-    return re.sub(r"/s/s$", "/s2", re.sub(r"\s*/\s*", "/", text)).replace("/sec", "/s")
+    return re.sub(r"/s/s$", "/s2", re.sub(r"(?i)/sec", "/s", re.sub(r"\s*/\s*", "/", text)))
 
 
 def _from_pint(text: str) -> Unit | None:

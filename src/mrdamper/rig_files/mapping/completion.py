@@ -47,8 +47,9 @@ _PER_COUNT = re.compile(
     re.IGNORECASE,
 )
 _KEY = re.compile(r"[\s#%;\"]*([^=:]{1,60}?)\s*[=:]\s*(\S+)\s*")  # CoilCurrent=0.5, CoilCurrentUnit=A
+_UNIT_KEY = re.compile(rf"(?i)(?:{'|'.join(words('unit'))})$")  # HUnit, X-Einheit
 _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.IGNORECASE)
-_LABELS, _MONITOR, _SENSE_NAMES = words("label"), words("monitor"), words("sense")
+_TITLES, _MONITOR, _SENSE_NAMES = words("label") | words("notes"), words("monitor"), words("sense")
 _LABVIEW = ("Delta_X", "X_Dimension")
 _COLON = re.compile(r"^([^:]+):\s+([^\s:]{1,12})$")  # force: N
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
@@ -181,7 +182,7 @@ def _with_values_for_all(table: RawTable) -> RawTable:
         cells = cells[:-1] if len(cells) == width and not cells[-1] else cells  # a separator ends the line
         if key and len(stated) == 1 and (len(cells) == width - 1 > 1 or key in _LABVIEW):
             keyed[key] = stated.pop()
-    units = {key[:-4]: unit for key, unit in keyed.items() if key.casefold().endswith("unit") and is_unit(unit)}
+    units = {_UNIT_KEY.sub("", key): unit for key, unit in keyed.items() if _UNIT_KEY.search(key) and is_unit(unit)}
     units |= {"Delta_X": "s"} if keyed.get("X_Dimension") == "Time" else {}
     numbers = {key: cell for key, cell in keyed.items() if looks_numeric(cell)}
     lines = [f"{key}: {cell}" for key, cell in numbers.items() if split_name(key).unit]
@@ -218,8 +219,8 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
     width = len(table.names)
     for key, cells in _keyed_cells(table, _LONGEST_CONDITIONS) if width > 2 else ():
         header, stated = split_name(key), [cell for cell in cells if cell]
-        if key.casefold().rstrip("s") in _LABELS and len(cells) == width - 1:
-            if len({split_name(cell).role for cell in cells} - {None}) > 1:
+        if {key.casefold(), key.casefold().rstrip("s")} & _TITLES and len(cells) == width - 1:
+            if len({split_name(cell).role for cell in cells} - {None}) > 1 or all(map(currents_in, stated)):
                 table = replace(table, over=("", *cells))
         elif _UNITS_KEY.fullmatch(key) and not any(table.units) and all(map(is_unit, cells[: width - 1])):
             table = replace(table, units=("", *cells[: width - 1])) if len(cells) >= width - 1 else table

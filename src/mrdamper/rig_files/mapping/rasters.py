@@ -32,8 +32,8 @@ def with_one_clock(table: RawTable) -> RawTable:
     if not roles["force"] or not roles["displacement"]:
         return table
     together = [c for c in groups if all(any(owner[i] == c for i in roles[r]) for r in ("displacement", "force"))]
-    if len(together) > 1 or (together and all(owner[i] in together for columns in roles.values() for i in columns)):
-        return table  # groups that are tests, or a clock with all that is needed
+    if len(together) > 1:
+        return table  # groups that are tests
     clock = together[0] if together else owner[roles["force"][0]]
     kept = [clock, *(i for i in owner if owner[i] == clock), *(i for i in owner if owner[i] != clock)]
     return _resampled(table, clock, kept, owner)
@@ -106,7 +106,18 @@ def _clocks(table: RawTable) -> dict[int, list[int]]:
             groups[i] = []
         elif clock is not None:
             groups[clock].append(i)
+    groups = groups if all(groups.values()) else _by_length(table, groups)
     return {clock: columns for clock, columns in groups.items() if columns}
+
+
+def _by_length(table: RawTable, groups: dict[int, list[int]]) -> dict[int, list[int]]:
+    """Return the channels of clocks that stand beside each other: those with as many samples, where that is unique."""
+    channels = [i for i, h in enumerate(table.headers) if i not in groups and (h.role or h.dimension)]
+    values = table.try_read(*groups, *channels) if len(groups) > 1 else None
+    sizes = {i: _filled(column).size for i, column in (values or {}).items()}
+    if values is None or len({sizes[clock] for clock in groups}) < len(groups):
+        return groups
+    return {clock: [i for i in channels if sizes[i] == sizes[clock]] for clock in groups}
 
 
 def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int, int]) -> RawTable:

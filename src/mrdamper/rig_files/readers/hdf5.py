@@ -109,8 +109,10 @@ class _Walk:
             cells = [self._at(item.file, r, depth) for r in references] if len(references) <= MOST_STRUCTS else []
             return {name: cells or np.empty(2, dtype=object)}
         value = self._dataset(name, item)
+        unit = next((_text(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), "")
         if not isinstance(value, Stored):
-            return {name: value} if value is not None else {}
+            stated = f"{name} [{unit}]" if isinstance(value, float) and is_unit(unit) else name
+            return {stated: value} if value is not None else {}
         lists = {
             f"{name} {key}": words for key in list(item.attrs)[:MOST_COLUMNS] if (words := _words(item.attrs[key]))
         }
@@ -125,7 +127,6 @@ class _Walk:
         numbers = _numbers(item.attrs)
         packed = item.dtype.kind in "iu" and counts_of(item.attrs) is None
         says = {f"{name}_{key}": number for key, number in numbers.items()} if packed else {}
-        unit = next((_text(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), "")
         unit = unit.partition(" since ")[0]  # netCDF counts time from a date
         clock = {} if timed or stated_clock(numbers) is None else numbers
         channel = {"name": name, "unit": unit, "data": value, **clock} if unit or clock else value

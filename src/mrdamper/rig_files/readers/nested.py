@@ -152,7 +152,7 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     cubes = [
         key for key, value in tree.items() if isinstance(value, Array) and value.ndim == 3 and min(value.shape) > 1
     ]
-    if len(cubes) == 1 and tree[cubes[0]].shape[0] <= MOST_ITEMS:
+    if len(cubes) == 1 and tree[cubes[0]].shape[0] <= MOST_ITEMS and _with_rows(tree) is tree:
         tree = {**tree, cubes[0]: [_unpadded(matrix) for matrix in np.asarray(tree[cubes[0]])]}
     lists = {
         key: value
@@ -185,18 +185,26 @@ def _numeric(tree: Mapping[str, Any]) -> tuple[dict[str, Array], dict[str, tuple
 def _with_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return arrays over several conditions and samples, force[current, frequency, time], with a row a test.
 
-    Every dimension has a vector of its length, the samples' a time, and no two are of one length.
+    No two dimensions are of one length, and each but the samples' has a vector. The time may be the same for some
+    conditions: time[frequency, sample].
     """
     numeric, shapes = _numeric(tree)
-    deep = [key for key, shape in shapes.items() if len(shape) > 2]
-    shape = shapes[deep[0]] if deep else ()
-    axes = {n: [key for key, own in shapes.items() if own == (n,)] for n in shape}
-    timed = [n for n, keys in axes.items() if any(split_name(key).role == "time" for key in keys)]
-    if len({shapes[key] for key in deep}) != 1 or len(axes) < len(shape) or not all(axes.values()) or len(timed) != 1:
+    shape = max(shapes.values(), key=len, default=())
+    times = [own for key, own in shapes.items() if split_name(key).role == "time"]
+    if len(shape) < 3 or len({*shape}) < len(shape) or len(times) != 1 or not {*times[0]} <= {*shape}:
         return tree
-    outer = [n for n in shape if n != timed[0]]
-    rows = {key: np.moveaxis(np.squeeze(numeric[key]), shape.index(timed[0]), -1) for key in deep}
-    rows = {key: array.reshape(-1, timed[0]) for key, array in rows.items()}
+    samples = max(times[0])
+    outer = [n for n in shape if n != samples]
+    axes = {n: [key for key, own in shapes.items() if own == (n,)] for n in outer}
+    if not all(axes.values()) or samples not in shape:
+        return tree
+    order = (*outer, samples)
+    rows = {}
+    for key in [key for key, own in shapes.items() if len(own) > 1 and {*own} <= {*shape}]:
+        there = [n for n in order if n in shapes[key]]
+        array = np.transpose(np.squeeze(numeric[key]), [shapes[key].index(n) for n in there])
+        array = np.reshape(array, [n if n in there else 1 for n in order])
+        rows[key] = np.broadcast_to(array, order).reshape(-1, samples)
     at = dict(zip(outer, np.indices(outer).reshape(len(outer), -1), strict=True))
     return {**tree, **rows, **{key: np.reshape(numeric[key], -1)[at[n]] for n in outer for key in axes[n]}}
 
