@@ -422,3 +422,26 @@ def test_a_number_of_hdf5_beside_the_channels_has_the_unit_of_its_attribute(tmp_
                 file.create_dataset(f"{group}/raw/{name}", data=values).attrs["units"] = unit
             file.create_dataset(f"{group}/set/coil_current", data=1e3 * amperes).attrs["units"] = "mA"
     assert currents(import_files([tmp_path]).records) == [0.2, 0.8]
+
+
+NODES = "Node;Meaning;Unit\nPLC.PT07;Stroke;mm\nPLC.LC02;Load;kN\nPLC.FT01;Coil current;mA\n"
+
+
+@pytest.mark.parametrize("long", [True, False], ids=["a row a value", "a column a node"])
+def test_a_list_beside_says_what_the_names_of_a_controller_mean(tmp_path, long):
+    names, columns = ("PLC.PT07", "PLC.LC02", "PLC.FT01"), (X, 1e-3 * force(0.5), np.full(T.size, 500.0))
+    if long:
+        body = "".join(
+            f"{name};{t:.3f};{v:.6f};OK\n"
+            for name, of in zip(names, columns, strict=True)
+            for t, v in zip(T, of, strict=True)
+        )
+        (tmp_path / "export.csv").write_text("Tag;Time [s];Value;Status\n" + body)
+    else:
+        (tmp_path / "export.csv").write_text(";".join(("Time [s]", *names)) + "\n" + rows(T, *columns, separator=";"))
+    (tmp_path / "nodes.csv").write_text(NODES)
+    found = import_files([tmp_path])
+    assert not found.refusals
+    assert currents(found.records) == [0.5]
+    assert np.ptp(found.records[0].displacement) == pytest.approx(0.02, rel=1e-3)
+    assert np.max(found.records[0].force) == pytest.approx(np.max(force(0.5)), rel=1e-2)

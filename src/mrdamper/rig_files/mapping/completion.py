@@ -84,7 +84,7 @@ def completed(table: RawTable) -> RawTable:
         table = table.named({0: header}) if header.role else table
     if not any(table.names):
         return table
-    table = _with_numbered_channels(_without_shared_path(table))
+    table = _with_explained_names(_with_numbered_channels(_without_shared_path(table)))
     table = _with_titles(_with_keyed_lines(table))
     table = _with_listed_units(with_axis_as_time(table))
     table = _with_stated_signs(with_nanoseconds(_with_clocks_and_weights(table)))
@@ -272,6 +272,20 @@ def _with_numbered_channels(table: RawTable) -> RawTable:
         return table
     names = tuple(next(iter(what), name) for name, what in zip(table.names, meant, strict=True))
     return replace(table, names=names)
+
+
+def _with_explained_names(table: RawTable) -> RawTable:
+    """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm."""
+    lines = [[cell.strip(' "') for cell in re.split(r"[,;|\t]", line[:_LONGEST_LINE])] for line in table.remarks]
+    says = {cells[0].casefold(): cells[1:] for cells in lines if len(cells) > 1}
+    headings = {}
+    for i, (name, header) in enumerate(zip(table.names, table.headers, strict=True)):
+        cells = says.get(name.strip().casefold(), []) if name and header.role is None else []
+        named = [cell for cell in cells if split_name(cell).role]
+        units = [cell for cell in cells if is_unit(cell.strip("[]()"))]
+        if len(named) == 1 and len(units) < 2:
+            headings[i] = named[0], (*units, table.units[i])[0].strip("[]()")
+    return table.named(headings) if len(headings) > 1 else table
 
 
 def _with_titles(table: RawTable) -> RawTable:

@@ -50,7 +50,10 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
 def _lacks_names_or_units(table: RawTable) -> bool:
     """Tell if a column that may be needed has no unit, or a number for a name."""
     bare = [i for i, header in enumerate(table.headers) if not header.unit]
-    return any(table.headers[i].role in REQUIRED or NUMBERED.fullmatch(table.names[i].strip()) for i in bare)
+    roles = {header.channel for header in table.headers}
+    return not {"displacement", "force"} <= roles or any(
+        table.headers[i].role in REQUIRED or NUMBERED.fullmatch(table.names[i].strip()) for i in bare
+    )
 
 
 def _of_channels(line: str) -> str:
@@ -100,7 +103,10 @@ def is_description(path: Path) -> bool:
     lines = short_lines(path) if path.suffix.lower() in _TEXTS and path.is_file() else []
     if sum(bool(line.strip()) for line in lines) >= _FEWEST_ROWS or numbered_tests(lines):
         return False
-    listed = [line for line in lines if _of_channels(line).startswith("channel ")]
+    listed = [re.split(r"[,;\t|]", of) for line in lines if (of := _of_channels(line))]
+    listed = [
+        cells for cells in listed if cells[0].startswith("channel ") or any(split_name(c).role for c in cells[1:])
+    ]
     return len(listed) > 1 or bool(stated_by_lines(lines, "."))
 
 

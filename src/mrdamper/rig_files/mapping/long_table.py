@@ -14,6 +14,7 @@ from mrdamper.rig_files.vocabulary import words
 
 _VALUE, _CHANNEL, _UNIT = words("value"), words("channel"), words("unit")
 _MOST_CHANNELS = 60
+_FEWEST_SAMPLES = 50  # of channels whose names say nothing
 
 
 def with_channels_as_columns(table: RawTable) -> RawTable:
@@ -28,7 +29,9 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
         return table
     words = table.words(channel[0])
     roles = {split_name(label).role: code for code, label in enumerate(words.labels)}
-    if not {"displacement", "force"} <= set(roles) or len(words.labels) > _MOST_CHANNELS:
+    sizes = np.bincount(words.codes, minlength=len(words.labels))
+    whole = {"displacement", "force"} <= set(roles) or sizes.min() >= _FEWEST_SAMPLES  # a list beside may name them
+    if not whole or not 1 < len(words.labels) <= _MOST_CHANNELS:
         return table
     unit = [i for i, name in enumerate(names) if name in _UNIT][:1]
     units = _units(table, words, unit)
@@ -37,7 +40,7 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
     others = [i for i in range(len(names)) if i not in (value[0], channel[0], *unit)]
     others.sort(key=lambda i: table.headers[i].role != "time")
     rows = [np.flatnonzero(words.codes == code) for code in range(len(words.labels))]
-    return _pivoted(table, value[0], others, words.labels, units, rows, rows[roles["force"]])
+    return _pivoted(table, value[0], others, words.labels, units, rows, rows[roles.get("force", int(sizes.argmax()))])
 
 
 def _pivoted(
@@ -72,7 +75,7 @@ def _pivoted(
         return Content({i: column(places[i][0])[places[i][1]] for i in columns})
 
     names, own = tuple(name for *_, name, _ in places), tuple(unit for *_, unit in places)
-    return replace(table, names=names, units=own, read=read, words=words, odd=(), over=(), remarks=())
+    return replace(table, names=names, units=own, read=read, words=words, odd=(), over=())
 
 
 def _alike(own: np.ndarray, base: np.ndarray, clocks: Sequence[np.ndarray]) -> bool:

@@ -409,9 +409,9 @@ def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) ->
             keyed = None  # a key with the scales of the columns, or one value for all of them
         elif len(cells) == width:
             keyed = keyed or (i, cells)
-            worded = worded or keyed
-    assert worded is not None
-    return worded
+    first = keyed or worded
+    assert first is not None
+    return first
 
 
 def _is_key(cell: str) -> bool:
