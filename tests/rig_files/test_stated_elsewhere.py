@@ -291,6 +291,7 @@ def test_a_current_of_the_profile_is_compared_with_a_channel_that_the_profile_do
         "displacement positive in compression, force positive in compression",
         "Signs: compressive load positive and bump stroke positive",
         "Convention of the rig: extension negative",
+        "Druckkraft positiv, Einfederweg positiv bei Druck",
         "Усилие и перемещение положительны при сжатии",
     ],
 )
@@ -299,6 +300,23 @@ def test_a_line_that_counts_both_channels_positive_in_compression_changes_both_s
     (record,) = import_files([tmp_path / "a_0.5A.csv"]).records
     assert record.displacement == pytest.approx(1e-3 * X, abs=1e-8)
     assert record.force == pytest.approx(force(0.5), abs=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("line", "codes"),
+    [
+        ("Pressure of the compression chamber: positive, 3 bar", []),
+        ("Kompressionsventil positiv geprüft", ["E_SIGN_CONVENTION"] * 2),
+        ("extension valve with positive stop", []),
+        ("Sign: tension positive, compression negative", []),
+        ("new compression valve with positive stop fitted", ["E_SIGN_CONVENTION"] * 2),
+    ],
+)
+def test_a_line_about_something_else_than_the_sign_changes_none(tmp_path, line, codes):
+    table(tmp_path / "a_0.5A.csv", [f"# {line}", "time [s],displacement [mm],force [N]"], T, X, force(0.5))
+    found = import_files([tmp_path])
+    assert [error.code for r in found.refusals for error in getattr(r.error, "errors", [r.error])] == codes
+    assert all(np.allclose(record.force, force(0.5), atol=1e-2) for record in found.records)
 
 
 def test_a_velocity_counts_as_the_displacement_does(tmp_path):
@@ -465,9 +483,9 @@ def test_dimensions_of_an_array_beside_vectors_are_conditions(tmp_path):
     assert [record.current[0] for record in import_files([tmp_path]).records] == [0, 0, 0, 0.5, 0.5, 0.5]
 
 
-@pytest.mark.parametrize("profile", ['column = "amps"\nunit = "A"\n', 'unit = "mA"\n'])
+@pytest.mark.parametrize("profile", ['column = "level"\nunit = "A"\n', 'unit = "mA"\n'])
 def test_a_profile_gives_a_number_beside_the_columns_its_unit(profile, tmp_path):
-    name, value = ("amps", 0.5) if "amps" in profile else ("current", 500)
+    name, value = ("level", 0.5) if "level" in profile else ("current", 500)
     savemat(tmp_path / "a.mat", {"time_s": T, "position_mm": X, "load_N": force(0.5), name: value})
     assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_CURRENT_MISSING"]
     records = import_files([tmp_path], parse_profile(f"[channels.current]\n{profile}")).records

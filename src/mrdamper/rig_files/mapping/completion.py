@@ -64,6 +64,7 @@ _CHANNEL_IS = re.compile(rf"(?i)(?<!\w){_NUMBERS}" + r"[ ._]?(?P<number>[0-9]{1,
 _SENSES = {1: tuple(words("tension_stems")), -1: tuple(words("compression_stems"))}
 _POLARITIES = {1: tuple(words("positive_stems")), -1: tuple(words("negative_stems"))}
 _WORD = re.compile(r"[^\W\d_]+")
+_IS = {"i", "ist", "est", "e", "count"}  # without an s at the end: compression is positive
 _MOVES = {"velocity": "displacement"}  # counts as
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _ZERO = re.compile(r"(?i)\bzero (?:is )?at ([+-]?[0-9]{1,10})(?![.,]?[0-9])")
@@ -129,22 +130,27 @@ def _sign_of(label: str, remarks: Sequence[str]) -> int:
 def _with_stated_signs(table: RawTable) -> RawTable:
     """Return the table with the senses in which lines count displacement and force: force positive in compression.
 
-    A line of one sense holds for all that it names, else each of its clauses does. Where a line names no channel, it
-    holds for those that no other states.
+    A line of one sense holds for all that it names, else each of its clauses does. A line about the sign that names no
+    channel holds for those that no other states; what else may be about the sign leaves it unclear.
     """
     stated: dict[str, set[int]] = {}
     for line in table.remarks:
         whole = line[:_LONGEST_LINE]
         for clause in re.split(r"[,;|\t]", whole) if len(_counted(whole)) > 1 else [whole]:
-            roles = {
-                _MOVES.get(role := role_of(word) or "", role)
-                for word in _WORD.findall(clause)
-                if not _sign(_SENSES, word)
+            every = _WORD.findall(clause)
+            words = [word for word in every if not _sign(_SENSES, word)]
+            named = {
+                _MOVES.get(role, role)
+                for word in every
+                if (role := role_of(word)) and (word in words or role == "force")
             }
-            for role in roles & {*SIGN_CHANGED} or {""}:
-                stated.setdefault(role, set()).update(_counted(clause))
-    others = stated.get("", set()) - {1} and stated[""]
-    senses = {role: sum(own) for role in SIGN_CHANGED if (own := stated.get(role) or others)}
+            own = _counted(clause) if not named or named & {*SIGN_CHANGED} else set()  # a pressure counts otherwise
+            others = {word.casefold().rstrip("s") for word in words if not _sign(_POLARITIES, word)}
+            general = others & _SENSE_NAMES or others <= _IS
+            for role in named & {*SIGN_CHANGED} or {""}:
+                stated.setdefault(role, set()).update(own if named or general or -1 not in own else {1, -1})
+    unnamed = stated.get("", set()) - {1} and stated[""]
+    senses = {role: sum(own) for role in SIGN_CHANGED if (own := stated.get(role) or unnamed)}
     changed = [Finding("W_SCALE", f"{SIGN_CHANGED[role]}: the file counts compression positive") for role in senses
                if senses[role] == -1]  # fmt: skip
     return replace(table, senses=senses).noted(*changed)
