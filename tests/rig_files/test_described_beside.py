@@ -78,3 +78,19 @@ def test_a_list_of_tests_without_anything_that_names_them_is_not_applied(tmp_pat
     write(tmp_path, "time [s],stroke [mm],load [N]\n")
     (tmp_path / "tests.csv").write_text("Remark;Current / A\nfirst;0.2\nsecond;0.9\nthird;0.0\n")
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("README.md", "# Rig\nExtension counts negative: sign of the rig.\n"),
+        ("setup.yaml", "rig: B\nsign convention: compression positive\n"),
+    ],
+)
+def test_a_text_beside_the_files_states_the_signs_of_all(tmp_path, name, text):
+    header = "time [s],disp [mm],load [N]\n"
+    write(tmp_path, header, (-1.0, -1.0))
+    (tmp_path / name).write_text(text)
+    for own, amperes in CURRENTS.items():
+        (tmp_path / f"{own}.csv").rename(tmp_path / f"{own}_{amperes}A.csv")
+    require_the_tests(tmp_path)

@@ -445,3 +445,22 @@ def test_a_list_beside_says_what_the_names_of_a_controller_mean(tmp_path, long):
     assert currents(found.records) == [0.5]
     assert np.ptp(found.records[0].displacement) == pytest.approx(0.02, rel=1e-3)
     assert np.max(found.records[0].force) == pytest.approx(np.max(force(0.5)), rel=1e-2)
+
+
+def test_a_list_of_stages_above_the_columns_gives_each_its_current(tmp_path):
+    head = "# Stage 1) 0.2 A, 1 Hz\n# Stage 2) 0.8 A, 1 Hz\ntime [s],stroke [mm],load [N],Stage\n"
+    both = (np.r_[T, T + 9], np.r_[X, X], np.r_[force(0.2), force(0.8)], np.repeat([1, 2], T.size))
+    (tmp_path / "night.csv").write_text(head + rows(*both))
+    assert currents(import_files([tmp_path]).records) == [0.2, 0.8]
+
+
+def test_the_remedy_for_a_velocity_against_the_motion_is_the_sign_that_it_has_not(tmp_path):
+    own = -np.gradient(X, T)
+    for convention, sign in (("", 1), ("# compression positive\n", -1)):
+        head = f"{convention}time [s],stroke [mm],velocity [mm/s],load [N]\n"
+        (tmp_path / "a_0.5A.csv").write_text(head + rows(T, sign * X, sign * own, sign * force(0.5)))
+        (refused,) = import_files([tmp_path]).refusals
+        remedy = f"set [channels.velocity] sign = {-sign} in a profile"
+        assert (refused.error.code, remedy in refused.error.remedy) == ("E_CHANNEL_LAG", True)
+        (record,) = import_files([tmp_path], parse_profile(f"[channels.velocity]\nsign = {-sign}")).records
+        assert np.corrcoef(record.velocity, np.gradient(record.displacement, T))[0, 1] > 0.99

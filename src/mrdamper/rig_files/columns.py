@@ -25,7 +25,7 @@ from mrdamper.rig_files.column_names import (
 )
 from mrdamper.rig_files.conditions import rate_in_name, stated_rate
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
-from mrdamper.rig_files.record import OPTIONAL, REQUIRED, SIGN_CHANGED
+from mrdamper.rig_files.record import OPTIONAL, REQUIRED, SIGNED
 from mrdamper.rig_files.units import DIMENSION, Unit, parse_unit
 from mrdamper.rig_files.vocabulary import words
 
@@ -49,6 +49,7 @@ class Assigned:
     factor: float
     offset: float = 0.0
     delay: float = 0.0  # how late the channel is [s]
+    sign: int = 1  # of the factor, beside a scale
 
 
 def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
@@ -248,7 +249,7 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
     if volts:  # a column alone would not do
         shown += f"; {', '.join(volts)} in volts without a scale"
         fixed |= dict.fromkeys(("displacement", "force"), ", unit and scale (unit per volt)")
-    if (len(table.names) == 2 and len(missing) > 1) or {*columns} & {*SIGN_CHANGED, "current"}:  # several files
+    if (len(table.names) == 2 and len(missing) > 1) or {*columns} & {*SIGNED, "current"}:  # several files
         each = ', and file = "...{run}..." where each file has one channel,'
         fixed |= {role: fixed.get(role, "") + each for role in missing if role != "time"}
     beside = f"(found {shown})"
@@ -289,7 +290,7 @@ def _convert(table: RawTable, role: str, column: int, profile: Profile) -> Assig
     if not channel.unit:
         _refuse_two_units(table, role, column, unit)
     name = table.names[column]
-    if not sign and role in SIGN_CHANGED and (sign == 0 or names_compression(name)):
+    if not sign and role in SIGNED and (sign == 0 or names_compression(name)):
         raise _refusal(
             ColumnError,
             table,
@@ -301,7 +302,7 @@ def _convert(table: RawTable, role: str, column: int, profile: Profile) -> Assig
     sign = sign or 1
     shift = 0.0 if channel.integrate else sign * (si.factor * channel.offset + si.offset)
     factor = sign * (channel.scale or 1.0) * si.factor
-    return Assigned(column, header.name, unit, factor, shift + 0.0, 1e-3 * channel.delay_ms)
+    return Assigned(column, header.name, unit, factor, shift + 0.0, 1e-3 * channel.delay_ms, sign)
 
 
 def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitError | None:

@@ -18,7 +18,7 @@ from mrdamper.rig_files.mapping.integration import with_integrated_velocity
 from mrdamper.rig_files.mapping.long_table import with_channels_as_columns
 from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_unit_of_time
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
-from mrdamper.rig_files.mapping.results import with_results
+from mrdamper.rig_files.mapping.results import form_of_tests, with_results
 from mrdamper.rig_files.parts import tests_of
 from mrdamper.rig_files.profile import Profile, profile_hash
 from mrdamper.rig_files.readers import raw_tables
@@ -85,7 +85,8 @@ def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
     tables = kept
     tables = with_joined_rasters([with_time_stated(completed(with_channels_as_columns(table))) for table in tables])
     tables = [with_one_clock(table) for table in tables]
-    parts = [part for table in tables for part in ([table] if table.fallback else tests_of(table, profile.file))]
+    forms = [form_of_tests(table, profile.file) for table in tables]
+    parts = [part for t, form in zip(tables, forms, strict=True) for part in ([t] if t.fallback else tests_of(t, form))]
     stated = {name: channel.column for name, channel in profile.channels.items() if channel.column is not None}
     timed = [with_integrated_velocity(with_unit_of_time(table)) for table in with_results(parts)]
     return [with_channels_by_physics(table, stated) for table in timed]

@@ -18,7 +18,7 @@ from mrdamper.rig_files.folder import files_in, unpacked
 from mrdamper.rig_files.profile import Channel, Profile, current_pattern, profile_of
 from mrdamper.rig_files.readers import raw_tables
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import SIGN_CHANGED
+from mrdamper.rig_files.record import SIGNED
 
 _ROWS_SHOWN, _MOST_SHOWN = 6, 30  # rows and columns of a preview
 _MOST_COLUMNS, _MOST_REMARKS, _MOST_NAMES = 40, 6, 3  # of a tree that is shown
@@ -123,7 +123,7 @@ def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable,
             header = table.names[column]
             says["column"] = header if header and table.names.count(header) == 1 else column + 1
             sign = sign_of(table, profile, name)
-            sign = (-1 if name in SIGN_CHANGED and names_compression(header) else 1) if sign is None else sign
+            sign = (-1 if name in SIGNED and names_compression(header) else 1) if sign is None else sign
             says |= {"sign": sign} if sign else {}
         stated = profile.channel(name).model_dump(exclude_unset=True, exclude_none=True)
         channels[name] = Channel(**{**says, **stated})

@@ -18,7 +18,7 @@ from mrdamper.errors import InputError
 
 REQUIRED = ("time", "displacement", "force")
 OPTIONAL = ("velocity", "acceleration", "current", "voltage", "temperature", "pressure")
-SIGN_CHANGED = {role: f"the sign of the {role} is changed unless a profile states it" for role in REQUIRED[1:]}
+SIGNED = ("displacement", "force")  # rigs count them positive in extension or in compression
 FURTHER = {"acceleration": "m_s2", "voltage": "V", "temperature": "C", "pressure": "Pa"}  # and their SI unit
 
 

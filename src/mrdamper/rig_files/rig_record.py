@@ -69,6 +69,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     remarks = {
         **recording_time(table.remarks),
         **_remarks(table, assigned),
+        "sign_changed": ", ".join(role for role, entry in assigned.items() if entry.sign < 0),
         "time_from": rate,
         "motion_stated": motion if len(stretches) == 1 else "",
     }

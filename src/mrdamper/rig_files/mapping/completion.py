@@ -24,7 +24,7 @@ from mrdamper.rig_files.column_names import (
 from mrdamper.rig_files.conditions import currents_in, without_currents
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_nanoseconds
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import SIGN_CHANGED, Finding
+from mrdamper.rig_files.record import SIGNED, Finding
 from mrdamper.rig_files.text.layout import LISTED, X_VALUE, cells_of
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.text.tokens import looks_numeric, number
@@ -144,16 +144,21 @@ def _with_stated_signs(table: RawTable) -> RawTable:
                 for word in every
                 if (role := role_of(word)) and (word in words or role == "force")
             }
-            own = _counted(clause) if not named or named & {*SIGN_CHANGED} else set()  # a pressure counts otherwise
+            own = _counted(clause) if not named or named & {*SIGNED} else set()  # a pressure counts otherwise
             others = {word.casefold().rstrip("s") for word in words if not _sign(_POLARITIES, word)}
             general = others & _SENSE_NAMES or others <= _IS
-            for role in named & {*SIGN_CHANGED} or {""}:
+            for role in named & {*SIGNED} or {""}:
                 stated.setdefault(role, set()).update(own if named or general or -1 not in own else {1, -1})
     unnamed = stated.get("", set()) - {1} and stated[""]
-    senses = {role: sum(own) for role in SIGN_CHANGED if (own := stated.get(role) or unnamed)}
-    changed = [Finding("W_SCALE", f"{SIGN_CHANGED[role]}: the file counts compression positive") for role in senses
-               if senses[role] == -1]  # fmt: skip
-    return replace(table, senses=senses).noted(*changed)
+    senses = {role: sum(own) for role in SIGNED if (own := stated.get(role) or unnamed)}
+    text = "the file counts compression positive in the {}: its sign is changed unless a profile states it"
+    notes = [Finding("W_SCALE", text.format(role)) for role, sense in senses.items() if sense == -1]
+    return replace(table, senses=senses).noted(*notes)
+
+
+def states_sign(line: str) -> bool:
+    """Tell if a line may state in which sense a channel counts positive."""
+    return bool(_counted(line[:_LONGEST_LINE]))
 
 
 def _counted(clause: str) -> set[int]:

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_by_lines
-from mrdamper.rig_files.mapping.completion import NUMBERED, scaled_columns, states_scale
+from mrdamper.rig_files.mapping.completion import NUMBERED, scaled_columns, states_scale, states_sign
 from mrdamper.rig_files.mapping.results import numbered_tests
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
@@ -23,6 +23,7 @@ _LARGEST = 2**16  # bytes
 _PLACES = ("column", "number", "index", "no", "position", "channel")
 _MOST = 200  # elements
 _FEWEST_ROWS = 50  # of a record
+_FEW_FILES = 10  # that describe a folder, not a test each
 _STRUCTURES = (".json", ".yaml", ".yml")
 _READ = ("", ".txt", ".md", ".rst", ".csv", ".tsv", *_STRUCTURES)
 _LARGEST_LIST = 4096  # bytes of a list of channels
@@ -33,18 +34,20 @@ _README = re.compile(
 
 
 def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
-    """Add the names, units and scales that short texts beside the file state, where the table lacks them."""
-    if not scaled_columns(table) and not _lacks_names_or_units(table):
-        return table
-    files = list(path.parent.iterdir())
+    """Add what short texts beside the file state of signs, and of names, units and scales where they lack."""
+    lacking = bool(scaled_columns(table)) or _lacks_names_or_units(table)
+    folder = path.parent
+    files = list(folder.iterdir())
     readme = [p for p in files if _README.fullmatch(p.name)]
-    readme = readme or [p for p in path.parent.parent.glob("*") if _README.fullmatch(p.name)]
-    readme += [p for p in files if p.suffix.lower() in _STRUCTURES]
-    listing = [p for p in files if p.suffix.lower() in _TEXTS and p.stat().st_size <= _LARGEST_LIST]
+    readme = readme or [p for p in folder.parent.iterdir() if _README.fullmatch(p.name)]
+    structures = [p for p in files if p.suffix.lower() in _STRUCTURES]
+    readme += structures if lacking or len(structures) <= _FEW_FILES else []
+    listing = [p for p in files if lacking and p.suffix.lower() in _TEXTS and p.stat().st_size <= _LARGEST_LIST]
     texts = [p for p in {*readme, *listing} if p.is_file() and p != path and p.suffix.lower() in _READ]
     texts = sorted(p for p in texts if not profile.leaves_out(p.name))
     lines = [line for text in texts if len(own := short_lines(text)) <= _MOST for line in own]
-    return replace(table, remarks=(*table.remarks, *filter(None, map(_of_channels, lines))))
+    stated = [(lacking and _of_channels(line)) or (line if states_sign(line) else "") for line in lines]
+    return replace(table, remarks=(*table.remarks, *filter(None, stated)))
 
 
 def _lacks_names_or_units(table: RawTable) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.rig_files.column_names import COIL, holds, names_condition, split_name, words_of
 from mrdamper.rig_files.conditions import contradicts, currents_in, quantity_in_cell
+from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of
 from mrdamper.rig_files.units import is_unit
@@ -123,10 +124,17 @@ def numbered_tests(lines: Iterable[str]) -> Results | None:
     return Results(tuple(row[2] for row in rows), cells, "a line for each test", ("", "", rows[0][0]))
 
 
+def form_of_tests(table: RawTable, form: FileForm) -> FileForm:
+    """Return the form of a file, with the column that numbers its tests as a list of them above the columns does."""
+    results = results_in(table.remarks) if form.run_column is None and len(table.remarks) >= _FEWEST_ROWS else None
+    column = results.column_of_tests(table) if results else None
+    return form.model_copy(update={"run_column": column}) if column else form
+
+
 def with_results(tables: list[RawTable]) -> list[RawTable]:
     """Tables of a file's tests with the currents that its table of results states."""
     lines = list(dict.fromkeys(line for table in tables for line in table.remarks))
-    results = results_in(lines) if len(lines) > _FEWEST_ROWS else None
+    results = results_in(lines) if len(lines) >= _FEWEST_ROWS else None
     others = tables
     if results is None:
         tables = [table for table in tables if not table.fallback]

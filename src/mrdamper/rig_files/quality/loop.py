@@ -12,7 +12,7 @@ from mrdamper.identification.loop_analysis import damping_share as share_of_damp
 from mrdamper.rig_files.quality.cycles import POINTS, Folded, every_cycle, steady_cycles
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, steady_window
 from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
-from mrdamper.rig_files.record import SIGN_CHANGED, Finding, SteadyPart
+from mrdamper.rig_files.record import SIGNED, Finding, SteadyPart
 
 _SLOW, _FAST = 0.1, 0.5  # of the largest velocity: samples near the reversals, and away from them
 _BELOW = 0.15  # of the range: so far below both strokes is a rectified force at the reversals
@@ -47,12 +47,10 @@ def dissipates(view: View) -> None:
             remedy = "name the columns the other way round: [channels.force] column = ... in a profile"
         else:
             what = "force and displacement count in opposite directions"
-            remedy = "set [channels.force] sign = -1 in a profile"
-            texts = " ".join(finding.text for finding in view.record.findings)
-            changed = [role for role, text in SIGN_CHANGED.items() if text in texts]
-            if len(changed) == 1:  # by a line of the file
-                (other,) = {*SIGN_CHANGED} - {*changed}
-                what += f", if only the {changed[0]} is positive in compression, as a line of the file states"
+            changed = [role for role in SIGNED if view.has_changed_sign(role)]
+            remedy = f"set [channels.force] sign = {1 if changed else -1} in a profile"
+            if len(changed) == 1:
+                (other,) = {*SIGNED} - {*changed}
                 remedy = f"set [channels.{other}] sign = -1 in a profile, or [channels.{changed[0]}] sign = 1"
         raise view.refused(
             "E_DISSIPATION_SIGN",

@@ -54,7 +54,9 @@ def velocity_channel(view: View) -> None:
         (
             f"set [channels.velocity] delay_ms = {1e3 * delay.delay:.4g} in a profile"
             if late and delay.gain > 0 and delay.unexplained <= UNLIKE
-            else "correct its unit or sign in a profile"
+            else f"set [channels.velocity] sign = {1 if view.has_changed_sign('velocity') else -1} in a profile"
+            if delay.gain < 0
+            else "correct its unit in a profile"
         )
         + ", or leave the column out",
     )

@@ -63,6 +63,10 @@ class View:
         """Check that one of these findings was made."""
         return any(finding.code in codes for finding in self.found)
 
+    def has_changed_sign(self, channel: str) -> bool:
+        """Check that the sign of a channel was changed, by the profile or by a line of the file."""
+        return channel in self.record.provenance.get("sign_changed", "").split(", ")
+
     @cached_property
     def step(self) -> float:
         """Usual step of time [s]."""
