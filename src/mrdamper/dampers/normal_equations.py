@@ -525,7 +525,7 @@ def _broken(fit: JointFunctionFit, name: str, conditions: Sequence[Condition], d
     return broken_law(function, conditions, dissipating[name]) if function and name in dissipating else ""
 
 
-@lru_cache(maxsize=1024)  # of all forms and of those over the current alone, and in the second pass, many are the same
+@lru_cache(maxsize=256)  # of all forms and of those over the current alone, and in the second pass, many are the same
 def _tried(
     data: Condensed, items: tuple[tuple[str, str | Law], ...], shape_values: tuple[float, ...]
 ) -> tuple[JointFunctionFit, dict[str, Floats]]:

@@ -66,9 +66,7 @@ def _samples(stretches: np.ndarray) -> int:
 def flat_tops(view: View, name: str) -> dict[float, np.ndarray]:
     """Flat tops of a channel by their level: at least five equal samples at an end of its range."""
     channel = _channels(view)[name]
-    kinks = channel.smooth or _scatters(
-        view
-    )  # else a force has plateaus of its own, or `flattened` finds their corners
+    kinks = channel.smooth or _scatters(view)  # else plateaus may be the damper's own, or `flattened` finds corners
     tops = {}
     if not len(channel.equal):
         return tops

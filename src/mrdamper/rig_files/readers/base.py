@@ -124,9 +124,8 @@ class RawTable:
     titles: tuple[str, ...] = ()  # of `remarks` those that are titles of several tests
     words: Callable[[int], Words] | None = None  # takes the position of a column
     findings: tuple[Finding, ...] = ()  # what was decided on the way from the file to this table
-    senses: Mapping[str, int] = field(
-        default_factory=dict
-    )  # of channels: 1, -1 if compression is positive, 0 if unclear
+    # of displacement and force where a text states them: 1, -1 if compression is positive, 0 if the text is unclear
+    senses: Mapping[str, int] = field(default_factory=dict)
     stated_in: str = ""  # where a constant that was added on that way stands
 
     @cached_property
