@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ from mrdamper.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
-    from mrdamper.data import Dataset
+    from mrdamper.data import Dataset, Run
     from mrdamper.study.validation import Validation
 
 app = typer.Typer()
@@ -81,15 +81,20 @@ def validate(
         for run in validation.runs
     }
     put([{**score_row(run), **peaks[run.run_id]} for run in validation.runs], out, as_json, csv_text)
-    fitted = damper.uncertainty.information if damper.uncertainty else {}
-    known = [run for run in validation.runs if run.run_id in fitted and by_id[run.run_id].split == "train"]
-    if known:
+    _note_identification_runs(damper, validation, by_id)
+    _print_summary(damper, validation, name, peaks.values(), level)
+
+
+def _note_identification_runs(damper: Damper, validation: Validation, runs: Mapping[str, Run]) -> None:
+    """State how many of the runs may be those that the model was identified from."""
+    names = damper.uncertainty.information if damper.uncertainty else {}
+    own = [run for run in validation.runs if run.run_id in names and runs[run.run_id].split == "train"]
+    if own:
         typer.echo(
-            f"note: {len(known)} of {len(validation.runs)} runs have the names of the model's identification runs: if "
+            f"note: {len(own)} of {len(validation.runs)} runs have the names of the model's identification runs: if "
             "they are these, their errors are those of the fit; --split validate omits them",
             err=True,
         )
-    _print_summary(damper, validation, name, peaks.values(), level)
 
 
 def _rig(dataset: Dataset, asked: str | None, of_model: str) -> Dataset:
