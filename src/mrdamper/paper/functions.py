@@ -58,12 +58,12 @@ def fit_paper_functions(
     fit = paper_functions(identifications, mass_law, about)
 
     @cache  # folds that differ only in runs without identification are one
-    def fitted(kept: frozenset[int]) -> Damper:
-        return paper_functions([identifications[i] for i in sorted(kept)], mass_law).damper
+    def fitted(kept: tuple[int, ...]) -> Damper:
+        return paper_functions([identifications[i] for i in kept], mass_law).damper
 
     def refit(rows: Sequence[int]) -> Damper:
         ids = {runs[i].id for i in rows}
-        return fitted(frozenset(n for n, one in enumerate(identifications) if one.run_id in ids))
+        return fitted(tuple(n for n, one in enumerate(identifications) if one.run_id in ids))
 
     return FitResult(fit.damper, refit, fit)
 
