@@ -9,9 +9,12 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from typer.testing import CliRunner
 
+from mrdamper.cli import application
 from mrdamper.data import Dataset, Run
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
+from mrdamper.rig_files.rig_import import import_files, to_dataset
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
 from mrdamper.study.contradictions.evidence import AssumedScatter, Evidence
 from mrdamper.study.contradictions.explanations import completed_matrix_odds
@@ -111,6 +114,37 @@ def test_a_stated_current_is_corrected_in_the_dataset_and_a_measured_one_by_anot
     corrected = pl.when(pl.col("run_id") == run).then(pl.lit(current)).otherwise(pl.col("current_A"))
     table.with_columns(current_A=corrected).write_csv(tmp_path / "rig" / "runs.csv")
     assert not find_contradictions(load_dataset(tmp_path / "rig").runs)
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "stated"),
+    [
+        ("force", 1 / 9.80665, 'unit = "kN" and scale = 9.8'),  # kilonewtons in thousands of kgf
+        ("displacement", 1 / 25.4, 'unit = "inch"'),
+        ("time", 5.0, 'unit = "s" and scale = 0.2'),
+    ],
+)
+def test_the_remedy_of_a_wrong_scale_obeyed_literally_corrects_the_test(sound, tmp_path, channel, factor, stated):
+    names = {"time": "time [s]", "displacement": "stroke [mm]", "force": "load [kN]"}
+    (tmp_path / "rig").mkdir()
+    for k, run in enumerate(sound):
+        columns = {"time": run.time, "displacement": 1e3 * run.displacement, "force": 1e-3 * run.force}
+        columns[channel] = columns[channel] * (factor if k == 7 else 1.0)
+        table = pl.DataFrame({names[name]: values for name, values in columns.items()})
+        table.write_csv(tmp_path / "rig" / f"{run.id}_{run.mean_current:g}A.csv".replace("/", "_"))
+    imported = import_files([tmp_path / "rig"])
+    assert not imported.refusals
+    save_dataset(to_dataset(imported.records), tmp_path / "data")
+    (found,) = find_contradictions(load_dataset(tmp_path / "data").runs)
+    assert stated in found.remedy
+    file, section, keys = re.search(
+        r"import (\S+) on its own with (\[\S+\]) (.*) in the profile", found.remedy
+    ).groups()
+    (tmp_path / "rig.toml").write_text(f"{section}\n{keys.replace(' and ', chr(10))}\n")
+    given = ["import", str(tmp_path / "rig" / file), "--profile", str(tmp_path / "rig.toml")]
+    done = CliRunner().invoke(application(), [*given, "--out", str(tmp_path / "data"), "--add"])
+    assert done.exit_code == 0, done.output
+    assert not find_contradictions(load_dataset(tmp_path / "data").runs)
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from mrdamper.data import Run
+from mrdamper.rig_files.units import DIMENSION, SI, Unit, parse_unit
 from mrdamper.study.contradictions.copies import Copy
 from mrdamper.study.contradictions.explanations import Explanation, Trial
 
@@ -75,23 +77,24 @@ def _force(run: Run, e: Trial) -> tuple[str, str]:
     if e.unit.startswith("not "):
         return (
             f"its force is {1 / e.value:.3g} times as large, as if newtons had been read as {e.unit[4:]}",
-            _own_profile(run, '[channels.force] unit = "N"'),
+            _corrected(run, "force", e.value, "N", read=e.unit[4:]),
         )
     if e.unit:
         return (
             f"its force is {1 / e.value:.3g} of what the others show, as if it were in {e.unit}",
-            _own_profile(run, f'[channels.force] unit = "{e.unit}"'),
+            _corrected(run, "force", e.value, e.unit, read="N"),
         )
     return (
         f"its force is {1 / e.value:.3g} times what the others show: another range of the load cell, or another damper",
-        _own_profile(run, f"[channels.force] scale = {e.value:.3g}") + f", or {_specimen(run)}",
+        _corrected(run, "force", e.value) + f", or {_specimen(run)}",
     )
 
 
 def _offset(run: Run, e: Trial) -> tuple[str, str]:
+    unit, of = _unit_read(run, "force")
     return (
         f"the zero of its force is off by {-e.value:.3g} N",
-        _own_profile(run, f"[channels.force] offset = {e.value:.3g}"),
+        _own_profile(run, f'[channels.force] unit = "{unit}", scale = 1 and offset = {e.value / of.factor:.3g}'),
     )
 
 
@@ -115,24 +118,23 @@ def _displacement(run: Run, e: Trial) -> tuple[str, str]:
     if e.unit.startswith("not "):
         return (
             f"its displacement is {1 / e.value:.3g} times too large, as if millimetres had been read as {e.unit[4:]}",
-            _own_profile(run, '[channels.displacement] unit = "mm"'),
+            _corrected(run, "displacement", e.value, "mm", read=e.unit[4:]),
         )
     if e.unit:
-        unit = {"inch": "in"}.get(e.unit, e.unit)
         return (
-            f"its displacement is {1 / e.value:.3g} of what its force shows, as if it were in {unit}, not mm",
-            _own_profile(run, f'[channels.displacement] unit = "{unit}"'),
+            f"its displacement is {1 / e.value:.3g} of what its force shows, as if it were in {e.unit}, not mm",
+            _corrected(run, "displacement", e.value, e.unit, read="mm"),
         )
     return (
         f"its displacement is about {1 / e.value:.2g} times what its force shows",
-        _own_profile(run, f"[channels.displacement] scale = {e.value:.2g}"),
+        _corrected(run, "displacement", e.value),
     )
 
 
 def _time(run: Run, e: Trial) -> tuple[str, str]:
     return (
         f"its time runs {1 / e.value:.2g} times as long as its force shows: another sample rate",
-        _own_profile(run, f"[channels.time] scale = {e.value:.2g}"),
+        _corrected(run, "time", e.value),
     )
 
 
@@ -157,6 +159,21 @@ def _shifted(run: Run, e: Trial) -> tuple[str, str]:
 
 def _own_profile(run: Run, line: str) -> str:
     return f"import {_file(run)} on its own with {line} in the profile, then add it with import --add"
+
+
+def _corrected(run: Run, channel: str, factor: float, unit: str = "", *, read: str = "") -> str:
+    """State how a channel is multiplied by a factor: by its true unit, where the file was read in the other one."""
+    stated, of = _unit_read(run, channel)
+    if unit and of == parse_unit(read):
+        return _own_profile(run, f'[channels.{channel}] unit = "{unit}"')
+    return _own_profile(run, f'[channels.{channel}] unit = "{stated}" and scale = {factor:.3g}')
+
+
+def _unit_read(run: Run, channel: str) -> tuple[str, Unit]:
+    """Return the unit in which the import read a channel of the run's file; the SI unit if it was not imported."""
+    columns = re.split(r", (?=[a-z]+ = )", run.notes.get("columns", ""))
+    text = next((c.rpartition(" in ")[2] for c in columns if c.startswith(f"{channel} = ")), SI[channel])
+    return (text, unit) if (unit := parse_unit(text)) else (SI[channel], Unit(DIMENSION[channel], 1.0))
 
 
 def _specimen(run: Run) -> str:
