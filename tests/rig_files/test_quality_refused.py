@@ -184,6 +184,7 @@ def test_units_out_of_all_proportion_are_refused(good, change, what):
     with pytest.raises(QualityError, match=what) as caught:
         check_record(replace(good, **{name: values}, velocity=None))
     assert caught.value.code == "E_RANGE"
+    assert factor <= 1 or f"in a profile: [channels.{name}] unit" in caught.value.remedy
 
 
 def test_a_late_velocity_channel_is_refused_with_its_lag():
