@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,8 +14,8 @@ from mrdamper.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
-    from mrdamper.data import Dataset, Run
-    from mrdamper.study.validation import Validation
+    from mrdamper.data import Dataset
+    from mrdamper.study.validation import RunScore, Validation
 
 app = typer.Typer()
 
@@ -53,11 +53,7 @@ def validate(
     student(level, 1.0)  # refuses a level that is none
     require_writable(out)
     damper = load_model(model)
-    dataset = load_dataset(data)
-    if data is None and rig is None and damper.rig not in dataset.rigs:
-        remedy = "give a dataset folder after the model, or a bundled rig as --rig NAME"
-        raise InputError("the bundled tests are not those of this model's rig", where=str(model), remedy=remedy)
-    whole = _rig(dataset, rig, damper.rig)
+    whole = _rig(load_dataset(data), rig, damper.rig)
     name = whole.rigs[0] or whole.name
     runs = [run for run in whole if split in (None, run.split)]
     if not runs:
@@ -81,20 +77,8 @@ def validate(
         for run in validation.runs
     }
     put([{**score_row(run), **peaks[run.run_id]} for run in validation.runs], out, as_json, csv_text)
-    _note_identification_runs(damper, validation, by_id)
+    _note_identification_runs(damper, [run for run in validation.runs if by_id[run.run_id].split == "train"])
     _print_summary(damper, validation, name, peaks.values(), level)
-
-
-def _note_identification_runs(damper: Damper, validation: Validation, runs: Mapping[str, Run]) -> None:
-    """State how many of the runs may be those that the model was identified from."""
-    names = damper.uncertainty.information if damper.uncertainty else {}
-    own = [run for run in validation.runs if run.run_id in names and runs[run.run_id].split == "train"]
-    if own:
-        typer.echo(
-            f"note: {len(own)} of {len(validation.runs)} runs have the names of the model's identification runs: if "
-            "they are these, their errors are those of the fit; --split validate omits them",
-            err=True,
-        )
 
 
 def _rig(dataset: Dataset, asked: str | None, of_model: str) -> Dataset:
@@ -103,7 +87,23 @@ def _rig(dataset: Dataset, asked: str | None, of_model: str) -> Dataset:
         asked = dataset.rigs[0]
         names = [f"rig {rig!r}" if rig else "a rig without a name" for rig in (of_model, asked)]
         typer.echo(f"the model is of {names[0]}; scoring the dataset's only rig, {names[1]}", err=True)
+    if asked is None and of_model not in dataset.rigs:
+        raise UnknownNameError(
+            f"the model's rig {of_model!r} is not in {dataset.name}",
+            remedy=f"give a dataset folder after the model, or --rig NAME: {', '.join(dataset.rigs)}",
+        )
     return dataset.rig(of_model if asked is None else asked)
+
+
+def _note_identification_runs(damper: Damper, runs: Sequence[RunScore]) -> None:
+    """Tell how many runs of the split train have the names of those that the model was identified from."""
+    fitted = damper.uncertainty.information if damper.uncertainty else {}
+    if count := sum(run.run_id in fitted for run in runs):
+        typer.echo(
+            f"note: {count} runs have the names of the model's identification runs: if they are these, their errors "
+            "are those of the fit; --split validate omits them",
+            err=True,
+        )
 
 
 def _print_summary(

@@ -29,7 +29,10 @@ def exchanged_or_out_of_range(view: View) -> None:
         for values in (record.force, record.current)
     )
     speed = float(np.median(strokes.lengths / strokes.durations)) if strokes.durations.size else 0.0
-    moves, exchanged = f"displacement moves {stroke:.4g} m peak to peak", 'set its unit in a profile: [channels.displacement] unit = "mm"?'
+    moves, exchanged = (
+        f"displacement moves {stroke:.4g} m peak to peak",
+        'set its unit in a profile: [channels.displacement] unit = "mm"?',
+    )
     if force < LONGEST_STROKE:
         moves += f", force {force:.4g} N"
         exchanged = "displacement and force look exchanged: name the columns the other way round"
@@ -38,7 +41,11 @@ def exchanged_or_out_of_range(view: View) -> None:
         (stroke > LONGEST_STROKE, moves, exchanged),
         (largest > LARGEST_FORCE, f"force reaches {largest:.4g} N", "set its unit in a profile: [channels.force] unit"),
         (force < SMALLEST_FORCE, f"force changes by {force:.3g} N in the whole record", changes),
-        (current > LARGEST_CURRENT, f"current reaches {current:.4g} A", 'set its unit in a profile: [channels.current] unit = "mA"?'),
+        (
+            current > LARGEST_CURRENT,
+            f"current reaches {current:.4g} A",
+            'set its unit in a profile: [channels.current] unit = "mA"?',
+        ),
         (
             speed > FASTEST,
             f"the mean speed of the strokes is {speed:.4g} m/s",
