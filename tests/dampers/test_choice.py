@@ -104,6 +104,13 @@ def test_two_levels_show_a_straight_line_and_more_choose_between_it_and_the_onse
     assert rise(several[1])[0] < 0.5 * 15.0 + 5.0
 
 
+def test_of_the_laws_of_the_current_the_selected_one_is_named():
+    kept = [choice.TermTrial(law.title, True, {}, {}) for law in choice.LEVEL_LAWS[1:3]]
+    inertia = choice.TermTrial("inertia", True, {}, {})
+    assert choice._kept_terms([*kept, inertia], choice.LEVEL_LAWS[2]) == f"{choice.LEVEL_LAWS[2].title}; inertia"
+    assert choice._kept_terms([], choice.LEVEL_LAWS[0]) == "none beyond the plain form"
+
+
 def test_one_level_determines_no_rise_with_current():
     def run(*current):
         return SimpleNamespace(coil_current=np.array(current))

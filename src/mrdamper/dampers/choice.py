@@ -131,8 +131,7 @@ def identify_jointly(runs: Sequence[Run]) -> JointChoice:
     left_out = CrossValidation.of(final, best).everything()
     left_out = _means({**left_out, **current, **CrossValidation.of(final, best, _by_session).everything()})
     tried = (*tried, *more)
-    kept = "; ".join(t.term for t in tried if t.kept)
-    about = {**best.damper.provenance, "terms": kept or "none beyond the plain form"}
+    about = {**best.damper.provenance, "terms": _kept_terms(tried, law)}
     about |= {f"left out, {what}": f"{100 * error:.2f} %" for what, error in left_out.items()}
     best = replace(best, damper=replace(best.damper, provenance=about), second=second)
     return JointChoice(final, best, tried, left_out)
@@ -171,6 +170,12 @@ def _level_laws(problem: JointProblem) -> tuple[ModelTerm, ...]:
     """
     levels = 5 if any(part.changes for part in problem.parts) else len(levels_of(problem))
     return tuple(law for law in LEVEL_LAWS if len(law.names) + 2 < max(levels, 3))[: None if levels > 2 else 1]
+
+
+def _kept_terms(tried: Sequence[TermTrial], law: ModelTerm) -> str:
+    """Name the kept terms; of the laws of the current, each kept until a better one, the selected one alone."""
+    others = {one.title for one in LEVEL_LAWS} - {law.title}
+    return "; ".join(t.term for t in tried if t.kept and t.term not in others) or "none beyond the plain form"
 
 
 def _level_law(

@@ -147,7 +147,8 @@ class Limits:
         least = self.opening + min(self.minutes(c) for c in allowed)
         if not (math.isfinite(hours) and hours * 60 >= least):
             raise bad_limits(
-                f"{hours:g} hours", f"a session with its shortest record takes {least:.1f} minutes with setting up"
+                f"{hours:g} hours are {60 * hours:g} minutes",
+                f"a session with its shortest record takes {least:.1f} minutes with setting up; give as many at least",
             )
         return allowed
 
