@@ -250,7 +250,7 @@ def test_runs_with_gains_of_their_own_are_found_and_gains_of_sessions_are_not(so
 
 
 @pytest.mark.parametrize("kind", [pytest.param(0, marks=pytest.mark.slow), 3])
-def test_two_dampers_half_the_runs_each_are_refused_with_both_groups(kind):
+def test_two_dampers_half_the_runs_each_are_refused_with_both_groups(kind, tmp_path):
     """A single model of many coefficients describes both dampers together with an error of a few per cent."""
     folder = next(f for f in first_set(DAMPERS[kind]) if f.name == "two dampers, half the runs each")
     with pytest.raises(ContradictionError, match=r"times what the others show\) against t") as refusal:
@@ -258,6 +258,13 @@ def test_two_dampers_half_the_runs_each_are_refused_with_both_groups(kind):
     groups = re.findall(r"((?:t\d\d(?:, )?)+) \(", str(refusal.value))
     smaller = min((group.split(", ") for group in groups), key=len)
     find_contradictions(folder.runs, keep=smaller)
+    column, file = re.search(r"two names in the column (\S+) of (\S+);", str(refusal.value)).groups()
+    save_dataset(Dataset(tuple(folder.runs)), tmp_path / "data")
+    table = pl.read_csv(tmp_path / "data" / file, infer_schema=False)
+    named = pl.when(pl.col("run_id").is_in(smaller)).then(pl.lit("B")).otherwise(pl.lit("A"))
+    table.with_columns(named.alias(column)).write_csv(tmp_path / "data" / file)
+    dataset = load_dataset(tmp_path / "data")
+    assert [find_contradictions(dataset.rig(name).runs) for name in ("A", "B")] == [[], []]
 
 
 def test_motions_that_complete_the_matrix_of_tests_are_those_of_another_stroke(sound):

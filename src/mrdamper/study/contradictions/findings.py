@@ -177,7 +177,7 @@ def _unit_read(run: Run, channel: str) -> tuple[str, Unit]:
 
 
 def _specimen(run: Run) -> str:
-    return f"in tests.csv, give {_file(run)} another specimen"
+    return f"if {run.id} and other runs are of another damper, name it for them in the column rig of runs.csv"
 
 
 def _stated_current(run: Run, current: float) -> str:

@@ -22,7 +22,7 @@ _REFUSED_SHARE = 0.2  # share of the runs from which they are refused if the oth
 _MAX_MISFIT_FACTOR = 4.0  # factor of the usual model error at which runs do not agree
 _INVERSE_TOLERANCE = 0.1  # logarithm of the product of two factors up to which one is the inverse of the other
 _MIN_GAIN = 1e-3  # gain of a run at least, for its logarithm
-_CLUSTERS_REMEDY = "tests of two dampers need a column specimen in tests.csv; --keep RUN keeps a run as it is"
+_CLUSTERS_REMEDY = "tests of two dampers need two names in the column rig of runs.csv; --keep RUN keeps a run as it is"
 _MILLIAMPERE_RATIO = 50.0  # ratio of a current to the usual one from which it is in milliamperes
 
 
