@@ -238,7 +238,9 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
     if missing and not columns and not any(table.names):
         what = f"{len(table.names)} columns without names or units"
         remedy = (
-            'name them in a profile, with their units: [file] names = ["time [s]", "displacement [mm]", "force [N]"]'
+            'name them in a profile, with their units: [file] names = ["time [s]", "displacement [mm]", "force [N]"]; '
+            "where each file has one channel, set column = 1 and unit under [channels.time], and column, unit and "
+            'file = "...{run}..." under [channels.displacement] and [channels.force]'
         )
         return [_refusal(UnitError, table, what, remedy, "E_UNITS_MISSING")]
     shown = ", ".join(name or f"column {i}" for i, name in enumerate(table.names, 1))
