@@ -464,3 +464,10 @@ def test_the_remedy_for_a_velocity_against_the_motion_is_the_sign_that_it_has_no
         assert (refused.error.code, remedy in refused.error.remedy) == ("E_CHANNEL_LAG", True)
         (record,) = import_files([tmp_path], parse_profile(f"[channels.velocity]\nsign = {-sign}")).records
         assert np.corrcoef(record.velocity, np.gradient(record.displacement, T))[0, 1] > 0.99
+
+
+def test_days_that_a_text_counts_are_no_tests(tmp_path):
+    (tmp_path / "diary.txt").write_text("Day 1: filled, warmed up at 0.2 A\nDay 2: coil tried at 0.8 A\n")
+    for run in (1, 2):
+        (tmp_path / f"rec_{run}.csv").write_text("time [s],stroke [mm],load [N]\n" + rows(T, X, force(0.5, run)))
+    assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_CURRENT_MISSING"] * 2

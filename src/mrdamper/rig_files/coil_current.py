@@ -125,7 +125,8 @@ def _refuse_contradiction(value: float, channel: Floats | None, statements: list
 def _statements(table: RawTable, path: Path, profile: Profile) -> list[Statement]:
     """Every current that stands beside the columns, the surest place first."""
     channel = profile.channel("current")
-    number = table.constants.get(str(channel.column))
+    called = (v for name, v in table.constants.items() if channel.column in (name, split_name(name).name))
+    number = next(called, None)
     named = {} if number is None else {f"current [{channel.unit or 'A'}]": (channel.scale or 1.0) * number}
     held = held_current_of(replace(table, constants=named) if named else table, channel.unit or "")
     statements = [] if held is None else [Statement(held, table.stated_in or "a number in the file")]

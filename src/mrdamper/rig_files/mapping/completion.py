@@ -288,10 +288,10 @@ def _with_numbered_channels(table: RawTable) -> RawTable:
 def _with_explained_names(table: RawTable) -> RawTable:
     """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm."""
     lines = [[cell.strip(' "') for cell in re.split(r"[,;|\t]", line[:_LONGEST_LINE])] for line in table.remarks]
-    says = {cells[0].casefold(): cells[1:] for cells in lines if len(cells) > 1}
     headings = {}
     for i, (name, header) in enumerate(zip(table.names, table.headers, strict=True)):
-        cells = says.get(name.strip().casefold(), []) if name and header.role is None else []
+        own = [cells[1:] for cells in lines if name and header.role is None and cells[0].casefold() == name.casefold()]
+        cells = own[0] if own and own.count(own[0]) == len(own) else []
         named = [cell for cell in cells if split_name(cell).role]
         units = [cell for cell in cells if is_unit(cell.strip("[]()"))]
         if len(named) == 1 and len(units) < 2:

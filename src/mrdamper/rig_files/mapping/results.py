@@ -39,6 +39,7 @@ class Results:
     cells: tuple[tuple[str, ...], ...]  # of every row those beside the current, by column
     title: str  # heading of the column of currents
     keys: tuple[str, ...] = ()  # headings of the columns of `cells`; empty for the number of the row
+    counts_tests: bool = True  # so that a number in a test's name may be meant; Day 1: 0.5 A counts something else
 
     def by_test(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
         """Return the current [A] of each test by its number, where one column of the table tells all of them apart.
@@ -47,7 +48,7 @@ class Results:
         """
         names = [_names(texts) for texts in tests]
         one_of_several = len(tests) == 1 < len(self.current)  # a number in its name alone may count anything
-        for exact in (True,) if one_of_several else (True, False):
+        for exact in (True,) if one_of_several or not self.counts_tests else (True, False):
             columns = list(zip(*self.cells, strict=True))
             columns = columns if self._counts_tests(columns, len(tests)) else columns[1:]
             matches = [match for column in columns if (match := _match(column, names, exact))]
@@ -121,7 +122,8 @@ def numbered_tests(lines: Iterable[str]) -> Results | None:
     if len(numbers) < _FEWEST_ROWS or len(numbers) < len(rows) or len({name for name, _ in numbers}) > 1:
         return None
     cells = tuple((str(i), f"{name}{number}", number) for i, (name, number, _) in enumerate(rows, 1))
-    return Results(tuple(row[2] for row in rows), cells, "a line for each test", ("", "", rows[0][0]))
+    counts = bool({word.casefold() for word in words_of(rows[0][0])} & _NUMBERED)
+    return Results(tuple(row[2] for row in rows), cells, "a line for each test", ("", "", rows[0][0]), counts)
 
 
 def form_of_tests(table: RawTable, form: FileForm) -> FileForm:
