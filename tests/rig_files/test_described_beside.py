@@ -94,3 +94,23 @@ def test_a_text_beside_the_files_states_the_signs_of_all(tmp_path, name, text):
     for own, amperes in CURRENTS.items():
         (tmp_path / f"{own}.csv").rename(tmp_path / f"{own}_{amperes}A.csv")
     require_the_tests(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "codes"),
+    [
+        ("Alle Größen in SI-Einheiten.\n", []),
+        ("Units: SI\n", []),
+        ("SI units, except the stroke in mm\n", ["E_UNITS_MISSING"]),
+        ("Si las unidades faltan, preguntar\n", ["E_UNITS_MISSING"]),
+    ],
+)
+def test_a_text_may_state_that_all_units_are_those_of_the_si(tmp_path, text, codes):
+    (tmp_path / "README.txt").write_text(text, encoding="utf-8")
+    rows = zip(T, 1e-3 * X, force(0.5), strict=True)
+    (tmp_path / "a_0.5A.csv").write_text(
+        "time,stroke,load\n" + "".join(f"{t:.3f},{x:.7f},{f:.4f}\n" for t, x, f in rows)
+    )
+    found = import_files([tmp_path])
+    assert {refusal.error.code for refusal in found.refusals} == {*codes}
+    assert [round(1e3 * np.ptp(record.displacement)) for record in found.records] == ([] if codes else [24])

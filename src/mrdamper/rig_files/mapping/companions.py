@@ -18,6 +18,7 @@ from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.conditions import amperes
 from mrdamper.rig_files.file_records import digest_of, records_of_file
 from mrdamper.rig_files.mapping.completion import completed
+from mrdamper.rig_files.mapping.description import with_notes
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
 from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
 from mrdamper.rig_files.profile import Channel, Profile
@@ -62,7 +63,7 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
         with raw_tables(path, profile.file) as tables:
             if len(tables) != 1:
                 return None
-            table, alone = completed(tables[0]), len(tables[0].names) == 1
+            table, alone = completed(with_notes(tables[0], path, profile)), len(tables[0].names) == 1
             stated = [role for role, channel in profile.channels.items() if channel.file]
             assigned = partly_assigned(table, profile, ["time", *stated] if run and not alone else ())
             raw = table.read([entry.column for entry in assigned.values()])

@@ -28,7 +28,7 @@ from mrdamper.rig_files.record import SIGNED, Finding
 from mrdamper.rig_files.text.layout import LISTED, X_VALUE, cells_of
 from mrdamper.rig_files.text.spool import rescale
 from mrdamper.rig_files.text.tokens import looks_numeric, number
-from mrdamper.rig_files.units import DIMENSION, is_unit, parse_unit
+from mrdamper.rig_files.units import DIMENSION, SI, is_unit, parse_unit
 from mrdamper.rig_files.vocabulary import meanings, words
 
 _SEPARATORS = ("\t", ";", ",", "|")
@@ -50,6 +50,9 @@ _KEY = re.compile(r"[\s#%;\"]*([^=:]{1,60}?)\s*[=:]\s*(\S+)\s*")  # CoilCurrent=
 _UNIT_KEY = re.compile(rf"(?i)(?:{'|'.join(words('unit'))})$")  # HUnit, X-Einheit
 _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.IGNORECASE)
 _TITLES, _MONITOR, _SENSE_NAMES = words("label") | words("notes"), words("monitor"), words("sense")
+_UNITS_IN = rf"(?i:{'|'.join(words('unit'))}|unités|unidades|units)"
+_SI_UNITS = re.compile(rf"\bSI[- ](?:base[- ])?{_UNITS_IN}|{_UNITS_IN}\W*(?:(?:in|du|del|do)\W+)?SI\b")
+_EXCEPT = re.compile(r"(?i)\b(?:except|but|not|no|non|außer|nicht|kein\w*|sauf|salvo|excepto|tranne)\b")
 _LABVIEW = ("Delta_X", "X_Dimension")
 _COLON = re.compile(r"^([^:]+):\s+([^\s:]{1,12})$")  # force: N
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
@@ -88,7 +91,7 @@ def completed(table: RawTable) -> RawTable:
     table = _with_explained_names(_with_numbered_channels(_without_shared_path(table)))
     table = _with_titles(_with_keyed_lines(table))
     table = _with_listed_units(with_axis_as_time(table))
-    table = _with_stated_signs(with_nanoseconds(_with_clocks_and_weights(table)))
+    table = _with_stated_signs(_with_si_units(with_nanoseconds(_with_clocks_and_weights(table))))
     return _with_sense(_with_scales(_with_counts(table)))
 
 
@@ -154,6 +157,11 @@ def _with_stated_signs(table: RawTable) -> RawTable:
     text = "the file counts compression positive in the {}: its sign is changed unless a profile states it"
     notes = [Finding("W_SCALE", text.format(role)) for role, sense in senses.items() if sense == -1]
     return replace(table, senses=senses).noted(*notes)
+
+
+def states_si(line: str) -> bool:
+    """Tell if a line states that all units are those of the SI: All quantities in SI units."""
+    return len(line) <= _LONGEST_LINE and _SI_UNITS.search(line) is not None and _EXCEPT.search(line) is None
 
 
 def states_sign(line: str) -> bool:
@@ -355,6 +363,14 @@ def _with_listed_units(table: RawTable) -> RawTable:
     of_name = {names[i]: unit for i, unit in units.items()}
     constants = {f"{name} [{of_name[name]}]" if name in of_name else name: v for name, v in table.constants.items()}
     return replace(table, constants=constants).named({i: (names[i], units[i]) for i in bare if i in units})
+
+
+def _with_si_units(table: RawTable) -> RawTable:
+    """Units of the SI of channels without a unit, where a line states that all units are."""
+    if not any(map(states_si, table.remarks)):
+        return table
+    bare = {i: h.role for i, h in enumerate(table.headers) if not h.unit and h.role in SI}
+    return table.named({i: (table.names[i], SI[role]) for i, role in bare.items() if role})
 
 
 def _with_clocks_and_weights(table: RawTable) -> RawTable:

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_by_lines
-from mrdamper.rig_files.mapping.completion import NUMBERED, scaled_columns, states_scale, states_sign
+from mrdamper.rig_files.mapping.completion import NUMBERED, scaled_columns, states_scale, states_si, states_sign
 from mrdamper.rig_files.mapping.results import numbered_tests
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
@@ -65,7 +65,11 @@ def _of_channels(line: str) -> str:
     if len(cells) > 2 and cells[0].isascii() and cells[0].isdigit() and parse_unit(cells[-1]):
         return f"channel {cells[0]}: {' '.join(cells[1:])}"
     units = [split_name(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]
-    return line if states_scale(line) or (any(map(is_unit, units)) and not stated_by_lines([line], ".")) else ""
+    return (
+        line
+        if states_scale(line) or states_si(line) or (any(map(is_unit, units)) and not stated_by_lines([line], "."))
+        else ""
+    )
 
 
 def with_description(table: RawTable, path: Path, profile: Profile) -> RawTable:
