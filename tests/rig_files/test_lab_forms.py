@@ -452,6 +452,7 @@ def test_a_list_of_stages_above_the_columns_gives_each_its_current(tmp_path):
     both = (np.r_[T, T + 9], np.r_[X, X], np.r_[force(0.2), force(0.8)], np.repeat([1, 2], T.size))
     (tmp_path / "night.csv").write_text(head + rows(*both))
     assert currents(import_files([tmp_path]).records) == [0.2, 0.8]
+    assert len(import_files([tmp_path], parse_profile('[file]\nblocks = "join"\n[current]\nvalue = 0.5')).records) == 1
 
 
 def test_the_remedy_for_a_velocity_against_the_motion_is_the_sign_that_it_has_not(tmp_path):
@@ -471,3 +472,12 @@ def test_days_that_a_text_counts_are_no_tests(tmp_path):
     for run in (1, 2):
         (tmp_path / f"rec_{run}.csv").write_text("time [s],stroke [mm],load [N]\n" + rows(T, X, force(0.5, run)))
     assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_CURRENT_MISSING"] * 2
+
+
+@pytest.mark.parametrize("last", ["A. Keller, operator", "n = 800 samples; end of record", "X scale per division 5 mm"])
+def test_lines_of_words_below_the_rows_may_begin_with_one_letter(tmp_path, last):
+    head = "Coil current: 0.5 A\ntime [s],stroke [mm],load [N]\n"
+    (tmp_path / "a.csv").write_text(head + rows(T, X, force(0.5)) + f"END\n{last}\n")
+    (record,) = import_files([tmp_path]).records
+    assert record.time.size == T.size
+    assert "W_FOOTER" in [finding.code for finding in record.findings]

@@ -128,7 +128,9 @@ def numbered_tests(lines: Iterable[str]) -> Results | None:
 
 def form_of_tests(table: RawTable, form: FileForm) -> FileForm:
     """Return the form of a file, with the column that numbers its tests as a list of them above the columns does."""
-    results = results_in(table.remarks) if form.run_column is None and len(table.remarks) >= _FEWEST_ROWS else None
+    if form.run_column is not None or form.blocks == "join" or len(table.remarks) < _FEWEST_ROWS:
+        return form
+    results = results_in(table.remarks)
     column = results.column_of_tests(table) if results else None
     return form.model_copy(update={"run_column": column}) if column else form
 

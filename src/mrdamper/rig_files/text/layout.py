@@ -279,7 +279,8 @@ def is_footer(line: str, layout: Layout) -> bool:
     if not any(cells):
         return False
     at = next(i for i, cell in enumerate(cells) if cell)
-    worded = _WORD.match(cells[at].lstrip("[<(*=-'")) is not None and cells[at].lower() not in MISSING
+    first = cells[at].lstrip("[<(*=-'")
+    worded = first[:1].isalpha() and _WORD.search(first) is not None and cells[at].lower() not in MISSING
     return worded and (at >= layout.width or layout.kinds[at] != "text")
 
 
