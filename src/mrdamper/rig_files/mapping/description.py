@@ -37,9 +37,9 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Add what short texts beside the file state of signs, and of names, units and scales where they lack."""
     lacking = bool(scaled_columns(table)) or _lacks_names_or_units(table)
     folder = path.parent
-    files = list(folder.iterdir())
+    files = list(folder.glob("*"))  # which tells of no folder that may not be read
     readme = [p for p in files if _README.fullmatch(p.name)]
-    readme = readme or [p for p in folder.parent.iterdir() if _README.fullmatch(p.name)]
+    readme = readme or [p for p in folder.parent.glob("*") if _README.fullmatch(p.name)]
     structures = [p for p in files if p.suffix.lower() in _STRUCTURES]
     readme += structures if lacking or len(structures) <= _FEW_FILES else []
     listing = [p for p in files if lacking and p.suffix.lower() in _TEXTS and p.stat().st_size <= _LARGEST_LIST]
