@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import replace
+from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
@@ -36,18 +37,26 @@ _README = re.compile(
 def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Add what short texts beside the file state of signs, and of names, units and scales where they lack."""
     lacking = bool(scaled_columns(table)) or _lacks_names_or_units(table)
-    folder = path.parent
-    files = list(folder.glob("*"))  # which tells of no folder that may not be read
-    readme = [p for p in files if _README.fullmatch(p.name)]
-    readme = readme or [p for p in folder.parent.glob("*") if _README.fullmatch(p.name)]
-    structures = [p for p in files if p.suffix.lower() in _STRUCTURES]
-    readme += structures if lacking or len(structures) <= _FEW_FILES else []
-    listing = [p for p in files if lacking and p.suffix.lower() in _TEXTS and p.stat().st_size <= _LARGEST_LIST]
-    texts = [p for p in {*readme, *listing} if p.is_file() and p != path and p.suffix.lower() in _READ]
-    texts = sorted(p for p in texts if not profile.leaves_out(p.name))
-    lines = [line for text in texts if len(own := short_lines(text)) <= _MOST for line in own]
+    readme, structures, listing = _texts_in(path.parent)
+    texts = readme or _texts_in(path.parent.parent)[0]
+    texts = texts + (structures if lacking or len(structures) <= _FEW_FILES else [])
+    texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
+    texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(p.name)]
+    lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
     stated = [(lacking and _of_channels(line)) or (line if states_sign(line) else "") for line in lines]
     return replace(table, remarks=(*table.remarks, *filter(None, stated)))
+
+
+def _texts_in(folder: Path) -> tuple[list[Path], list[Path], list[Path]]:
+    """Return the files of a folder that may describe its records: by their names, structures, and other texts."""
+    return _texts_as_of(folder, folder.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=64)  # every file of a folder asks
+def _texts_as_of(folder: Path, changed_ns: int) -> tuple[list[Path], list[Path], list[Path]]:
+    files = [p for p in folder.glob("*") if p.suffix.lower() in _READ]  # nothing of a folder that may not be read
+    structures = [p for p in files if p.suffix.lower() in _STRUCTURES]
+    return [p for p in files if _README.fullmatch(p.name)], structures, [p for p in files if p.suffix.lower() in _TEXTS]
 
 
 def _lacks_names_or_units(table: RawTable) -> bool:
