@@ -227,7 +227,7 @@ def series(**given: Any) -> tuple[NDArray[np.float64], ...]:
 def shown(value: object) -> str:
     """Whatever a user gave, in the first line of a few characters; a number of thousands of digits has no text."""
     try:
-        return f"{value:.6g}" if isinstance(value, float) else f"{value!r}".partition("\n")[0][:60]
+        return f"{value:.10g}" if isinstance(value, float) else f"{value!r}".partition("\n")[0][:60]
     except ValueError:
         return "a number of thousands of digits"
 

@@ -103,6 +103,7 @@ def test_a_text_beside_the_files_states_the_signs_of_all(tmp_path, name, text):
         ("Units: SI\n", []),
         ("SI units, except the stroke in mm\n", ["E_UNITS_MISSING"]),
         ("Si las unidades faltan, preguntar\n", ["E_UNITS_MISSING"]),
+        ("All in SI units: mm and N\n", ["E_UNITS_MISSING"]),
     ],
 )
 def test_a_text_may_state_that_all_units_are_those_of_the_si(tmp_path, text, codes):
@@ -114,3 +115,40 @@ def test_a_text_may_state_that_all_units_are_those_of_the_si(tmp_path, text, cod
     found = import_files([tmp_path])
     assert {refusal.error.code for refusal in found.refusals} == {*codes}
     assert [round(1e3 * np.ptp(record.displacement)) for record in found.records] == ([] if codes else [24])
+
+
+def test_the_text_of_one_test_states_the_sign_of_no_other(tmp_path):
+    write(tmp_path, "time [s],disp [mm],load [N]\n", (1.0, 1.0))
+    for own, amperes in CURRENTS.items():
+        (tmp_path / f"{own}.csv").rename(tmp_path / f"{own}_{amperes}A.csv")
+    first, *others = sorted(tmp_path.glob("*.csv"))
+    first.with_suffix(".json").write_text('{"sign convention": "compression positive"}')
+    found = import_files([tmp_path])
+    changed = {r.id: r.provenance.get("sign_changed", "") for r in found.records}
+    assert changed[first.stem]
+    assert not any(changed[other.stem] for other in others)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Start direction: compression, positive ramp\n",
+        "The damper is pushed to the positive end stop before each test.\n",
+    ],
+)
+def test_sentences_about_the_test_state_no_sign(tmp_path, text):
+    write(tmp_path, "time [s],disp [mm],load [N]\n", (1.0, 1.0))
+    (tmp_path / "README.txt").write_text(text)
+    for own, amperes in CURRENTS.items():
+        (tmp_path / f"{own}.csv").rename(tmp_path / f"{own}_{amperes}A.csv")
+    require_the_tests(tmp_path)
+
+
+def test_steps_of_a_procedure_are_no_tests(tmp_path):
+    write(tmp_path, "time [s],disp [mm],load [N]\n", (1.0, 1.0))
+    for number, path in enumerate(sorted(tmp_path.glob("*.csv")), 1):
+        path.rename(tmp_path / f"rec_{number}.csv")
+    (tmp_path / "procedure.txt").write_text("Step 1: warm up at 0.2 A\nStep 2: heat the coil at 0.8 A\n")
+    found = import_files([tmp_path])
+    assert not found.records
+    assert {refusal.error.code for refusal in found.refusals} == {"E_CURRENT_MISSING"}

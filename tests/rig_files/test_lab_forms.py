@@ -380,6 +380,7 @@ def test_one_step_of_all_channels_in_lines_of_another_language_is_the_step_of_ti
 def test_a_row_of_notes_states_the_current_of_every_column(tmp_path):
     rows_of = rows(T, X, force(0.2), T, X, force(0.8), separator="\t").splitlines()
     head = "Name\tt\tx\tF\tt\tx\tF\nUnit\ts\tmm\tN\ts\tmm\tN\nNotes\t0.2 A\t0.2 A\t0.2 A\t0.8 A\t0.8 A\t0.8 A\n"
+    head += "Comments\t\t\t\t\t\t\n"  # which says nothing
     (tmp_path / "both.txt").write_text(head + "".join(f"{i}\t{row}\n" for i, row in enumerate(rows_of)))
     assert currents(import_files([tmp_path]).records) == [0.2, 0.8]
 
@@ -404,6 +405,7 @@ def test_a_time_of_a_netcdf_table_may_be_the_same_for_some_conditions(tmp_path):
             ("coil_current", "A", ("coil_current",), np.array([0.0, 0.4, 0.8])),
             ("amplitude", "mm", ("amplitude",), np.array([10.0, 20.0])),
             ("time", "s", ("sample", "amplitude"), np.column_stack([T, T])),
+            ("time_of_day", "s", ("sample", "amplitude"), 3600 + np.column_stack([T, T])),
             ("displacement", "mm", ("amplitude", "sample"), np.stack([X, 2 * X])),
             ("force", "N", ("coil_current", "amplitude", "sample"), loads),
         ):

@@ -4,6 +4,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 from support import lab_exports
 from support.lab_exports import Lab, campaign
@@ -159,6 +160,8 @@ def test_a_file_read_otherwise_replaces_its_test_with_what_the_table_beside_it_s
         write(tmp_path / "rig", name, text(rows(seed=number)))
     write(tmp_path / "rig", "tests.csv", "file,current_A,split\n" + "".join(f"{name},0.5,train\n" for name in names))
     assert run("import", tmp_path / "rig", "--out", tmp_path / "data").exit_code == 0
+    listed = tmp_path / "data" / "runs.csv"
+    pl.read_csv(listed).with_columns(rig=pl.lit("bench 4")).write_csv(listed)
     before = load_dataset(tmp_path / "data")
     assert repr(import_files([tmp_path / "rig"])) == "<import: tests accepted: 3, refused: 0>"
     profile = write(tmp_path, "lbf.toml", '[channels.force]\nunit = "lbf"\n')
@@ -173,6 +176,7 @@ def test_a_file_read_otherwise_replaces_its_test_with_what_the_table_beside_it_s
     assert np.allclose(after["t01"].force, 4.4482216 * before["t01"].force)
     assert np.array_equal(after["t02"].force, before["t02"].force)
     assert after["t01"].mean_current == 0.5
+    assert {one.rig for one in after} == {"bench 4"}
 
 
 @pytest.mark.parametrize(

@@ -122,6 +122,7 @@ def test_a_stated_current_is_corrected_in_the_dataset_and_a_measured_one_by_anot
         ("force", 1 / 9.80665, 'unit = "kN" and scale = 9.8'),  # kilonewtons in thousands of kgf
         ("displacement", 1 / 25.4, 'unit = "inch"'),
         ("time", 5.0, 'unit = "s" and scale = 0.2'),
+        ("rate", 0.2, "[file] sample_rate_Hz = "),
     ],
 )
 def test_the_remedy_of_a_wrong_scale_obeyed_literally_corrects_the_test(sound, tmp_path, channel, factor, stated):
@@ -129,9 +130,15 @@ def test_the_remedy_of_a_wrong_scale_obeyed_literally_corrects_the_test(sound, t
     (tmp_path / "rig").mkdir()
     for k, run in enumerate(sound):
         columns = {"time": run.time, "displacement": 1e3 * run.displacement, "force": 1e-3 * run.force}
-        columns[channel] = columns[channel] * (factor if k == 7 else 1.0)
+        rate = (factor if k == 7 else 1.0) * (run.time.size - 1) / float(np.ptp(run.time))
+        if channel == "rate":
+            del columns["time"]
+        else:
+            columns[channel] = columns[channel] * (factor if k == 7 else 1.0)
         table = pl.DataFrame({names[name]: values for name, values in columns.items()})
-        table.write_csv(tmp_path / "rig" / f"{run.id}_{run.mean_current:g}A.csv".replace("/", "_"))
+        head = f"Sample rate: {rate:.6g} Hz\n" if channel == "rate" else ""
+        path = tmp_path / "rig" / f"{run.id}_{run.mean_current:g}A.csv".replace("/", "_")
+        path.write_text(head + table.write_csv())
     imported = import_files([tmp_path / "rig"])
     assert not imported.refusals
     save_dataset(to_dataset(imported.records), tmp_path / "data")

@@ -32,7 +32,9 @@ _MAX_RUN_SHARE = 0.6  # share of the information on a parameter from which one r
 _MIN_EIGENVALUE = 1e-10  # of the largest of the scaled normal matrix, below which a direction is not determined
 _REFITS = 16  # draws of gains and offsets that are fitted without linearisation
 _SEED = 20261124  # of errors within the runs that are drawn beside those of sessions
-_MIN_RETAINED = 0.05  # share of the information on a direction that a fit without a condition has at least
+# share of the information on a direction, and of the variance of the error of the form, that a fit without a condition
+# has at least
+_MIN_RETAINED = 0.05
 _LEVEL = 0.95  # of the intervals by which a parameter is identifiable or not
 
 

@@ -14,8 +14,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -45,6 +46,8 @@ _MIN_ERROR_PP = 1e-4  # nrmse_pp below which a run gains no more weight
 _PASSES = 2  # over all coordinates in the choice of forms
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
+_Trial: TypeAlias = "tuple[JointFunctionFit, dict[str, Floats]]"  # and its errors by kind of fold
+
 
 @dataclass(frozen=True, eq=False)
 class Condensed:
@@ -62,6 +65,8 @@ class Condensed:
     gram: Floats
     # (R, K, L+1, L+1) their second derivatives along the ladder, counted in rungs, as a cubic spline has them
     bend: Floats
+    # of the choice of forms, by these and where the shape starts
+    trials: dict[tuple[Any, ...], _Trial] = field(default_factory=lambda: {}, init=False, repr=False)
 
     @cached_property
     def folds(self) -> dict[str, list[list[int]]]:
@@ -472,7 +477,7 @@ def choose_forms(
     start = tuple(shape_values.tolist())
     options = {name: _supported(laws, data.conditions) for name, laws in candidates.items()}
     forms: dict[str, str | Law] = {name: laws[0] for name, laws in options.items()}
-    fit, errors = _tried(data, tuple(forms.items()), start)
+    fit, errors = _tried(data, forms, start)
     refused: dict[str, str] = {}
     for _ in range(_PASSES):
         before = dict(forms)
@@ -481,7 +486,7 @@ def choose_forms(
                 if law == forms[name]:
                     continue
                 try:
-                    trial, other = _tried(data, tuple({**forms, name: law}.items()), start)
+                    trial, other = _tried(data, {**forms, name: law}, start)
                 except IdentificationError:
                     continue  # the tests cannot tell this form's terms apart
                 larger = _size(law) >= _size(forms[name])
@@ -525,12 +530,16 @@ def _broken(fit: JointFunctionFit, name: str, conditions: Sequence[Condition], d
     return broken_law(function, conditions, dissipating[name]) if function and name in dissipating else ""
 
 
-@lru_cache(maxsize=256)  # of all forms and of those over the current alone, and in the second pass, many are the same
-def _tried(
-    data: Condensed, items: tuple[tuple[str, str | Law], ...], shape_values: tuple[float, ...]
-) -> tuple[JointFunctionFit, dict[str, Floats]]:
+def _tried(data: Condensed, forms: Mapping[str, str | Law], shape_values: tuple[float, ...]) -> _Trial:
     """Return a fit with some forms, and its errors by kind of fold."""
-    forms = dict(items)
+    # Of all forms and of those over the current alone, and in the second pass, many are the same.
+    trial = *forms.items(), shape_values
+    if trial not in data.trials:
+        data.trials[trial] = _fitted(data, forms, shape_values)
+    return data.trials[trial]
+
+
+def _fitted(data: Condensed, forms: Mapping[str, str | Law], shape_values: tuple[float, ...]) -> _Trial:
     for name in data.linear:
         if not law_of(forms[name])[1] and _form(forms[name]).terms:
             require_determined(law_of(forms[name])[0], data.conditions)

@@ -42,7 +42,8 @@ class Channel(Table):
     unit : str, optional
         Of the numbers, or of the numbers times `scale`.
     sign : 1 or -1
-        -1 where the file counts compression positive.
+        -1 where the file counts compression positive; that of the displacement holds for a velocity and an
+        acceleration without one of their own.
     scale, offset : float
         A calibration: value in `unit` = scale * number + offset. Not for zeroing: the zero
         of force and displacement is data.
@@ -199,7 +200,7 @@ class Profile(Table):
 
     def require_matches(self, tests: Sequence[tuple[Path, str]]) -> None:
         """Refuse patterns of the table of currents and of the channels' files that match no file and no test."""
-        for role, channel in self.channels.items():
+        for role, channel in ((role, self.channels[role]) for role in REQUIRED if role in self.channels):
             only = Profile(channels={role: channel})
             if channel.file is not None and not any(only.of_file(path)[0] for path, _ in tests):
                 remedy = "write the files' name, with folders where it has slashes, and {run} for what names the test"

@@ -70,6 +70,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         **recording_time(table.remarks),
         **_remarks(table, assigned),
         "sign_changed": ", ".join(role for role, entry in assigned.items() if entry.sign < 0),
+        "scaled": ", ".join(f"{r} = {scale:g}" for r in assigned if (scale := profile.channel(r).scale)),
         "time_from": rate,
         "motion_stated": motion if len(stretches) == 1 else "",
     }

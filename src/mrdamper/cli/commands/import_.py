@@ -195,9 +195,16 @@ def _joined(old: Dataset, new: Dataset) -> Dataset:
     from mrdamper.data import Dataset
     from mrdamper.rig_files.record import unique_names
 
-    stored = {(run.notes["sha256"], run.id): run for run in old if run.notes.get("sha256")}
-    again = {run.id: run for run in new if (run.notes.get("sha256"), run.id) in stored}
-    same = [run.id for run in again.values() if _reads_alike(run, stored[run.notes["sha256"], run.id])]
+    stored, given = _by_file(old), _by_file(new)
+    again: dict[str, Run] = {}  # by the name of the run that it replaces
+    for before, now in ((stored[digest], runs) for digest, runs in given.items() if digest in stored):
+        if len(before) != len(now):
+            raise OutputError(
+                f"{listed([run.id for run in before], 5)} are of the same file, which gives {len(now)} tests now",
+                where=f"dataset {old.name}", remedy="delete them from runs.csv, or import into a new folder",
+            )  # fmt: skip
+        again |= {one.id: other for one, other in zip(before, now, strict=True)}
+    same = [run.id for run in old if run.id in again and _reads_alike(run, again[run.id])]
     if same:
         raise OutputError(
             f"there already, read in the same way: {listed(same, 5)}",
@@ -205,11 +212,27 @@ def _joined(old: Dataset, new: Dataset) -> Dataset:
         )  # fmt: skip
     if again:
         typer.echo(f"read otherwise than before and replaced: {listed([*again], 5)}", err=True)
-    kept = [replace(again[run.id], split=run.split) if run.id in again else run for run in old]
-    fresh = [run for run in new if run.id not in again]
+    kept = [_replaced(run, again[run.id]) if run.id in again else run for run in old]
+    fresh = [run for run in new if run.notes.get("sha256") not in stored]
     names = unique_names((run.id for run in fresh), (run.id for run in old))
     added = (run if name == run.id else replace(run, id=name) for run, name in zip(fresh, names, strict=True))
     return Dataset((*kept, *added), old.name)
+
+
+def _by_file(runs: Dataset) -> dict[str, list[Run]]:
+    """Return runs by the digest of their file, in their order."""
+    files: dict[str, list[Run]] = {}
+    for run in runs:
+        if digest := run.notes.get("sha256"):
+            files.setdefault(digest, []).append(run)
+    return files
+
+
+def _replaced(before: Run, now: Run) -> Run:
+    """Return a run read anew, with the name, split and what runs.csv states of the one before."""
+    anew = ("columns", "sign_changed", "scaled", "time_from", "motion_stated", "findings")
+    stated = {key: text for key, text in before.notes.items() if key not in anew}
+    return replace(now, id=before.id, split=before.split, rig=now.rig or before.rig, notes={**now.notes, **stated})
 
 
 def _reads_alike(one: Run, other: Run) -> bool:

@@ -100,8 +100,8 @@ def _note_identification_runs(damper: Damper, runs: Sequence[RunScore]) -> None:
     fitted = damper.uncertainty.information if damper.uncertainty else {}
     if count := sum(run.run_id in fitted for run in runs):
         typer.echo(
-            f"note: {count} runs have the names of the model's identification runs: if they are these, their errors "
-            "are those of the fit; --split validate omits them",
+            f"note: runs with names of the model's identification runs: {count}; if they are these, their errors are "
+            "those of the fit, and --split validate omits them",
             err=True,
         )
 

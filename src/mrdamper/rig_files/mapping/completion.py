@@ -68,6 +68,7 @@ _SENSES = {1: tuple(words("tension_stems")), -1: tuple(words("compression_stems"
 _POLARITIES = {1: tuple(words("positive_stems")), -1: tuple(words("negative_stems"))}
 _WORD = re.compile(r"[^\W\d_]+")
 _IS = {"i", "ist", "est", "e", "count"}  # without an s at the end: compression is positive
+_CONVENTION = {"sign", "vorzeichen", "convention", "polarity", "konvention", "polarität", "signe", "signo", "segno"}
 _MOVES = {"velocity": "displacement"}  # counts as
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _ZERO = re.compile(r"(?i)\bzero (?:is )?at ([+-]?[0-9]{1,10})(?![.,]?[0-9])")
@@ -149,7 +150,7 @@ def _with_stated_signs(table: RawTable) -> RawTable:
             }
             own = _counted(clause) if not named or named & {*SIGNED} else set()  # a pressure counts otherwise
             others = {word.casefold().rstrip("s") for word in words if not _sign(_POLARITIES, word)}
-            general = others & _SENSE_NAMES or others <= _IS
+            general = others & _CONVENTION or others <= _IS | _SENSE_NAMES
             for role in named & {*SIGNED} or {""}:
                 stated.setdefault(role, set()).update(own if named or general or -1 not in own else {1, -1})
     unnamed = stated.get("", set()) - {1} and stated[""]
@@ -161,12 +162,19 @@ def _with_stated_signs(table: RawTable) -> RawTable:
 
 def states_si(line: str) -> bool:
     """Tell if a line states that all units are those of the SI: All quantities in SI units."""
-    return len(line) <= _LONGEST_LINE and _SI_UNITS.search(line) is not None and _EXCEPT.search(line) is None
+    if len(line) > _LONGEST_LINE or not _SI_UNITS.search(line) or _EXCEPT.search(line):
+        return False
+    named = [parse_unit(word) for word in re.split(r"[\s,;:()\[\]=]+", line) if word != "in" and is_unit(word)]
+    return all(unit is None or unit.factor == 1 for unit in named)
 
 
 def states_sign(line: str) -> bool:
     """Tell if a line may state in which sense a channel counts positive."""
-    return bool(_counted(line[:_LONGEST_LINE]))
+    words = _WORD.findall(line[:_LONGEST_LINE])
+    others = {w.casefold().rstrip("s") for w in words if not _sign(_SENSES, w) and not _sign(_POLARITIES, w)}
+    roles = {role for w in words if (role := role_of(w)) and (not _sign(_SENSES, w) or role == "force")}
+    about = others & _CONVENTION or others <= _IS | _SENSE_NAMES or {_MOVES.get(r, r) for r in roles} & {*SIGNED}
+    return bool(about and _counted(line[:_LONGEST_LINE]))
 
 
 def _counted(clause: str) -> set[int]:
@@ -239,7 +247,8 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
     for key, cells in _keyed_cells(table, _LONGEST_CONDITIONS) if width > 2 else ():
         header, stated = split_name(key), [cell for cell in cells if cell]
         if {key.casefold(), key.casefold().rstrip("s")} & _TITLES and len(cells) == width - 1:
-            if len({split_name(cell).role for cell in cells} - {None}) > 1 or all(map(currents_in, stated)):
+            roles = {split_name(cell).role for cell in cells} - {None}
+            if len(roles) > 1 or (stated and all(map(currents_in, stated))):
                 table = replace(table, over=("", *cells))
         elif _UNITS_KEY.fullmatch(key) and not any(table.units) and all(map(is_unit, cells[: width - 1])):
             table = replace(table, units=("", *cells[: width - 1])) if len(cells) >= width - 1 else table

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections import Counter
 from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
@@ -55,7 +56,8 @@ def _texts_in(folder: Path) -> tuple[list[Path], list[Path], list[Path]]:
 @lru_cache(maxsize=64)  # every file of a folder asks
 def _texts_as_of(folder: Path, changed_ns: int) -> tuple[list[Path], list[Path], list[Path]]:
     files = [p for p in folder.glob("*") if p.suffix.lower() in _READ]  # nothing of a folder that may not be read
-    structures = [p for p in files if p.suffix.lower() in _STRUCTURES]
+    stems = Counter(p.stem for p in files)
+    structures = [p for p in files if p.suffix.lower() in _STRUCTURES and stems[p.stem] == 1]  # else of one test
     return [p for p in files if _README.fullmatch(p.name)], structures, [p for p in files if p.suffix.lower() in _TEXTS]
 
 

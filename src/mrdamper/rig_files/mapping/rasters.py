@@ -146,13 +146,13 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
     def columns_of(columns: Sequence[int]) -> Content:
         return Content({i: on_clock(kept[i]) for i in columns})
 
-    names = sorted({table.headers[i].name for i in kept if owner.get(i, i) != clock})
+    names = sorted({table.headers[i].name for i in kept if owner.get(i, i) != clock and table.headers[i].channel})
     own, text = "on clocks of their own", f"interpolated onto the force's: {', '.join(names[:6])}"
     apart = _apart(table, clock, {*owner.values()} - {clock})
     if apart is not None and apart > _SAME:
         own += f", up to {1e3 * apart:.4g} ms apart"
     resampled_table = table.picked(kept, columns_of).named({0: ("time", table.headers[clock].unit)})
-    same = apart is not None and apart <= _SAME
+    same = not names or (apart is not None and apart <= _SAME)
     return resampled_table if same else resampled_table.noted(Finding("W_RASTER", f"{own}, {text}"))
 
 

@@ -25,7 +25,8 @@ _FEWEST_ROWS = _TELLING = 2
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
 _LISTED_TEST = re.compile(r"[\s#%*\"-]*(?P<name>[^\W\d_][^\d:=]{0,30}?)[\s_.#-]*(?P<number>[0-9]{1,6})\s*[:=;,\t)]")
 _STARTS, _ENDS = words("start"), words("end")
-_NUMBERED = words("run") | words("run_number") | {"step", "schritt", "#"}
+_COUNTED = words("run") | words("run_number")  # what the number in a test's name may be
+_NUMBERED = _COUNTED | {"step", "schritt", "#"}
 _SPECIMEN = re.compile(
     r"(?i)^(?:specimen|probe|prüfkörper|test|versuch|run|sample|essai|éprouvette|ensayo|no|nr)\b[\s.:#]*"
 )
@@ -122,7 +123,7 @@ def numbered_tests(lines: Iterable[str]) -> Results | None:
     if len(numbers) < _FEWEST_ROWS or len(numbers) < len(rows) or len({name for name, _ in numbers}) > 1:
         return None
     cells = tuple((str(i), f"{name}{number}", number) for i, (name, number, _) in enumerate(rows, 1))
-    counts = bool({word.casefold() for word in words_of(rows[0][0])} & _NUMBERED)
+    counts = bool({word.casefold() for word in words_of(rows[0][0])} & _COUNTED)
     return Results(tuple(row[2] for row in rows), cells, "a line for each test", ("", "", rows[0][0]), counts)
 
 

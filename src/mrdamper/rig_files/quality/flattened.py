@@ -126,13 +126,13 @@ def _top(loop: Floats, depth: float) -> Top:
     middle = int(np.argmax(loop))
     turned = np.roll(loop, POINTS // 2 - middle)  # the top in the middle
     sides = turned[POINTS // 2 :: -1], turned[POINTS // 2 :]
-    reach = np.array([[_reach(side, level - times * depth) for times in (1, 2, 4)] for side in sides])
+    reach = np.array([[_reach(side, level - times * depth) for times in (1, 2, 4, 8, 16)] for side in sides])
     left, right = reach[:, 0]
     half = max(0.5 * (left + right), 0.5)
     wider = 1 + float(np.max(reach[:, 2] - reach[:, 0])) / half
     slope = 3 * depth / max(0.5 * float(np.sum(reach[:, 2])) - half, 0.25)
-    near, far = np.diff(reach).T
-    shoulders = bool(np.all((near > _SHOULDER) & (far < _CORNER * near)))
+    growth = np.diff(reach)  # with the logarithm of the depth, also far down: a filter rounds corners near the top only
+    shoulders = bool(np.all(growth[:, 0] > _SHOULDER) and np.all(growth[:, 1:] < _CORNER * growth[:, :-1]))
     edges = round(middle - left), round(middle + right)
     return Top(level, 2 * half / POINTS, wider, edges, 0.5 * slope * half, shoulders)
 

@@ -191,7 +191,7 @@ def _with_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     numeric, shapes = _numeric(tree)
     shape = max(shapes.values(), key=len, default=())
     times = [own for key, own in shapes.items() if split_name(key).role == "time"]
-    if len(shape) < 3 or len({*shape}) < len(shape) or len(times) != 1 or not {*times[0]} <= {*shape}:
+    if len(shape) < 3 or len({*shape}) < len(shape) or len({*times}) != 1 or not {*times[0]} <= {*shape}:
         return tree
     samples = max(times[0])
     outer = [n for n in shape if n != samples]
@@ -200,7 +200,7 @@ def _with_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
         return tree
     order = (*outer, samples)
     rows = {}
-    for key in [key for key, own in shapes.items() if len(own) > 1 and {*own} <= {*shape}]:
+    for key in [key for key, own in shapes.items() if 1 < len(own) == len({*own}) and {*own} <= {*shape}]:
         there = [n for n in order if n in shapes[key]]
         array = np.transpose(np.squeeze(numeric[key]), [shapes[key].index(n) for n in there])
         array = np.reshape(array, [n if n in there else 1 for n in order])

@@ -92,10 +92,9 @@ def _force(run: Run, e: Trial) -> tuple[str, str]:
 
 def _offset(run: Run, e: Trial) -> tuple[str, str]:
     unit, of = _unit_read(run, "force")
-    return (
-        f"the zero of its force is off by {-e.value:.3g} N",
-        _own_profile(run, f'[channels.force] unit = "{unit}", scale = 1 and offset = {e.value / of.factor:.3g}'),
-    )
+    offset, scale = _sign_read(run, "force") * e.value / of.factor, _scale_read(run, "force")
+    line = f'[channels.force] unit = "{unit}" and scale = {scale:g} and offset = {offset:.3g}'
+    return f"the zero of its force is off by {-e.value:.3g} N", _own_profile(run, line)
 
 
 def _current(run: Run, e: Trial) -> tuple[str, str]:
@@ -132,17 +131,16 @@ def _displacement(run: Run, e: Trial) -> tuple[str, str]:
 
 
 def _time(run: Run, e: Trial) -> tuple[str, str]:
-    return (
-        f"its time runs {1 / e.value:.2g} times as long as its force shows: another sample rate",
-        _corrected(run, "time", e.value),
-    )
+    remedy = _corrected(run, "time", e.value)
+    if run.notes.get("time_from"):  # no column holds it
+        rate = (run.time.size - 1) / float(np.ptp(run.time)) / e.value
+        remedy = _own_profile(run, f"[file] sample_rate_Hz = {rate:.5g}")
+    return f"its time runs {1 / e.value:.2g} times as long as its force shows: another sample rate", remedy
 
 
 def _sign(run: Run, e: Trial) -> tuple[str, str]:
-    return (
-        "its force and displacement both count in the other direction",
-        _own_profile(run, "[channels.force] sign = -1 and [channels.displacement] sign = -1"),
-    )
+    lines = [f"[channels.{name}] sign = {-_sign_read(run, name)}" for name in ("force", "displacement")]
+    return "its force and displacement both count in the other direction", _own_profile(run, " and ".join(lines))
 
 
 def _damper(run: Run, e: Trial) -> tuple[str, str]:
@@ -166,7 +164,18 @@ def _corrected(run: Run, channel: str, factor: float, unit: str = "", *, read: s
     stated, of = _unit_read(run, channel)
     if unit and of == parse_unit(read):
         return _own_profile(run, f'[channels.{channel}] unit = "{unit}"')
-    return _own_profile(run, f'[channels.{channel}] unit = "{stated}" and scale = {factor:.3g}')
+    scale = _scale_read(run, channel) * factor
+    return _own_profile(run, f'[channels.{channel}] unit = "{stated}" and scale = {scale:.3g}')
+
+
+def _sign_read(run: Run, channel: str) -> int:
+    """Return the sign with which the import read a channel."""
+    return -1 if channel in run.notes.get("sign_changed", "").split(", ") else 1
+
+
+def _scale_read(run: Run, channel: str) -> float:
+    """Return the scale with which the import read a channel."""
+    return float(dict(part.split(" = ") for part in run.notes.get("scaled", "").split(", ") if part).get(channel, 1.0))
 
 
 def _unit_read(run: Run, channel: str) -> tuple[str, Unit]:
