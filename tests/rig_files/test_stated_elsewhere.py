@@ -293,6 +293,7 @@ def test_a_current_of_the_profile_is_compared_with_a_channel_that_the_profile_do
         "Convention of the rig: extension negative",
         "Druckkraft positiv, Einfederweg positiv bei Druck",
         "Усилие и перемещение положительны при сжатии",
+        "符号约定：压缩为正",
     ],
 )
 def test_a_line_that_counts_both_channels_positive_in_compression_changes_both_signs(tmp_path, line):
@@ -300,6 +301,31 @@ def test_a_line_that_counts_both_channels_positive_in_compression_changes_both_s
     (record,) = import_files([tmp_path / "a_0.5A.csv"]).records
     assert record.displacement == pytest.approx(1e-3 * X, abs=1e-8)
     assert record.force == pytest.approx(force(0.5), abs=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("line", "motion", "load"),
+    [
+        ("Kraft: Zug positiv; Weg: Einfahren positiv", -1, 1),
+        ("Vorzeichen: Kraft Druck positiv, Weg Ausfahren positiv", 1, -1),
+        ("Positive force = compression. Positive displacement = extension.", 1, -1),
+        ("Force sign: tension +, compression -; stroke sign: compression +", -1, 1),
+        ("Effort positif en compression, déplacement positif en détente", 1, -1),
+        ("Force positive in tension, displacement positive when retracting", -1, 1),
+        ("Force positive in tension, displacement positive inwards", 0, 1),
+        ("Load cell ±5 kN, tension/compression +/-; displacement +/-50 mm", 1, 1),
+    ],
+)
+def test_each_clause_of_a_line_gives_the_sense_of_its_channel_or_asks_for_it(tmp_path, line, motion, load):
+    head = [f"# {line}", "time [s],displacement [mm],force [N]"]
+    table(tmp_path / "a_0.5A.csv", head, T, (motion or -1) * X, load * force(0.5))
+    found = import_files([tmp_path])
+    assert [(r.error.code, "displacement" in r.error.found) for r in found.refusals] == (
+        [] if motion else [("E_SIGN_CONVENTION", True)]
+    )
+    for record in found.records:
+        assert record.displacement == pytest.approx(1e-3 * X, abs=1e-8)
+        assert record.force == pytest.approx(force(0.5), abs=1e-2)
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,8 @@ _CHANNEL_IS = re.compile(rf"(?i)(?<!\w){_NUMBERS}" + r"[ ._]?(?P<number>[0-9]{1,
 _SENSES = {1: tuple(words("tension_stems")), -1: tuple(words("compression_stems"))}
 _POLARITIES = {1: tuple(words("positive_stems")), -1: tuple(words("negative_stems"))}
 _WORD = re.compile(r"[^\W\d_]+")
+_WORD_OR_SIGN = re.compile(r"[^\W\d_]+|(?<![\w+/-])[+-](?=\s*(?:[,;.)=]|$))")  # tension +, compression -
+_CLAUSE = re.compile(r"[,;|\t，；。]|\.\s")
 _IS = {"i", "ist", "est", "e", "count"}  # without an s at the end: compression is positive
 _CONVENTION = {"sign", "vorzeichen", "convention", "polarity", "konvention", "polarität", "signe", "signo", "segno"}
 _MOVES = {"velocity": "displacement"}  # counts as
@@ -134,21 +136,20 @@ def _sign_of(label: str, remarks: Sequence[str]) -> int:
 def _with_stated_signs(table: RawTable) -> RawTable:
     """Return the table with the senses in which lines count displacement and force: force positive in compression.
 
-    A line of one sense holds for all that it names, else each of its clauses does. A line about the sign that names no
-    channel holds for those that no other states; what else may be about the sign leaves it unclear.
+    A line of one sense holds for all that it names, unless clauses of it are about the sign of a channel each; else
+    each clause does. A line about the sign that names no channel holds for those that no other states; what else may be
+    about the sign leaves it unclear, as a clause does whose sense is none of the words known.
     """
     stated: dict[str, set[int]] = {}
     for line in table.remarks:
         whole = line[:_LONGEST_LINE]
-        for clause in re.split(r"[,;|\t]", whole) if len(_counted(whole)) > 1 else [whole]:
-            every = _WORD.findall(clause)
-            words = [word for word in every if not _sign(_SENSES, word)]
-            named = {
-                _MOVES.get(role, role)
-                for word in every
-                if (role := role_of(word)) and (word in words or role == "force")
-            }
+        counted, clauses = _counted(whole), _CLAUSE.split(whole)
+        each = [clause for clause in clauses if _signs(_POLARITIES, clause)]
+        apart = len(each) > 1 and all(_named(clause) & {*SIGNED} for clause in each) and counted
+        for clause in clauses if apart or len(counted) > 1 else [whole]:
+            words, named = [word for word in _WORD.findall(clause) if not _sign(_SENSES, word)], _named(clause)
             own = _counted(clause) if not named or named & {*SIGNED} else set()  # a pressure counts otherwise
+            own = own or ({1, -1} if apart and clause in each else set())
             others = {word.casefold().rstrip("s") for word in words if not _sign(_POLARITIES, word)}
             general = others & _CONVENTION or others <= _IS | _SENSE_NAMES
             for role in named & {*SIGNED} or {""}:
@@ -177,17 +178,28 @@ def states_sign(line: str) -> bool:
     return bool(about and _counted(line[:_LONGEST_LINE]))
 
 
+def _named(clause: str) -> set[str]:
+    """Return the channels that a clause names, by words that are no senses themselves."""
+    roles = {word: role_of(word) for word in _WORD.findall(clause)}
+    named = {role for word, role in roles.items() if role and (role == "force" or not _sign(_SENSES, word))}
+    return {_MOVES.get(role, role) for role in named}
+
+
+def _signs(stems: Mapping[int, tuple[str, ...]], clause: str) -> list[int]:
+    return [sign for word in _WORD_OR_SIGN.findall(clause) if (sign := _sign(stems, word))]
+
+
 def _counted(clause: str) -> set[int]:
     """Return the senses that a clause counts positive: 1 for tension, -1 for compression."""
-    words = _WORD.findall(clause)
-    senses, polarities = ([sign for w in words if (sign := _sign(of, w))] for of in (_SENSES, _POLARITIES))
+    senses, polarities = _signs(_SENSES, clause), _signs(_POLARITIES, clause)
     paired = zip(senses, polarities, strict=True) if len(senses) == len(polarities) else product(senses, polarities)
     return {sense * polarity for sense, polarity in paired}
 
 
 def _sign(stems: Mapping[int, tuple[str, ...]], word: str) -> int:
-    """Return 1 or -1 where a word begins with one of its stems, else 0."""
-    return next((sign for sign, of in stems.items() if word.casefold().startswith(of)), 0)
+    """Return 1 or -1 where a word begins with one of its stems, or has a Chinese or Japanese one in it; else 0."""
+    low = word.casefold()
+    return next((sign for sign, of in stems.items() if low.startswith(of) or any(s in low for s in of if s > "⺀")), 0)
 
 
 def _keyed_cells(table: RawTable, longest: int = _LONGEST_LINE) -> Iterator[tuple[str, list[str]]]:
