@@ -190,6 +190,14 @@ def test_physics_tells_a_dampers_force_in_any_units_and_with_the_right_sign_only
     assert damping_share(test.t, test.x, np.random.default_rng(0).normal(0, 1, test.t.size)) < 0.2
 
 
+@pytest.mark.parametrize(
+    ("heading", "scale"), [("Coil current (A)", 1), ("coil_mA", 1000), ("Bestromung [A]", 1), ("Coil (V)", 0)]
+)
+def test_a_table_of_results_names_its_currents(heading, scale):
+    results = results_in([f"No;{heading}", f"1;{0.4 * scale:g}", f"2;{0.8 * scale:g}"])
+    assert (results.current if results else ()) == (pytest.approx((0.4, 0.8)) if scale else ())
+
+
 def test_a_table_of_results_that_two_columns_tell_differently_states_nothing():
     results = results_in(["No;Specimen;Coil current (A)", "1;S2;0.5", "2;S1;1.0"])
     assert results is not None

@@ -294,6 +294,10 @@ def test_a_current_of_the_profile_is_compared_with_a_channel_that_the_profile_do
         "Druckkraft positiv, Einfederweg positiv bei Druck",
         "Усилие и перемещение положительны при сжатии",
         "符号约定：压缩为正",
+        "変位・荷重とも圧縮方向を正とする",
+        "부호 규약: 압축이 양(+)",
+        "Znaménko: tlak kladný, tah záporný",
+        "Tekenafspraak: druk is positief",
     ],
 )
 def test_a_line_that_counts_both_channels_positive_in_compression_changes_both_signs(tmp_path, line):
@@ -336,6 +340,10 @@ def test_each_clause_of_a_line_gives_the_sense_of_its_channel_or_asks_for_it(tmp
         ("extension valve with positive stop", []),
         ("Sign: tension positive, compression negative", []),
         ("new compression valve with positive stop fitted", ["E_SIGN_CONVENTION"] * 2),
+        ("Sign convention: positive upwards", ["E_SIGN_CONVENTION"] * 2),
+        ("Pressure sign: positive", []),
+        ("Trigger direction: positive", []),
+        ("Polarity: positive", []),
     ],
 )
 def test_a_line_about_something_else_than_the_sign_changes_none(tmp_path, line, codes):

@@ -49,7 +49,8 @@ _PER_COUNT = re.compile(
 _KEY = re.compile(r"[\s#%;\"]*([^=:]{1,60}?)\s*[=:]\s*(\S+)\s*")  # CoilCurrent=0.5, CoilCurrentUnit=A
 _UNIT_KEY = re.compile(rf"(?i)(?:{'|'.join(words('unit'))})$")  # HUnit, X-Einheit
 _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.IGNORECASE)
-_TITLES, _MONITOR, _SENSE_NAMES = words("label") | words("notes"), words("monitor"), words("sense")
+_TITLES, _MONITOR, _CONVENTION = words("label") | words("notes"), words("monitor"), words("sign")
+_SENSE_NAMES = words("sense") | _CONVENTION
 _UNITS_IN = rf"(?i:{'|'.join(words('unit'))}|unités|unidades|units)"
 _SI_UNITS = re.compile(rf"\bSI[- ](?:base[- ])?{_UNITS_IN}|{_UNITS_IN}\W*(?:(?:in|du|del|do)\W+)?SI\b")
 _EXCEPT = re.compile(r"(?i)\b(?:except|but|not|no|non|außer|nicht|kein\w*|sauf|salvo|excepto|tranne)\b")
@@ -68,9 +69,9 @@ _SENSES = {1: tuple(words("tension_stems")), -1: tuple(words("compression_stems"
 _POLARITIES = {1: tuple(words("positive_stems")), -1: tuple(words("negative_stems"))}
 _WORD = re.compile(r"[^\W\d_]+")
 _WORD_OR_SIGN = re.compile(r"[^\W\d_]+|(?<![\w+/-])[+-](?=\s*(?:[,;.)=]|$))")  # tension +, compression -
+_PARTICLE = re.compile(r"とも|[とはがのを]")  # 変位と荷重は
 _CLAUSE = re.compile(r"[,;|\t，；。]|\.\s")
 _IS = {"i", "ist", "est", "e", "count"}  # without an s at the end: compression is positive
-_CONVENTION = {"sign", "vorzeichen", "convention", "polarity", "konvention", "polarität", "signe", "signo", "segno"}
 _MOVES = {"velocity": "displacement"}  # counts as
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _ZERO = re.compile(r"(?i)\bzero (?:is )?at ([+-]?[0-9]{1,10})(?![.,]?[0-9])")
@@ -149,8 +150,9 @@ def _with_stated_signs(table: RawTable) -> RawTable:
         for clause in clauses if apart or len(counted) > 1 else [whole]:
             words, named = [word for word in _WORD.findall(clause) if not _sign(_SENSES, word)], _named(clause)
             own = _counted(clause) if not named or named & {*SIGNED} else set()  # a pressure counts otherwise
-            own = own or ({1, -1} if apart and clause in each else set())
             others = {word.casefold().rstrip("s") for word in words if not _sign(_POLARITIES, word)}
+            if not own and clause in each and (apart or (others & _CONVENTION and (not named or named & {*SIGNED}))):
+                own = {1, -1}  # in other words than those known
             general = others & _CONVENTION or others <= _IS | _SENSE_NAMES
             for role in named & {*SIGNED} or {""}:
                 stated.setdefault(role, set()).update(own if named or general or -1 not in own else {1, -1})
@@ -173,14 +175,15 @@ def states_sign(line: str) -> bool:
     """Tell if a line may state in which sense a channel counts positive."""
     words = _WORD.findall(line[:_LONGEST_LINE])
     others = {w.casefold().rstrip("s") for w in words if not _sign(_SENSES, w) and not _sign(_POLARITIES, w)}
-    roles = {role for w in words if (role := role_of(w)) and (not _sign(_SENSES, w) or role == "force")}
-    about = others & _CONVENTION or others <= _IS | _SENSE_NAMES or {_MOVES.get(r, r) for r in roles} & {*SIGNED}
+    if others & _CONVENTION:
+        return bool(_signs(_POLARITIES, line[:_LONGEST_LINE]))
+    about = others <= _IS | _SENSE_NAMES or _named(line[:_LONGEST_LINE]) & {*SIGNED}
     return bool(about and _counted(line[:_LONGEST_LINE]))
 
 
 def _named(clause: str) -> set[str]:
     """Return the channels that a clause names, by words that are no senses themselves."""
-    roles = {word: role_of(word) for word in _WORD.findall(clause)}
+    roles = {word: role_of(word) for word in _WORD.findall(_PARTICLE.sub(" ", clause))}
     named = {role for word, role in roles.items() if role and (role == "force" or not _sign(_SENSES, word))}
     return {_MOVES.get(role, role) for role in named}
 

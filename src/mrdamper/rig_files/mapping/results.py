@@ -233,6 +233,7 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
 def _is_current(cell: str) -> bool:
     header = split_name(cell)
     named = names_condition(header.name, "current") and header.dimension in (None, "current")
+    named = named or (header.dimension == "current" and holds(header.name, COIL))  # coil_mA
     return named and not currents_in(cell)  # coil current 0.5 A heads no column
 
 
