@@ -6,6 +6,7 @@ import pytest
 from scipy.io import savemat
 
 from mrdamper.rig_files.mapping.integration import displacement_of
+from mrdamper.rig_files.mapping.questions import question_of
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.recorded_at import recording_time
 from mrdamper.rig_files.rig_import import import_files
@@ -43,6 +44,33 @@ def test_names_listed_in_a_remark_with_other_separators_and_the_sense_of_a_load_
     ]
     table(tmp_path / "a.txt", head, T, X, -force(0.5))
     expect(tmp_path, 0.5)
+
+
+@pytest.mark.parametrize("line", ["Units: force=N, time=s, displacement=mm", "time = s; displacement = mm; force = N"])
+def test_a_line_gives_every_channel_its_unit_behind_an_equals_sign(tmp_path, line):
+    table(tmp_path / "a_0.5A.txt", [line, "time,displacement,force"], T, X, force(0.5))
+    expect(tmp_path, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("line", "scale"),
+    [
+        ("Note: multiply force by 2 (lever 2:1)", 2),
+        ("Kraft mit 2,5 multiplizieren", 2.5),
+        ("Displacement multiplied by 1", 1),
+        ("Temperature: multiply by 10", 1),
+    ],
+)
+def test_a_factor_that_a_line_states_is_asked_about_and_its_remedy_works(tmp_path, line, scale):
+    table(tmp_path / "a_0.5A.txt", [f"# {line}", "time [s],displacement [mm],force [N]"], T, X, force(0.5) / scale)
+    if scale != 1:
+        (refusal,) = import_files([tmp_path]).refusals
+        assert refusal.error.code == "E_AMBIGUOUS"
+        assert f'[channels.force] unit = "N" and scale = {scale}' in refusal.error.remedy
+        assert question_of(refusal.error) is None  # two keys
+    profile = parse_profile(f'[channels.force]\nunit = "N"\nscale = {scale}' if scale != 1 else "")
+    (record,) = import_files([tmp_path], profile).records
+    assert record.force == pytest.approx(force(0.5), abs=1e-2)
 
 
 def test_a_column_with_one_session_states_the_session_of_the_test(tmp_path):

@@ -121,7 +121,7 @@ def test_a_table_against_the_files_name_is_refused_and_its_remedies_work(tmp_pat
     table = write(tmp_path / "rig", "tests.csv", "file,current_A\na_0.5A.csv,1\n")
     (refusal,) = import_files([tmp_path / "rig"]).refusals
     assert refusal.error.code == "E_CURRENT_CONTRADICTS"
-    assert "file name" in str(refusal.error)
+    assert "gives 1 A, a_0.5A has 0.5 A (file name)" in str(refusal.error)
     for cell in ("", "0.5"):
         table.write_text(f"file,current_A,split\na_0.5A.csv,{cell},train\n")
         assert len(import_files([tmp_path / "rig"]).records) == 1

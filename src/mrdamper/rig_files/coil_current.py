@@ -99,7 +99,7 @@ def with_stated_current(record: Record, current: float, whence: str, where: str)
     own = record.provenance.get("current_from", "")
     mean = None if record.current is None else contradicted(record.current, current)
     if mean is not None:
-        problem = printable(f"{whence} gives {current:g} A, {record.id} by its {own or 'current channel'} {mean:g} A")
+        problem = printable(f"{whence} gives {current:g} A, {record.id} has {mean:g} A ({own or 'current channel'})")
         remedy = "correct the one that is wrong, leave it out, or rename the file"
         raise ColumnError(problem, where=printable(where), remedy=remedy, code="E_CURRENT_CONTRADICTS")
     if record.current is not None and not own:

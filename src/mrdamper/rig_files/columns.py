@@ -19,9 +19,11 @@ from mrdamper.rig_files.column_names import (
     holds,
     names_command,
     names_compression,
+    role_of,
     says_nothing,
     split_name,
     unknown_unit,
+    words_of,
 )
 from mrdamper.rig_files.conditions import rate_in_name, stated_rate
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
@@ -37,6 +39,8 @@ _DERIVED = ("velocity", "acceleration")  # of the displacement
 _MOST_RESTARTS = 0.05  # of the samples of a clock that counts within steps
 _TOTAL = re.compile(r"total|absolut|gesamt|cumulat|kumul", re.IGNORECASE)
 _INDEX = words("sample")
+_TIMES = re.compile(r"(?i)(?<!\w)multipl\w*")
+_FACTOR = re.compile(r"(?<![\w.,])[0-9]+(?:[.,][0-9]+)?(?!\w)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,11 +304,29 @@ def _convert(table: RawTable, role: str, column: int, profile: Profile) -> Assig
             f"set [channels.{role}] sign = -1 in a profile, or sign = 1 if it counts extension positive",
             "E_SIGN_CONVENTION",
         )
+    if role in SIGNED and channel.scale is None:
+        _refuse_factor(table, role, unit)
     si = parse_unit(unit) or Unit("", 1.0)
     sign = sign or 1
     shift = 0.0 if channel.integrate else sign * (si.factor * channel.offset + si.offset)
     factor = sign * (channel.scale or 1.0) * si.factor
     return Assigned(column, header.name, unit, factor, shift + 0.0, 1e-3 * channel.delay_ms, sign)
+
+
+def _refuse_factor(table: RawTable, role: str, unit: str) -> None:
+    """Refuse a channel that a line says to multiply, or to have been multiplied: multiply force by 2."""
+    for line in (line[:300] for line in table.remarks):
+        times = _TIMES.search(line)
+        if times is None or role not in map(role_of, words_of(line)):
+            continue
+        behind, before = _FACTOR.findall(line[times.end() :]), _FACTOR.findall(line[: times.start()])
+        factor = float((behind or before[::-1] or ["1"])[0].replace(",", "."))
+        if factor not in (0.0, 1.0):
+            found = f"{line.strip()[:80]!r} may be meant for the {role}"
+            remedy = (
+                f'set [channels.{role}] unit = "{unit}" and scale = {factor:g} in a profile, or scale = 1 if applied'
+            )
+            raise _refusal(ColumnError, table, found, remedy, "E_AMBIGUOUS")
 
 
 def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitError | None:

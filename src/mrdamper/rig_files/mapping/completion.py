@@ -55,7 +55,7 @@ _UNITS_IN = rf"(?i:{'|'.join(words('unit'))}|unités|unidades|units)"
 _SI_UNITS = re.compile(rf"\bSI[- ](?:base[- ])?{_UNITS_IN}|{_UNITS_IN}\W*(?:(?:in|du|del|do)\W+)?SI\b")
 _EXCEPT = re.compile(r"(?i)\b(?:except|but|not|no|non|außer|nicht|kein\w*|sauf|salvo|excepto|tranne)\b")
 _LABVIEW = ("Delta_X", "X_Dimension")
-_COLON = re.compile(r"^([^:]+):\s+([^\s:]{1,12})$")  # force: N
+_COLON = re.compile(r"^([^:=]+)(?::\s+|\s*=\s*)([^\s:=]{1,12})$")  # force: N; force=N
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
 _INDEXED = re.compile(
     r"^\s*(?:(?P<what>desc|name|label|units?|scale)[A-Za-z]*[._ ]*)?(?:chan(?:nel)?|ch)[._ ]*(?P<number>[0-9]{1,3})"

@@ -55,7 +55,7 @@ def question_of(error: InputError, columns: Sequence[str] = ()) -> Question | No
     """
     match = _ROLE.search(error.remedy or "")
     role = match[1] if match else ""
-    if role not in DIMENSION:
+    if role not in DIMENSION or " scale = " in error.remedy:  # with its unit: two keys
         return None
     if error.code == "E_UNITS_MISSING":
         units = _UNITS.get(DIMENSION[role], ())
