@@ -72,6 +72,6 @@ def test_the_commands_of_the_page_do_what_it_says(place):
     ranked = [*done.output.splitlines()[-1].partition(": mrdamper ")[2].split(), "--models", "kwok"]
     assert "hyperbolic tangent" in CliRunner().invoke(application(), ranked).output
     scored = CliRunner().invoke(application(), ["validate", "result/model.json", "my-rig"])
-    assert "8 runs have the names of the model's identification runs" in scored.output
+    assert "runs with names of the model's identification runs: 8" in scored.output
     bundled = CliRunner().invoke(application(), ["validate", "result/model.json"])
     assert "give a dataset folder after the model" in str(bundled.exception)

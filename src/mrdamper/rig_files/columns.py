@@ -322,11 +322,11 @@ def _refuse_factor(table: RawTable, role: str, unit: str) -> None:
         behind, before = _FACTOR.findall(line[times.end() :]), _FACTOR.findall(line[: times.start()])
         factor = float((behind or before[::-1] or ["1"])[0].replace(",", "."))
         if factor not in (0.0, 1.0):
-            found = f"{line.strip()[:80]!r} may be meant for the {role}"
+            problem = f"{line.strip()[:80]!r} may be meant for the {role}"
             remedy = (
                 f'set [channels.{role}] unit = "{unit}" and scale = {factor:g} in a profile, or scale = 1 if applied'
             )
-            raise _refusal(ColumnError, table, found, remedy, "E_AMBIGUOUS")
+            raise _refusal(ColumnError, table, problem, remedy, "E_AMBIGUOUS")
 
 
 def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitError | None:
