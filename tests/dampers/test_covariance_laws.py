@@ -316,17 +316,6 @@ def test_intervals_are_as_wide_as_refits_and_no_narrower_than_linearised_fits(mo
     assert still.curved(joint_damper(), [None] * 3) is still  # no gains, nothing to fit
 
 
-@pytest.mark.parametrize("count", [3, 15])
-def test_representative_draws_have_no_mean_and_the_mean_squares_of_all(count):
-    for seed in range(5):
-        moved = np.random.default_rng(seed).standard_normal((600, count)) * np.logspace(-3, 3, count)
-        draws = Draws(np.zeros((600, 1, 2)), moved, np.ones(moved.shape))
-        chosen, unit = draws.representative(16), np.sqrt(np.mean(moved**2, axis=0))
-        assert len(chosen) == 16
-        assert np.mean(moved[chosen], axis=0) / unit == pytest.approx(np.zeros(count), abs=0.2)
-        assert np.mean(moved[chosen] ** 2, axis=0) == pytest.approx(unit**2, rel=0.25)
-
-
 def test_what_gains_of_other_runs_moved_is_no_error_within_a_run():
     """Parameters that large gains have moved leave the shape of their force in every run's residual."""
     runs = runs_of(gain=0.3, noise=0.002, seed=3)

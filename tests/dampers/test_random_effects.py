@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mrdamper.dampers.random_effects import Effects, GainsAndOffsets
+from mrdamper.dampers.random_effects import Draws, Effects, GainsAndOffsets
 
 PHASE = np.linspace(0.0, 2 * np.pi, 120, endpoint=False)
 FORCE = 100 * np.sin(PHASE)
@@ -330,3 +330,14 @@ def test_a_run_counts_by_its_relative_error_whatever_its_force():
     scatter = GainsAndOffsets(runs, slopes, [s.T / (s.T @ s) / 20 for s in slopes])
     variance = covariance_of(scatter, Effects(run_gain=0.08, run_dof=19.0))[0, 0]
     assert variance == pytest.approx(0.08**2 / 20, rel=0.2)
+
+
+@pytest.mark.parametrize("count", [3, 15])
+def test_representative_draws_have_no_mean_and_the_mean_squares_of_all(count):
+    for seed in range(5):
+        moved = np.random.default_rng(seed).standard_normal((600, count)) * np.logspace(-3, 3, count)
+        draws = Draws(np.zeros((600, 1, 2)), moved, np.ones(moved.shape))
+        chosen, unit = draws.representative(16), np.sqrt(np.mean(moved**2, axis=0))
+        assert len(chosen) == 16
+        assert np.mean(moved[chosen], axis=0) / unit == pytest.approx(np.zeros(count), abs=0.2)
+        assert np.mean(moved[chosen] ** 2, axis=0) == pytest.approx(unit**2, rel=0.25)
