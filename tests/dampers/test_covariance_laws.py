@@ -281,6 +281,9 @@ def test_parameters_that_make_up_for_each_other_leave_no_variance_of_what_both_d
     draws, within = Draws(np.zeros((600, 1, 2)), np.column_stack([a, -a]), shown), np.zeros((2, 2))
     spread = _Spread(("c", "fy"), [], within, np.zeros(2), draws, Effects(), [], np.ones(2), np.ones((1, 2)))
     assert spread.quantiles[1] < 1.5 < spread.quantiles[0]
+    # Where a normal interval would hold more than its share, it is narrower by as much, else as wide.
+    assert spread.interval_factor == pytest.approx(np.minimum(spread.quantiles / 1.959964, 1.0), rel=1e-6)
+    assert spread.interval_factor[1] < 0.8
     assert np.ones(2) @ spread.covariance @ np.ones(2) == pytest.approx(0.0, abs=1e-12)
 
 
