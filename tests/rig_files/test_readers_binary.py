@@ -280,7 +280,8 @@ def test_a_reading_process_that_dies_is_replaced(tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of processes differ elsewhere")
 @pytest.mark.parametrize("limit", ["_SECONDS", "_BYTES"])
 def test_a_file_that_takes_too_much_is_refused(tmp_path, monkeypatch, limit):
-    path = write(tmp_path, "a.h5", hdf5_bytes({name: np.arange(400_000.0) for name in NAMES}))
+    # Read in a tenth of a second of processor time, which the system counts by ticks of some milliseconds.
+    path = write(tmp_path, "a.h5", hdf5_bytes({name: np.arange(1_000_000.0) for name in NAMES}, packed=True))
     monkeypatch.setattr(sandbox, limit, 1e-4 if limit == "_SECONDS" else 0)
     monkeypatch.setattr(sandbox, "_BYTES_PER_BYTE", 0 if limit == "_BYTES" else 30)
     monkeypatch.setattr(Hdf5, "seconds_per_byte", 0.0)

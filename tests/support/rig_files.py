@@ -120,13 +120,15 @@ def mat_bytes(table: dict, **kwargs) -> bytes:
     return target.getvalue()
 
 
-def hdf5_bytes(table: dict[str, np.ndarray], units: dict[str, str] | None = None, group: str = "") -> bytes:
+def hdf5_bytes(
+    table: dict[str, np.ndarray], units: dict[str, str] | None = None, group: str = "", packed: bool = False
+) -> bytes:
     import h5py
 
     target = io.BytesIO()
     with h5py.File(target, "w") as file:
         for name, values in table.items():
-            dataset = file.create_dataset(f"{group}/{name}", data=values)
+            dataset = file.create_dataset(f"{group}/{name}", data=values, compression="gzip" if packed else None)
             if units and name in units:
                 dataset.attrs["units"] = units[name]
     return target.getvalue()
