@@ -59,6 +59,8 @@ def test_a_line_gives_every_channel_its_unit_behind_an_equals_sign(tmp_path, lin
         ("Kraft mit 2,5 multiplizieren", 2.5),
         ("Displacement multiplied by 1", 1),
         ("Temperature: multiply by 10", 1),
+        ("Multiple sines of force and stroke at 2 Hz", 1),
+        ("Multiplexed: force, 10 channels", 1),
     ],
 )
 def test_a_factor_that_a_line_states_is_asked_about_and_its_remedy_works(tmp_path, line, scale):

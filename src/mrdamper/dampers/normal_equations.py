@@ -70,7 +70,7 @@ class Condensed:
 
     @cached_property
     def folds(self) -> dict[str, list[list[int]]]:
-        """Runs left out together in the choice of forms, by kind of fold."""
+        """Runs that each fold omits in the choice of forms, by kind of fold."""
         return fold_groups(self.conditions)
 
     def only(self, rows: Sequence[int]) -> Condensed:

@@ -69,9 +69,8 @@ def with_stated_signs(table: RawTable) -> RawTable:
         each = [clause for clause in clauses if _signs(_POLARITIES, clause)]
         apart = len(each) > 1 and all(_named(clause) & {*SIGNED} for clause in each) and counted
         for clause in clauses if apart or len(counted) > 1 else [whole]:
-            words, named = [word for word in _WORD.findall(clause) if not _sign(_SENSES, word)], _named(clause)
+            named, others = _named(clause), _others(clause)
             own = _counted(clause) if not named or named & {*SIGNED} else set()  # a pressure counts otherwise
-            others = {word.casefold().rstrip("s") for word in words if not _sign(_POLARITIES, word)}
             if not own and clause in each and (apart or (others & _CONVENTION and (not named or named & {*SIGNED}))):
                 own = {1, -1}  # in other words than those known
             general = others & _CONVENTION or others <= _IS | _SENSE_NAMES
@@ -86,12 +85,17 @@ def with_stated_signs(table: RawTable) -> RawTable:
 
 def states_sign(line: str) -> bool:
     """Tell if a line may state in which sense a channel counts positive."""
-    words = _WORD.findall(line[:_LONGEST_LINE])
-    others = {w.casefold().rstrip("s") for w in words if not _sign(_SENSES, w) and not _sign(_POLARITIES, w)}
+    line = line[:_LONGEST_LINE]
+    others = _others(line)
     if others & _CONVENTION:
-        return bool(_signs(_POLARITIES, line[:_LONGEST_LINE]))
-    about = others <= _IS | _SENSE_NAMES or _named(line[:_LONGEST_LINE]) & {*SIGNED}
-    return bool(about and _counted(line[:_LONGEST_LINE]))
+        return bool(_signs(_POLARITIES, line))
+    return bool((others <= _IS | _SENSE_NAMES or _named(line) & {*SIGNED}) and _counted(line))
+
+
+def _others(clause: str) -> set[str]:
+    """Return the words of a clause that are neither senses nor polarities, without an s at the end."""
+    words = _WORD.findall(clause)
+    return {w.casefold().rstrip("s") for w in words if not _sign(_SENSES, w) and not _sign(_POLARITIES, w)}
 
 
 def _named(clause: str) -> set[str]:
