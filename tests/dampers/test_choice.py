@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from mrdamper.dampers import choice
-from mrdamper.dampers.choice import CrossValidation, ModelTerm, levels_of
+from mrdamper.dampers.choice import CrossValidation, ModelTerm
+from mrdamper.dampers.current_levels import level_count, levels_of, undetermined
 from mrdamper.data import Condition
-from mrdamper.models.play_bypass import RISE_CURRENT, _level_law
+from mrdamper.models.play_bypass import RISE_CURRENT, PlayBypass, _level_law
 
 RNG = np.random.default_rng(2)
 N, NAMES = 120, ("d", "h1", "c1", "f0")
@@ -75,10 +76,8 @@ def part(current, changes=False, is_sine=True):
 
 def test_levels_are_runs_of_constant_current_a_two_hundredth_apart():
     currents = [1.0, 0.0, 0.5, 1.004, 0.004, 0.3]
-    problem = SimpleNamespace(parts=[*map(part, currents), part(0.7, changes=True)])
-    assert levels_of(problem) == [[1, 4], [5], [2], [0, 3]]
-    problem.parts = [part(0.0), part(2.0), part(1.989)]
-    assert levels_of(problem) == [[0], [2], [1]]
+    assert levels_of([*currents, None]) == [[1, 4], [5], [2], [0, 3]]
+    assert levels_of([0.0, 2.0, 1.989]) == [[0], [2], [1]]
 
 
 @pytest.mark.parametrize(
@@ -86,7 +85,7 @@ def test_levels_are_runs_of_constant_current_a_two_hundredth_apart():
     [(1, False, 1), (2, False, 1), (3, False, 2), (4, False, 5), (5, False, 6), (2, True, 6)],
 )
 def test_the_law_of_the_current_has_a_number_fewer_than_there_are_levels(levels, changes, forms):
-    problem = SimpleNamespace(parts=[part(0.5 * k) for k in range(levels)] + [part(0.1, changes=True)] * changes)
+    problem = SimpleNamespace(currents=[0.5 * k for k in range(levels)] + [None] * changes)
     found = choice._level_laws(problem)
     assert len(found) == forms
     straight = 2  # yield force without current, and its rise
@@ -98,7 +97,7 @@ def test_two_levels_show_a_straight_line_and_more_choose_between_it_and_the_onse
         onset = dict(law.held).get("Ic", RISE_CURRENT)
         return _level_law(np.array([0.05, 0.25, 0.5]), 10.0, 100.0, onset, 0.0)
 
-    few, several = (choice._level_laws(SimpleNamespace(parts=[part(0.5 * k) for k in range(n)])) for n in (2, 3))
+    few, several = (choice._level_laws(SimpleNamespace(currents=[0.5 * k for k in range(n)])) for n in (2, 3))
     assert [rise(law) for law in few] == [pytest.approx([15.0, 35.0, 60.0])]
     assert rise(several[0]) == pytest.approx([15.0, 35.0, 60.0])
     assert rise(several[1])[0] < 0.5 * 15.0 + 5.0
@@ -112,12 +111,10 @@ def test_of_the_laws_of_the_current_the_selected_one_is_named():
 
 
 def test_one_level_determines_no_rise_with_current():
-    def run(*current):
-        return SimpleNamespace(coil_current=np.array(current))
-
-    assert choice._undetermined([run(1.0), run(1.004, 1.0)]) == {"fy1": 0.0, "c1": 0.0, "h1": 0.0}
-    assert choice._undetermined([run(1.0), run(0.9)]) == {}
-    assert choice._undetermined([run(-1.0), run(1.0)]) == {"fy1": 0.0, "c1": 0.0, "h1": 0.0}
+    assert level_count([1.0, 1.004]) == level_count([-1.0, 1.0]) == 1
+    assert level_count([1.0, 0.9, 1.0]) == 2
+    assert undetermined(PlayBypass, [1.0, 1.004]) == ("fy1", "c1", "h1")
+    assert undetermined(PlayBypass, [1.0, 0.9]) == undetermined(PlayBypass, [None]) == ()
 
 
 def test_conditions_are_left_out_whole_and_other_records_in_stretches():
@@ -149,7 +146,8 @@ def test_a_current_is_predicted_by_a_fit_to_the_others_from_a_start_that_never_s
 
     class Problem:
         def __init__(self):
-            self.parts = [part(I) for I in (0.0, 0.5, 1.0, 0.5, 2.0)]
+            self.currents = [0.0, 0.5, 1.0, 0.5, 2.0]
+            self.parts = [part(current) for current in self.currents]
 
         def from_point(self, start):
             return f"point of {start}"
@@ -163,6 +161,6 @@ def test_a_current_is_predicted_by_a_fit_to_the_others_from_a_start_that_never_s
             return np.array([0.1 * i for i in level])
 
     problem = Problem()
-    found = choice._left_out_current(problem, ["a", "b"], levels_of(problem)[1:-1])
+    found = choice._left_out_current(problem, ["a", "b"], levels_of(problem.currents)[1:-1])
     assert asked == [([0, 2, 4], "point of a"), ([0, 1, 3, 4], "point of b")]
     assert found == pytest.approx([0.1, 0.3, 0.2])

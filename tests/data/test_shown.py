@@ -12,7 +12,7 @@ from mrdamper import identify, plot_force, plot_loop, validate
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
-from mrdamper.study.recipe import RecipeResult, play_and_bypass
+from mrdamper.study.recipe import RecipeResult, whole_damper
 from mrdamper.study.validation import Validation
 from mrdamper.study.workflow import RigStudy
 
@@ -52,7 +52,7 @@ def test_a_headline_names_neither_a_missing_rig_nor_missing_runs_nor_the_noise_o
     assert repr(bundled.only([run])).endswith(": 1 run, 1 of rig utfsm; no validation runs>")
     damper = replace(joint_damper(), rig="")
     assert repr(damper).startswith(f"<{damper.title}: ")
-    scored = RecipeResult(play_and_bypass(), damper, None, (), 0.1, *3 * (Validation("none", ()),), 0.1)
+    scored = RecipeResult(whole_damper("play-bypass"), damper, None, (), 0.1, *3 * (Validation("none", ()),), 0.1)
     study = RigStudy("", bundled.only([one]), (), (), (scored,), {}, {})
     assert repr(study).splitlines()[0].startswith(f"<{scored.title}, no cross-validation runs, no validation runs")
 

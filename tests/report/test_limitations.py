@@ -13,7 +13,7 @@ from mrdamper.data import Condition
 from mrdamper.report.limitations import RANGE, by_group, limitations
 from mrdamper.statistics.metrics import Scores
 from mrdamper.statistics.stop_reason import StopReason
-from mrdamper.study.recipe import RecipeResult, play_and_bypass
+from mrdamper.study.recipe import RecipeResult, whole_damper
 from mrdamper.study.validation import RunScore, Validation
 
 NONE = Validation("none", ())
@@ -24,7 +24,7 @@ def texts(fit):
 
 
 def scored(fit):
-    return RecipeResult(play_and_bypass(), fit.damper, fit, (), float("nan"), NONE, NONE, NONE, 0.1)
+    return RecipeResult(whole_damper("play-bypass"), fit.damper, fit, (), float("nan"), NONE, NONE, NONE, 0.1)
 
 
 @pytest.mark.parametrize(

@@ -269,11 +269,14 @@ def test_joint_ways_hand_on_what_their_fits_make(monkeypatch):
     ]
     folds = SimpleNamespace(refit=lambda rows: SimpleNamespace(damper=("without", rows)))
     monkeypatch.setattr(recipes, "identify_jointly", lambda runs: SimpleNamespace(problem="problem", fit=fit))
+    monkeypatch.setattr(recipes, "identify_whole", lambda *given: SimpleNamespace(problem=given, fit=fit))
     monkeypatch.setattr(recipes, "all_folds", lambda runs: [[0], [1]])
-    monkeypatch.setattr(recipes, "FoldFits", lambda *given: asked.append(given[:2]) or folds)
-    made_ = recipes.fit_global_model("ab", [])
+    monkeypatch.setattr(recipes, "FoldFits", lambda *given: asked.append(given) or folds)
+    made_ = recipes.fit_whole_damper(model_type("play-bypass"), "ab", [])
     assert (made_.damper, made_.fit, made_.refit([1])) == ("damper", fit, ("without", [1]))
-    assert asked[-1] == ("problem", [[0], [1]])
+    assert asked[-1] == ("problem", [[0], [1]], recipes.SEARCHED)
+    recipes.fit_whole_damper(model_type("tanh"), "ab", [])
+    assert asked[-1] == (("ab", model_type("tanh")), [[0], [1]], ())
     law = SimpleNamespace(basis="spencer", fit=lambda *given: given)
     made_ = recipes.fit_published(law, "abc", [7, 8, 9])
     assert made_.damper == (["a", "b", "c"], [7, 8, 9], {"identification runs": "3"})
@@ -389,7 +392,7 @@ def test_a_recipe_says_its_model_and_an_unknown_fault_is_not_hidden():
 def test_every_recipe_says_what_it_is():
     known = recipes.catalogue()
     assert {"bouc-wen", "bouc-wen:joint", "play-bypass", "bouc-wen:paper", "ali-type", "kernel"} <= set(known)
-    assert "play-bypass:joint" not in known
+    assert not {"play-bypass:joint", "tanh:joint"} & set(known)
     joint = {name.partition(":")[0] for name in known if name.endswith(":joint")}
     assert {"bingham", "bouc-wen", "dahl"} <= joint  # at most one shape coordinate, the yield displacement
     assert not {"lugre", "spencer", "kwok"} & joint
@@ -405,9 +408,10 @@ def test_every_recipe_says_what_it_is():
     )  # fmt: skip
     assert (both.basis, both.make, one.basis) == (Basis("dahl"), recipes.fit_functions_jointly, Basis("dahl"))
     ours = known["play-bypass"]
-    assert (ours.basis, ours.make, ours.way, ours.title, ours.source) == (
-        None, recipes.fit_global_model, "global fit", "play and bypass", model_type("play-bypass").source,
+    assert (ours.basis, ours.way, ours.title, ours.source) == (
+        None, "global fit", "play and bypass", model_type("play-bypass").source,
     )  # fmt: skip
+    assert (ours.make.func, ours.make.args) == (recipes.fit_whole_damper, (model_type("play-bypass"),))
     assert (ali.make.func, ali.make.args) == (recipes.fit_published, (all_published()["ali-type"],))
     paper = PaperOptions(functions="shorter").recipe(runs_with(1400.0, 12.0, (0.5, 1.0, 2.0)))
     assert (paper.name, paper.make.func, paper.pure) == ("paper", fit_paper_functions, True)

@@ -14,10 +14,12 @@ from typing import Literal
 import numpy as np
 
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.current_levels import level_count, levels_of
 from mrdamper.dampers.fold_fits import FoldFits
 from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem, LocalMinimum
 from mrdamper.data import SESSIONS_NEEDED, Floats, Run, same_condition, session_of
 from mrdamper.errors import InputError
+from mrdamper.models import Model
 from mrdamper.statistics.functions.selection import Errors, smaller_wins
 from mrdamper.statistics.linear import on_one_blas_thread, solve_linear
 
@@ -25,8 +27,8 @@ _COARSE_TOLERANCE = 1e-4  # relative gain of a step that is enough to tell forms
 _NO_ONSET_A = 1e-4  # below the currents of any test: the yield force rises from no current on [A]
 _NO_PLAY_LENGTH_M = 1e-2  # longer than any free play, so that none is left [m]
 _BLOCK_CYCLES = 12.0  # cycles of one block of a record that is no sine, in cross-validation
-_LEVEL_TOLERANCE = 5e-3  # currents closer than this share of the largest are one level
 MODEL = "play-bypass"
+_PLAIN = "none beyond the plain form"
 SEARCHED = ("leak", "cq", "qb")  # presets free from the first fit on: without them others make up for what they do
 
 
@@ -96,8 +98,8 @@ def identify_jointly(runs: Sequence[Run]) -> JointChoice:
     IdentificationError, RunError
         As `JointProblem`.
     """
-    fixed = _undetermined(runs)
-    problem = JointProblem(runs, MODEL, fixed)
+    problem = JointProblem(runs, MODEL).determined()
+    fixed = problem.fixed
     laws = _level_laws(problem)
     ends = [part.steady_end() for part in problem.parts]
     searched = sorted({name for law in laws for name in law.names})
@@ -137,6 +139,36 @@ def identify_jointly(runs: Sequence[Run]) -> JointChoice:
     return JointChoice(final, best, tried, left_out)
 
 
+@on_one_blas_thread
+def identify_whole(runs: Sequence[Run], model: type[Model]) -> JointChoice:
+    """Identify one damper from all runs with a model of a whole damper, its optional terms selected as above.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Of one rig; any motion, any current.
+    model : type of Model
+        One with `current_levels`. Each parameter that is preset to zero is a term of its own.
+
+    Raises
+    ------
+    IdentificationError, RunError
+        As `JointProblem`.
+    """
+    optional = {info.name: info.meaning for info in model.parameters() if info.preset and info.default == 0.0}
+    problem = JointProblem(runs, model, free=tuple(optional)).determined()
+    ends = problem.with_parts([part.steady_end() for part in problem.parts])
+    short = ends.search(rounds=2, most_steps=15, settled=_COARSE_TOLERANCE)
+    fit = problem.fit(start=short.point, rounds=1, settled=_COARSE_TOLERANCE / 10)
+    evidence = CrossValidation.of(problem, fit)
+    chosen, tried = evidence.choose([ModelTerm(optional[n], (n,), (0.0,)) for n in problem.free if n in optional])
+    final = problem.with_free(tuple(chosen))
+    best = final.fit(start=evidence.start(final), rounds=1, settled=_COARSE_TOLERANCE / 10, to_the_last_digit=True)
+    about = {**best.damper.provenance, "terms": "; ".join(t.term for t in tried if t.kept) or _PLAIN}
+    best = replace(best, damper=replace(best.damper, provenance=about), second=short.second)
+    return JointChoice(final, best, tried, _means(CrossValidation.of(final, best).everything()))
+
+
 def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, JointFit, tuple[TermTrial, ...]]:
     """Remove the free play from the model where it predicts as well without it."""
     without = problem.with_free(problem.free, {"e": _NO_PLAY_LENGTH_M})
@@ -168,14 +200,14 @@ def _level_laws(problem: JointProblem) -> tuple[ModelTerm, ...]:
     A law has a parameter fewer than there are levels; a current that changes passes through all. Two levels show no
     more than a straight line.
     """
-    levels = 5 if any(part.changes for part in problem.parts) else len(levels_of(problem))
+    levels = level_count(problem.currents)
     return tuple(law for law in LEVEL_LAWS if len(law.names) + 2 < max(levels, 3))[: None if levels > 2 else 1]
 
 
 def _kept_terms(tried: Sequence[TermTrial], law: ModelTerm) -> str:
     """Name the kept terms; of the laws of the current, each kept until a better one, the selected one alone."""
     others = {one.title for one in LEVEL_LAWS} - {law.title}
-    return "; ".join(t.term for t in tried if t.kept and t.term not in others) or "none beyond the plain form"
+    return "; ".join(t.term for t in tried if t.kept and t.term not in others) or _PLAIN
 
 
 def _level_law(
@@ -187,7 +219,7 @@ def _level_law(
     are fitted, from starts that never saw them. The search began with every parameter of the law, for the others make
     up for a form that is too short.
     """
-    levels = levels_of(longest)[1:-1] if len(forms) > 1 else []
+    levels = levels_of(longest.currents)[1:-1] if len(forms) > 1 else []
     without = FoldFits(longest, levels)
     starts = [without.refit([i for i in range(len(longest.parts)) if i not in level]) for level in levels]
     tried: list[TermTrial] = []
@@ -223,28 +255,6 @@ def _left_out_current(problem: JointProblem, starts: Sequence[JointFit], levels:
     return np.concatenate(errors)
 
 
-def levels_of(problem: JointProblem) -> list[list[int]]:
-    """Return runs of constant current, by level from the lowest."""
-    constant = [i for i, part in enumerate(problem.parts) if not part.changes]
-    highest = max((abs(problem.parts[i].condition.current_A) for i in constant), default=0.0)
-    levels: list[list[int]] = []
-    for i in sorted(constant, key=lambda i: problem.parts[i].condition.current_A):
-        now = problem.parts[i].condition.current_A
-        if levels and now - problem.parts[levels[-1][0]].condition.current_A <= max(_LEVEL_TOLERANCE * highest, 1e-3):
-            levels[-1].append(i)
-        else:
-            levels.append([i])
-    return levels
-
-
-def _undetermined(runs: Sequence[Run]) -> dict[str, float]:
-    """Parameters that the currents of the tests cannot tell from others: of one level, the rises with current."""
-    lowest = min(float(np.min(np.abs(run.coil_current))) for run in runs)
-    highest = max(float(np.max(np.abs(run.coil_current))) for run in runs)
-    one_level = highest - lowest <= _LEVEL_TOLERANCE * highest
-    return {"fy1": 0.0, "c1": 0.0, "h1": 0.0} if one_level else {}
-
-
 Grouping = Callable[[JointProblem, np.ndarray], dict[str, list[np.ndarray]]]
 
 
@@ -273,17 +283,13 @@ class CrossValidation:
         table, owner = linearised.table, linearised.table.owner
         names = [*(a.name for a in problem.axes), *(i.name for i in problem.linear)]
         values = np.array([*fit.point, *(getattr(fit.damper.model, i.name) for i in problem.linear)])
-        neutral = values.copy()
-        for k, name in enumerate(names):
-            if any(name in term.names for term in TERMS):
-                neutral[k] = 0.0
         rows = (by or _by_condition)(problem, owner)
 
         def error(weighted: Floats, group: np.ndarray) -> float:
             runs = float(np.sum(table.share[group]))  # one for each whole run
             return float(np.sqrt(np.sum((weighted[group] / table.weights[owner[group]]) ** 2) / runs))
 
-        return cls(names, values, neutral, linearised.residual, linearised.jacobian, rows, error)
+        return cls(names, values, np.zeros(values.size), linearised.residual, linearised.jacobian, rows, error)
 
     def everything(self) -> dict[str, Floats]:
         """Return the cross-validated errors with all parameters."""

@@ -37,6 +37,7 @@ class FoldFits:
     def __init__(self, problem: JointProblem, folds: Iterable[Sequence[int]], searched: Sequence[str] = ()):
         self.problem, self.searched = problem, tuple(searched)
         self.blocks = _blocks(folds, len(problem.parts))
+        self._without_effects: dict[tuple[str, ...], FoldFits] = {}
         self._starts: dict[frozenset[int], list[JointFit]] = {}
         self._fits: dict[tuple[int, ...], JointFit] = {}
 
@@ -50,7 +51,14 @@ class FoldFits:
         return self._fits[key]
 
     def _fit(self, rows: Sequence[int]) -> JointFit:
-        """Fit the runs at some indices from the starts of the block of the others."""
+        """Fit the runs at some indices from the starts of the block of the others.
+
+        Effects of the current that these runs do not determine are zero.
+        """
+        if (problem := self.problem.determined(rows)) is not self.problem:
+            if problem.free not in self._without_effects:
+                self._without_effects[problem.free] = FoldFits(problem, self.blocks, self.searched)
+            return self._without_effects[problem.free].refit(rows)
         left = frozenset(range(len(self.problem.parts))) - set(rows)
         block = next((block for block in self.blocks if left <= block), left)
         if block not in self._starts:

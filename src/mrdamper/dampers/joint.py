@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from mrdamper.dampers.base import Damper, Saved, not_held
 from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.concatenated_runs import JointResiduals, Linearisation, RunRows
+from mrdamper.dampers.current_levels import undetermined
 from mrdamper.dampers.envelope import UNTESTED, Envelope
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Condition, Floats, Run
@@ -243,6 +244,22 @@ class JointProblem:
         """Return the same runs with other presets free, or more parameters held."""
         held = {**self.fixed, **(fixed or {})}
         return JointProblem(self.runs, self.model_type, held, free=free, coil=self.given_coil, parts=self.parts)
+
+    @property
+    def currents(self) -> list[float | None]:
+        """Constant currents of the runs [A]; None where the current changes."""
+        return [None if part.changes else part.condition.current_A for part in self.parts]
+
+    def determined(self, rows: Sequence[int] | None = None) -> JointProblem:
+        """Return the problem with effects of the current held at zero that all runs, or some, do not determine."""
+        names = undetermined(
+            self.model_type, [self.currents[i] for i in range(len(self.parts)) if rows is None or i in rows]
+        )
+        return self.with_free(self.free, dict.fromkeys(names, 0.0)) if set(names) & set(self.free) else self
+
+    def with_parts(self, parts: Sequence[RunRows]) -> JointProblem:
+        """Return the same problem of other samples of the runs."""
+        return JointProblem(self.runs, self.model_type, self.fixed, free=self.free, coil=self.given_coil, parts=parts)
 
     def from_point(self, fit: JointFit) -> Floats:
         """(D,) the end of another problem's fit on these axes; what it did not have begins at its own start."""

@@ -105,6 +105,9 @@ class Model(ABC):
     integrated: ClassVar[bool] = False  # the state is stepped: following a motion costs a hundred times more
     # Linear parameter whose column the state is, where the search moves no other column; None: no such one.
     state_column: ClassVar[str | None] = None
+    # Levels of the current that determine each parameter of its effects; a model with such parameters describes a whole
+    # damper by one set of them.
+    current_levels: ClassVar[Mapping[str, int]] = {}
 
     def __post_init__(self) -> None:
         for info in self.parameters():

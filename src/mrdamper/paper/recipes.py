@@ -37,7 +37,7 @@ from mrdamper.paper.options import (
     PaperOptions,
 )
 from mrdamper.study.fit_result import FitResult
-from mrdamper.study.recipe import Recipe, conditioned, fit_functions_jointly, modified, play_and_bypass
+from mrdamper.study.recipe import Recipe, conditioned, fit_functions_jointly, modified, whole_damper
 
 _MOST_CURRENTS = 5  # currents at which Ali's model is identified on every run
 
@@ -91,7 +91,7 @@ def comparators(train: Sequence[Run], held_out: Sequence[Run], assumptions: Pape
 
 def literature(train: Sequence[Run]) -> Steps:
     """Return Bingham, hyperbolic tangent, play and bypass, and the published dampers but Ali's."""
-    recipes = [modified("bingham"), modified("kwok"), play_and_bypass()]
+    recipes = [modified("bingham"), modified("kwok"), whole_damper("play-bypass")]
     recipes += [conditioned(cls) for name, cls in all_published().items() if name != "ali-type"]
     return [(replace(recipe, way="literature"), train) for recipe in recipes]
 

@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.choice import SEARCHED, identify_jointly
+from mrdamper.dampers.choice import MODEL, SEARCHED, identify_jointly, identify_whole
 from mrdamper.dampers.fold_fits import FoldFits
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
@@ -28,7 +28,7 @@ from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import Identification
 from mrdamper.identification.basis import Basis
 from mrdamper.identification.methods import values_of_fields
-from mrdamper.models import Scale, all_models, model_type
+from mrdamper.models import Model, Scale, all_models, model_type
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.study.cross_validation import all_folds, cross_validate, cross_validate_by_kind, stretches
@@ -37,7 +37,7 @@ from mrdamper.study.validation import Validation, validate
 
 Progress = Callable[[str, float], None]
 
-JOINTLY = "play-bypass"  # the model whose parameters hold for a whole damper
+WHOLE_DAMPER = ("tanh", MODEL)  # models with one set of parameters for every current, which a study compares
 
 
 IdentificationCache = dict[tuple[Basis, str], tuple[Identification | str, float]]  # or why there is none; seconds
@@ -277,10 +277,11 @@ def fit_current_laws(runs: Sequence[Run], identifications: Sequence[Identificati
     return FitResult(fit.damper, refit, fit)
 
 
-def fit_global_model(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
-    """One set of parameters for every condition, of the model that takes the current as an input."""
-    choice = identify_jointly(runs)
-    without = FoldFits(choice.problem, all_folds(runs), SEARCHED)
+def fit_whole_damper(model: type[Model], runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
+    """One set of parameters for every condition, of a model that takes the current as an input."""
+    ours = model.name == MODEL
+    choice = identify_jointly(runs) if ours else identify_whole(runs, model)
+    without = FoldFits(choice.problem, all_folds(runs), SEARCHED if ours else ())
     return FitResult(choice.fit.damper, lambda rows: without.refit(rows).damper, choice.fit)
 
 
@@ -321,10 +322,10 @@ def current_only(name: str) -> Recipe:
     return replace(apart, name=f"{name}:current", make=fit_current_laws, way="current laws", limits=limits)
 
 
-def play_and_bypass() -> Recipe:
-    """Return the model whose one set of parameters holds for every condition."""
-    cls, limits = model_type(JOINTLY), "takes any motion and a current that varies"
-    return Recipe(JOINTLY, None, fit_global_model, "global fit", cls.title, cls.source, limits)
+def whole_damper(name: str) -> Recipe:
+    """Return a model whose one set of parameters holds for every condition."""
+    cls, limits = model_type(name), "takes any motion and a current that varies"
+    return Recipe(name, None, partial(fit_whole_damper, cls), "global fit", cls.title, cls.source, limits)
 
 
 def conditioned(cls: Published) -> Recipe:
@@ -396,11 +397,11 @@ def catalogue(method: StudyMethod | None = None) -> Mapping[str, Recipe]:
     method : StudyMethod, optional
         A published method with options, in place of its own defaults.
     """
-    all_recipes = [modified(name) for name in all_models() if name != JOINTLY]
+    all_recipes = [whole_damper(n) if cls.current_levels else modified(n) for n, cls in all_models().items()]
     all_recipes += [jointly(name) for name in _closed_shapes()]
     methods = {name: cls() for name, cls in study_methods().items()} | ({method.name: method} if method else {})
     all_recipes += [recipe for one in methods.values() for recipe in one.compared()]
-    all_recipes += [play_and_bypass(), *(conditioned(cls) for cls in all_published().values())]
+    all_recipes += [conditioned(cls) for cls in all_published().values()]
     return {recipe.name: recipe for recipe in all_recipes}
 
 
@@ -434,7 +435,7 @@ def _closed_shapes() -> list[str]:
             axis.name for axis in cls.search_axes(Scale(1.0, 1.0), [i.name for i in cls.parameters() if not i.preset])
         ]
         for name, cls in all_models().items()
-        if name != JOINTLY
+        if not cls.current_levels
     }
     return [name for name, axes in shapes.items() if axes in ([], ["yield_displacement"])]
 

@@ -35,7 +35,7 @@ from mrdamper.study.cross_validation import NO_CURRENT
 from mrdamper.study.dissipation import gains_energy
 from mrdamper.study.parallel import IN_PROCESS, Processes
 from mrdamper.study.recipe import (
-    JOINTLY,
+    WHOLE_DAMPER,
     Progress,
     Recipe,
     RecipeResult,
@@ -45,8 +45,8 @@ from mrdamper.study.recipe import (
     fit_and_score_all,
     jointly,
     modified,
-    play_and_bypass,
     study_methods,
+    whole_damper,
 )
 from mrdamper.study.validation import RunScore, Validation, validate
 
@@ -583,8 +583,9 @@ def _steps(
         return [(method.recipe(pure), train), *((modified(name), train) for name in STUDIED)]
     steps: list[tuple[Recipe, Sequence[Run]]] = []
     named = [
-        r for n, r in catalogue().items() if n != JOINTLY and (model == n or (model == r.model and not r.on_request))
-    ]
+        recipe for name, recipe in catalogue().items()
+        if name not in WHOLE_DAMPER and (model == name or (model == recipe.model and not recipe.on_request))
+    ]  # fmt: skip
     if len(train) > 1:
         steps += [(make(name), train) for name in STUDIED for make in (modified, jointly, current_only)]
         there = {recipe.name for recipe, _ in steps}
@@ -594,4 +595,4 @@ def _steps(
     if len(pure) > 2:
         steps += [(cls().beside_others().recipe(pure), train) for cls in study_methods().values()]
     steps += [(recipe, everything) for recipe in named if recipe.basis is None]
-    return [*steps, (play_and_bypass(), everything)]
+    return [*steps, *((whole_damper(name), everything) for name in WHOLE_DAMPER)]

@@ -17,15 +17,15 @@ from mrdamper.data import Dataset
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import Identification
 from mrdamper.identification.basis import Basis
+from mrdamper.models import model_type
 from mrdamper.study.recipe import (
-    JOINTLY,
     RecipeResult,
     fit_and_score,
     fit_functions_jointly,
     fit_per_run,
     identified,
     modified,
-    play_and_bypass,
+    whole_damper,
 )
 from mrdamper.study.workflow import Study, run_study, usable_sines
 
@@ -71,8 +71,8 @@ def identify_rig(
     if not runs:
         reason = next((refused[i] for i in run_ids if i in refused), "no identification run is a steady sine")
         raise IdentificationError(reason, where=f"rig {dataset.name}", remedy="choose other runs")
-    if model == JOINTLY:
-        recipe = play_and_bypass()
+    if model_type(model).current_levels:
+        recipe = whole_damper(model)
     else:
         recipe = modified(model, method)
         basis = Basis(model, method, tuple(free), tuple(sorted(fixed.items())))

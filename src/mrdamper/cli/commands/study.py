@@ -81,7 +81,7 @@ def study(
         return
     models = ", ".join(str(path) for path in written if path.name.startswith("model"))
     where = f" {shlex.quote(str(data))}" if data else ""
-    further = f"further models (hyperbolic tangent, LuGre, published ones): mrdamper compare{where} --out comparison"
+    further = f"further models (Spencer, LuGre, published ones): mrdamper compare{where} --out comparison"
     files = [f"model: {models}", f"report: {written[0]}", further]
     print("\n".join(study_lines(result, files, verbose=verbose)))
 

@@ -14,7 +14,7 @@ from mrdamper.data import Dataset
 from mrdamper.data.encoding import csv_text
 from mrdamper.report.comparison import summary_rows
 from mrdamper.study.comparison import Comparison, RigComparison
-from mrdamper.study.recipe import JOINTLY, RecipeResult, recipes
+from mrdamper.study.recipe import WHOLE_DAMPER, RecipeResult, recipes
 from mrdamper.study.validation import RunScore, Validation
 from mrdamper.study.workflow import STUDIED
 from mrdamper.web.answers import archive, download, frame, number
@@ -43,7 +43,7 @@ def choices(session: Current) -> list[dict[str, Any]]:
             "title": c.title,
             "source": c.source,
             "slow": bool(c.basis and c.basis.costly),
-            "studied": c.model in (*STUDIED, JOINTLY),
+            "studied": c.model in (*STUDIED, *WHOLE_DAMPER),
         }
         for c in recipes()
     ]

@@ -18,7 +18,7 @@ from mrdamper.errors import InputError
 from mrdamper.identification import Identification, all_methods, identify
 from mrdamper.models import all_models
 from mrdamper.report.about import About, about_of, logo_of
-from mrdamper.study.recipe import JOINTLY, RecipeResult
+from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import Validation
 from mrdamper.study.workflow import Study
 from mrdamper.web.answers import frame, number
@@ -70,7 +70,7 @@ def choices(session: Current) -> dict[str, Any]:
                 "source": cls.source,
                 "equation": cls.equation,
                 "integrated": cls.integrated,
-                "jointly": name == JOINTLY,
+                "jointly": bool(cls.current_levels),
                 "parameters": [
                     {"name": p.name, "unit": p.unit, "meaning": p.meaning, "preset": p.preset, "default": p.default}
                     for p in cls.parameters()
