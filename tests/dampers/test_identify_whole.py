@@ -27,6 +27,11 @@ def saturating(current, x, v):
     return 50 + 300 * x + np.where(v > 0, 1.0, 0.8) * ((400 + 250 * current) * v + strength * np.tanh(v / 0.02))
 
 
+def thinning(current, x, v):
+    viscous = np.sign(v) * (1200 + 800 * current) * np.abs(v) ** 0.6
+    return 100 + 900 * x + viscous + (60 + 700 * (1 - np.exp(-1.2 * current))) * np.tanh(v / 0.008)
+
+
 def motion(frequency, amplitude):
     t = np.arange(int(5 * 500 / frequency)) / 500
     phase = 2 * np.pi * frequency * t
@@ -44,7 +49,7 @@ def rig(law, currents=(0.0, 0.5, 1.0, 1.5)):
     return runs
 
 
-@pytest.mark.parametrize("law", [tangent, arctangent, saturating])
+@pytest.mark.parametrize("law", [tangent, arctangent, saturating, thinning])
 def test_untested_corners_and_currents_are_predicted(law):
     """At twice the tested velocity, and between and beyond the tested currents, within 3 % of the peak."""
     damper = identify_whole(rig(law), Tanh).fit.damper

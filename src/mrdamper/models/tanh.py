@@ -16,13 +16,14 @@ from mrdamper.physics.motion import Excitation
 
 @dataclass(frozen=True)
 class Tanh(Model):
-    """F = f0 + (k0 + k1 I) x + (c0 + c1 I) v + cq |v| + fy(I) (S + q |S|) + m a, with
+    """F = f0 + (k0 + k1 I) x + (c0 + c1 I) v |v|^p + cq |v| + fy(I) (S + q |S|) + m a, with
 
     S = (1 - w) tanh u + w (2/pi) arctan(pi u/2), u = (v + lambda x)/vy, fy(I) = fy0 + fy1 I/(1 + si |I|).
 
     Without memory and without jumps: the displacement, counted from mid-stroke, moves the yield
-    to either side of the loop, in any motion. Of the parameters that are preset to zero only what
-    the tests show is freed (`dampers.choice`).
+    to either side of the loop, in any motion. The viscous damping is c0 + c1 I at 1 m/s; p is
+    negative for a fluid that thins with shear, 1 for quadratic damping. Of the parameters that
+    are preset to zero only what the tests show is freed (`dampers.choice`).
 
     References
     ----------
@@ -33,7 +34,7 @@ class Tanh(Model):
     name: ClassVar[str] = "tanh"
     title: ClassVar[str] = "shifted hyperbolic tangent"
     equation: ClassVar[str] = (
-        r"F = f_0 + (k_0 + k_1 I) x + (c_0 + c_1 I) v + c_q |v| + f_y (S + q |S|) + m a,\quad "
+        r"F = f_0 + (k_0 + k_1 I) x + (c_0 + c_1 I) v |v|^p + c_q |v| + f_y (S + q |S|) + m a,\quad "
         r"S = (1 - w) \tanh u + w \frac{2}{\pi} \arctan\frac{\pi u}{2},\quad u = \frac{v + \lambda x}{v_y},\quad "
         r"f_y = f_{y0} + \frac{f_{y1} I}{1 + s_i |I|}"
     )
@@ -51,6 +52,13 @@ class Tanh(Model):
     k1: float = param("N/m/A", "rise of the stiffness with current", linear=True, preset=True, default=0.0)
     si: float = param(
         "1/A", "saturation of the yield force with current", bounds=(0, 1e3), preset=True, default=0.0, symbol="s_i"
+    )
+    p: float = param(
+        "-",
+        "excess over one of the exponent of the velocity [m/s] in the viscous force",
+        bounds=(-0.9, 2),
+        preset=True,
+        default=0.0,
     )
     tail: float = param(
         "-", "share of the arctangent, which saturates slowly", bounds=(0, 1), preset=True, default=0.0, symbol="w"
@@ -74,8 +82,9 @@ class Tanh(Model):
     def force(self, motion: Excitation, state: Floats) -> Floats:
         x, v, a, current = motion.displacement, motion.velocity, motion.acceleration, motion.current
         yield_force = self.fy0 + self.fy1 * current / (1 + self.si * np.abs(current))
-        linear = self.f0 + (self.k0 + self.k1 * current) * x + (self.c0 + self.c1 * current) * v
-        return linear + self.cq * np.abs(v) + yield_force * (state + self.asymmetry * np.abs(state)) + self.m * a
+        viscous = (self.c0 + self.c1 * current) * np.sign(v) * np.abs(v) ** (1 + self.p) + self.cq * np.abs(v)
+        yielded = yield_force * (state + self.asymmetry * np.abs(state))
+        return self.f0 + (self.k0 + self.k1 * current) * x + viscous + yielded + self.m * a
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
@@ -86,6 +95,7 @@ class Tanh(Model):
             SearchAxis("vy", 1e-3 * speed, 30 * speed, (0.03 * speed, 0.2 * speed, speed), log=True),
             SearchAxis("shift", -frequency, 30 * frequency, (0.05 * frequency, 0.5 * frequency)),
             SearchAxis("si", 0.0, 10 / current, (0.1 / current,)),
+            SearchAxis("p", -0.7, 1.0, (0.0,)),
             SearchAxis("tail", 0.0, 1.0, (0.1,)),
             SearchAxis("asymmetry", -0.9, 0.9, (0.0,)),
         )
