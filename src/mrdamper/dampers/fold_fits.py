@@ -57,7 +57,9 @@ class FoldFits:
         """
         if (problem := self.problem.determined(rows)) is not self.problem:
             if problem.free not in self._without_effects:
-                self._without_effects[problem.free] = FoldFits(problem, self.blocks, self.searched)
+                self._without_effects[problem.free] = FoldFits(
+                    problem, [sorted(block) for block in self.blocks], self.searched
+                )
             return self._without_effects[problem.free].refit(rows)
         left = frozenset(range(len(self.problem.parts))) - set(rows)
         block = next((block for block in self.blocks if left <= block), left)
