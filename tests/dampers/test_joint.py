@@ -472,3 +472,13 @@ def test_nothing_several_rigs_and_dead_channels_are_refused(runs):
     dead = Run("dead", t, np.sin(6 * t), np.zeros(400), 0.0)
     with pytest.raises(RunError, match="force does not change"):
         JointProblem([dead], "play-bypass")
+
+
+def test_an_excitation_is_predicted_as_the_run_of_its_motion():
+    damper = joint_damper()
+    motion = sweep(0.5, 4.0, 3.0, 0.008, current=0.7)
+    run = Run("sweep", motion.time, motion.displacement, np.zeros(len(motion)), 0.7)
+    of_motion, of_run = damper.predict(motion), damper.predict(run)
+    np.testing.assert_array_equal(of_motion.force, of_run.force)
+    assert of_motion.extrapolation == of_run.extrapolation
+    assert np.ptp(of_motion.force) > 100

@@ -245,7 +245,7 @@ class Damper(Displayable):
         return motion.with_current(self.coil.along(motion.time, motion.current))
 
     @validate_arguments()
-    def predict(self, at: Condition | Run) -> Prediction:
+    def predict(self, at: Condition | Run | Excitation) -> Prediction:
         """Predict the force at a condition, one steady loop, or along the motion and current of a run.
 
         The measured force of a run is not used. Parameters that depend on frequency and amplitude get
@@ -254,19 +254,22 @@ class Damper(Displayable):
 
         Parameters
         ----------
-        at : Condition or Run
-            A motion of one's own is a run: ``Run("mine", time, displacement, np.zeros(time.size), current)``
-            in s, m, N and A.
+        at : Condition, Run or Excitation
+            An excitation is a motion without a measured force, as `sine` and `sweep` return it, and counts as a
+            run of its time, displacement and current. A motion in arrays is a run with any force:
+            ``Run("mine", time, displacement, np.zeros(time.size), current)`` in s, m, N and A.
 
         Returns
         -------
         Prediction
-            Of a condition, one closed cycle; of a run, a force at each of its samples. `extrapolation` lists
+            Of a condition, one closed cycle; otherwise a force at each sample. `extrapolation` lists
             what lies outside the tested ranges.
         """
         if isinstance(at, Condition):
             loop = self.loop(at)
             return Prediction(loop.excitation, loop.force, at, self.envelope.flags(at), steady=True)
+        if isinstance(at, Excitation):
+            at = Run("excitation", at.time, at.displacement, np.zeros(len(at)), at.current)
         sine = equivalent_sine(at)
         motion = centred_motion(at)
         if sine.is_sine and not at.current_changes:
