@@ -1,6 +1,8 @@
 """The check says nothing of a sound FMU, and finds what is planted: nothing takes the caller down."""
 
+import os
 import re
+from subprocess import CompletedProcess
 from unittest.mock import patch
 
 import numpy as np
@@ -8,7 +10,7 @@ import pytest
 from support.fmu_files import COMPILERS, DAMPERS, FEW, fmu_bytes, unpacked
 
 from mrdamper.errors import MissingExtraError
-from mrdamper.exporters import fmu_check, toolchain
+from mrdamper.exporters import fmu_check, fmu_probe, toolchain
 from mrdamper.exporters.fmu import token_of, zipped
 from mrdamper.exporters.fmu_check import check_fmu
 from mrdamper.exporters.toolchain import build_library, here
@@ -19,7 +21,7 @@ pytestmark = pytest.mark.skipif(not COMPILERS or not here(), reason="no C compil
 
 
 @pytest.fixture
-def check(tmp_path):
+def check_apart(tmp_path):
     """Codes of the errors found in changed files of an FMU, and the texts."""
 
     def run(files):
@@ -29,6 +31,24 @@ def check(tmp_path):
         return {f.code for f in findings if f.level == "error"}, " | ".join(map(str, findings))
 
     return run
+
+
+@pytest.fixture
+def check(check_apart, monkeypatch):
+    """The same, with the check's program in a fork of this process, which has loaded NumPy and FMPy."""
+    monkeypatch.setattr(fmu_check.subprocess, "run", _forked)
+    return check_apart
+
+
+def _forked(command, **_):
+    child = os.fork()
+    if child == 0:
+        try:
+            fmu_probe.main(*command[3:])
+            os._exit(0)
+        finally:
+            os._exit(1)
+    return CompletedProcess(command, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 
 
 def binary_of(files):
@@ -66,8 +86,8 @@ def test_a_sound_fmu_passes(check, name, fmi):
     assert check(fmu_bytes(name, fmi)) == (set(), "")
 
 
-def test_one_of_sources_alone_is_compiled_to_be_checked(check):
-    codes, text = check(fmu_bytes("joint", 3, compiled=False))
+def test_one_of_sources_alone_is_compiled_to_be_checked(check_apart):
+    codes, text = check_apart(fmu_bytes("joint", 3, compiled=False))
     assert not codes
     assert "its sources were compiled instead [N_FMU_PLATFORM]" in text
 
@@ -111,25 +131,25 @@ def test_a_garbage_binary_is_caught(check, garbage):
     assert "cannot be loaded" in text
 
 
-def test_a_binary_cut_short_is_caught(check):
+def test_a_binary_cut_short_is_caught(check_apart):
     files = unpacked(fmu_bytes("joint", 3))
     whole = files[binary_of(files)]
-    codes, _ = check({**files, binary_of(files): whole[: len(whole) // 2]})
+    codes, _ = check_apart({**files, binary_of(files): whole[: len(whole) // 2]})
     assert codes == {"E_FMU_BINARY"}
 
 
 @pytest.mark.parametrize(("fmi", "function"), [(2, "DoStep"), (3, "FreeInstance")])
-def test_a_binary_that_crashes_takes_nobody_along(check, fmi, function):
+def test_a_binary_that_crashes_takes_nobody_along(check_apart, fmi, function):
     crash = in_function(f"fmi{fmi}{function}".encode(), b"    *(volatile int *)0 = 1;\n")
-    codes, text = check(rebuilt(unpacked(fmu_bytes("joint", fmi)), crash))
+    codes, text = check_apart(rebuilt(unpacked(fmu_bytes("joint", fmi)), crash))
     assert codes == {"E_FMU_BINARY"}
     assert "crashed (signal 11)" in text
 
 
-def test_a_binary_that_hangs_is_given_up(check, monkeypatch):
+def test_a_binary_that_hangs_is_given_up(check_apart, monkeypatch):
     monkeypatch.setattr(fmu_check, "_CHECK_TIMEOUT_S", 1)
     hang = in_function(b"fmi3DoStep", b"    for (;;) { if (time < -1.0) { break; } }\n")
-    codes, text = check(rebuilt(unpacked(fmu_bytes("joint", 3)), hang))
+    codes, text = check_apart(rebuilt(unpacked(fmu_bytes("joint", 3)), hang))
     assert codes == {"E_FMU_BINARY"}
     assert "did not answer within 1 s" in text
 
