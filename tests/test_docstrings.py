@@ -8,9 +8,12 @@ import pytest
 import mrdamper
 
 RAISES_NOTHING = ("Condition", "Damper", "Prediction")
+STUDIES = ("run_study", "compare")  # of many runs: seconds
 
 
-@pytest.mark.parametrize("name", mrdamper.__all__)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in STUDIES else n for n in mrdamper.__all__]
+)
 def test_every_public_name_has_an_example_that_runs(name, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "agg")

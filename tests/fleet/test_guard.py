@@ -27,15 +27,15 @@ def guard():
         ("crash", None, "E_JOB_CRASH", "SIGSEGV"),
         ("leave", None, "E_JOB_CRASH", "status 7"),
         ("hang", None, "E_JOB_TIME", "not done after 2 s"),
-        ("spin", None, "E_JOB_TIME", "1 s of processor time"),
+        ("spin", None, "E_JOB_TIME", "0.5 s of processor time"),
         ("want", 4 * 2**30, "E_JOB_MEMORY", "0.684 GiB"),
         ("fork_and_want", 400 * 2**20, "E_JOB_MEMORY", "0.684 GiB"),
         ("slip", None, "E_JOB_FAULT", "ZeroDivisionError: ours"),
     ],
 )
 def test_it_fails_alone_and_is_named(guard, job, argument, code, found):
-    if job == "hang":
-        guard = KillableWorker(replace(SMALL, wall_s=2.0))
+    if job in ("hang", "spin"):
+        guard = KillableWorker(replace(SMALL, wall_s=2.0) if job == "hang" else replace(SMALL, cpu_s=0.5))
     with pytest.raises(JobError) as failed:
         guard.call(f"{HERE}:{job}", argument)
     assert failed.value.code == code

@@ -120,8 +120,8 @@ def test_a_stated_current_is_corrected_in_the_dataset_and_a_measured_one_by_anot
     ("channel", "factor", "stated"),
     [
         ("force", 1 / 9.80665, 'unit = "kN" and scale = 9.8'),  # kilonewtons in thousands of kgf
-        ("displacement", 1 / 25.4, 'unit = "inch"'),
-        ("time", 5.0, 'unit = "s" and scale = 0.2'),
+        pytest.param("displacement", 1 / 25.4, 'unit = "inch"', marks=pytest.mark.slow),
+        pytest.param("time", 5.0, 'unit = "s" and scale = 0.2', marks=pytest.mark.slow),
         ("rate", 0.2, "[file] sample_rate_Hz = "),
     ],
 )
