@@ -1,6 +1,5 @@
 """The check says nothing of a sound FMU, and finds what is planted: nothing takes the caller down."""
 
-import os
 import re
 from subprocess import CompletedProcess
 from unittest.mock import patch
@@ -8,6 +7,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 from support.fmu_files import COMPILERS, DAMPERS, FEW, fmu_bytes, unpacked
+from support.forked import forked
 
 from mrdamper.errors import MissingExtraError
 from mrdamper.exporters import fmu_check, fmu_probe, toolchain
@@ -36,19 +36,12 @@ def check_apart(tmp_path):
 @pytest.fixture
 def check(check_apart, monkeypatch):
     """The same, with the check's program in a fork of this process, which has loaded NumPy and FMPy."""
-    monkeypatch.setattr(fmu_check.subprocess, "run", _forked)
+
+    def run(command, **_):
+        return CompletedProcess(command, forked(fmu_probe.main, *command[3:]))
+
+    monkeypatch.setattr(fmu_check.subprocess, "run", run)
     return check_apart
-
-
-def _forked(command, **_):
-    child = os.fork()
-    if child == 0:
-        try:
-            fmu_probe.main(*command[3:])
-            os._exit(0)
-        finally:
-            os._exit(1)
-    return CompletedProcess(command, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 
 
 def binary_of(files):

@@ -1,15 +1,14 @@
 """What is written appears in one step, whenever the process is killed."""
 
 import errno
+import itertools
 import json
 import os
 import signal
-import subprocess
-import sys
-import textwrap
 
 import pytest
 from support.command import mrdamper
+from support.forked import forked
 
 from mrdamper.data import atomic
 from mrdamper.data.atomic import MADE, ResultRecord, publish, require_writable, write_file, write_folder, write_into
@@ -63,29 +62,22 @@ def test_an_error_leaves_what_stood_there(tmp_path):
     assert files(tmp_path) == {f"out/{name}": text for name, text in before.items()}
 
 
-KILLED = textwrap.dedent("""
-    import os, signal, sys
-    from pathlib import Path
-    from mrdamper.data import atomic
-    at, calls = int(sys.argv[2]), 0
+def written_until(at, out):
+    """Write a result in this process; it is killed at this call of the system."""
+    calls = itertools.count(1)
+
     def counted(real):
         def call(*arguments, **named):
-            global calls
-            calls += 1
-            if calls == at:
+            if next(calls) == at:
                 os.kill(os.getpid(), signal.SIGKILL)
             return real(*arguments, **named)
+
         return call
+
     for name in ("mkdir", "rename", "replace", "link", "fsync", "unlink", "rmdir"):
         setattr(os, name, counted(getattr(os, name)))
     atomic._exchange = counted(atomic._exchange)
-    def fill(work):
-        (work / "figures").mkdir()
-        for name in ("page", "model.json", "figures/a.svg"):
-            (work / name).write_text("new")
-    atomic.publish(sys.argv[1], "page", fill)
-    print(calls)
-""")
+    publish(out, "page", result(["page", "model.json", "figures/a.svg"], "new"))
 
 
 @posix
@@ -96,9 +88,7 @@ def test_killed_at_any_step_it_is_the_old_result_or_the_new_one(tmp_path):
         at += 1
         publish(out, "page", result(["page", "model-a.json", "figures/b.svg"], "old"))
         (out / "mine.txt").write_text("mine")
-        done = subprocess.run(
-            [sys.executable, "-c", KILLED, str(out), str(at)], capture_output=True, text=True, check=False
-        )
+        ended = forked(written_until, at, out)
         found = files(out)
         assert found.pop("mine.txt") == "mine"
         found.pop(MADE)
@@ -106,9 +96,9 @@ def test_killed_at_any_step_it_is_the_old_result_or_the_new_one(tmp_path):
         new = dict.fromkeys(["page", "model.json", "figures/a.svg"], "new")
         assert found in (old, new), (at, found)
         seen.add(found == new)
-        if done.returncode == 0:
+        if ended == 0:
             break
-        assert done.returncode == -signal.SIGKILL, done.stderr
+        assert ended == -signal.SIGKILL
     assert at > 10
     assert seen == {True, False}
     publish(out, "page", result(["page"], "old"))  # sweeps what the killed ones left
