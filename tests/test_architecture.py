@@ -39,7 +39,8 @@ def test_runs_are_identified_and_compared_without_scipy():
         "identify(Run('a', t, x + 1e-7 * noise[0], force, 0.5)).standard_errors;"
         "print([m for m in ('scipy', 'matplotlib', 'polars', 'pydantic') if m in sys.modules]);"
         "from mrdamper import check, load_dataset;"
-        "check(load_dataset().rig('utfsm')); print('scipy' in sys.modules)"  # which brings threads of its own, too
+        "tests = load_dataset().rig('utfsm'); check(tests.only(tests.runs[:8]));"
+        "print('scipy' in sys.modules)"  # which brings threads of its own, too
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["[]", "False"]

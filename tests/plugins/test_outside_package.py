@@ -6,10 +6,11 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.command import EACH
+from support.command import EACH, mrdamper
 
 PARTS = Path(__file__).parents[1] / "drop_in"
 GROUPS = {
@@ -80,21 +81,42 @@ def site(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def call(site):
-    def called(*arguments, installed=True, code=0):
-        folders = [str(site)] * installed + [os.environ.get("PYTHONPATH", "")]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))}
-        command = [sys.executable, "-m", "mrdamper", *map(str, arguments)]
-        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
-        assert done.returncode == code, done.stdout + done.stderr
-        return done
+def environment(site):
+    """Variables of a process that finds the installed packages and the support of the tests."""
+    places = (str(site), str(PARTS.parent), os.environ.get("PYTHONPATH", ""))
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, places))}
 
-    return called
+
+def run(environment, *commands, first=""):
+    """Results of commands that one process runs after a program; starting one takes longer than most of them."""
+    words = json.dumps([[str(word) for word in command] for command in commands])
+    done = subprocess.run(
+        [sys.executable, "-c", first + EACH], input=words, capture_output=True, text=True, env=environment, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return [SimpleNamespace(**one) for one in json.loads(done.stdout)]
 
 
 @pytest.fixture(scope="module")
-def parts(call):
-    return json.loads(call("plugins", "--json").stdout)
+def said(environment, tmp_path_factory):
+    """Results of commands with the packages installed."""
+    place = tmp_path_factory.mktemp("place")
+    t = np.arange(3001) / 500
+    x, v = 0.01 * np.sin(2 * np.pi * t), 0.02 * np.pi * np.cos(2 * np.pi * t)
+    table = np.column_stack([t, x, 900 * v + 300 * np.tanh(v / 0.01)])
+    (place / "1A.rigx").write_bytes(b"RIGX" + table.tobytes())
+    commands = {
+        "model": ("models", "bingham"), "plugins": ("plugins", "--json"), "rigs": ("rigs",),
+        "import": ("import", place / "1A.rigx", "--out", place / "rig"),
+    }  # fmt: skip
+    done = dict(zip(commands, run(environment, *commands.values()), strict=True))
+    assert not any(one.returncode for one in done.values()), done
+    return done
+
+
+@pytest.fixture(scope="module")
+def parts(said):
+    return json.loads(said["plugins"].stdout)
 
 
 def test_every_part_is_listed_with_its_package(parts):
@@ -103,57 +125,47 @@ def test_every_part_is_listed_with_its_package(parts):
     assert ("mrdamper.models", "rounded-coulomb") in ours
 
 
-def test_a_broken_package_is_named_with_its_reason_and_skipped(call, parts):
+def test_a_broken_package_is_named_with_its_reason_and_skipped(said, parts):
     problems = {part["package"]: part["problem"] for part in parts if part["problem"]}
     assert "no licence" in problems["raises 1.0"]
     assert "'bingham' exists already in mrdamper" in problems["takes 1.0"]
     assert "it needs mrdamper >=99" in problems["newer 1.0"]
     assert "neither a module nor a class" in problems["lacks 1.0"]
-    done = call("models", "bingham")
-    assert done.stderr.count("is skipped") == 4
-    assert "Traceback" not in done.stderr
+    assert said["model"].stderr.count("is skipped") == 4
+    assert "Traceback" not in said["model"].stderr
 
 
 FIT = """
-import sys
 from mrdamper import identify, load_dataset, save_model
 from mrdamper.dampers.modified import fit_modified
 runs = load_dataset().rig("utfsm").split("train")[:8]
-save_model(fit_modified([identify(run, "rounded-coulomb") for run in runs]).damper, sys.argv[1])
+save_model(fit_modified([identify(run, "rounded-coulomb") for run in runs]).damper, {model!r})
 """
 
 
-def test_an_outside_model_is_identified_saved_loaded_and_exported(call, site, tmp_path):
+def test_an_outside_model_is_identified_saved_loaded_and_exported(environment, tmp_path):
     model = tmp_path / "model.json"
-    environment = {**os.environ, "PYTHONPATH": str(site), "PYTHONWARNINGS": "ignore"}
-    subprocess.run([sys.executable, "-c", FIT, str(model)], check=True, env=environment)
-    assert json.loads(model.read_text())["provenance"]["package of the model"] == "rig-parts 1.0"
     predict = ("predict", model, "--current", 0.5, "--frequency", 2, "--amplitude", 10, "--out", tmp_path / "force.csv")
     exports = [
         ("export", model, "--to", to, "--out", tmp_path / out) for to, out in (("c", "c"), ("peaks", "peaks.csv"))
     ]
-    words = json.dumps([[str(word) for word in command] for command in (predict, *exports)])
-    environment["PYTHONPATH"] += f"{os.pathsep}{PARTS.parent}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
-    done = subprocess.run([sys.executable, "-c", EACH], input=words, capture_output=True, text=True, env=environment)
-    assert [one["returncode"] for one in json.loads(done.stdout)] == [0, 0, 0], done
+    done = run(environment, predict, *exports, first=FIT.format(model=str(model)))
+    assert [one.returncode for one in done] == [0, 0, 0], done
+    assert json.loads(model.read_text())["provenance"]["package of the model"] == "rig-parts 1.0"
     assert (tmp_path / "peaks.csv").read_text().startswith("current_A,force_N\n")
-    refused = call(*predict, installed=False, code=2)
+    refused = mrdamper(*predict)  # here the package is not installed
+    assert refused.returncode == 2
     assert "rounded-coulomb" in refused.stderr
     assert "rig-parts 1.0" in refused.stderr
 
 
 @pytest.mark.slow
-def test_an_outside_model_is_studied(call, tmp_path):
-    call("study", "--model", "rounded-coulomb", "--out", tmp_path / "result")
+def test_an_outside_model_is_studied(environment, tmp_path):
+    run(environment, ("study", "--model", "rounded-coulomb", "--out", tmp_path / "result"))
     saved = json.loads((tmp_path / "result" / "model-utfsm.json").read_text())
     assert saved["damper"]["model"] == "rounded-coulomb"
 
 
-def test_an_outside_reader_check_and_command_are_used(call, tmp_path):
-    t = np.arange(3001) / 500
-    x, v = 0.01 * np.sin(2 * np.pi * t), 0.02 * np.pi * np.cos(2 * np.pi * t)
-    table = np.column_stack([t, x, 900 * v + 300 * np.tanh(v / 0.01)])
-    (tmp_path / "1A.rigx").write_bytes(b"RIGX" + table.tobytes())
-    done = call("import", tmp_path / "1A.rigx", "--out", tmp_path / "rig")
-    assert "W_ODD_COUNT" in done.stdout + done.stderr
-    assert call("rigs").stdout.split() == ["labcontrol", "utfsm"]
+def test_an_outside_reader_check_and_command_are_used(said):
+    assert "W_ODD_COUNT" in said["import"].stdout + said["import"].stderr
+    assert said["rigs"].stdout.split() == ["labcontrol", "utfsm"]
