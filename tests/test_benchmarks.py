@@ -13,7 +13,6 @@ from benchmarks import accuracy, commands, conditions, goals, page, streams, stu
 from benchmarks.batches import prepared
 from benchmarks.genetic import plain_genetic
 from benchmarks.identification import Task
-from benchmarks.rk4 import rk4
 from benchmarks.timing import growth, race
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.physics.hysteresis import Shape, follow
@@ -39,6 +38,8 @@ def test_a_race_calls_everybody_and_ranks_by_work():
 
 def test_rk4_of_the_peer_solves_the_same_equation():
     """Stepped finely, where it is accurate, it agrees with the exact strokes."""
+    from benchmarks.rk4 import rk4  # with Numba
+
     t = np.arange(40_001) / 20_000
     beta = 0.5 / 2e-3**2
     x, v = 0.02 * np.sin(2 * np.pi * t), 0.04 * np.pi * np.cos(2 * np.pi * t)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import t as students_t
+from scipy.special import stdtrit
 
 from mrdamper.dampers import bands
 from mrdamper.dampers.bands import band, no_band, portable_band, scope, session_band
@@ -75,7 +75,7 @@ def reach(level, *parts, known=True, at=slice(None)):
     whole, shares = sum(parts), np.mean(SLOPES[at] ** 2, axis=0) * np.diag(COVARIANCE)
     by_sessions = 3.0 if known else shares.sum() / (shares[0] / 12.0 + shares[1] / 5.0)
     dof = whole**2 / ((parts[0] + parts[1]) ** 2 / by_sessions + parts[2] ** 2 / 8.0)
-    return students_t.ppf((1 + level) / 2, dof) * np.sqrt(whole)
+    return stdtrit(dof, (1 + level) / 2) * np.sqrt(whole)
 
 
 def test_of_unknown_sessions_parameters_have_degrees_of_freedom_of_their_own():
@@ -116,7 +116,7 @@ def test_a_band_adds_numbers_sessions_and_form(level, shown):
     assert found.parameter == pytest.approx(np.sqrt(own))
     assert found.session == pytest.approx(np.sqrt(session))
     assert found.model == pytest.approx(np.sqrt(form + GROWN["force"].sum() * half**2))
-    quantiles = students_t.ppf((1 + level) / 2, GROWN_DOF)
+    quantiles = stdtrit(GROWN_DOF, (1 + level) / 2)
     away = {quantity: np.sqrt(quantiles**2 @ grown) for quantity, grown in GROWN.items()}
     whole = own + session + form
     t = reach(level, own.mean(), session.mean(), form.mean(), at=at) / np.sqrt(whole.mean())
@@ -164,7 +164,7 @@ def test_a_calibrated_band_is_its_factor_times_the_band_at_the_tests():
     assert found.energy[1] == pytest.approx(2.5 * plain.energy[1])
     # The growth away from the tests is outside the calibration: it stays as it is.
     away = band(damper(replace(KNOWN, calibration=calibrated)), PREDICTION, 0.8)
-    grown = students_t.ppf(0.9, GROWN_DOF) ** 2 @ GROWN["energy"]
+    grown = stdtrit(GROWN_DOF, 0.9) ** 2 @ GROWN["energy"]
     assert away.energy[1] == pytest.approx(np.sqrt(found.energy[1] ** 2 + grown))
 
 
@@ -251,7 +251,7 @@ def test_a_portable_band_is_that_of_loops_at_three_currents(monkeypatch):
         0.8, pytest.approx(np.hypot(0.03, 0.012) * t), pytest.approx(np.hypot(4, 2.5) * t),
     )  # fmt: skip
     assert portable.of_peak == pytest.approx(t * np.sqrt(0.02**2 + own))
-    away = np.sqrt(students_t.ppf(0.9, GROWN_DOF) ** 2 @ GROWN["force"])
+    away = np.sqrt(stdtrit(GROWN_DOF, 0.9) ** 2 @ GROWN["force"])
     assert portable.of_peak_untested == pytest.approx(np.hypot(portable.of_peak, away))
     assert asked == [replace(CONDITION, current_A=I) for I in widths]
     slow = SimpleNamespace(**(vars(tested) | {"peak_velocity_m_s": (0.0, 0.05)}))  # slower than the middle of all
@@ -266,9 +266,9 @@ def test_an_interval_is_as_wide_as_its_level_says():
     for level in (0.5, 0.95):
         low, high = KNOWN.interval(damper(), "c", level)
         assert (low + high) / 2 == pytest.approx(2000)
-        assert (high - low) / 2 == pytest.approx(students_t.ppf((1 + level) / 2, 12.0) * np.sqrt(90.0))
+        assert (high - low) / 2 == pytest.approx(stdtrit(12.0, (1 + level) / 2) * np.sqrt(90.0))
     low, high = replace(KNOWN, logs=(False, True), covariance=np.diag([90.0, 0.04])).interval(damper(), "fy")
-    assert (low * high, high / low) == pytest.approx((1e4, np.exp(2 * 0.2 * students_t.ppf(0.975, 5.0))))
+    assert (low * high, high / low) == pytest.approx((1e4, np.exp(2 * 0.2 * stdtrit(5.0, 0.975))))
     with pytest.raises(InputError, match="fy is held by a bound"):
         replace(KNOWN, names=("c",), one_sided=("fy",)).interval(damper(), "fy")
     assert replace(KNOWN, unknown=("c",)).ends(damper(), "c") is None
@@ -294,7 +294,7 @@ def test_what_is_known_badly_is_told_number_by_number():
     assert "c is not significant (2000 ± 2200 N s/m)" in said(covariance=errors)
     assert "fy is not" not in said(covariance=errors)
     logs = np.diag([0.49**2, 0.7**2])
-    factor = np.exp(2 * 0.7 * students_t.ppf(0.975, 5.0))
+    factor = np.exp(2 * 0.7 * stdtrit(5.0, 0.975))
     assert f"95 % interval of fy spans a factor of {factor:.2g}" in said(covariance=logs, logs=(True, True))
     assert "interval of c spans" not in said(covariance=logs, logs=(True, True))
     assert "fy" not in said(covariance=np.diag([0.1, 3.1**2]), logs=(True, True)).replace("fy0", "")

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from mrdamper.dampers.calibration import (
     LEVELS,
@@ -203,7 +203,7 @@ def test_peaks_are_calibrated_as_split_conformal_prediction():
         found = calibrated([scored(1.0, peak=p, energy=2 * p) for p in scores])
         for level, peak, energy in zip(LEVELS, found.peak, found.energy, strict=False):
             k = (count + 1) * level  # the k-th smallest score is k
-            assert peak == pytest.approx(k / norm.ppf((1 + level) / 2))
+            assert peak == pytest.approx(k / ndtri((1 + level) / 2))
             assert energy == pytest.approx(2 * peak)
         assert len(found.peak) == sum(level <= count / (count + 1) + 1e-12 for level in LEVELS)
 
@@ -212,8 +212,8 @@ def test_peaks_of_few_runs_are_covered_at_the_level_and_not_above():
     """Twelve runs at 90 %: the largest of them alone would cover 12 of 13."""
     rng, count, repeats = np.random.default_rng(8), 12, 800
     values = np.sort(np.abs(rng.standard_normal((repeats, count))), axis=1)
-    limits = [calibrated([scored(1.0, peak=p) for p in row]).factor("peak", 0.9) * norm.ppf(0.95) for row in values]
-    covered = 2 * norm.cdf(limits) - 1  # of a run to come
+    limits = [calibrated([scored(1.0, peak=p) for p in row]).factor("peak", 0.9) * ndtri(0.95) for row in values]
+    covered = 2 * ndtr(limits) - 1  # of a run to come
     # A distribution that thins out is covered a little above the level; three standard errors are 0.9 points.
     assert 0.9 - 0.009 <= np.mean(covered) <= 0.915
     assert calibrated([scored(1.0, peak=np.inf)] * 12).factor("peak", 0.9) == 1e3
@@ -223,7 +223,7 @@ def test_few_units_reach_a_lower_level_and_say_so():
     found = calibrated([scored(1.0, peak=p) for p in (1.0, 2.0, 3.0, 4.0)])
     assert found.reachable == found.level == pytest.approx(0.8)
     assert "4 independent runs reach 80 % at most" in found.summary
-    assert found.factor("peak", 0.99) == found.factor("peak", 0.8) == pytest.approx(4 / norm.ppf(0.9))
+    assert found.factor("peak", 0.99) == found.factor("peak", 0.8) == pytest.approx(4 / ndtri(0.9))
     assert replace(found, peak=()).factor("peak", 0.9) == 1.0
     many = calibrated([scored(1.0, peak=p) for p in np.arange(1.0, 40)])
     assert many.level == 0.9
@@ -251,7 +251,7 @@ def test_runs_of_several_loops_are_pooled_and_one_of_a_single_loop_makes_room_fo
     pooled = calibrated([scored(1.0, peak=row) for row in values])
     for level, factor in zip(LEVELS, pooled.peak, strict=False):
         smallest = np.sort(values.ravel())[int(np.ceil(level * values.size - 1e-9)) - 1]
-        assert factor == pytest.approx(smallest / norm.ppf((1 + level) / 2))
+        assert factor == pytest.approx(smallest / ndtri((1 + level) / 2))
     single = calibrated([scored(1.0, peak=values[0].mean()), *(scored(1.0, peak=row) for row in values[1:])])
     assert all(a > b for a, b in zip(single.peak[-2:], pooled.peak[-2:], strict=True))
 
@@ -279,7 +279,7 @@ def test_peaks_of_runs_to_come_are_covered_whatever_their_distribution():
     for _ in range(120):
         values = np.abs(rng.standard_t(2, 15))
         found = calibrated([scored(1.0, peak=p) for p in values[:14]])
-        inside.append(values[14] <= found.factor("peak", 0.9) * norm.ppf(0.95))
+        inside.append(values[14] <= found.factor("peak", 0.9) * ndtri(0.95))
         assert found.coverage[1] >= 12 / 14
     # 14 of 15 at 90 %; three standard errors of 120 are 7 points.
     assert np.mean(inside) >= 14 / 15 - 0.07

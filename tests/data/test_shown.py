@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas
 import polars
 import pytest
 from support.dampers import all_dampers, joint_damper
@@ -31,6 +30,8 @@ def shown(bundled):
 
 
 def test_a_line_a_table_and_data_frames(shown):
+    import pandas  # for which no other test waits
+
     for name, one in shown.items():
         assert all(len(line) < 200 for line in repr(one).splitlines()), name
         html = one._repr_html_()

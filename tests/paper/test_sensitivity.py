@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import qmc
 
 from mrdamper.data import Condition
 from mrdamper.errors import ParameterError, UnknownNameError
@@ -56,6 +55,8 @@ def test_intervals_of_indices_are_drawn_the_same_every_time():
 
 def test_indices_are_those_of_the_change_of_the_force(monkeypatch):
     """The RMS change of the viscous force and of the offset: of two changes the indices are those of their squares."""
+    from scipy.stats import qmc  # half a second, for whoever collects it
+
     condition, given = Condition(0.7, 1.3, 0.05), []
 
     def indices(func, n):
