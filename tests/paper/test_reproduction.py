@@ -45,7 +45,7 @@ def quick():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study_module, "GeneticSettings", lambda seed: GeneticSettings(generations=10, seed=seed))
         patch.setattr(study_module, "CURRENTS", CURRENTS)
-        patch.setattr(study_module, "SOBOL_SAMPLES", 64)
+        patch.setattr(study_module, "SOBOL_SAMPLES", 8)
         yield
 
 
