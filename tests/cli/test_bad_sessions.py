@@ -17,6 +17,13 @@ from mrdamper.errors import InputError, ModelFileError
 from mrdamper.study.workflow import run_study
 
 
+@pytest.fixture(scope="module")
+def text():
+    """A saved model with its uncertainty."""
+    truth = joint_damper()
+    return dump_model(estimate_uncertainty(truth, session_runs(truth)))
+
+
 @pytest.mark.parametrize(
     ("place", "value"),
     [
@@ -28,17 +35,15 @@ from mrdamper.study.workflow import run_study
         (("degrees_of_freedom", 0), 1e999),
     ],
 )
-def test_an_uncertainty_that_is_no_number_of_a_damper_is_refused(tmp_path, place, value):
-    truth = joint_damper()
-    document = json.loads(dump_model(estimate_uncertainty(truth, session_runs(truth))))
+def test_an_uncertainty_that_is_no_number_of_a_damper_is_refused(text, tmp_path, place, value):
+    document = json.loads(text)
     inner = document["covariance"]
     for key in place[:-1]:
         inner = inner[key]
     inner[place[-1]] = value
-    text = json.dumps(document)
     with pytest.raises(ModelFileError):
-        parse_model(text)
-    (tmp_path / "m.json").write_text(text, encoding="utf-8")
+        parse_model(json.dumps(document))
+    (tmp_path / "m.json").write_text(json.dumps(document), encoding="utf-8")
     ask = ["--current", "0.5", "--frequency", "1", "--amplitude", "10", "--out", str(tmp_path / "f.csv")]
     got = CliRunner().invoke(application(), ["predict", str(tmp_path / "m.json"), *ask])
     assert got.exit_code == 2 or isinstance(got.exception, ModelFileError)
@@ -53,9 +58,7 @@ def _numbers(part, place=()):
         yield place
 
 
-def test_a_model_with_any_coefficient_of_1e308_is_refused_or_predicts_and_never_overflows(tmp_path):
-    truth = joint_damper()
-    text = dump_model(estimate_uncertainty(truth, session_runs(truth)))
+def test_a_model_with_any_coefficient_of_1e308_is_refused_or_predicts_and_never_overflows(text, tmp_path):
     places = [place for place in _numbers(json.loads(text)) if not {"covariance", "envelope", "conditions"} & {*place}]
     assert len(places) >= 5
     for place in places:

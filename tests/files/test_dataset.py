@@ -189,7 +189,7 @@ def test_samples_that_unpack_without_end_are_refused_before(tmp_path, name):
     if name.endswith("parquet"):
         constant(2**24).write_parquet(tmp_path / name, compression="zstd")
     else:
-        with gzip.open(tmp_path / name, "wb") as file:
+        with gzip.open(tmp_path / name, "wb", compresslevel=1) as file:
             file.write(b"run_id,time_s,displacement_m,force_N\n" + b"a,0,0,0\n" * 2**25)
     with pytest.raises(DatasetError) as error:
         load_dataset(tmp_path)
