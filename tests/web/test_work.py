@@ -131,11 +131,14 @@ def test_a_worker_that_is_killed_is_told_from_our_faults(capsys):
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks into /proc for what is left running")
 def test_workers_end_with_a_bench_that_was_killed(tmp_path):
-    """Whatever a worker is doing: it waits for a child here, and would never look at its pipe again."""
+    """Whatever a worker is doing: it waits for a child here, and would never look at its pipe again.
+
+    The script has no guard: a worker must not run it once more.
+    """
     code = (
         "from web import slow_tasks; from mrdamper.web.work import Job; import sys, time\n"
-        "if __name__ == '__main__':\n"
-        "    Job('job1', 'test', slow_tasks.sleep_with_child, (sys.argv[1],), lambda r: {}).start(); time.sleep(60)\n"
+        "open(sys.argv[1] + '/begun', 'a').write('x')\n"
+        "Job('job1', 'test', slow_tasks.sleep_with_child, (sys.argv[1],), lambda r: {}).start(); time.sleep(20)\n"
     )
     script = tmp_path / "bench.py"
     script.write_text(code)
@@ -149,6 +152,7 @@ def test_workers_end_with_a_bench_that_was_killed(tmp_path):
         time.sleep(0.01)
     bench.kill()
     bench.wait()
+    assert (tmp_path / "begun").read_text() == "x"
     child = int(note.read_text())
     deadline = time.monotonic() + 20
     while alive(child) and time.monotonic() < deadline:

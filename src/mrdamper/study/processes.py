@@ -27,7 +27,7 @@ def processes(count: int) -> Generator[ProcessPoolExecutor]:
     ResourceError
         E_WORKER if a process was ended from outside, as systems do that run short of memory.
     """
-    pool = ProcessPoolExecutor(count, _Context(), initializer=_begin)
+    pool = ProcessPoolExecutor(count, SPAWNED, initializer=_begin)
     try:
         yield pool
         pool.shutdown()
@@ -66,6 +66,9 @@ class _Process(SpawnProcess):
 
 class _Context(SpawnContext):
     Process = _Process
+
+
+SPAWNED = _Context()  # starts such processes
 
 
 def _begin() -> None:

@@ -13,12 +13,12 @@ import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any
 
 from mrdamper.data.child import end_with_parent
 from mrdamper.errors import InputError
+from mrdamper.study.processes import SPAWNED
 
 _AT_ONCE = max(1, os.cpu_count() or 1)  # processes of all sessions together
 _NICENESS = 15  # of workers, so that the page is answered first
@@ -105,10 +105,9 @@ class Job:
 
     def _run(self) -> None:
         self.state, self.what = "running", "starting"
-        context = get_context("spawn")  # a fork of a process that runs threads can hang
-        here, there = context.Pipe(duplex=False)
+        here, there = SPAWNED.Pipe(duplex=False)
         with self._starting:
-            self._process = context.Process(target=_work, args=(there, self.task, self.arguments))
+            self._process = SPAWNED.Process(target=_work, args=(there, self.task, self.arguments))
             self._process.start()
         there.close()
         if self._stop.is_set():  # cancelled while it was being started
