@@ -5,6 +5,7 @@ import gc
 import json
 import os
 import sys
+from functools import cache
 from pathlib import Path
 
 # Small matrices, few cores: threads of the linear algebra would wait for each other.
@@ -20,10 +21,14 @@ sys.dont_write_bytecode = False
 gc.disable()
 
 import pytest
+import typer.main
 from support.browser import LOGO, WIDE, launched
 
 from mrdamper.data import Condition
 from mrdamper.rig_files.dataset_folder import load_dataset
+
+# A command line is built from the signatures of all its commands, which takes longer than many a command.
+typer.main.get_command = cache(typer.main.get_command)
 
 # One process of several runs the files of a group, as they share what is dear to make; every other file is a group
 # of its own. The marks of pytest-xdist do not reach its scheduler under pytest 9.

@@ -14,6 +14,7 @@ import traceback
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -112,6 +113,7 @@ def _say(text: str) -> None:
         print(f"mrdamper: {text}", file=sys.stderr)
 
 
+@cache
 def application() -> typer.Typer:
     """Build the application; with the commands of every module of the entry points `mrdamper.commands`."""
     app = typer.Typer(
