@@ -30,6 +30,7 @@ from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, an
 from mrdamper.physics.motion import analyse_motion, equivalent_sine
 from mrdamper.rig_files.quality.table import check_run, with_findings
 from mrdamper.statistics.functions.selection import mean_error, smaller_wins
+from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.contradictions import Contradiction, find_contradictions
 from mrdamper.study.cross_validation import NO_CURRENT
 from mrdamper.study.dissipation import gains_energy
@@ -306,6 +307,7 @@ def require_runs(dataset: Dataset, names: Iterable[str]) -> None:
         dataset[name]
 
 
+@on_one_blas_thread
 def study_rig(
     dataset: Dataset,
     progress: Progress = lambda what, share: None,
