@@ -9,6 +9,7 @@ from mrdamper.dampers.modified import fit_modified, fit_modified_jointly
 from mrdamper.dampers.normal_equations import (
     _Design,
     _ShapeSearch,
+    _solve,
     choose_forms,
     condense,
     fit_jointly,
@@ -21,7 +22,7 @@ from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.physics.motion import sweep
 from mrdamper.physics.simulation import simulate
-from mrdamper.statistics.functions.forms import ParameterFunction
+from mrdamper.statistics.functions.forms import ParameterFunction, features
 from mrdamper.study.validation import leave_out, validate
 
 MATRIX = [Condition(i, f, a) for i in (0.0, 0.5, 1.0, 1.5) for f, a in ((1.0, 0.02), (2.0, 0.02), (0.5, 0.05))]
@@ -111,8 +112,14 @@ def test_condensed_error_is_the_error_in_time(runs, identifications):
 def test_leave_out_is_larger_than_fit_and_needs_every_group(runs):
     data = condense(runs, BoucWen)
     fit = fit_jointly(data, FORMS, ParameterFunction("constant", (np.log(1.2e-3),), log=True))
-    errors = leave_out_errors(data, fit, same_condition(data.conditions), FORMS)
+    errors = leave_out_errors(data, fit, FORMS)["condition"]
     assert errors.mean() >= fit.nrmse_pp.mean() * 0.999
+    for place, group in enumerate(same_condition(data.conditions)):  # one condition a run, in the order of the runs
+        kept = 1 / np.sqrt(fit.nrmse_pp)
+        kept[group] = 0.0
+        shapes = fit.parameters.functions[data.shape](*features(data.conditions))
+        table, _ = _Design(data, FORMS).table(data.at(shapes)[0])
+        assert errors[place] == pytest.approx(_solve(table, kept).nrmse_pp[group[0]], rel=1e-9)
 
 
 def test_forms_are_chosen_short(runs, identifications):

@@ -123,19 +123,21 @@ def test_searched_rates_are_charged_to_the_error_at_left_out_conditions():
 def test_errors_of_left_out_groups_are_those_of_refits_and_charged_for_rates(form, rates):
     """A fold of every kind is refitted without its values, at the rates of all; weights count in every error."""
     errors = np.where(np.arange(CURRENT.size) % 3 == 0, 60.0, 20.0)
-    found = fitting._fitted(form, CONDITIONS, VALUES, False, fitting._weights(errors, len(CONDITIONS)))
+    weight = fitting._weights(errors, len(CONDITIONS))
+    found, beside = (fitting._fitted(f, CONDITIONS, VALUES, False, weight) for f in (form, "quadratic-current"))
+    left_out = fitting._errors([found, beside], tuple(CONDITIONS))[0]
     w, y, N = 20.0 / errors, VALUES, VALUES.size
     first = CURRENT if not rates else np.exp(-found.fit.function.rates[0] * CURRENT)
     columns = np.column_stack([first, np.ones(N)])
     folds = fold_groups(CONDITIONS)
-    assert set(found.errors) == set(folds) == {"condition", "current", "motion"}
+    assert set(left_out) == set(folds) == {"condition", "current", "motion"}
     for kind, groups in folds.items():
         missed = []
         for group in groups:
             rest = np.setdiff1d(np.arange(N), group)
             solved = np.linalg.lstsq(columns[rest] * w[rest, None], y[rest] * w[rest])[0]
             missed += [w[i] * abs(y[i] - columns[i] @ solved) for i in group]
-        assert found.errors[kind] == pytest.approx(np.array(missed) * N / (N - rates), rel=1e-6)
+        assert left_out[kind] == pytest.approx(np.array(missed) * N / (N - rates), rel=1e-6)
 
 
 def test_a_form_that_breaks_a_law_of_physics_is_refused_with_its_reason():
@@ -227,6 +229,7 @@ def fits(monkeypatch, errors):
         return SimpleNamespace(fit=FunctionFit(function, 0.0, 0.0), errors=folds)
 
     monkeypatch.setattr(fitting, "_fitted", fit)
+    monkeypatch.setattr(fitting, "_errors", lambda tried, conditions: [one.errors for one in tried])
     return choose_function(errors, CONDITIONS, VALUES).function.form
 
 

@@ -15,7 +15,7 @@ import math
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -31,7 +31,13 @@ from mrdamper.statistics.functions.fitting import fit_function, require_determin
 from mrdamper.statistics.functions.forms import FORMS, Form, ParameterFunction, features
 from mrdamper.statistics.functions.selection import broken_law, fold_groups, rises, smaller_wins, supported
 from mrdamper.statistics.levenberg_marquardt import least_squares, newton_refine
-from mrdamper.statistics.linear import on_one_blas_thread, project_out_columns, robust_weights, solve_linear
+from mrdamper.statistics.linear import (
+    on_one_blas_thread,
+    project_out_columns,
+    robust_weights,
+    solve_linear,
+    solve_weighted,
+)
 
 _GRID_RATIO = 1500 ** (1 / 40)  # from one yield displacement to the next; between them Gram matrices are interpolated
 _GRID_ORIGIN_M = 2e-6  # m, one of the rungs, whatever the data
@@ -44,6 +50,7 @@ _WEIGHT_TOLERANCE = 1e-3  # change of the robust weights below which another rou
 _SEARCH_RANGE = 6.0  # of a search, in units of a function's terms
 _MIN_ERROR_PP = 1e-4  # nrmse_pp below which a run gains no more weight
 _PASSES = 2  # over all coordinates in the choice of forms
+_RANK_LIMIT = 1e-10  # singular value over the largest below which a coefficient is not determined
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
 _Trial: TypeAlias = "tuple[JointFunctionFit, dict[str, Floats]]"  # and its errors by kind of fold
@@ -297,10 +304,8 @@ def fit_jointly(
 
 
 @on_one_blas_thread
-def leave_out_errors(
-    data: Condensed, fit: JointFunctionFit, groups: Sequence[Sequence[int]], forms: Mapping[str, str | Law]
-) -> Floats:
-    """(R,) nrmse_pp of runs whose group was left out of the linear coefficients.
+def leave_out_errors(data: Condensed, fit: JointFunctionFit, forms: Mapping[str, str | Law]) -> dict[str, Floats]:
+    """Calculate nrmse_pp of the runs of every fold left out of the linear coefficients, by kind of fold.
 
     The shape function stays that of the whole fit: quick, for choosing forms, not a final score.
     """
@@ -311,13 +316,15 @@ def leave_out_errors(
         else np.full(data.scale.size, data.ladder[0])
     )
     table, _ = design.table(data.at(shapes)[0])
-    weights = robust_weights(fit.nrmse_pp, _MIN_ERROR_PP)
-    errors = np.zeros(data.scale.size)
-    for group in groups:
-        kept = weights.copy()
-        kept[list(group)] = 0.0
-        solution = _solve(table, kept)
-        errors[list(group)] = solution.nrmse_pp[list(group)]
+    rows, weights = table.reshape(-1, table.shape[2]), robust_weights(fit.nrmse_pp, _MIN_ERROR_PP)
+    errors: dict[str, Floats] = {}
+    for kind, groups in data.folds.items():
+        kept = np.tile(weights, (len(groups), 1))
+        for fold, group in zip(kept, groups, strict=True):
+            fold[group] = 0.0
+        solutions = solve_weighted(rows[:, :-1], rows[:, -1], np.repeat(kept, table.shape[1], axis=1), _RANK_LIMIT)
+        left_out = [_Solution.of(table[group], solution) for group, solution in zip(groups, solutions, strict=True)]
+        errors[kind] = np.concatenate([solution.nrmse_pp for solution in left_out])
     return errors
 
 
@@ -325,6 +332,10 @@ def leave_out_errors(
 class _Solution:
     coefficients: Floats
     error: Floats  # (R, L+1)
+
+    @classmethod
+    def of(cls, table: Floats, coefficients: Floats) -> _Solution:
+        return cls(coefficients, table[:, :, :-1] @ coefficients - table[:, :, -1])
 
     @property
     def nrmse_pp(self) -> Floats:
@@ -422,8 +433,7 @@ class _ShapeSearch:
 def _solve(table: Floats, weights: Floats) -> _Solution:
     """Coefficients of least weighted squares; errors are those of the condensed runs."""
     weighted = (weights[:, None, None] * table).reshape(-1, table.shape[2])
-    solution = solve_linear(weighted[:, :-1], weighted[:, -1], rank_limit=1e-10)
-    return _Solution(solution, table[:, :, :-1] @ solution - table[:, :, -1])
+    return _Solution.of(table, solve_linear(weighted[:, :-1], weighted[:, -1], _RANK_LIMIT))
 
 
 def _factor(gram: Floats) -> Floats:
@@ -543,12 +553,11 @@ def _fitted(data: Condensed, forms: Mapping[str, str | Law], shape_values: tuple
     for name in data.linear:
         if not law_of(forms[name])[1] and _form(forms[name]).terms:
             require_determined(law_of(forms[name])[0], data.conditions)
-    start = None
-    if data.shape:
-        start = fit_function(law_of(forms[data.shape])[0], data.conditions, shape_values, log=True).function
+    start = _start(law_of(forms[data.shape])[0], data.conditions, shape_values) if data.shape else None
     fit = fit_jointly(data, forms, start, reweightings=2, most_steps=5, polish=False)
-    errors: dict[str, Floats] = {}
-    for kind, groups in data.folds.items():
-        members = [i for group in groups for i in group]
-        errors[kind] = leave_out_errors(data, fit, groups, forms)[members]
-    return fit, errors
+    return fit, leave_out_errors(data, fit, forms)
+
+
+@lru_cache(maxsize=16)  # the same for all forms of the other coordinates
+def _start(form: str, conditions: Sequence[Condition], shape_values: tuple[float, ...]) -> ParameterFunction:
+    return fit_function(form, conditions, shape_values, log=True).function

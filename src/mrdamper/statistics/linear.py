@@ -55,6 +55,25 @@ def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None
     return np.asarray(np.linalg.lstsq(columns / scale, right, rcond=rank_limit)[0], dtype=float) / scale
 
 
+def solve_weighted(columns: Floats, right: Floats, weights: Floats, rank_limit: float | None = None) -> Floats:
+    """Coefficients (F, L) of least squares with each of F sets of weights (F, N); other arguments as `solve_linear`."""
+    squares, width = weights**2, columns.shape[1]
+    products = (columns[:, :, None] * columns[:, None, :]).reshape(len(columns), -1)
+    gram = (squares @ products).reshape(-1, width, width)
+    scale = np.sqrt(np.einsum("fll->fl", gram))
+    scale[~(scale > 0)] = 1.0
+    normal = gram / scale[:, :, None] / scale[:, None, :]
+    if _pivots(normal).min(initial=1.0) <= _WELL_APART:
+        each = [solve_linear(columns * own[:, None], right * own, rank_limit) for own in weights]
+        return np.array(each).reshape(-1, width)
+    inverse = np.linalg.inv(normal) / scale[:, :, None] / scale[:, None, :]
+    solution = np.zeros(scale.shape)
+    for _ in range(2):  # the second time for what the first left, as in `solve_linear`
+        left = (squares * (right - solution @ columns.T)) @ columns
+        solution = solution + (inverse @ left[:, :, None])[:, :, 0]
+    return solution
+
+
 def project_out_columns(columns: Floats, right: Floats) -> Floats:
     """Subtract from (N,) or (N, D) right sides the part the columns explain; arguments as `solve_linear`."""
     scale = np.linalg.norm(columns, axis=0)
@@ -112,7 +131,7 @@ def robust_weights(errors: Floats, best: float) -> Floats:
 
 def _pivots(normal: Floats) -> Floats:
     try:
-        return np.asarray(np.linalg.cholesky(normal).diagonal(), dtype=float)
+        return np.asarray(np.linalg.cholesky(normal).diagonal(0, -2, -1), dtype=float)
     except np.linalg.LinAlgError:
         return np.zeros(1)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -41,14 +41,11 @@ class _Fitted:
     fit: FunctionFit
     basis: Floats  # (N, terms), orthonormal, of the weighted columns
     residual: Floats  # (N,), weighted
-    conditions: tuple[Condition, ...]
 
-    @cached_property
-    def errors(self) -> Mapping[str, Floats]:
-        """(N,) cross-validation errors of the values, by kind of fold."""
-        penalty = self.residual.size / (self.residual.size - len(self.fit.function.rates))
-        folds = _folds(self.conditions).items()
-        return {kind: penalty * _fold_errors(self.basis, self.residual, *rows) for kind, rows in folds}
+    @property
+    def penalty(self) -> float:
+        """Factor on the errors for the rates, which saw the values left out."""
+        return self.residual.size / (self.residual.size - len(self.fit.function.rates))
 
 
 def fit_function(
@@ -100,7 +97,7 @@ def _fitted(form: str | Form, conditions: Sequence[Condition], values: ArrayLike
     function = ParameterFunction(chosen.name, tuple(coefficients.tolist()), tuple(float(r) for r in rates), log)
     size = np.sqrt(spread / target.size) or 1.0
     fit = FunctionFit(function, r2=1.0 - cost / spread if spread > 0 else 1.0, left_out=left_out / size)
-    return _Fitted(fit, basis, residual, tuple(conditions))
+    return _Fitted(fit, basis, residual)
 
 
 def choose_function(
@@ -128,13 +125,13 @@ def choose_function(
     IdentificationError
         If they can determine none.
     """
-    best: _Fitted | None = None
+    able: list[_Fitted] = []
     refusal: IdentificationError | None = None
     refused: dict[str, str] = {}
     ordered = sorted((form_named(name) for name in forms), key=lambda f: len(f.terms) + len(f.rate_bounds))
     weight = _weights(uncertainty, len(conditions))
     for form in ordered:
-        if best is not None and not supported(form, conditions):
+        if able and not supported(form, conditions):
             refused[form.name] = "too many parameters for the tested currents and motions"
             continue
         try:
@@ -144,18 +141,31 @@ def choose_function(
             refused[form.name] = str(error)
             continue
         reason = broken_law(tried.fit.function, conditions, dissipating) if dissipating else ""
-        if reason and best is not None:
+        if reason and able:
             refused[form.name] = reason
-        elif best is None or _replaces(tried, best, dissipating, conditions):
-            best = tried
-    if best is None:
+        else:
+            able.append(tried)
+    if not able:
         raise refusal or IdentificationError("no form to choose from", remedy="name at least one")
-    return replace(best.fit, refused=refused)
+    errors, best = _errors(able, tuple(conditions)), 0
+    for k in range(1, len(able)):
+        risen = rises(able[best].fit.function, able[k].fit.function, dissipating, conditions)
+        if risen or not smaller_wins(errors[best], errors[k]):
+            best = k
+    return replace(able[best].fit, refused=refused)
 
 
-def _replaces(longer: _Fitted, shorter: _Fitted, dissipating: str, conditions: Sequence[Condition]) -> bool:
-    risen = rises(shorter.fit.function, longer.fit.function, dissipating, conditions)
-    return risen or not smaller_wins(shorter.errors, longer.errors)
+def _errors(fits: Sequence[_Fitted], conditions: tuple[Condition, ...]) -> list[Mapping[str, Floats]]:
+    """(N,) cross-validation errors of the values, of every fit by kind of fold."""
+    if len(fits) < 2:
+        return [{} for _ in fits]
+    residuals = np.array([fit.residual for fit in fits])
+    bases = np.zeros((*residuals.shape, max(fit.basis.shape[1] for fit in fits)))
+    for basis, fit in zip(bases, fits, strict=True):
+        basis[:, : fit.basis.shape[1]] = fit.basis
+    penalty = np.array([[fit.penalty] for fit in fits])
+    by_kind = {kind: penalty * _fold_errors(bases, residuals, *rows) for kind, rows in _folds(conditions).items()}
+    return [{kind: errors[k] for kind, errors in by_kind.items()} for k in range(len(fits))]
 
 
 def assess(function: ParameterFunction, conditions: Sequence[Condition], values: ArrayLike) -> FunctionFit:
@@ -262,22 +272,25 @@ def _folds(conditions: tuple[Condition, ...]) -> dict[str, tuple[list[NDArray[np
 
 
 def _fold_errors(
-    basis: Floats, residual: Floats, groups: Sequence[NDArray[np.intp]], order: NDArray[np.intp]
+    bases: Floats, residuals: Floats, groups: Sequence[NDArray[np.intp]], order: NDArray[np.intp]
 ) -> Floats:
-    """Magnitudes of errors at values left out in groups, exact for the linear part by the hat matrix."""
-    errors = np.full(residual.size, np.inf)
+    """(M, N) magnitudes of errors at values left out in groups, exact for the linear part by the hat matrix.
+
+    Of M fits: (M, N, terms) bases, and (M, N) residuals.
+    """
+    errors = np.full(residuals.shape, np.inf)
     for rows in groups:
-        own = basis[rows]
+        own, left = bases[:, rows], residuals[:, rows]
         if rows.shape[1] == 1:
-            share = 1.0 - np.sum(own[:, 0] ** 2, axis=1)
-            apart = share > _RANK_LIMIT
-            errors[rows[apart, 0]] = np.abs(residual[rows[apart, 0]] / share[apart])
-            continue
-        spare = np.eye(rows.shape[1]) - own @ own.transpose(0, 2, 1)
-        determined = np.linalg.eigvalsh(spare)[:, 0] > _RANK_LIMIT
-        missed = np.linalg.solve(spare[determined], residual[rows[determined], None])
-        errors[rows[determined]] = np.abs(missed[..., 0])
-    return errors[order]
+            share = 1.0 - np.sum(own[:, :, 0] ** 2, axis=2)
+            missed, determined = left / np.where(share > _RANK_LIMIT, share, 1.0)[:, :, None], share > _RANK_LIMIT
+        else:
+            spare = np.eye(rows.shape[1]) - own @ own.transpose(0, 1, 3, 2)
+            determined = np.linalg.eigvalsh(spare)[:, :, 0] > _RANK_LIMIT
+            spare[~determined] = np.eye(rows.shape[1])
+            missed = np.linalg.solve(spare, left[:, :, :, None])[:, :, :, 0]
+        errors[:, rows] = np.where(determined[:, :, None], np.abs(missed), np.inf)
+    return errors[:, order]
 
 
 def _weights(uncertainty: ArrayLike | None, count: int) -> Floats:

@@ -1,0 +1,20 @@
+"""Least squares under several sets of weights beside one after the other."""
+
+import numpy as np
+import pytest
+
+from mrdamper.statistics.linear import solve_linear, solve_weighted
+
+
+@pytest.mark.parametrize("angle", [1.0, 1e-6])  # of the last column from the first: well apart, and nearly alike
+def test_several_sets_of_weights_are_solved_as_one_after_the_other(angle):
+    rng = np.random.default_rng(4)
+    columns, right = rng.standard_normal((30, 4)) * [1.0, 1e5, 1e-4, 0.0], rng.standard_normal(30)
+    columns[:, 3] = columns[:, 0] + angle * rng.standard_normal(30)
+    weights = rng.uniform(0.5, 2.0, (6, 30)) * (np.arange(30) // 5 != np.arange(6)[:, None])
+    solved = solve_weighted(columns, right, weights)
+    for own, solution in zip(weights, solved, strict=True):
+        alone = solve_linear(columns * own[:, None], right * own)
+        expected = np.linalg.lstsq(columns * own[:, None], right * own)[0]
+        np.testing.assert_allclose(solution, alone, rtol=1e-10)
+        np.testing.assert_allclose(columns @ solution, columns @ expected, atol=1e-8)
