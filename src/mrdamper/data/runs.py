@@ -290,7 +290,7 @@ def require_name(what: str, name: object) -> None:
 
 
 def once_per_run(function: Callable[[K], T]) -> Callable[[K], T]:
-    """Remember what a function of a run, or of a view of one, found for as long as that lives.
+    """Remember what a function of a run, or of a view or study of runs, found for as long as that lives.
 
     A study asks for the same run's motion dozens of times; runs are frozen, so the answer
     cannot change.

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run, current_levels, index_at, same_motion
+from mrdamper.data.runs import once_per_run
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.measured import measured_motion
 from mrdamper.physics.motion.sines import MotionAnalysis, analyse_motion
@@ -36,6 +37,7 @@ class LoopAnalysis:
         return self.motion.condition
 
 
+@once_per_run
 def analyse_loop(run: Run) -> LoopAnalysis:
     """Analyse the whole cycles inside a run's steady window.
 

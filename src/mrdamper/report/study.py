@@ -18,6 +18,7 @@ from mrdamper.dampers.uncertainty import table
 from mrdamper.data import Dataset
 from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names
+from mrdamper.data.runs import once_per_run
 from mrdamper.errors import IdentificationError
 from mrdamper.identification import Identification
 from mrdamper.identification.characteristics import Characteristics, characterise
@@ -240,6 +241,7 @@ def _shown(rig: RigStudy) -> list[Any]:
     return [ordered[i] for i in picks]
 
 
+@once_per_run
 def _measured(rig: RigStudy) -> dict[str, Characteristics]:
     """Characterise the tests without a model; empty where no run holds a steady cycle."""
     try:

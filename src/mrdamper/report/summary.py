@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.dampers.uncertainty import table
+from mrdamper.data.runs import once_per_run
 from mrdamper.errors import listed
 from mrdamper.report.limitations import limitations
 from mrdamper.study.recipe import RecipeResult
@@ -31,6 +32,7 @@ class IntervalCheck:
     half_width: float  # median half width of the interval over the predicted peak force [-]
 
 
+@once_per_run  # of the page and of the terminal
 def check_intervals(rig: RigStudy) -> IntervalCheck | None:
     """Compare the prediction intervals of the peak force with the validation runs; None where there are none."""
     rows = [peak_band(rig.damper, rig.dataset[run.run_id], LEVEL) for run in rig.chosen.validation.runs]
