@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -89,12 +89,7 @@ class Problem:
     @cached_property
     def motion(self) -> Excitation:
         """Smooth measured motion about mid-stroke, from one cycle before the steady window on."""
-        run, window = self.run, self.run.window
-        if window is not None:
-            early = window[0] - 1.0 / self.analysis.condition.frequency_Hz
-            inside = np.flatnonzero((run.time >= early) & (run.time <= window[1]))
-            run = run.part(int(inside[0]), int(inside[-1]) + 1)
-        return measured_motion(run).about(self.analysis.series.mean)
+        return _motion_of(self.run)
 
     @cached_property
     def scored(self) -> slice:
@@ -110,6 +105,16 @@ class Problem:
     def force(self) -> Floats:
         """Measured force in the steady window [N]."""
         return self.run.steady().force
+
+
+@lru_cache(maxsize=2)  # several models are identified from one run, some from a shortened version of it
+def _motion_of(run: Run) -> Excitation:
+    analysis, window = analyse_motion(run), run.window
+    if window is not None:
+        early = window[0] - 1.0 / analysis.condition.frequency_Hz
+        inside = np.flatnonzero((run.time >= early) & (run.time <= window[1]))
+        run = run.part(int(inside[0]), int(inside[-1]) + 1)
+    return measured_motion(run).about(analysis.series.mean)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import Executor, Future, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -154,6 +154,7 @@ def shortened_method(basis: Basis, run: Run) -> tuple[Method, Problem]:
     return method, basis.problem(shortened(run) if basis.costly else run)
 
 
+@lru_cache(maxsize=1)  # of one run after the other, for several models
 def shortened(run: Run) -> Run:
     """Return the last cycles of a run's steady window, thinned: what costly identifications see."""
     steady = run.steady()
