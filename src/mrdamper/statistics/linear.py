@@ -60,17 +60,17 @@ def solve_weighted(columns: Floats, right: Floats, weights: Floats, rank_limit: 
     squares, width = weights**2, columns.shape[1]
     products = (columns[:, :, None] * columns[:, None, :]).reshape(len(columns), -1)
     gram = (squares @ products).reshape(-1, width, width)
-    scale = np.sqrt(np.einsum("fll->fl", gram))
+    scale: Floats = np.sqrt(np.diagonal(gram, 0, 1, 2))
     scale[~(scale > 0)] = 1.0
     normal = gram / scale[:, :, None] / scale[:, None, :]
     if _pivots(normal).min(initial=1.0) <= _WELL_APART:
         each = [solve_linear(columns * own[:, None], right * own, rank_limit) for own in weights]
         return np.array(each).reshape(-1, width)
-    inverse = np.linalg.inv(normal) / scale[:, :, None] / scale[:, None, :]
-    solution = np.zeros(scale.shape)
+    inverse: Floats = np.linalg.inv(normal) / scale[:, :, None] / scale[:, None, :]
+    solution: Floats = np.zeros(scale.shape)
     for _ in range(2):  # the second time for what the first left, as in `solve_linear`
-        left = (squares * (right - solution @ columns.T)) @ columns
-        solution = solution + (inverse @ left[:, :, None])[:, :, 0]
+        left: Floats = (squares * (right - solution @ columns.T)) @ columns
+        solution += np.matmul(inverse, left[:, :, None])[:, :, 0]
     return solution
 
 

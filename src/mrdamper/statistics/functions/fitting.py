@@ -161,8 +161,8 @@ def _errors(fits: Sequence[_Fitted], conditions: tuple[Condition, ...]) -> list[
         return [{} for _ in fits]
     residuals = np.array([fit.residual for fit in fits])
     bases = np.zeros((*residuals.shape, max(fit.basis.shape[1] for fit in fits)))
-    for basis, fit in zip(bases, fits, strict=True):
-        basis[:, : fit.basis.shape[1]] = fit.basis
+    for k, fit in enumerate(fits):
+        bases[k, :, : fit.basis.shape[1]] = fit.basis
     penalty = np.array([[fit.penalty] for fit in fits])
     by_kind = {kind: penalty * _fold_errors(bases, residuals, *rows) for kind, rows in _folds(conditions).items()}
     return [{kind: errors[k] for kind, errors in by_kind.items()} for k in range(len(fits))]
