@@ -3,8 +3,8 @@ EXPORT int prepare(const real *p, real *d)
     return prepare_0(p, d);
 }
 
-/* Outputs at every sample, or at the `count` samples whose ascending indices are picked; the memory starts anew at
-   `begins`, which ends with the number of samples. */
+/* Outputs at every sample, or at the `count` samples whose ascending indices are picked, the only ones that a program
+   without memory computes; the memory starts anew at `begins`, which ends with the number of samples. */
 EXPORT whole along(const real *p, const real *d, real *memory, whole samples, const real *const *inputs,
     const whole *strides, const whole *picked, whole count, const whole *begins, real *outputs)
 {
@@ -15,6 +15,9 @@ EXPORT whole along(const real *p, const real *d, real *memory, whole samples, co
         m[k] = NAN;
     }
     for (i = 0; i < samples; i++) {
+        if (!REMEMBERS && picked && (at == count || i != picked[at])) {
+            continue;
+        }
         if (begins && i == *begins) {
             memcpy(s, memory, sizeof s);
             begins++;

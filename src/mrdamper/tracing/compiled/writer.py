@@ -163,5 +163,6 @@ def record_source(program: Program) -> str:
     sizes = {"MEMORY": len(tape.memory), "INPUTS": len(tape.inputs), "OUTPUTS": len(program.outputs)}
     sizes["KEPT"] = ArrayWriter(program, keep=True).kept
     defined = "".join(f"#define {name} {max(1, size)}\n" for name, size in sizes.items())
+    defined += f"#define REMEMBERS {int(bool(tape.memory))}\n"
     along = _HERE.with_name("record.c").read_text(encoding="utf-8")
     return f"{PREAMBLE}{functions(program, keep=True)}\n{defined}\n{along}"
