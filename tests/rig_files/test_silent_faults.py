@@ -312,3 +312,39 @@ def test_lines_among_the_rows_that_state_other_currents_begin_other_tests(title,
     assert [record.current[0] for record in found.records] == [0.5, 1.0]
     (refusal,) = import_files([write(tmp_path, "b.csv", head + rows[1.0] + tests)]).refusals
     assert refusal.error.code == "E_BLOCKS"
+
+
+@pytest.mark.parametrize(
+    ("line", "current"),
+    [
+        ("# coil current = 0.5 A/V x (U_cmd - 0.4 V)", 1.0),
+        ("# driver: 0.5 A/V, 0 A at 400 mV", 1.0),
+        ("# driver: 0.5 A/V, zero at 0.4", 1.0),
+        ("# driver: 0.5 A/V, zero at 0 V", 1.2),
+        ("# driver: 0.5 A/V, offset 0.4 V", None),
+        ("# coil current = 0.5 A/V * U_cmd - 0.2 A", None),
+        ("# coil current: 1.0 V = 2 A, range -10 to 10 V", 4.8),
+    ],
+)
+def test_a_scale_with_a_zero_of_its_own_is_applied_about_it_or_asked_for(line, current, tmp_path):
+    columns = {**NAMES, "U_cmd (V)": np.full_like(T, 2.4)}
+    record = read_run(write(tmp_path, "a.csv", f"{line}\n{table(columns)}"))
+    assert (record.current is None) == (current is None)
+    if current is not None:
+        np.testing.assert_allclose(record.current, current, rtol=1e-6)
+
+
+def test_a_scale_of_the_profile_replaces_that_of_the_file(tmp_path):
+    path = write(tmp_path, "a.csv", f"# driver: 0.5 A/V\n{table({**NAMES, 'U_cmd (V)': np.full_like(T, 2.4)})}")
+    np.testing.assert_allclose(read_run(path).current, 1.2)
+    for column in ("U_cmd (V)", 4, None):
+        profile = Profile(channels={"current": Channel(column=column, unit="A", scale=0.4)})
+        np.testing.assert_allclose(read_run(path, profile).current, 0.96, err_msg=str(column))
+
+
+def test_notes_beside_the_tests_are_refused_by_no_profile(tmp_path):
+    write(tmp_path, "a_0.5A.csv", table(NAMES, ";"))
+    write(tmp_path, "README.txt", "A dataset of tests.\nC0 = none; C1 = one half; C2 = one\nD1 = 10; D2 = 20; D3 = 5\n")
+    profile = Profile.model_validate({"file": {"separator": ";"}})
+    imported = import_files([tmp_path], profile)
+    assert (len(imported.records), imported.refusals, imported.left_out) == (1, (), ("README.txt",))

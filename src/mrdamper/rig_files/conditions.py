@@ -38,7 +38,9 @@ _LINE = re.compile(
 CELL = re.compile(r"\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*((?:[^\W\d_]|°){0,8})\s*")  # a number, and a unit behind it
 _LONGEST_LINE, _MOST_PARTS = 300, 20
 _TOLERANCE = re.compile(r"\s*(?:\+\s?/?\s?[-−]|±)\s*[0-9]+(?:[.,][0-9]+)?\s*%?")
-_SCALE = re.compile(r"[0-9]\s*(?:%|m?V\b|counts?\b|bits?\b)[^=:;]*=|\bper\b|\b100 ?%")  # 60 mV = 10 A, 1 A per V
+_SCALE = re.compile(  # 60 mV = 10 A, 1 A per V, 0.5 A/V * U - 0.2 A
+    r"[0-9]\s*(?:%|m?V\b|counts?\b|bits?\b)[^=:;]*=|\bper\b|\b100 ?%|A ?/ ?(?:m?V|%)[^=:;]*[-−–+] ?[0-9]"
+)
 _LABELLED_RATING = re.compile(
     r"fuse|suppl|amplif|rated|range|probe|clamp|(?<![a-z])(?:max|limit)(?![a-z])", re.IGNORECASE
 )

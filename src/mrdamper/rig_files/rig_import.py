@@ -32,7 +32,7 @@ from mrdamper.rig_files.mapping.companions import (
     tests_by,
     within_times,
 )
-from mrdamper.rig_files.mapping.description import is_description
+from mrdamper.rig_files.mapping.description import is_description, is_readme
 from mrdamper.rig_files.mapping.integration import is_integrated
 from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.profile import Profile, profile_of
@@ -203,6 +203,7 @@ class _Intake:
         records, refusals = _unchecked(path, profile)
         self.met += [] if records else [(path, "")]
         no_table = not records and not given and [type(refusal.error) for refusal in refusals] == [NoTableError]
+        no_table |= not records and not given and is_readme(path)
         (self.notes if no_table else self.refusals).extend(refusals)
         split = profile.file.blocks == "split" or (self._table and self._table.of_file(path))
         if refusals or split or not goes_on(records):

@@ -11,6 +11,7 @@ import numpy as np
 
 from mrdamper.rig_files.column_names import (
     WEIGHT,
+    Header,
     holds,
     names_condition,
     role_of,
@@ -64,7 +65,15 @@ _NUMBERS = r"(?:ch(?:annel)?|kanal|canal|voie|canale|var(?:iable)?|col(?:umn)?)"
 NUMBERED = re.compile(rf"(?i)(?:{_NUMBERS}?[ ._]?|[a-z]\w*\[)([0-9]{{1,3}})\]?")
 _CHANNEL_IS = re.compile(rf"(?i)(?<!\w){_NUMBERS}" + r"[ ._]?(?P<number>[0-9]{1,3})\s*[:=]\s*(?P<what>[^;|\t]{2,60})")
 _SIGNALS = ("voltage", "count")  # what a scale leads from
-_ZERO = re.compile(r"(?i)\bzero (?:is )?at ([+-]?[0-9]{1,10})(?![.,]?[0-9])")
+_AT = r"(?P<{}>[+-]?[0-9]{{1,10}}(?:\.[0-9]{{1,6}})?)(?![.,]?[0-9])\s*(?P<{}>[a-zµ]{{0,6}})"
+_ZERO = re.compile(  # zero at 32768; 0 A at 0.4 V; 0.5 A/V x (U - 0.4 V)
+    rf"(?i)(?<![\w.,])(?:zero|0(?:\.0+)? ?[a-z]{{1,3}}) (?:is )?(?:at|=) {_AT.format('at', 'its')}"
+    rf"|\([^()]{{0,30}}[a-z_]\w{{0,30}} ?[-−–] ?{_AT.format('less', 'of')}\)"
+)
+_SHIFT = re.compile(  # of a scale, in words that may mean one thing or the other
+    r"(?i)\b(?:zero|offset|bias|null\w*)\b[^0-9;,.]{0,12}[0.,]*[1-9]"
+    r"|(?:[*×·]|\sx)\s?\(?[a-z_]\w{0,30} ?[-−–+] ?[0.,]*[1-9]"
+)
 _FULL_SCALE = re.compile(  # sections of a header: Name=Stroke, FullScale=75, Unit=mm
     r"(?im)^name *= *(?P<name>[^=\n]{1,60})\n(?:[^=\n]*=[^\n]*\n){0,4}?full[ _]?scale *= *(?P<full>[0-9.]{1,12})\n"
     r"(?:[^=\n]*=[^\n]*\n){0,4}?unit *= *(?P<unit>\S{1,12})$"
@@ -332,12 +341,25 @@ def _with_scales(table: RawTable) -> RawTable:
         unit, factor, line = other
         header = table.headers[i]
         text = f"column {table.names[i]!r} is scaled as the file states: {line.strip()[:60]!r}"
-        zero = _ZERO.search(line)
+        zero = _zero_of(line, header)
+        if zero is None:
+            continue
         role = next((role for role, dimension in DIMENSION.items() if dimension == parse_unit(unit).dimension), "")  # type: ignore[union-attr]
         name = header.name if header.role == role else f"{role} {header.name}"
         name = name if role_of(name) == role else role
-        table = _scaled(table, i, name, unit, factor * header.factor, text, float(zero[1]) if zero else 0.0)
+        table = _scaled(table, i, name, unit, factor * header.factor, text, zero)
     return table
+
+
+def _zero_of(line: str, header: Header) -> float | None:
+    """Return the number of a column at which a line of its scale sees zero; None if the line states an unclear one."""
+    match = _ZERO.search(line)
+    if match is None:
+        return None if _SHIFT.search(line) else 0.0
+    number, unit = float(match["at"] or match["less"]), parse_unit(match["its"] or match["of"] or "")
+    if unit is None or not number:
+        return number
+    return number * unit.factor / header.factor if unit.dimension == header.dimension else None
 
 
 def scaled_columns(table: RawTable) -> list[int]:
@@ -396,6 +418,8 @@ def _scales(line: str) -> list[tuple[str, float]]:
 def _scaled(
     table: RawTable, column: int, name: str, unit: str, factor: float, text: str, zero: float = 0.0
 ) -> RawTable:
-    """Return the table with a column multiplied by a number, in another unit; its own zero is at a number."""
+    """Return the table with a column multiplied by a number, in another unit; a scale of the profile replaces it."""
+    if role_of(name) in table.calibrated:
+        return table.named({column: (name, unit)})
     scaled = table.computed(column, (column,), lambda values: rescale(values[column], factor, -zero * factor))
     return scaled.named({column: (name, unit)}).noted(Finding("W_SCALE", text))

@@ -46,7 +46,8 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(p.name)]
     lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
     stated = [(lacking and _of_channels(line)) or (line if states_sign(line) else "") for line in lines]
-    return replace(table, remarks=(*table.remarks, *filter(None, stated)))
+    calibrated = frozenset(role for role, channel in profile.channels.items() if channel.scale is not None)
+    return replace(table, remarks=(*table.remarks, *filter(None, stated)), calibrated=calibrated)
 
 
 def _texts_in(folder: Path) -> tuple[list[Path], list[Path], list[Path]]:
@@ -59,7 +60,12 @@ def _texts_as_of(folder: Path, changed_ns: int) -> tuple[list[Path], list[Path],
     files = [p for p in folder.glob("*") if p.suffix.lower() in _READ]  # nothing of a folder that may not be read
     stems = Counter(p.stem for p in files)
     structures = [p for p in files if p.suffix.lower() in _STRUCTURES and stems[p.stem] == 1]  # else of one test
-    return [p for p in files if _README.fullmatch(p.name)], structures, [p for p in files if p.suffix.lower() in _TEXTS]
+    return [p for p in files if is_readme(p)], structures, [p for p in files if p.suffix.lower() in _TEXTS]
+
+
+def is_readme(path: Path) -> bool:
+    """Tell if a file is one of notes by its name: README.md, LIESMICH.txt."""
+    return _README.fullmatch(path.name) is not None
 
 
 def _lacks_names_or_units(table: RawTable) -> bool:
