@@ -50,8 +50,10 @@ def test_a_magnitude_has_the_sign_of_the_sense_beside_it(tmp_path):
     assert np.allclose(read_run(tmp_path / "frame.csv").force, measured, atol=1e-3)
 
 
-def test_channels_in_rows_are_turned(tmp_path):
-    cells = [("Time [s]", T), ("Displacement [mm]", X), ("Force [N]", force(0.5))]
+@pytest.mark.parametrize("behind", ["{} [{}]", "{};{}", "{};[{}]"], ids=["one cell", "two cells", "brackets"])
+def test_channels_in_rows_are_turned(behind, tmp_path):
+    cells = [("Time", "s", T), ("Displacement", "mm", X), ("Force", "N", force(0.5))]
+    cells = [(behind.format(name, unit), values) for name, unit, values in cells]
     text = "Test;7\nCoil current [A];0.5\n" + "".join(
         f"{n};" + ";".join(f"{v:.4f}" for v in c) + "\n" for n, c in cells
     )
@@ -114,6 +116,38 @@ def test_a_cell_of_matrices_takes_its_numbers_from_the_vectors_beside_it(tmp_pat
     tests = read_runs(tmp_path / "m.mat")
     assert currents(tests) == [0.0, 0.5]
     assert np.ptp(tests[1].force) > np.ptp(tests[0].force)
+
+
+@pytest.mark.parametrize("order", [1, -1], ids=["current first", "frequency first"])
+def test_arrays_over_two_conditions_take_a_number_of_each_from_the_vectors_beside_them(order, tmp_path):
+    savemat, conditions = pytest.importorskip("scipy.io").savemat, {"I_vec_A": [0.0, 0.3, 0.6], "f_vec_Hz": [1, 2]}
+    loops = [[np.column_stack([T, X, force(i)])[: T.size // f] for f in (1, 2)] for i in conditions["I_vec_A"]]
+    cells = {name: np.empty((3, 2), object) for name in ("t_s", "x_mm", "F_N")}
+    for at in np.ndindex(3, 2):
+        for column, of in enumerate(cells.values()):
+            of[at] = loops[at[0]][at[1]][:, [column]]
+    savemat(tmp_path / "cells.mat", conditions | {name: of.T if order < 0 else of for name, of in cells.items()})
+    padded = np.full((3, 2, T.size, 3), np.nan)
+    for at in np.ndindex(3, 2):
+        padded[at][: len(loops[at[0]][at[1]])] = loops[at[0]][at[1]]
+    padded = padded.swapaxes(0, 1) if order < 0 else padded
+    columns = np.array(["time_s", "disp_mm", "force_N"])
+    np.savez(tmp_path / "grid.npz", data=padded, currents_A=[0.0, 0.3, 0.6], freqs_Hz=[1, 2], columns=columns)
+    for name in ("cells.mat", "grid.npz"):
+        tests = read_runs(tmp_path / name)
+        assert sorted((round(t.current[0], 2), t.time.size) for t in tests) == [
+            (i, T.size // f) for i in (0.0, 0.3, 0.6) for f in (2, 1)
+        ]
+        assert all(np.ptp(t.force) == pytest.approx(2 * (300 + 500 * t.current[0]), rel=0.02) for t in tests)
+
+
+def test_structs_with_a_matrix_and_its_conditions_are_tests_and_no_channels(tmp_path):
+    savemat = pytest.importorskip("scipy.io").savemat
+    tests = np.zeros((1, 2), dtype=[("Name", "O"), ("I_A", "O"), ("data", "O")])
+    for k, amperes in enumerate((0.0, 0.6)):
+        tests[0, k] = f"exp_{k}", amperes, np.column_stack([T, X, force(amperes)])
+    savemat(tmp_path / "m.mat", {"experiment": tests, "columns": np.array(["t (s)", "x (mm)", "F (N)"], object)})
+    assert currents(read_runs(tmp_path / "m.mat")) == [0.0, 0.6]
 
 
 def test_counts_are_scaled_by_the_formula_that_a_text_states_and_refused_without_it(tmp_path):

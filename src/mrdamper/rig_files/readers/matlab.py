@@ -71,7 +71,10 @@ def _tree(value: Any, depth: int = 0) -> Any:
         if size == 1:
             return _tree(cells[0], depth + 1)
         if all(cell.dtype.names for cell in cells) or all(cell.dtype.kind in "iuf" and cell.size > 1 for cell in cells):
-            return [_tree(cell, depth + 1) for cell in cells[:MOST_STRUCTS]]
+            trees = [_tree(cell, depth + 1) for cell in cells[:MOST_STRUCTS]]
+            if cells[0].dtype.names or array.ndim != 2 or min(array.shape) < 2 or size > MOST_STRUCTS:
+                return trees
+            return [trees[i : i + array.shape[1]] for i in range(0, size, array.shape[1])]
         return array
     return value_of(array) if size else ""
 

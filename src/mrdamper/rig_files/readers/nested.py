@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.conditions import stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
@@ -29,6 +29,7 @@ _MOST_TEXT = 200  # characters
 _FEWEST_SAMPLES = 50  # of channels beside which as many words are a column
 _HEAD = re.compile(r"_?(?:header|info|properties|attributes|meta(?:data)?)$", re.IGNORECASE)
 _BODY = re.compile(r"_?(?:data|values)$", re.IGNORECASE)
+_OF_TESTS = re.compile(r"(?i)(?:s|_?(?:vec(?:tor)?|list|values|levels|array|grid|axis))(?=$|_m?a$|\s*[\[(])")
 _CLOCK = re.compile(r"(^|[_. ])time[_. ]", re.IGNORECASE)
 
 
@@ -80,6 +81,8 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     rows = _tests_of_rows(_with_rows(arrays))
     tree = _with_own_axes(tree if rows is arrays else rows)
     stated = next((v for key, v in tree.items() if key.casefold() in KEYS["unit"] and isinstance(v, Mapping)), {})
+    pairs = next((v for k, v in tree.items() if k.casefold() in KEYS["unit"] and isinstance(v, list)), [])
+    stated = stated or dict(zip(pairs[::2], pairs[1::2], strict=False) if {*pairs[::2]} <= {*tree} else ())
     own = {key[:-5]: unit for key, unit in tree.items() if key.casefold().endswith("_unit")} | dict(stated)
     own |= {key: channel["unit"] for key, channel in channels.items()}
     node.units = {**node.units, **{key: u for key, u in own.items() if isinstance(u, str) and is_unit(u)}}
@@ -147,33 +150,59 @@ def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**{key: value for key, value in tree.items() if key not in (keys["x"], keys["y"])}, keys["y"]: timed}
 
 
+def _grid_of(value: Any) -> tuple[tuple[int, ...], list[Array]]:
+    """Return the conditions' dimensions and the arrays of samples of a list, or of an array over conditions."""
+    if isinstance(value, Array) and value.ndim > 2 and min(value.shape) > 1 and len(value) <= MOST_ITEMS:
+        matrices = np.reshape(np.asarray(value), (-1, *value.shape[-2:]))
+        return value.shape[:-2], [_unpadded(matrix) for matrix in matrices]
+    rows = value if isinstance(value, list) and len(value) > 1 else []
+    flat = [item for row in rows for item in (row if isinstance(row, list) else [row])]
+    if not flat or not all(isinstance(item, Array) for item in flat):
+        return (), []
+    return (len(rows), len(flat) // len(rows)) if len(flat) > len(rows) else (len(rows),), flat
+
+
 def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Split a list of matrices, or a cube of them, into a node each, with its own of the numbers of vectors beside."""
-    cubes = [
-        key for key, value in tree.items() if isinstance(value, Array) and value.ndim == 3 and min(value.shape) > 1
+    """Split lists of arrays, or arrays over conditions, into a node a test, each with its own of the numbers beside.
+
+    These are a list of matrices, data[current, frequency, sample, channel], or several lists of vectors: T{i, j},
+    X{i, j}. Beside them stand vectors of conditions, one for every test or one for every dimension.
+    """
+    grids = {key: grid for key, value in tree.items() if (grid := _grid_of(value))[1]}
+    shapes = {key: [tuple(n for n in item.shape if n > 1) for item in items] for key, (_, items) in grids.items()}
+    flat = {k: grids[k][1] if k in grids and isinstance(v, list) else v for k, v in tree.items()}
+    chosen = [key for key, of in shapes.items() if {len(shape) for shape in of} == {2}]
+    if any(isinstance(tree[key], Array) for key in chosen) and _with_rows(tree) is not tree:
+        return flat
+    vectors = [key for key, of in shapes.items() if {len(shape) for shape in of} == {1}]
+    if not chosen and sum(split_name(key).role is not None for key in vectors) > 1:
+        chosen = vectors if all(shapes[key] == shapes[vectors[0]] for key in vectors) else []
+    if not chosen or len({grids[key][0] for key in chosen}) > 1 or (len(chosen) > 1 and chosen is not vectors):
+        return flat
+    outer, count = grids[chosen[0]][0], len(grids[chosen[0]][1])
+    at = np.indices(outer).reshape(len(outer), -1)
+    beside = {}
+    for key, value in tree.items():
+        if isinstance(value, Array) and value.dtype.kind in "iuf" and key not in chosen:
+            shape = tuple(n for n in value.shape if n > 1)
+            if shape == outer:
+                beside[_of_one_test(key)] = np.reshape(value, -1)
+            elif len(shape) == 1 and outer.count(*shape) == 1:
+                beside[_of_one_test(key)] = np.reshape(value, -1)[at[outer.index(*shape)]]
+    words = {k: v for k, v in flat.items() if isinstance(v, list) and all(isinstance(i, str) for i in v)}
+    rest = {k: v for k, v in flat.items() if k not in chosen and _of_one_test(k) not in beside and k not in words}
+    title = chosen[0] if len(chosen) == 1 else "test"
+    own = [
+        {**{k: grids[k][1][i] for k in chosen}, **words, **{k: float(v[i]) for k, v in beside.items()}}
+        for i in range(count)
     ]
-    if len(cubes) == 1 and tree[cubes[0]].shape[0] <= MOST_ITEMS and _with_rows(tree) is tree:
-        tree = {**tree, cubes[0]: [_unpadded(matrix) for matrix in np.asarray(tree[cubes[0]])]}
-    lists = {
-        key: value
-        for key, value in tree.items()
-        if isinstance(value, list)
-        and len(value) > 1
-        and all(isinstance(i, Array) and i.ndim == 2 and min(i.shape) > 1 for i in value)
-    }
-    if len(lists) != 1:
-        return tree
-    key, matrices = next(iter(lists.items()))
-    count = len(matrices)
-    vectors = {
-        k: np.reshape(v, -1)
-        for k, v in tree.items()
-        if isinstance(v, Array) and v.size == count and v.dtype.kind in "iuf"
-    }
-    words = {k: v for k, v in tree.items() if isinstance(v, list) and k != key and all(isinstance(i, str) for i in v)}
-    rest = {k: v for k, v in tree.items() if k != key and k not in vectors and k not in words}
-    own = [{key: matrices[i], **words, **{k: float(v[i]) for k, v in vectors.items()}} for i in range(count)]
-    return {**rest, **{f"{key}_{i}": node for i, node in enumerate(own, 1)}}
+    return {**rest, **{f"{title}_{i}": node for i, node in enumerate(own, 1)}}
+
+
+def _of_one_test(key: str) -> str:
+    """Return the name of one of the currents of a vector, currents_A or I_vec_A, as that of a current."""
+    one = _OF_TESTS.sub("", key, count=1)
+    return one if names_condition(split_name(one).name, "current") else key
 
 
 def _numeric(tree: Mapping[str, Any]) -> tuple[dict[str, Array], dict[str, tuple[int, ...]]]:
@@ -230,7 +259,7 @@ def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     rows = [np.array([arrays[key][i] for key in tables]) for i in range(count)]
     rows = rows if clocks else [_unpadded(row) for row in rows]
     own = [
-        {**clocks, **dict(zip(tables, row, strict=True)), **{k: float(arrays[k][i]) for k in conditions}}
+        {**clocks, **dict(zip(tables, row, strict=True)), **{_of_one_test(k): float(arrays[k][i]) for k in conditions}}
         for i, row in enumerate(rows)
     ]
     rest = {key: value for key, value in rest.items() if key not in clocks}
@@ -321,6 +350,9 @@ def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
             lower |= {name: None, "time": across[:, 0], "data": across[:, 1]}
             break
     data = next((lower[name] for name in KEYS["data"] if isinstance(lower.get(name), Array)), None)
+    numbers = [split_name(name).dimension for name, value in says.items() if isinstance(value, float)]
+    if data is not None and data.ndim == 2 and min(data.shape) > 1 and "current" in numbers:  # a test
+        return []
     if data is None or data.size < 2:
         signals = lower.get("signals")
         data = signals.get("values") if isinstance(signals, Mapping) else None
