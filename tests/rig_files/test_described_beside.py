@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mrdamper import import_files
+from mrdamper.rig_files.profile import Profile
 
 T = np.arange(1001) / 200.0
 X = 12.0 * np.sin(2 * np.pi * T)
@@ -152,3 +153,55 @@ def test_steps_of_a_procedure_are_no_tests(tmp_path):
     found = import_files([tmp_path])
     assert not found.records
     assert {refusal.error.code for refusal in found.refusals} == {"E_CURRENT_MISSING"}
+
+
+def test_a_rate_in_a_sentence_of_a_readme_times_counted_samples_and_two_rates_are_asked_about(tmp_path):
+    for name, amperes in CURRENTS.items():
+        rows = "".join(f"{i};{x:.7f};{f:.6f}\n" for i, (x, f) in enumerate(zip(X, force(amperes), strict=True)))
+        (tmp_path / f"{name}_{amperes}A.csv").write_text("Index;Weg [mm];Kraft [N]\n" + rows)
+    says = "Alle Kanäle wurden mit einer Abtastrate von 200 Hz aufgezeichnet, Filter 50 Hz.\n"
+    (tmp_path / "LIESMICH.txt").write_text(says, encoding="utf-8")
+    require_the_tests(tmp_path)
+    assert import_files([tmp_path]).records[0].time[-1] == pytest.approx(5.0)
+    (tmp_path / "LIESMICH.txt").write_text(says + "The force was sampled at 1 kHz.\n", encoding="utf-8")
+    assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_AMBIGUOUS"}
+
+
+@pytest.mark.parametrize("word", ["Signal", "Row", "column"])
+def test_columns_without_names_are_those_that_a_text_numbers(word, tmp_path):
+    for name, amperes in CURRENTS.items():
+        np.savetxt(tmp_path / f"{name}.dat", np.column_stack([X, force(amperes), np.full_like(T, amperes), T]))
+    listed = ["displacement [mm]", "force [N], load cell 3", "coil current [A]", "time [s]"]
+    text = "Recorded with a target computer\n" + "".join(f"{word} {i}: {what}\n" for i, what in enumerate(listed, 1))
+    (tmp_path / "signals.txt").write_text(text)
+    require_the_tests(tmp_path)
+
+
+@pytest.mark.parametrize("between", ["\n", "; ", ", "], ids=["lines", "semicolons", "commas"])
+def test_codes_of_names_are_listed_on_lines_or_on_one(between, tmp_path):
+    write(tmp_path, "time [s],stroke [mm],load [N]\n")
+    for i, name in enumerate(CURRENTS):
+        (tmp_path / f"{name}.csv").rename(tmp_path / f"M1_C{i}.csv")
+    codes = between.join(f"C{i} = {amperes} A" for i, amperes in enumerate(CURRENTS.values()))
+    (tmp_path / "README.txt").write_text(f"M: motion, C: current\n{codes}\n")
+    require_the_tests(tmp_path)
+
+
+def test_currents_in_a_line_below_the_units_belong_to_the_columns_beside_one_time(tmp_path):
+    columns = [c for amperes in CURRENTS.values() for c in (X, force(amperes))]
+    over = "".join(f"\tI = {amperes} A" * 2 for amperes in CURRENTS.values())
+    head = "Time" + 3 * "\tDisplacement\tForce" + "\ns" + 3 * "\tmm\tN" + f"\n{over}\n"
+    np.savetxt(tmp_path / "book.txt", np.column_stack([T, *columns]), delimiter="\t", header=head[:-1], comments="")
+    require_the_tests(tmp_path)
+
+
+def test_a_text_that_changes_where_the_time_starts_again_names_the_tests(tmp_path):
+    lines = ["condition,time_s,stroke_mm,load_N,phase"]
+    for name, amperes in CURRENTS.items():
+        rows = enumerate(zip(T, X, force(amperes), strict=True))
+        lines += [f"{name},{t:.3f},{x:.7f},{f:.6f},{'start' if i < 99 else 'run'}" for i, (t, x, f) in rows]
+    (tmp_path / "tidy.csv").write_text("\n".join(lines) + "\n")
+    values = {f"*_{name}": amperes for name, amperes in CURRENTS.items()}
+    result = import_files([tmp_path], Profile.model_validate({"current": {"values": values}}))
+    assert [record.id for record in result.records] == [f"tidy_{name}" for name in CURRENTS]
+    assert [record.current[0] for record in result.records] == list(CURRENTS.values())

@@ -51,8 +51,25 @@ def _run_column(table: RawTable, form: FileForm) -> int | None:
         if named:
             return named[0]
         stated = [(i, table.words(i).labels[:_MOST_LEVELS]) for i, cell in enumerate(table.odd) if currents_in(cell)]
-        return next((i for i, labels in stated if all(len(currents_in(label)) == 1 for label in labels)), None)
+        stated = [i for i, labels in stated if all(len(currents_in(label)) == 1 for label in labels)]
+        return next((i for i in (*stated, *_texts(table)) if i in stated or _changes_with_time(table, i)), None)
     return column_called(table, wanted, "runs", "run_column under [file]")
+
+
+def _texts(table: RawTable) -> list[int]:
+    """Return the columns that hold texts, by a cell of each where there is one."""
+    bare = [i for i, header in enumerate(table.headers) if header.role is None and not header.unit]
+    return [i for i in bare if (table.odd[i] if table.odd else table.try_read(i) is None)]
+
+
+def _changes_with_time(table: RawTable, column: int) -> bool:
+    """Tell if a column of texts changes where the time starts again, and only there, and never to an earlier text."""
+    times = table.columns("time")
+    values = table.try_read(*times) if len(times) == 1 and table.words is not None else None
+    if values is None or table.words is None:
+        return False
+    words, starts = table.words(column), np.flatnonzero(np.diff(values[times[0]]) < 0)
+    return 0 < starts.size == len(words.labels) - 1 and np.array_equal(starts, np.flatnonzero(np.diff(words.codes)))
 
 
 def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:

@@ -33,7 +33,7 @@ from mrdamper.rig_files.units import SI
 
 _FEWEST_ROWS = 50  # of a record
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")  # short ones
-_CODE = re.compile(  # I1 = 0.3 A; test01-test04: 0.5 A
+_CODE = re.compile(  # I1 = 0.3 A or test01-test04: 0.5 A
     r"\s*([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?\s*(?:=|:|->)"
     r"\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$"
 )
@@ -180,7 +180,8 @@ def currents_beside(
     lines = short_lines(path) if path.suffix.lower() in TEXTS else []
     rows = zip(results.cells, results.current, strict=True) if results else ()  # Level, Current (A): L1, 0.35
     lines += [f"{cells[1]}: {value:g} A" for cells, value in rows if len(cells) > 1]
-    matches = [match for line in dict.fromkeys(lines) if (match := _CODE.match(line))]
+    codes_of = (part for line in dict.fromkeys(lines) for part in re.split(r"\s*[;|]\s*|,\s+|[.:]\s+(?=\w+ ?=)", line))
+    matches = [match for part in codes_of if (match := _CODE.match(part))]
     stated = {
         (f"{match[1].casefold()}{number}", amperes(match[4], match[5]))
         for match in matches

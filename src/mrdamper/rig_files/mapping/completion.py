@@ -61,9 +61,13 @@ _INDEXED = re.compile(
     r"[._ ]*(?(what)|(?P<after>desc|name|label|units?|scale)[A-Za-z]*)\s*[=:]\s*(?P<value>.+?)\s*$",
     re.IGNORECASE,
 )
-_NUMBERS = r"(?:ch(?:annel)?|kanal|canal|voie|canale|var(?:iable)?|col(?:umn)?)"  # what counts columns
+_NUMBERS = (
+    r"(?:ch(?:annel)?|kanal|canale?|voie|var(?:iable)?|col(?:umn)?|row|zeile|ligne|fila|riga|signale?)"  # of columns
+)
 NUMBERED = re.compile(rf"(?i)(?:{_NUMBERS}?[ ._]?|[a-z]\w*\[)([0-9]{{1,3}})\]?")
-_CHANNEL_IS = re.compile(rf"(?i)(?<!\w){_NUMBERS}" + r"[ ._]?(?P<number>[0-9]{1,3})\s*[:=]\s*(?P<what>[^;|\t]{2,60})")
+_CHANNEL_IS = re.compile(
+    rf"(?i)(?<!\w){_NUMBERS}" + r"[ ._]?(?P<number>[0-9]{1,3})\s*[:=]\s*(?P<what>(?:(?!, )[^;|\t]){2,60})"
+)
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _AT = r"(?P<{}>[+-]?[0-9]{{1,10}}(?:\.[0-9]{{1,6}})?)(?![.,]?[0-9])\s*(?P<{}>[a-zµ]{{0,6}})"
 _ZERO = re.compile(  # zero at 32768; 0 A at 0.4 V; 0.5 A/V x (U - 0.4 V)
@@ -89,9 +93,10 @@ def completed(table: RawTable) -> RawTable:
     if table.names == ("",):  # a channel a file: force_N.txt
         header = split_name(Path(table.source.name).stem)
         table = table.named({0: header}) if header.role else table
+    table = _with_numbered_channels(_without_shared_path(table))
     if not any(table.names):
         return table
-    table = _with_explained_names(_with_numbered_channels(_without_shared_path(table)))
+    table = _with_explained_names(table)
     table = _with_titles(_with_keyed_lines(table))
     table = _with_listed_units(with_axis_as_time(table))
     table = with_stated_signs(_with_si_units(with_nanoseconds(_with_clocks_and_weights(table))))
@@ -170,9 +175,10 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
     width = len(table.names)
     for key, cells in _keyed_cells(table, _LONGEST_CONDITIONS) if width > 2 else ():
         header, stated = split_name(key), [cell for cell in cells if cell]
-        if {key.casefold(), key.casefold().rstrip("s")} & _TITLES and len(cells) == width - 1:
+        titled = {key.casefold(), key.casefold().rstrip("s")} & _TITLES or (not key and all(cells))
+        if titled and len(cells) == width - 1:
             roles = {split_name(cell).role for cell in cells} - {None}
-            if len(roles) > 1 or (stated and all(map(currents_in, stated))):
+            if (key and len(roles) > 1) or (stated and all(map(currents_in, stated))):
                 table = replace(table, over=("", *cells))
         elif _UNITS_KEY.fullmatch(key) and not any(table.units) and all(map(is_unit, cells[: width - 1])):
             table = replace(table, units=("", *cells[: width - 1])) if len(cells) >= width - 1 else table
@@ -214,7 +220,8 @@ def _with_listed_names(table: RawTable) -> RawTable:
 
 def _with_numbered_channels(table: RawTable) -> RawTable:
     """Names of columns that are called by their numbers, where a line says what each channel is: channel 2: LVDT."""
-    numbers = [match[1] if (match := NUMBERED.fullmatch(name.strip())) else "" for name in table.names]
+    called = table.names if any(table.names) else map(str, range(1, len(table.names) + 1))
+    numbers = [match[1] if (match := NUMBERED.fullmatch(name.strip())) else "" for name in called]
     says: dict[str, set[str]] = {}
     for line in table.remarks if any(numbers) else ():
         for match in _CHANNEL_IS.finditer(line[:_LONGEST_LINE]):

@@ -31,6 +31,10 @@ _STRUCTURES = (".json", ".yaml", ".yml")
 _READ = ("", ".txt", ".md", ".rst", ".csv", ".tsv", *_STRUCTURES)
 _LARGEST_LIST = 4096  # bytes of a list of channels
 _TEXTS = (".csv", ".txt", ".tsv", ".ini", ".cfg", ".par", ".set")
+_RATE = re.compile(  # all channels were sampled at 512 Hz
+    r"(?i)(?:sampl|abtast|échantillon|muestre|amostra|campion|(?:recorded|acquired|logged) (?:at|with))[^0-9;]{0,40}?"
+    r"(?P<rate>[0-9]+(?:[.,][0-9]+)? ?k?Hz)\b"
+)
 _README = re.compile(
     r"(?i)(?:read[_ ]?me|lies_?mich|lisez[-_ ]?moi|l[eé]eme|leggimi|leia[-_ ]?me|notes?|info|说明|説明|설명)\b.*"
 )
@@ -46,6 +50,8 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(p.name)]
     lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
     stated = [(lacking and _of_channels(line)) or (line if states_sign(line) else "") for line in lines]
+    if table.names and not any("time" in (header.role, header.dimension) for header in table.headers):
+        stated += [f"sample rate: {match['rate']}" for line in lines for match in _RATE.finditer(line)]
     calibrated = frozenset(role for role, channel in profile.channels.items() if channel.scale is not None)
     return replace(table, remarks=(*table.remarks, *filter(None, stated)), calibrated=calibrated)
 

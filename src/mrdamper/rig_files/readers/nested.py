@@ -152,7 +152,7 @@ def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _grid_of(value: Any) -> tuple[tuple[int, ...], list[Array]]:
     """Return the conditions' dimensions and the arrays of samples of a list, or of an array over conditions."""
-    if isinstance(value, Array) and value.ndim > 2 and min(value.shape) > 1 and len(value) <= MOST_ITEMS:
+    if isinstance(value, Array) and value.ndim > 2 and min(value.shape) > 1 and value.shape[0] <= MOST_ITEMS:
         matrices = np.reshape(np.asarray(value), (-1, *value.shape[-2:]))
         return value.shape[:-2], [_unpadded(matrix) for matrix in matrices]
     rows = value if isinstance(value, list) and len(value) > 1 else []
