@@ -205,3 +205,11 @@ def test_a_text_that_changes_where_the_time_starts_again_names_the_tests(tmp_pat
     result = import_files([tmp_path], Profile.model_validate({"current": {"values": values}}))
     assert [record.id for record in result.records] == [f"tidy_{name}" for name in CURRENTS]
     assert [record.current[0] for record in result.records] == list(CURRENTS.values())
+
+
+@pytest.mark.parametrize("at", ["at {} A", "bei {} A", "@ {} A"])
+def test_columns_of_forces_state_their_current_behind_the_unit(at, tmp_path):
+    names = ["time (s)", "stroke (mm)", *(f"force (N) {at.format(amperes)}" for amperes in CURRENTS.values())]
+    columns = np.column_stack([T, X, *map(force, CURRENTS.values())])
+    np.savetxt(tmp_path / "wide.csv", columns, delimiter=",", header=",".join(names), comments="")
+    require_the_tests(tmp_path)

@@ -23,7 +23,10 @@ _COMPRESSION = tuple(words("compression"))
 _FACTOR = re.compile(r"[\s_][x×*·]\s?10+(?![0-9])|\bp-p\b")  # Force x10, Force p-p
 _CONDITION = re.compile(r"=\s*[+-]?[0-9]")  # stroke = 40
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,40})[\])}>]\s*$", re.DOTALL)
-_INNER = re.compile(r"^(?P<name>[^\[({<]+?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,20})[\])}>]\s*[-–:,;@|/].*$", re.DOTALL)
+_INNER = re.compile(
+    r"^(?P<name>[^\[({<]+?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,20})[\])}>]\s*(?:[-–:,;@|/]|(?:at|for|bei|mit|à|con|com)\b).*$",
+    re.DOTALL,
+)
 _SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+in\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
 _EAST_ASIAN = re.compile("[\u3040-\u30ff\u4e00-\u9fff\uac00-\ud7af]")
 _LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long

@@ -70,13 +70,19 @@ _CHANNEL_IS = re.compile(
 )
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _AT = r"(?P<{}>[+-]?[0-9]{{1,10}}(?:\.[0-9]{{1,6}})?)(?![.,]?[0-9])\s*(?P<{}>[a-zµ]{{0,6}})"
-_ZERO = re.compile(  # zero at 32768; 0 A at 0.4 V; 0.5 A/V x (U - 0.4 V)
+_ZERO = re.compile(  # zero at 32768; 0 A at 0.4 V; 0.5 A/V x (U - 0.4 V); 2.5 V at 0 A
     rf"(?i)(?<![\w.,])(?:zero|0(?:\.0+)? ?[a-z]{{1,3}}) (?:is )?(?:at|=) {_AT.format('at', 'its')}"
     rf"|\([^()]{{0,30}}[a-z_]\w{{0,30}} ?[-−–] ?{_AT.format('less', 'of')}\)"
+    rf"|(?<![\w.,]){_AT.format('mid', 'volt')} (?:at|=) (?:zero|0(?:\.0+)? ?m?A)(?![\w.])"
 )
 _SHIFT = re.compile(  # of a scale, in words that may mean one thing or the other
     r"(?i)\b(?:zero|offset|bias|null\w*)\b[^0-9;,.]{0,12}[0.,]*[1-9]"
     r"|(?:[*×·]|\sx)\s?\(?[a-z_]\w{0,30} ?[-−–+] ?[0.,]*[1-9]"
+)
+_RANGE = re.compile(r"(?i)\b(?:range|max|limit|full|suppl|rated|bereich|plage|rango)")
+_SIGNAL = re.compile(  # a number of volts or counts, and no end of a range
+    r"(?P<before>(?:\.\.|[-−–±]|\b(?:to|bis|à|a)) ?)?(?<![\w.,])(?P<number>[0-9]+(?:[.,][0-9]+)?) ?"
+    r"(?P<unit>[A-Za-zµ]{1,6})(?![\w/])"
 )
 _FULL_SCALE = re.compile(  # sections of a header: Name=Stroke, FullScale=75, Unit=mm
     r"(?im)^name *= *(?P<name>[^=\n]{1,60})\n(?:[^=\n]*=[^\n]*\n){0,4}?full[ _]?scale *= *(?P<full>[0-9.]{1,12})\n"
@@ -362,8 +368,12 @@ def _zero_of(line: str, header: Header) -> float | None:
     """Return the number of a column at which a line of its scale sees zero; None if the line states an unclear one."""
     match = _ZERO.search(line)
     if match is None:
-        return None if _SHIFT.search(line) else 0.0
-    number, unit = float(match["at"] or match["less"]), parse_unit(match["its"] or match["of"] or "")
+        others = [] if _RANGE.search(line) else _SIGNAL.finditer(_SCALE.sub(" ", line))
+        others = [m for m in others if not m["before"] and split_name("", m["unit"]).dimension == header.dimension]
+        return None if _SHIFT.search(line) or any(m["number"].strip("0.,") for m in others) else 0.0
+    groups = (match[key] for key in ("at", "less", "mid", "its", "of", "volt"))
+    text, unit_text = (*filter(None, groups), "")[:2]
+    number, unit = float(text), parse_unit(unit_text)
     if unit is None or not number:
         return number
     return number * unit.factor / header.factor if unit.dimension == header.dimension else None
