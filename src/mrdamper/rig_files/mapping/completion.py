@@ -69,11 +69,11 @@ _CHANNEL_IS = re.compile(
     rf"(?i)(?<!\w){_NUMBERS}" + r"[ ._]?(?P<number>[0-9]{1,3})\s*[:=]\s*(?P<what>(?:(?!, )[^;|\t]){2,60})"
 )
 _SIGNALS = ("voltage", "count")  # what a scale leads from
-_AT = r"(?P<{}>[+-]?[0-9]{{1,10}}(?:\.[0-9]{{1,6}})?)(?![.,]?[0-9])\s*(?P<{}>[a-zµ]{{0,6}})"
+_AT = r"(?P<{}>[+-]?[0-9]{{1,10}}(?:\.[0-9]{{1,6}})?)(?![.,]?[0-9])\s*(?P<{}>[a-zµ]{{0,6}}|%)"
 _ZERO = re.compile(  # zero at 32768; 0 A at 0.4 V; 0.5 A/V x (U - 0.4 V); 2.5 V at 0 A
     rf"(?i)(?<![\w.,])(?:zero|0(?:\.0+)? ?[a-z]{{1,3}}) (?:is )?(?:at|=) {_AT.format('at', 'its')}"
     rf"|\([^()]{{0,30}}[a-z_]\w{{0,30}} ?[-−–] ?{_AT.format('less', 'of')}\)"
-    rf"|(?<![\w.,]){_AT.format('mid', 'volt')} (?:at|=) (?:zero|0(?:\.0+)? ?m?A)(?![\w.])"
+    rf"|(?<![\w.,]){_AT.format('mid', 'volt')} (?:\w{{1,12}} )?(?:at|=) (?:zero|0(?:\.0+)? ?m?A)(?![\w.])"
 )
 _SHIFT = re.compile(  # of a scale, in words that may mean one thing or the other
     r"(?i)\b(?:zero|offset|bias|null\w*)\b[^0-9;,.]{0,12}[0.,]*[1-9]"
@@ -374,6 +374,8 @@ def _zero_of(line: str, header: Header) -> float | None:
     groups = (match[key] for key in ("at", "less", "mid", "its", "of", "volt"))
     text, unit_text = (*filter(None, groups), "")[:2]
     number, unit = float(text), parse_unit(unit_text)
+    if number and not any(re.search("/|per|pro", of[0]) for of in _SCALE.finditer(line)):
+        return None  # 10 % = 0 A, 50 % = 1 A: a line through two points
     if unit is None or not number:
         return number
     return number * unit.factor / header.factor if unit.dimension == header.dimension else None
