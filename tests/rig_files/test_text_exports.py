@@ -201,3 +201,13 @@ def test_counts_and_shares_of_a_full_scale_are_scaled_as_the_file_states(tmp_pat
     record = read_run(tmp_path / "a_0.5A.csv")
     np.testing.assert_allclose(record.displacement, X / 1e3, atol=1.1e-6)
     np.testing.assert_allclose(record.force, force(0.5), atol=0.13)
+
+
+def test_a_table_of_latex_is_read_with_the_current_of_its_caption(tmp_path):
+    head = "\\begin{table}\n\\caption{Loop at $I = 0.5$ A}\n\\begin{tabular}{rrr}\n\\hline\n"
+    head += "$t$ [s] & $x$ [mm] & $F$ [N] \\\\\n\\hline\n"
+    body = lines(lambda i, t, x, f: f"{t:.3f} & {x:.6f} & {f:.4f} \\\\")
+    (tmp_path / "table.tex").write_text(head + body + "\\hline\n\\end{tabular}\n\\end{table}\n", encoding="utf-8")
+    (record,) = import_files([tmp_path]).records
+    assert np.mean(record.current) == 0.5
+    np.testing.assert_allclose(record.force, force(0.5), rtol=0, atol=1e-3)

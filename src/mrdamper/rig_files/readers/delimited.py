@@ -24,7 +24,9 @@ from mrdamper.rig_files.text.turned import turned_table
 _ODD = re.compile("[\udc80-\udcff\ufffd\x80-\x9fÿþðÞÐ¤¦¬¸¨÷×]")  # bytes of another encoding, as they come out
 _HEADER_LINES, _BREAKS = 200, 12  # lines in which a quoted name may be broken, and into how many
 _FOOTER = 8192  # bytes in which lines of words below the rows are looked for
-_ARRIVED = re.compile(rb"\[?[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{1,6}\]? -> ?")
+_ARRIVED = re.compile(rb"^\[?[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{1,6}\]? -> ?")
+_LATEX_ROW = re.compile(rb"^.*&.*\\\\\s*(?:\\hline)?\s*$")
+_LATEX = re.compile(rb" *(&) *|\$|\s*\\\\[^&]*$|^\s*\\(?!caption)[a-z]+.*$")
 _HEAD_LINES = 4000  # in which the data must have begun
 BULK_FROM = 2**16  # bytes; below, reading cell by cell takes less time than loading the fast reader
 
@@ -43,7 +45,7 @@ class DelimitedText(Reader):
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a block of rows."""
-        stream = open_text(_without_arrival(source), form)
+        stream = open_text(_plain(source), form)
         head = stream.head()
         whole = stream.start + len(head) >= stream.stop
         raw = head.split(b"\n", _HEAD_LINES)
@@ -77,16 +79,21 @@ class DelimitedText(Reader):
         )
 
 
-def _without_arrival(source: Source) -> Source:
-    """Return the text without the time of arrival that a serial monitor writes before every line: 16:05:12.005 -> ."""
+def _plain(source: Source) -> Source:
+    """Return the text without what a serial monitor or LaTeX adds to every row: 16:05:12.005 -> 1;2."""
     lines = [line for line in source.head(_FOOTER).splitlines()[:-1] if line.strip()]
-    if len(lines) < 2 or not all(map(_ARRIVED.match, lines)):
+    arrived = len(lines) > 1 and all(map(_ARRIVED.match, lines))
+    if not arrived and 2 * sum(map(bool, map(_LATEX_ROW.match, lines))) <= len(lines):
         return source
     file = scratch(source.keep)
     source.file.seek(0)
     for line in source.file:
-        file.write(_ARRIVED.sub(b"", line, count=1))
+        file.write(_ARRIVED.sub(b"", line) if arrived else _LATEX.sub(_as_tab, line.rstrip()) + b"\n")
     return replace(source, file=file, size=file.tell())
+
+
+def _as_tab(match: re.Match[bytes]) -> bytes:
+    return b"\t" if match[1] else b""
 
 
 def _with_whole_quotes(lines: list[str]) -> list[str]:
