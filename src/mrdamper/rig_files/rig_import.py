@@ -432,7 +432,7 @@ def _with_current(record: Record) -> Record:
         where=Path(record.provenance.get("file", record.id)).name,
         remedy=(calibrated if why and "may both" not in why[0] else "")
         + "write the currents into tests.csv (--write-tests), or set [current] "
-        'pattern = "*_{current}A_*", values = {"test1*" = 0.5}, [channels.current] column = "..." or, '
+        'pattern = "*_{current}A_*" and unit = "A", values = {"test1*" = 0.5}, [channels.current] column = "..." or, '
         "if all tests have one, [current] value = 0.5 in a profile",
         code="E_CURRENT_MISSING",
     )
