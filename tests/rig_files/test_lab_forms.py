@@ -133,12 +133,17 @@ def test_arrays_over_two_conditions_take_a_number_of_each_from_the_vectors_besid
     padded = padded.swapaxes(0, 1) if order < 0 else padded
     columns = np.array(["time_s", "disp_mm", "force_N"])
     np.savez(tmp_path / "grid.npz", data=padded, currents_A=[0.0, 0.3, 0.6], freqs_Hz=[1, 2], columns=columns)
+    np.savez(tmp_path / "first.npz", data=np.moveaxis(padded, -1, 0), current_A=[0.0, 0.3, 0.6], columns=columns)
     for name in ("cells.mat", "grid.npz"):
         tests = read_runs(tmp_path / name)
         assert sorted((round(t.current[0], 2), t.time.size) for t in tests) == [
             (i, T.size // f) for i in (0.0, 0.3, 0.6) for f in (2, 1)
         ]
         assert all(np.ptp(t.force) == pytest.approx(2 * (300 + 500 * t.current[0]), rel=0.02) for t in tests)
+    two = np.moveaxis(np.array([loops[0][0], loops[2][0]]), -1, 0)
+    np.savez(tmp_path / "two.npz", data=two, current_A=[0.0, 0.6], columns=columns)
+    assert currents(read_runs(tmp_path / "two.npz")) == [0.0, 0.6]
+    assert import_files([tmp_path / "first.npz"]).refusals  # three currents, three channels: which dimension is which?
 
 
 def test_structs_with_a_matrix_and_its_conditions_are_tests_and_no_channels(tmp_path):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -150,11 +150,19 @@ def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**{key: value for key, value in tree.items() if key not in (keys["x"], keys["y"])}, keys["y"]: timed}
 
 
-def _grid_of(value: Any) -> tuple[tuple[int, ...], list[Array]]:
-    """Return the conditions' dimensions and the arrays of samples of a list, or of an array over conditions."""
-    if isinstance(value, Array) and value.ndim > 2 and min(value.shape) > 1 and value.shape[0] <= MOST_ITEMS:
-        matrices = np.reshape(np.asarray(value), (-1, *value.shape[-2:]))
-        return value.shape[:-2], [_unpadded(matrix) for matrix in matrices]
+def _grid_of(value: Any, channels: Collection[int]) -> tuple[tuple[int, ...], list[Array]]:
+    """Return the conditions' dimensions and the arrays of samples of a list, or of an array over conditions.
+
+    The channels of such an array stand along the only dimension of a length of `channels`, else along one of the last.
+    """
+    if isinstance(value, Array) and value.ndim > 2 and min(value.shape) > 1 and value.dtype.kind in "iuf":
+        across = [i for i, n in enumerate(value.shape) if n in channels]
+        along = int(np.argmax(value.shape))
+        last = (along, *across) if len(across) == 1 and across != [along] else (-2, -1)
+        array = np.moveaxis(np.asarray(value), last, (-2, -1))
+        outer = array.shape[:-2]
+        matrices = np.reshape(array, (-1, *array.shape[-2:]))
+        return (outer, [_unpadded(matrix) for matrix in matrices]) if len(matrices) <= MOST_ITEMS else ((), [])
     rows = value if isinstance(value, list) and len(value) > 1 else []
     flat = [item for row in rows for item in (row if isinstance(row, list) else [row])]
     if not flat or not all(isinstance(item, Array) for item in flat):
@@ -168,7 +176,9 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     These are a list of matrices, data[current, frequency, sample, channel], or several lists of vectors: T{i, j},
     X{i, j}. Beside them stand vectors of conditions, one for every test or one for every dimension.
     """
-    grids = {key: grid for key, value in tree.items() if (grid := _grid_of(value))[1]}
+    words = {k: v for k, v in tree.items() if isinstance(v, list) and all(isinstance(i, str) for i in v)}
+    channels = {len(names) for names in words.values() if sum(split_name(n).role is not None for n in names) > 1}
+    grids = {key: grid for key, value in tree.items() if (grid := _grid_of(value, channels))[1]}
     shapes = {key: [tuple(n for n in item.shape if n > 1) for item in items] for key, (_, items) in grids.items()}
     flat = {k: grids[k][1] if k in grids and isinstance(v, list) else v for k, v in tree.items()}
     chosen = [key for key, of in shapes.items() if {len(shape) for shape in of} == {2}]
@@ -189,7 +199,6 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
                 beside[_of_one_test(key)] = np.reshape(value, -1)
             elif len(shape) == 1 and outer.count(*shape) == 1:
                 beside[_of_one_test(key)] = np.reshape(value, -1)[at[outer.index(*shape)]]
-    words = {k: v for k, v in flat.items() if isinstance(v, list) and all(isinstance(i, str) for i in v)}
     rest = {k: v for k, v in flat.items() if k not in chosen and _of_one_test(k) not in beside and k not in words}
     title = chosen[0] if len(chosen) == 1 else "test"
     own = [
