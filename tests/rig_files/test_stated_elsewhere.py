@@ -228,6 +228,18 @@ def test_rows_of_tables_beside_a_vector_of_currents_are_tests(tmp_path):
     expect(tmp_path, *currents)
 
 
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_arrays_over_two_conditions_have_their_samples_along_any_dimension(tmp_path, axis):
+    forces = np.array([[force(current) * share for share in (1.0, 0.9)] for current in (0.0, 0.5, 1.0)])
+    arrays = {"displacement_mm": np.broadcast_to(X, forces.shape), "force_N": forces}
+    arrays = {name: np.moveaxis(array, -1, axis) for name, array in arrays.items()}
+    np.savez(tmp_path / "a.npz", time_s=T, **arrays, current_A=[0.0, 0.5, 1.0], temperature_degC=[20.0, 40.0])
+    tests = import_files([tmp_path]).records
+    assert [float(np.mean(test.current)) for test in tests] == pytest.approx([0.0, 0.0, 0.5, 0.5, 1.0, 1.0])
+    for test, expected in zip(tests, forces.reshape(6, -1), strict=True):
+        np.testing.assert_array_equal(test.force, expected)
+
+
 @pytest.mark.parametrize("cube", [False, True], ids=["a clock a test", "a cube"])
 def test_tests_of_different_lengths_in_one_array_are_cut_where_they_end(tmp_path, cube):
     tests = np.full((3, 3, T.size), np.nan)

@@ -74,12 +74,12 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, togeth
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
-    tree = _spread({key: _object_in(value) for key, value in tree.items()})
+    tree = {key: _object_in(value) for key, value in tree.items()}
     keys = {"name", "unit", "data"}
     channels = {key: value for key, value in tree.items() if isinstance(value, Mapping) and {*value} == keys}
     arrays = {**tree, **{key: value["data"] for key, value in channels.items()}}
-    rows = _tests_of_rows(_with_rows(arrays))
-    tree = _with_own_axes(tree if rows is arrays else rows)
+    tests = _tests_of_arrays(arrays)
+    tree = _with_own_axes(_spread(tree) if tests is arrays else tests)
     stated = next((v for key, v in tree.items() if key.casefold() in KEYS["unit"] and isinstance(v, Mapping)), {})
     pairs = next((v for k, v in tree.items() if k.casefold() in KEYS["unit"] and isinstance(v, list)), [])
     stated = stated or dict(zip(pairs[::2], pairs[1::2], strict=False) if {*pairs[::2]} <= {*tree} else ())
@@ -182,8 +182,6 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     shapes = {key: [tuple(n for n in item.shape if n > 1) for item in items] for key, (_, items) in grids.items()}
     flat = {k: grids[k][1] if k in grids and isinstance(v, list) else v for k, v in tree.items()}
     chosen = [key for key, of in shapes.items() if {len(shape) for shape in of} == {2}]
-    if any(isinstance(tree[key], Array) for key in chosen) and _with_rows(tree) is not tree:
-        return flat
     vectors = [key for key, of in shapes.items() if {len(shape) for shape in of} == {1}]
     if not chosen and sum(split_name(key).role is not None for key in vectors) > 1:
         chosen = vectors if all(shapes[key] == shapes[vectors[0]] for key in vectors) else []
@@ -214,64 +212,42 @@ def _of_one_test(key: str) -> str:
     return one if names_condition(split_name(one).name, "current") else key
 
 
-def _numeric(tree: Mapping[str, Any]) -> tuple[dict[str, Array], dict[str, tuple[int, ...]]]:
-    """Return the arrays of numbers of a node, and their shapes without dimensions of one."""
-    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf"}
-    return numeric, {key: tuple(n for n in array.shape if n != 1) for key, array in numeric.items()}
+def _tests_of_arrays(tree: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Split arrays over conditions and samples, force[current, frequency, time], into a node a test.
 
-
-def _with_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return arrays over several conditions and samples, force[current, frequency, time], with a row a test.
-
-    No two dimensions are of one length, and each but the samples' has a vector. The time may be the same for some
-    conditions: time[frequency, sample].
+    Two arrays or more, no two dimensions of one length, each but that of the samples with a vector of a condition.
+    The time may be the same for all or some conditions: time[frequency, sample].
     """
-    numeric, shapes = _numeric(tree)
+    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf" and v.size > 1}
+    shapes = {key: tuple(n for n in array.shape if n != 1) for key, array in numeric.items()}
     shape = max(shapes.values(), key=len, default=())
-    times = [own for key, own in shapes.items() if split_name(key).role == "time"]
-    if len(shape) < 3 or len({*shape}) < len(shape) or len({*times}) != 1 or not {*times[0]} <= {*shape}:
+    times = {own for key, own in shapes.items() if split_name(key).role == "time"}
+    times -= {shape[:1]} if len(shape) == 2 else set()  # when each test began
+    if len(shape) < 2 or len({*shape}) < len(shape) or len(times) != 1 or not {*max(times)} <= {*shape}:
         return tree
-    samples = max(times[0])
+    samples = shape[-1] if len(shape) == 2 else max(max(times))
     outer = [n for n in shape if n != samples]
-    axes = {n: [key for key, own in shapes.items() if own == (n,)] for n in outer}
-    if not all(axes.values()) or samples not in shape:
+    tables = [key for key, own in shapes.items() if len(own) > 1 and samples in own and {*own} <= {*shape}]
+    clocks = {key: numeric[key] for key, own in shapes.items() if own == (samples,)}
+    conditions = {key: outer.index(*own) for key, own in shapes.items() if len(own) == 1 and own[0] in outer}
+    if (
+        {*conditions.values()} != {*range(len(outer))}
+        or {*tables, *clocks, *conditions} != {*shapes}
+        or len(tables) < 2
+    ):
         return tree
-    order = (*outer, samples)
-    rows = {}
-    for key in [key for key, own in shapes.items() if 1 < len(own) == len({*own}) and {*own} <= {*shape}]:
-        there = [n for n in order if n in shapes[key]]
+    rows = []
+    for key in tables:
+        there = [n for n in (*outer, samples) if n in shapes[key]]
         array = np.transpose(np.squeeze(numeric[key]), [shapes[key].index(n) for n in there])
-        array = np.reshape(array, [n if n in there else 1 for n in order])
-        rows[key] = np.broadcast_to(array, order).reshape(-1, samples)
-    at = dict(zip(outer, np.indices(outer).reshape(len(outer), -1), strict=True))
-    return {**tree, **rows, **{key: np.reshape(numeric[key], -1)[at[n]] for n in outer for key in axes[n]}}
-
-
-def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Split tables whose rows are tests into a node each, with its own of the numbers of a vector of conditions.
-
-    Two tables of K rows and N samples or more, one of times or N samples of it, and else only N or K numbers each.
-    """
-    numeric, shapes = _numeric(tree)
-    tables = [key for key, shape in shapes.items() if len(shape) == 2]
-    if len(tables) < 2 or len({shapes[key] for key in tables}) > 1:
-        return tree
-    count, samples = shapes[tables[0]]
-    vectors = {key: shape for key, shape in shapes.items() if key not in tables}
-    conditions = [key for key, shape in vectors.items() if shape == (count,)]
-    timed = any(shape != (count,) and split_name(key).role == "time" for key, shape in shapes.items())
-    if not (timed and conditions) or count == samples or {*vectors.values()} - {(samples,), (count,)}:
-        return tree
-    arrays = {key: np.squeeze(np.asarray(numeric[key])) for key in (*tables, *conditions)}
-    rest = {key: value for key, value in tree.items() if key not in tables and key not in conditions}
-    clocks = {key: value for key, value in rest.items() if isinstance(value, Array)}
-    rows = [np.array([arrays[key][i] for key in tables]) for i in range(count)]
-    rows = rows if clocks else [_unpadded(row) for row in rows]
-    own = [
-        {**clocks, **dict(zip(tables, row, strict=True)), **{_of_one_test(k): float(arrays[k][i]) for k in conditions}}
-        for i, row in enumerate(rows)
-    ]
-    rest = {key: value for key, value in rest.items() if key not in clocks}
+        array = np.reshape(array, [n if n in there else 1 for n in (*outer, samples)])
+        rows.append(np.broadcast_to(array, (*outer, samples)).reshape(-1, samples))
+    own = []
+    for i, at in enumerate(np.ndindex(*outer)):
+        test = np.array([row[i] for row in rows])
+        values = {_of_one_test(key): float(np.reshape(numeric[key], -1)[at[of]]) for key, of in conditions.items()}
+        own.append({**clocks, **dict(zip(tables, test if clocks else _unpadded(test), strict=True)), **values})
+    rest = {key: value for key, value in tree.items() if key not in shapes}
     return {**rest, **{f"test_{i}": node for i, node in enumerate(own, 1)}}
 
 
