@@ -13,8 +13,9 @@ from xml.etree import ElementTree
 
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_by_lines
-from mrdamper.rig_files.mapping.completion import NUMBERED, scaled_columns, states_scale, states_si
+from mrdamper.rig_files.mapping.completion import NUMBERED, states_si
 from mrdamper.rig_files.mapping.results import numbered_tests
+from mrdamper.rig_files.mapping.scales import scaled_columns, states_scale
 from mrdamper.rig_files.mapping.signs import states_sign
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable

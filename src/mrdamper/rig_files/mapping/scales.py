@@ -1,0 +1,152 @@
+"""Scales that a file states of channels in volts, counts or per cent: 0.5 A/V, 100 % = 2 A, 0.25 N/count."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from mrdamper.rig_files.column_names import Header, role_of, split_name, unknown_unit, words_of
+from mrdamper.rig_files.readers.base import RawTable
+from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.text.spool import rescale
+from mrdamper.rig_files.units import DIMENSION, is_unit, parse_unit
+from mrdamper.rig_files.vocabulary import words
+
+_MONITOR = words("monitor")
+SCALE = re.compile(
+    r"(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{1,6}|%)"
+    r"(?:\s*(?:PWM|duty(?: cycle)?|drive|output))?\s*(?:/|=|per|pro|entspricht|->)\s*"
+    r"(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{1,6}|%)(?![A-Za-z0-9/])"
+)
+_PER_COUNT = re.compile(
+    r"(?P<number>[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]+)?)\s*(?P<unit>[A-Za-zµ/]{1,6}?)(?:\s*(?:/|per)\s*"
+    r"(?:counts?|cnts?|cts?|digits?|bits?|lsb|incs?|increments?|inkr?|steps?|pulses?|imp|ticks?))?",
+    re.IGNORECASE,
+)
+_SIGNALS = ("voltage", "count")  # what a scale leads from
+_AT = r"(?P<{}>[+-]?[0-9]{{1,10}}(?:\.[0-9]{{1,6}})?)(?![.,]?[0-9])\s*(?P<{}>[a-zµ]{{0,6}}|%)"
+_ZERO = re.compile(  # zero at 32768; 0 A at 0.4 V; 0.5 A/V x (U - 0.4 V); 2.5 V at 0 A
+    rf"(?i)(?<![\w.,])(?:zero|0(?:\.0+)? ?[a-z]{{1,3}}) (?:is )?(?:at|=) {_AT.format('at', 'its')}"
+    rf"|\([^()]{{0,30}}[a-z_]\w{{0,30}} ?[-−–] ?{_AT.format('less', 'of')}\)"
+    rf"|(?<![\w.,]){_AT.format('mid', 'volt')} (?:\w{{1,12}} )?(?:at|=) (?:zero|0(?:\.0+)? ?m?A)(?![\w.])"
+)
+_SHIFT = re.compile(  # of a scale, in words that may mean one thing or the other
+    r"(?i)\b(?:zero|offset|bias|null\w*)\b[^0-9;,.]{0,12}[0.,]*[1-9]"
+    r"|(?:[*×·]|\sx)\s?\(?[a-z_]\w{0,30} ?[-−–+] ?[0.,]*[1-9]"
+)
+_RANGE = re.compile(r"(?i)\b(?:range|max|limit|full|suppl|rated|bereich|plage|rango)")
+_SIGNAL = re.compile(  # a number of volts or counts, and no end of a range
+    r"(?P<before>(?:\.\.|[-−–±]|\b(?:to|bis|à|a)) ?)?(?<![\w.,])(?P<number>[0-9]+(?:[.,][0-9]+)?) ?"
+    r"(?P<unit>[A-Za-zµ]{1,6})(?![\w/])"
+)
+_LONGEST_LINE = 300
+
+
+def with_counts(table: RawTable) -> RawTable:
+    """Channels recorded in counts, by the scale in their heading: load_cnt [0.25 N/count]."""
+    for i, name in enumerate(table.names):
+        match = _PER_COUNT.fullmatch((table.units[i] or unknown_unit(name)).strip())
+        if match and is_unit(match["unit"]):
+            factor = float(match["number"].replace(",", "."))
+            bare = re.sub(r"[\s_]*(?:counts?|cnts?|raw)$", "", table.headers[i].name, flags=re.IGNORECASE)
+            text = f"column {name!r} is scaled as its heading states"
+            table = scaled(table, i, bare or table.headers[i].name, match["unit"], factor, text)
+    return table
+
+
+def with_scales(table: RawTable) -> RawTable:
+    """Channels recorded in volts or per cent, by a scale the file states: amplifier monitor: 0.5 A/V; 100 % = 2 A."""
+    volts = scaled_columns(table)
+    for i in volts:
+        other = _stated_scale(table, i, volts)
+        if other is None:
+            continue
+        unit, factor, line = other
+        header = table.headers[i]
+        text = f"column {table.names[i]!r} is scaled as the file states: {line.strip()[:60]!r}"
+        zero = _zero_of(line, header)
+        if zero is None:
+            continue
+        role = next((role for role, dimension in DIMENSION.items() if dimension == parse_unit(unit).dimension), "")  # type: ignore[union-attr]
+        name = header.name if header.role == role else f"{role} {header.name}"
+        name = name if role_of(name) == role else role
+        table = scaled(table, i, name, unit, factor * header.factor, text, zero)
+    return table
+
+
+def _zero_of(line: str, header: Header) -> float | None:
+    """Return the number of a column at which a line of its scale sees zero; None if the line states an unclear one."""
+    match = _ZERO.search(line)
+    if match is None:
+        others = [] if _RANGE.search(line) else _SIGNAL.finditer(SCALE.sub(" ", line))
+        others = [m for m in others if not m["before"] and split_name("", m["unit"]).dimension == header.dimension]
+        return None if _SHIFT.search(line) or any(m["number"].strip("0.,") for m in others) else 0.0
+    groups = (match[key] for key in ("at", "less", "mid", "its", "of", "volt"))
+    text, unit_text = (*filter(None, groups), "")[:2]
+    number, unit = float(text), parse_unit(unit_text)
+    if number and not any(re.search("/|per|pro", of[0]) for of in SCALE.finditer(line)):
+        return None  # 10 % = 0 A, 50 % = 1 A: a line through two points
+    if unit is None or not number:
+        return number
+    return number * unit.factor / header.factor if unit.dimension == header.dimension else None
+
+
+def scaled_columns(table: RawTable) -> list[int]:
+    """Return the columns in volts, counts or per cent, which mean something by a scale alone."""
+    return [i for i, header in enumerate(table.headers) if header.dimension in _SIGNALS]
+
+
+def states_scale(line: str) -> bool:
+    """Tell if a line states a scale: 0.5 A/V; 100 % PWM = 2 A."""
+    return bool(scales_in(line[:_LONGEST_LINE]))
+
+
+def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[str, float, str] | None:
+    """Return unit, its number per volt and the line of a scale that can only be meant for a column; else None."""
+    name = table.headers[column].name
+    own = [table.names[column], *table.over[column : column + 1]]
+    beside = [line[:_LONGEST_LINE] for line in table.remarks]
+    parts = [part for t in beside for part in (re.split(r"[,;|\t]\s*", t) if len(scales_in(t)) > 1 else [t])]
+    for lines in (own, parts):
+        scales = []
+        for line in lines:
+            for unit, factor in scales_in(line):
+                unit_of = parse_unit(unit)
+                role = next((r for r, d in DIMENSION.items() if unit_of is not None and d == unit_of.dimension), None)
+                if role is None or role in ("voltage", "time"):
+                    continue
+                words = {word.casefold() for word in words_of(name)}
+                meant = role_of(name) == role or lines is own or name.casefold() in line.casefold()
+                meant = meant or (role == "current" and bool(words & _MONITOR))
+                alone = len(volts) == 1 and role_of(name) in (None, "voltage") and role == "current"
+                has = any(header.dimension == unit_of.dimension for header in table.headers) if unit_of else True
+                if (meant or alone) and not has:
+                    scales.append((unit, factor, line))
+        if scales:
+            return scales[0] if len({entry[:2] for entry in scales}) == 1 else None
+    return None
+
+
+def scales_in(line: str) -> list[tuple[str, float]]:
+    """Return unit and number per volt of every scale that a line states: 0.5 A/V, 100 mV/A, 1 V = 2 A."""
+    scales = []
+    for match in SCALE.finditer(line):
+        one, other = parse_unit(match["unit"]), parse_unit(match["volt"])
+        if one is None or other is None or (one.dimension in _SIGNALS) == (other.dimension in _SIGNALS):
+            continue
+        left, right = (float((match[key] or "1").replace(",", ".")) for key in ("one", "other"))
+        if not left or not right:
+            continue
+        if other.dimension in _SIGNALS:
+            scales.append((match["unit"], left / (right * other.factor)))
+        else:
+            scales.append((match["volt"], right / (left * one.factor)))
+    return scales
+
+
+def scaled(table: RawTable, column: int, name: str, unit: str, factor: float, text: str, zero: float = 0.0) -> RawTable:
+    """Return the table with a column multiplied by a number, in another unit; a scale of the profile replaces it."""
+    if role_of(name) in table.calibrated:
+        return table.named({column: (name, unit)})
+    scaled = table.computed(column, (column,), lambda values: rescale(values[column], factor, -zero * factor))
+    return scaled.named({column: (name, unit)}).noted(Finding("W_SCALE", text))
