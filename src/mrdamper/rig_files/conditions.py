@@ -41,6 +41,9 @@ _TOLERANCE = re.compile(r"\s*(?:\+\s?/?\s?[-−]|±)\s*[0-9]+(?:[.,][0-9]+)?\s*%
 _SCALE = re.compile(  # 60 mV = 10 A, 1 A per V, 0.5 A/V * U - 0.2 A
     r"[0-9]\s*(?:%|m?V\b|counts?\b|bits?\b)[^=:;]*=|\bper\b|\b100 ?%|A ?/ ?(?:m?V|%)[^=:;]*[-−–+] ?[0-9]"
 )
+_LISTED = re.compile(
+    r"[0-9]\s*(?:([,;/])\s*[0-9.]+\s*\1|\b(?:and|und|et|to|bis)\b|\.{2,3})\s*[0-9][0-9.]*\s*m?A\b"
+)  # 0, 1, 2 A
 _LABELLED_RATING = re.compile(
     r"fuse|suppl|amplif|rated|range|probe|clamp|(?<![a-z])(?:max|limit)(?![a-z])", re.IGNORECASE
 )
@@ -133,7 +136,8 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
     """Return the current in free text of lines that name no limit or range, if all state one: "Test 3: 0.4 A"."""
     statements = []
     for line in lines:
-        stated = () if RATING.search(line) or _SCALE.search(line) else currents_in(_TOLERANCE.sub("", line))
+        several = RATING.search(line) or _SCALE.search(line) or _LISTED.search(line)
+        stated = () if several else currents_in(_TOLERANCE.sub("", line))
         if len(stated) == 1:
             statements.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))
     return statements if len({statement.amperes for statement in statements}) == 1 else []

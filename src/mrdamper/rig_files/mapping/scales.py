@@ -31,7 +31,7 @@ _ZERO = re.compile(  # zero at 32768; 0 A at 0.4 V; 0.5 A/V x (U - 0.4 V); 2.5 V
     rf"|(?<![\w.,]){_AT.format('mid', 'volt')} (?:\w{{1,12}} )?(?:at|=) (?:zero|0(?:\.0+)? ?m?A)(?![\w.])"
 )
 _SHIFT = re.compile(  # of a scale, in words that may mean one thing or the other
-    r"(?i)\b(?:zero|offset|bias|null\w*)\b[^0-9;,.]{0,12}[0.,]*[1-9]"
+    r"(?i)\b(?:zero|offset|bias|tar[ae]|null\w*)\b[^0-9;,.]{0,12}[0.,]*[1-9]"
     r"|(?:[*×·]|\sx)\s?\(?[a-z_]\w{0,30} ?[-−–+] ?[0.,]*[1-9]"
 )
 _RANGE = re.compile(r"(?i)\b(?:range|max|limit|full|suppl|rated|bereich|plage|rango)")
