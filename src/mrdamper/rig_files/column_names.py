@@ -18,7 +18,9 @@ COIL, COMPUTED, WEIGHT = words("coil"), words("computed"), words("weight")
 _SET, _NOT_MEASURED, _ELSEWHERE = words("set"), words("not_measured"), words("elsewhere")
 _MEANINGFUL = frozenset().union(_ROLES, _NOT_MEASURED, COMPUTED, _ELSEWHERE, _SET)
 _COMMANDED = re.compile("|".join(words("commanded")))
-RATING = re.compile("(?i)" + "|".join(words("rating")))  # of a line or a number that is not the value of the test
+RATING = re.compile(
+    "(?i)" + "|".join(words("rating") | words("probe"))
+)  # of a line or a number that is not the value of the test
 _COMPRESSION = tuple(words("compression"))
 _FACTOR = re.compile(r"[\s_][x×*·]\s?10+(?![0-9])|\bp-p\b")  # Force x10, Force p-p
 _CONDITION = re.compile(r"=\s*[+-]?[0-9]")  # stroke = 40
@@ -61,8 +63,11 @@ class Header(NamedTuple):
 
     @property
     def role(self) -> str | None:
-        """The channel the name stands for."""
-        return role_of(self.name)
+        """The channel the name stands for: of Time_Force in s the time."""
+        role = role_of(self.name)
+        if role in (None, "time") or self.dimension != "time":
+            return role
+        return "time" if "time" in map(role_of, words_of(self.name)) else role
 
     @property
     def channel(self) -> str | None:

@@ -19,6 +19,7 @@ from mrdamper.data.arrays import Floats
 from mrdamper.data.runs import held_current
 from mrdamper.rig_files.column_names import COIL, RATING, holds, names_condition, split_name
 from mrdamper.rig_files.units import Unit, parse_unit
+from mrdamper.rig_files.vocabulary import words
 
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
 _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it
@@ -45,14 +46,13 @@ _LISTED = re.compile(
     r"[0-9]\s*(?:([,;/])\s*[0-9.]+\s*\1|\b(?:and|und|et|to|bis)\b|\.{2,3})\s*[0-9][0-9.]*\s*m?A\b"
 )  # 0, 1, 2 A
 _LABELLED_RATING = re.compile(
-    r"fuse|suppl|amplif|rated|range|probe|clamp|(?<![a-z])(?:max|limit)(?![a-z])", re.IGNORECASE
+    "|".join([r"fuse|suppl|amplif|rated|range|clamp|(?<![a-z])(?:max|limit)(?![a-z])", *words("probe")]), re.IGNORECASE
 )
-_RATE = re.compile(
-    r"sampl|abtast|messrate|^(?:data )?rate$|scan|acquisition|échantillon|muestreo|campion|^fs$|^f_s$", re.IGNORECASE
-)
+_SAMPLING = "|".join(words("sampling"))
+_RATE = re.compile(rf"{_SAMPLING}|messrate|^(?:data )?rate$|scan|acquisition|^fs$|^f_s$", re.IGNORECASE)
 _STEP = re.compile(
-    r"^dt$|^d_t$|^delta[ _]?[tx]|^[dΔ] ?[tx]$|sampl|abtast|time ?step|step ?time|zeitschritt|increment|échantillon"
-    r"|muestreo|^[hx][ _-]?(?:resolution|interval|increment|step|delta)$",
+    rf"{_SAMPLING}|^dt$|^d_t$|^delta[ _]?[tx]|^[dΔ] ?[tx]$|time ?step|step ?time|zeitschritt|increment"
+    r"|^[hx][ _-]?(?:resolution|interval|increment|step|delta)$",
     re.IGNORECASE,
 )
 _SHARE = re.compile(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -29,7 +30,12 @@ _AXIS_UNIT = re.compile(
 )
 _LONGEST_LINE = 300
 _DAY_S = 86_400.0
-_EPOCH_NS = 9.4e17, 4.2e18  # the years 2000 to 2100 [ns since 1970]
+_EPOCHS = (  # the years 2000 to 2100 by a clock: its first and last number, its unit, the factor to it, what it counts
+    (9.4e17, 4.2e18, "ns", 1.0, "nanoseconds from the year 1970"),
+    (3.65e10, 7.31e10, "days", 1e-6, "millionths of days from the year 1900"),  # Time_ms of process control systems
+    (3.65e4, 7.31e4, "days", 1.0, "days from the year 1900"),
+)
+_COARSE_S = 2.0  # [s] between the durations of a clock and of one of whole seconds
 _LARGEST = 64 * 2**20  # bytes of a file whose clock without a unit is looked at
 _LONGEST = 5_000_000  # samples; a longer record lies in a file and is not read as a whole
 _SAME_RATE, _SAME_FREQUENCY = 0.2, 0.1  # relative differences of what is stated from what is measured
@@ -54,20 +60,27 @@ def with_axis_as_time(table: RawTable) -> RawTable:
     return replace(table, names=tuple(names), units=tuple(units))
 
 
-def with_nanoseconds(table: RawTable) -> RawTable:
-    """Return the table with a time without a unit in ns, where its numbers are nanoseconds of this century since 1970.
+def with_epoch(table: RawTable) -> RawTable:
+    """Return the table with a time in the unit of its numbers, where they are of this century since 1970 or 1900.
 
-    No other clock counts so far: thousandths of those numbers may also be the nanoseconds since a start.
+    Nanoseconds without a unit; days without one, of a record shorter than half a day; millionths of days, also under
+    another unit, whose duration a clock of dates has, too. No other clock counts so far: thousandths of nanoseconds
+    may also be the nanoseconds since a start.
     """
     clocks = table.columns("time")
-    bare = len(clocks) == 1 and not table.headers[clocks[0]].unit and table.source.size <= _LARGEST
-    values = table.try_read(clocks[0]) if bare else None
-    if values is None or not (
-        _EPOCH_NS[0] < np.nanmin(values[clocks[0]]) and np.nanmax(values[clocks[0]]) < _EPOCH_NS[1]
-    ):
+    values = table.try_read(*clocks) if 0 < len(clocks) < 3 and table.source.size <= _LARGEST else None
+    if values is None:
         return table
-    note = Finding("W_UNITS", f"the unit of {table.names[clocks[0]]!r} is ns: its numbers count from the year 1970")
-    return table.named({clocks[0]: (table.names[clocks[0]], "ns")}).noted(note)
+    for i, (begin, end, unit, factor, what) in itertools.product(clocks, _EPOCHS):
+        first, last = np.nanmin(values[i]), np.nanmax(values[i])
+        duration = _DAY_S * factor * (last - first) if unit == "days" else 0.0
+        dated = [np.ptp(values[k]) for k in clocks if k != i and table.headers[k].unit == "s"]
+        stated = table.headers[i].unit and not any(abs(duration - of_dates) <= _COARSE_S for of_dates in dated)
+        if begin < first <= last < end and duration < _DAY_S / 2 and not stated:
+            note = Finding("W_UNITS", f"the unit of {table.names[i]!r} is {unit}: its numbers count {what}")
+            scaled = table.computed(i, (i,), lambda values, i=i, factor=factor: factor * values[i])
+            return scaled.named({i: (table.names[i] if len(clocks) == 1 else "time", unit)}).noted(note)
+    return table
 
 
 def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displacement: Floats) -> None:

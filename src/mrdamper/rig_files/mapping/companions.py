@@ -175,6 +175,9 @@ def currents_beside(
     timed = results.rows_in_time([record.time for _, record in tests]) if results else {}
     by_test = {i: results.current[row] for i, (row, _) in timed.items()} if results else {}
     by_test = by_test or (results.by_test(_called(tests)) if results else {})
+    folders = [(file.parent.name,) for file, _ in tests]
+    if results and len({*folders}) == len(tests):
+        by_test = by_test or results.by_test(folders)
     if results and len(by_test) == len(tests):
         return [(by_test[i], f"{path.name}, {results.title}") for i in range(len(tests))]
     lines = short_lines(path) if path.suffix.lower() in TEXTS else []

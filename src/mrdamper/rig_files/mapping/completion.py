@@ -18,7 +18,7 @@ from mrdamper.rig_files.column_names import (
     split_name,
 )
 from mrdamper.rig_files.conditions import currents_in, without_currents
-from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_nanoseconds
+from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
 from mrdamper.rig_files.mapping.scales import SCALE, scaled, scales_in, with_counts, with_scales
 from mrdamper.rig_files.mapping.signs import with_sense, with_stated_signs
 from mrdamper.rig_files.readers.base import RawTable
@@ -76,7 +76,7 @@ def completed(table: RawTable) -> RawTable:
     table = _with_explained_names(table)
     table = _with_titles(_with_keyed_lines(table))
     table = _with_listed_units(with_axis_as_time(table))
-    table = with_stated_signs(_with_si_units(with_nanoseconds(_with_clocks_and_weights(table))))
+    table = with_stated_signs(_with_si_units(with_epoch(_with_clocks_and_weights(table))))
     return with_sense(with_scales(with_counts(table)))
 
 
@@ -211,8 +211,8 @@ def _with_numbered_channels(table: RawTable) -> RawTable:
 
 
 def _with_explained_names(table: RawTable) -> RawTable:
-    """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm."""
-    lines = [[cell.strip(' "') for cell in re.split(r"[,;|\t]", line[:_LONGEST_LINE])] for line in table.remarks]
+    """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm; y0 = load, N."""
+    lines = [[cell.strip(' "') for cell in re.split(r"[,;|\t=:]", line[:_LONGEST_LINE])] for line in table.remarks]
     headings = {}
     for i, (name, header) in enumerate(zip(table.names, table.headers, strict=True)):
         own = [cells[1:] for cells in lines if name and header.role is None and cells[0].casefold() == name.casefold()]

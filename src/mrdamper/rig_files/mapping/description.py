@@ -15,7 +15,7 @@ from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_by_lines
 from mrdamper.rig_files.mapping.completion import NUMBERED, states_si
 from mrdamper.rig_files.mapping.results import numbered_tests
-from mrdamper.rig_files.mapping.scales import scaled_columns, states_scale
+from mrdamper.rig_files.mapping.scales import NUMBER_IS, scaled_columns, states_scale
 from mrdamper.rig_files.mapping.signs import states_sign
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
@@ -50,7 +50,10 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(p.name)]
     lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
-    stated = [(lacking and _of_channels(line)) or (line if states_sign(line) else "") for line in lines]
+    stated = [
+        (lacking and _of_channels(line)) or (line if states_sign(line) or NUMBER_IS.search(line) else "")
+        for line in lines
+    ]
     if table.names and not any("time" in (header.role, header.dimension) for header in table.headers):
         stated += [f"sample rate: {match['rate']}" for line in lines for match in _RATE.finditer(line)]
     calibrated = frozenset(role for role, channel in profile.channels.items() if channel.scale is not None)

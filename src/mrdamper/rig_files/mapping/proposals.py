@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -19,6 +20,11 @@ from mrdamper.rig_files.record import REQUIRED, Finding
 _FREQUENCY = re.compile(
     r"(?<![0-9A-Za-z.,])(?:f|freq|frequency)?[_ =]?([0-9]{1,3}(?:[.,px][0-9]{1,4})?)[ _]?(m?)Hz(?![A-Za-z])"
 )
+_BARE_RATE = re.compile(
+    r"(?i)[\s#%\"]*(?:f_?s|sampl(?:e|ing)[ _]?(?:rate|freq(?:uency)?))\"?"
+    r"\s*[=:;,\t]\s*\"?([0-9]+(?:\.[0-9]+)?)[\s;,\"]*"
+)
+_LONGEST_LINE = 300
 _CLOCK_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 _AGREE = 0.05  # of a frequency that is stated
 _LARGEST = 64 * 2**20  # bytes of a file whose columns are tried
@@ -28,8 +34,13 @@ _CLEAR, _POOR = 0.5, 0.2  # share of the force that velocity explains: of a damp
 
 
 def with_unit_of_time(table: RawTable) -> RawTable:
-    """Return the table with the unit of its time, where only one agrees with the frequency or rate the file states."""
+    """Return the table with the unit of its time, where only one agrees with the frequency or rate the file states.
+
+    A table without a time has the sampling rate that is stated without its unit, if it is that in Hz.
+    """
     times, moved = table.columns("time"), table.columns("displacement")
+    if not times and len(moved) == 1:
+        return _with_rate(table, moved[0])
     if len(times) != 1 or len(moved) != 1 or table.headers[times[0]].unit or table.source.size > _LARGEST:
         return table
     rates = {q.value for q in table.quantities if q.unit.dimension == "frequency" and stated_rate([q])}
@@ -45,6 +56,21 @@ def with_unit_of_time(table: RawTable) -> RawTable:
     what = "samples are taken at" if frequency in rates else "motion has"
     text = f"the unit of time is {units[0]}: so the {what} the {frequency:g} Hz that the file states"
     return table.named({times[0]: (table.names[times[0]], units[0])}).noted(Finding("W_UNITS", text))
+
+
+def _with_rate(table: RawTable, moved: int) -> RawTable:
+    """Add the sampling rate that a line or a number states without its unit, where the motion has the frequency so."""
+    lines = (*table.remarks, *(f"{name}={number!r}" for name, number in table.constants.items()))
+    rates = {float(match[1]) for line in lines if (match := _BARE_RATE.fullmatch(line[:_LONGEST_LINE]))}
+    stated = {*stated_frequencies(table)}
+    values = table.try_read(moved) if len(rates) == len(stated) == 1 and table.source.size <= _LARGEST else None
+    if values is None or not (rate := rates.pop()) or any(stated_rate([q]) for q in table.quantities):
+        return table
+    frequency, measured = stated.pop(), frequency_of(np.arange(values[moved].size) / rate, values[moved])
+    if not measured or abs(measured - frequency) > _AGREE * frequency:
+        return table
+    text = f"the sampling rate {rate:g} is in Hz: so the motion has the {frequency:g} Hz that the file states"
+    return replace(table, remarks=(*table.remarks, f"sampling rate: {rate!r} Hz")).noted(Finding("W_UNITS", text))
 
 
 def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -> RawTable:

@@ -144,10 +144,12 @@ def with_results(tables: list[RawTable]) -> list[RawTable]:
     if results is None:
         tables = [table for table in tables if not table.fallback]
         stated = [(table, r) for table in tables if _may_be_results(table) and (r := results_in(lines_of(table)))]
-        if len(stated) != 1 or len(tables) < 2:
+        beside = [table for table, _ in stated]
+        tables = [t for t in tables if t not in beside and (not any(t.names) or _names_channels(t))]
+        stated = [r for _, r in stated if len(stated) == 1 or len(r.current) == len(tables)]  # no means over them
+        if len(stated) != 1:
             return others
-        results = stated[0][1]
-        tables = [t for t in tables if t is not stated[0][0] and (not any(t.names) or _names_channels(t))]
+        results = stated[0]
     shared = set(tables[0].remarks).intersection(*(table.remarks for table in tables[1:])) if len(tables) > 1 else set()
     tests = [[table.label, *(_last_lines(table, shared))] for table in tables]
     currents = results.by_test(tests)
@@ -239,9 +241,8 @@ def _is_current(cell: str) -> bool:
 
 def _is_units_row(cells: Sequence[str], width: int) -> bool:
     filled = [cell.strip("[]()") for cell in cells if cell and cell not in ("-", "[-]", "(-)")]
-    if len(filled) > 1 and not is_unit(filled[0]) and not _NUMBER.fullmatch(filled[0]):
-        filled = filled[1:]  # a heading of the rows: No, A, Hz
-    return 0 < len(filled) <= width and all(is_unit(cell) for cell in filled)
+    units = [cell for cell in filled if is_unit(cell)]  # beside a heading of the rows, or J: No, A, Hz, J
+    return 0 < len(filled) <= min(width, 2 * len(units)) and not any(map(_NUMBER.fullmatch, filled))
 
 
 def _amperes(cell: str, unit: str) -> float | None:

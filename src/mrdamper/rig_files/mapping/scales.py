@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 from mrdamper.rig_files.column_names import Header, role_of, split_name, unknown_unit, words_of
 from mrdamper.rig_files.readers.base import RawTable
@@ -39,6 +40,10 @@ _SIGNAL = re.compile(  # a number of volts or counts, and no end of a range
     r"(?P<before>(?:\.\.|[-−–±]|\b(?:to|bis|à|a)) ?)?(?<![\w.,])(?P<number>[0-9]+(?:[.,][0-9]+)?) ?"
     r"(?P<unit>[A-Za-zµ]{1,6})(?![\w/])"
 )
+NUMBER_IS = re.compile(  # pwm 255 = 1.5 A: the largest number of a converter
+    r"(?<!\w)(?P<name>[^\W\d]\w{0,20})[ =]+(?P<number>100|1000|255|1023|4095|16383|32767|65535)"
+    r"\s*(?:=|->|entspricht)\s*(?P<value>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>m?A)(?![\w/])"
+)
 _LONGEST_LINE = 300
 
 
@@ -51,7 +56,10 @@ def with_counts(table: RawTable) -> RawTable:
             bare = re.sub(r"[\s_]*(?:counts?|cnts?|raw)$", "", table.headers[i].name, flags=re.IGNORECASE)
             text = f"column {name!r} is scaled as its heading states"
             table = scaled(table, i, bare or table.headers[i].name, match["unit"], factor, text)
-    return table
+    whole = {m["name"].casefold(): m for t in table.remarks if (m := NUMBER_IS.search(t[:_LONGEST_LINE]))}
+    bare = {i: (h.name, "counts") for i, h in enumerate(table.headers) if not h.unit and h.name.casefold() in whole}
+    lines = [f"{m['name']}: {m['number']} counts = {m['value']} {m['unit']}" for m in whole.values()]
+    return replace(table, remarks=(*table.remarks, *lines)).named(bare) if bare else table
 
 
 def with_scales(table: RawTable) -> RawTable:

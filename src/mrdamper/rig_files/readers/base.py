@@ -73,6 +73,7 @@ class Source:
     file: IO[bytes]  # seekable, at its start
     size: int  # bytes after unpacking
     keep: ExitStack = field(default_factory=ExitStack)  # closes what readers opened when the file is closed
+    added: int = 0  # lines of names that were written above the rows
 
     def head(self, size: int = 4096) -> bytes:
         """Return the first bytes; the file stands at its start afterwards."""
@@ -85,6 +86,7 @@ class Source:
         self, code: str, problem: str, remedy: str = "", *, line: int | None = None, column: int | None = None
     ) -> RigFileError:
         """Return a refusal that names this file."""
+        line = None if line is None else max(line - self.added, 1)
         return RigFileError(code, problem, file=self.name, line=line, column=column, remedy=remedy)
 
 

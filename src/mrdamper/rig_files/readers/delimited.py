@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -27,6 +28,12 @@ _FOOTER = 8192  # bytes in which lines of words below the rows are looked for
 _ARRIVED = re.compile(rb"^\[?[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{1,6}\]? -> ?")
 _LATEX_ROW = re.compile(rb"^.*&.*\\\\\s*(?:\\hline)?\s*$")
 _LATEX = re.compile(rb" *(&) *|\$|\s*\\\\[^&]*$|^\s*\\(?!caption)[a-z]+.*$")
+_KEYED = re.compile(
+    rb"(?:(?<=[\s;,|])|^)[ \t]*([A-Za-z_\x80-\xff][^=:;,|\t]{0,30}?)[ \t]*[=:][ \t]*"
+    rb"([+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]+)?)[ \t]?([A-Za-z\x80-\xff/%]{1,6}(?![=:]))?"
+    rb"[ \t]*(?:[;,|\t]|(?=[ \r\n])|$)"
+)
+_FEWEST_KEYED = 20  # rows
 _HEAD_LINES = 4000  # in which the data must have begun
 BULK_FROM = 2**16  # bytes; below, reading cell by cell takes less time than loading the fast reader
 
@@ -45,7 +52,7 @@ class DelimitedText(Reader):
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a block of rows."""
-        stream = open_text(_plain(source), form)
+        stream = open_text(_with_keys_above(_plain(source)), form)
         head = stream.head()
         whole = stream.start + len(head) >= stream.stop
         raw = head.split(b"\n", _HEAD_LINES)
@@ -94,6 +101,31 @@ def _plain(source: Source) -> Source:
 
 def _as_tab(match: re.Match[bytes]) -> bytes:
     return b"\t" if match[1] else b""
+
+
+def _with_keys_above(source: Source) -> Source:
+    """Return a text of rows in which every value has its name, t=120 ms; F=-3.1 N, with the names above the rows."""
+    lines = source.head(_FOOTER).splitlines()[:-1]
+    keys = Counter(keyed for line in lines if (keyed := _keyed(line)[0]))
+    names, count = keys.most_common(1)[0] if keys else ((), 0)
+    if count < max(_FEWEST_KEYED, 0.5 * len(lines)):
+        return source
+    file, above = scratch(source.keep), b"\t".join(names) + b"\n"
+    source.file.seek(0)
+    for line in source.file:
+        own, values = _keyed(line)
+        file.write(above + b"\t".join(values) + b"\n" if own == names else line)
+        above = b"" if own == names else above
+    return replace(source, file=file, size=file.tell(), added=1)
+
+
+def _keyed(line: bytes) -> tuple[tuple[bytes, ...], list[bytes]]:
+    """Return the names with their units and the values of a line of at least two of them and nothing else."""
+    pieces = list(_KEYED.finditer(line[:LONGEST_LINE]))
+    if len(pieces) < 2 or _KEYED.sub(b"", line).strip():
+        return (), []
+    names = (piece[1].strip() + (b" [" + piece[3] + b"]" if piece[3] else b"") for piece in pieces)
+    return tuple(names), [piece[2] for piece in pieces]
 
 
 def _with_whole_quotes(lines: list[str]) -> list[str]:

@@ -21,8 +21,9 @@ from mrdamper.rig_files.conditions import stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
 from mrdamper.rig_files.units import is_unit, parse_unit
-from mrdamper.rig_files.vocabulary import KEYS
+from mrdamper.rig_files.vocabulary import KEYS, words
 
+_VALUE = words("value")
 DEEPEST = 8  # levels
 MOST_ITEMS = 2000  # of a list
 _MOST_TEXT = 200  # characters
@@ -397,7 +398,7 @@ def _is_plain(value: Any) -> bool:
 def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
     """Keep single numbers and texts beside the columns of a node."""
     lower = {key.casefold(): value for key, value in says.items()}
-    number, unit = lower.get("value"), lower.get("unit", lower.get("units"))
+    number, unit = (next((lower[key] for key in keys if key in lower), None) for keys in (_VALUE, KEYS["unit"]))
     if above and isinstance(number, float) and isinstance(unit, str):  # {"current": {"value": 0.5, "unit": "A"}}
         says = {f"{above} [{unit}]": number}
     for key, value in says.items():

@@ -50,6 +50,7 @@ def _group(group: Any, properties: dict[str, Any]) -> dict[str, Any]:
     starts = {c.properties["wf_start_time"] for c in channels if "wf_start_time" in c.properties}
     begin = min(starts, default=None)
     texts = {name: f"{value}" for name, value in properties.items() if isinstance(value, (str, int, float))}
+    texts |= {f"{c.name} {name}": v for c in channels for name, v in c.properties.items() if isinstance(v, str) and v}
     return {**texts, "channels": [_channel(channel, {} if timed else _clock(channel, begin)) for channel in channels]}
 
 

@@ -489,15 +489,23 @@ def _header_lines(
         below = below if candidates is plain else []
         return last, (form.units_line - 1 if form.units_line else (*below, None)[0])
     naming = [i for i in plain if _names_columns(lines[i], separator)]
+    naming = [i for i in naming if i == plain[-1] or len(_roles(_fields(lines[i], separator, 0))) >= _TELLING]
     if naming and not form.names:
         raise _mismatch(source, separator, len(_fields(lines[naming[-1]], separator, width)), width, first, lines)
     return None, (form.units_line - 1 if form.units_line else None)
 
 
 def _keyed_lines(cells: Mapping[int, Sequence[str]], roles: Mapping[int, int]) -> tuple[int, int] | None:
-    """Return the lines of names and of units, where lines begin with what they hold: descriptor, path, unit."""
+    """Return the lines of names and of units, where lines begin with what they hold: descriptor, path, unit.
+
+    A last line that begins with a time holds the names: Channel, Position, Force; Unit, mm, N; Time (s), C1, C2.
+    """
     units = [i for i, row in cells.items() if row[0].casefold() in _UNIT_KEYS and _is_units(row[1:])]
-    named = {i: (row[0].casefold() == "name", roles[i], i) for i, row in cells.items() if i not in units}
+    others = {i: row for i, row in cells.items() if i not in units and row[0].casefold() not in _NOTES}
+    last = [i for i in others if i == max(cells) and split_name(others[i][0]).role == "time" and units]
+    if last and not any(looks_numeric(cell) or stamp(cell) is not None for cell in others[last[0]]):
+        return last[0], units[-1]
+    named = {i: (row[0].casefold() == "name", roles[i], i) for i, row in others.items()}
     return (max(named, key=lambda i: named[i]), units[-1]) if units and named else None
 
 

@@ -1,0 +1,159 @@
+"""Exports of testing machines, controllers and loggers, as whole folders: each gives the tests it was made of."""
+
+import json
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+from openpyxl import Workbook
+
+from mrdamper import import_files
+from mrdamper.rig_files.profile import parse_profile
+
+T = np.arange(1001) / 250
+X = 10 * np.sin(2 * np.pi * T + 0.3)  # [mm]
+CURRENTS = (0.0, 0.6)
+
+
+def force(amperes):
+    noise = np.random.default_rng(3).normal(0, 1, T.size)
+    return (150 + 400 * amperes) * np.tanh(8 * np.cos(2 * np.pi * T + 0.3)) + noise
+
+
+def rows(write, amperes=0.6):
+    return "".join(write(*row) + "\n" for row in zip(T, X, force(amperes), strict=True))
+
+
+def expect(folder, *currents, profile=""):
+    result = import_files([folder], parse_profile(profile))
+    assert not [str(refusal.error) for refusal in result.refusals]
+    means = [float(np.mean(record.current)) for record in result.records if record.current is not None]
+    assert means == pytest.approx(currents, abs=1e-6)
+    for record, amperes in zip(result.records, currents, strict=True):
+        np.testing.assert_allclose(record.time - record.time[0], T, rtol=0, atol=1e-4)
+        np.testing.assert_allclose(record.displacement, 1e-3 * X, rtol=0, atol=2e-6)
+        np.testing.assert_allclose(record.force, force(amperes), rtol=0, atol=0.1)
+
+
+def test_a_clock_has_the_name_of_its_channel_in_any_language(tmp_path):
+    body = "".join(
+        f"{t:.4f};{f:.3f};{t:.4f};{x:.5f};{f'{s:.4f};0.6' if s < T[-1] + 0.02 else ';'}\n"
+        for t, s, x, f in zip(T, 0.04 * np.arange(T.size), X, force(0.6), strict=True)
+    )
+    head = "Čas_Síla [s];Síla [N];Čas_Zdvih [s];Zdvih [mm];Čas_Proud [s];Proud cívky [A]\n"
+    (tmp_path / "mereni.csv").write_text(head + body, "utf-8")
+    expect(tmp_path, 0.6)
+
+
+def test_a_sheet_of_means_over_the_tests_is_no_table_of_results(tmp_path):
+    book = Workbook()
+    results, means = book.create_sheet("Ergebnisse"), book.create_sheet("Statistik")
+    book.remove(book.worksheets[0])
+    for line in (["Nr", "Erregerstrom", "Arbeit"], ["", "mA", "J"], [1, 0, 5.2], [2, 600, 9.1]):
+        results.append(line)
+    for line in (["Serie", "Erregerstrom"], ["n = 2", "mA"], ["x", 300], ["s", 424], ["v", 140]):
+        means.append(line)
+    for number, amperes in enumerate(CURRENTS, 1):
+        sheet = book.create_sheet(f"Probe {number}")
+        for line in (["Zeit", "Weg", "Kraft"], ["s", "mm", "N"], *zip(T, X, force(amperes), strict=True)):
+            sheet.append([cell if isinstance(cell, str) else float(cell) for cell in line])
+    book.save(tmp_path / "serie.xlsx")
+    expect(tmp_path, *CURRENTS)
+
+
+@pytest.mark.parametrize(("name", "read"), [("Probe_MR_0.6A", True), ("probe_0.6A", False), ("hall probe 0.6A", False)])
+def test_a_specimen_is_called_probe_in_german(tmp_path, name, read):
+    (tmp_path / f"{name}.csv").write_text("t [s],x [mm],F [N]\n" + rows(lambda t, x, f: f"{t:.4f},{x:.5f},{f:.3f}"))
+    result = import_files([tmp_path])
+    assert [refusal.error.code for refusal in result.refusals] == [] if read else ["E_CURRENT_MISSING"]
+    assert len(result.records) == read
+
+
+def test_properties_of_a_channel_state_its_scale(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    clock = {"wf_increment": 0.004, "wf_start_offset": 0.0, "wf_samples": T.size, "unit_string": "V"}
+    channels = (("Position", X / 5, "5 mm/V"), ("Load cell", force(0.6) / 200, "200 N/V"))
+    with nptdms.TdmsWriter(str(tmp_path / "run 0.6 A.tdms")) as writer:
+        for name, values, scale in channels:
+            writer.write_segment([nptdms.ChannelObject("run", name, values, {**clock, "Sensitivity": scale})])
+    expect(tmp_path, 0.6)
+
+
+def test_keys_of_nested_structures_are_known_in_other_languages(tmp_path):
+    channels = [("Przemieszczenie", "mm", X), ("Siła", "N", force(0.6))]
+    tree = {
+        "badanie": {"prad_cewki": {"wartosc": 0.6, "jednostka": "A"}},
+        "czestotliwosc_probkowania_Hz": 250,
+        "kanaly": [{"nazwa": name, "jednostka": unit, "dane": list(values)} for name, unit, values in channels],
+    }
+    (tmp_path / "badanie.json").write_text(json.dumps(tree))
+    expect(tmp_path, 0.6)
+
+
+def test_names_of_columns_are_explained_behind_an_equals_sign(tmp_path):
+    head = "Scan rate: 250 Hz\ny0 = AIN0: y=10*(v), Units: mm, position\ny1 = AIN1: y=200*(v), Units: N, force\n"
+    body = rows(lambda t, x, f: f"{t:.4f}\t{x / 10:.6f}\t{f / 200:.6f}\t{x:.5f}\t{f:.3f}")
+    (tmp_path / "data 600mA.dat").write_text(f"{head}\nTime\tv0\tv1\ty0\ty1\n{body}")
+    expect(tmp_path, 0.6)
+
+
+@pytest.mark.parametrize("times", ["Time_ms", "Time"])
+def test_days_since_1900_need_no_unit_and_their_millionths_the_dates_beside_them(tmp_path, times):
+    start = datetime(2024, 3, 12, 10, 15, 2)
+    body = ""
+    for t, x, f in zip(T, X, force(0.6), strict=True):
+        moment = start + timedelta(seconds=float(t))
+        days = (moment - datetime(1899, 12, 30)) / timedelta(days=1)
+        for name, value in (("Weg_mm", x), ("Kraft_N", f), ("Spulenstrom_A", 0.6)):
+            clock = f"{1e6 * days:.4f}" if times == "Time_ms" else f"{days:.11f}"
+            body += f'"{name}";"{moment:%d.%m.%Y %H:%M:%S}";{value:.4f};{clock}\n'
+    stamps = "TimeString" if times == "Time_ms" else "Remark"
+    (tmp_path / "trend.csv").write_text(f'"VarName";"{stamps}";"VarValue";"{times}"\n{body}')
+    expect(tmp_path, 0.6)
+
+
+@pytest.mark.parametrize(("frequency", "code"), [(1, ""), (2, "E_COLUMN")])
+def test_a_rate_without_a_unit_counts_where_the_motion_has_the_frequency_that_is_stated(tmp_path, frequency, code):
+    head = f"CONTROLLER ASCII DATA FILE\nTITLE=damper 0.6 A sine {frequency} Hz\nSAMPLE_RATE=250\n"
+    for number, (name, unit, scale) in enumerate((("Displacement", "mm", 0.001), ("Force", "N", 0.05)), 1):
+        head += f"CHAN_{number}_NAME={name}\nCHAN_{number}_UNITS={unit}\nCHAN_{number}_SCALE={scale}\n"
+    body = rows(lambda t, x, f: f"{round(x / 0.001):7d}{round(f / 0.05):8d}")
+    (tmp_path / "run.asc").write_text(f"{head}DATA=INTEGER\n{body}")
+    if code:
+        assert [refusal.error.code for refusal in import_files([tmp_path]).refusals] == [code]
+    else:
+        expect(tmp_path, 0.6)
+
+
+def test_lines_of_channels_units_and_remarks_above_the_names_are_read(tmp_path):
+    head = "Channel;ACT1.Position;ACT1.Force;AI3.CoilMonitor\nUnit;mm;N;V\nRemark;LVDT;load cell;current 0.5 A/V\n"
+    body = rows(lambda t, x, f: f"{t:.4f};{x:.5f};{f:.3f};1.2")
+    (tmp_path / "rec.csv").write_text(f"Controller;V4\n{head}Time [s];C1;C2;C3\n{body}")
+    expect(tmp_path, 0.6)
+
+
+@pytest.mark.parametrize("separator", ["; ", ",", "  "])
+def test_rows_that_name_every_value_are_a_table(tmp_path, separator):
+    row = separator.join(("t={:.0f} ms", "pos={:.5f} mm", "F={:.3f} N", "pwm=102"))
+    text = "=~=~= PuTTY log =~=~=\nHX711 ok\n" + rows(lambda t, x, f: row.format(1000 * t, x, f))
+    (tmp_path / "putty.log").write_text(text)
+    (tmp_path / "README.txt").write_text("pwm 255 = 1.5 A in the coil\n")
+    expect(tmp_path, 0.6)
+    (tmp_path / "putty.log").write_text(text.replace("t=2000 ms", "t=2000x ms"))
+    (refusal,) = import_files([tmp_path]).refusals
+    assert "line 503" in str(refusal.error)
+
+
+def test_a_list_beside_folders_names_them_by_their_currents(tmp_path):
+    profile = '[file]\nnames = ["t [s]", "y"]\n'
+    for role, number, unit in (("displacement", 1, "mm"), ("force", 2, "N")):
+        profile += f'[channels.{role}]\nfile = "{{run}}CH{number}.CSV"\ncolumn = 2\nunit = "{unit}"\n'
+    for number, amperes in enumerate(CURRENTS):
+        folder = tmp_path / f"ALL{number:04d}"
+        folder.mkdir()
+        for channel, values in enumerate((X, force(amperes)), 1):
+            body = "".join(f"{t:.4f},{y:.5f}\n" for t, y in zip(T, values, strict=True))
+            (folder / f"F{number:04d}CH{channel}.CSV").write_text(body)
+    listed = [f"ALL{number:04d}: {amperes} A, 1 Hz" for number, amperes in enumerate(CURRENTS)]
+    (tmp_path / "README.txt").write_text("\n".join(listed))
+    expect(tmp_path, *CURRENTS, profile=profile)
