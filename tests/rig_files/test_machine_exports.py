@@ -157,3 +157,41 @@ def test_a_list_beside_folders_names_them_by_their_currents(tmp_path):
     listed = [f"ALL{number:04d}: {amperes} A, 1 Hz" for number, amperes in enumerate(CURRENTS)]
     (tmp_path / "README.txt").write_text("\n".join(listed))
     expect(tmp_path, *CURRENTS, profile=profile)
+
+
+def test_a_clock_before_every_channel_of_a_controllers_trace_is_a_time(tmp_path):
+    head = "Name\tScope YT\n\nName\tPos_mm\tName\tForce_N\tName\tCoilCurrent_A\n" + "\t".join(["SampleTime[ms]\t4"] * 3)
+    head += "\n" + "\t".join(["Data-Type\tREAL64"] * 3)
+    body = rows(lambda t, x, f: f"{1000 * t:.0f}\t{x:.5f}\t{1000 * t:.0f}\t{f:.3f}\t{1000 * t:.0f}\t0.6")
+    (tmp_path / "scope.txt").write_text(f"{head}\n\n{body}")
+    expect(tmp_path, 0.6)
+
+
+def test_the_interval_above_the_samples_gives_a_clock_its_unit(tmp_path):
+    body = rows(lambda t, x, f: f"{t:.4E},{x:.5f},{f:.3f}")
+    (tmp_path / "AUTO_0.6A.csv").write_text(f'"Interval","4ms"\n"Time","CH1-1[mm]","CH1-2[N]"\n{body}')
+    expect(tmp_path, 0.6)
+
+
+def test_a_row_of_units_may_end_with_the_start_and_the_step_of_the_samples(tmp_path):
+    body = "".join(f"{i},{x / 5:.6f},{f / 300:.6f},,,\n" for i, (x, f) in enumerate(zip(X, force(0.6), strict=True)))
+    head = "X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-5.0e-01,4.0e-03,\n"
+    (tmp_path / "scope 0.6A.csv").write_text(head + body)
+    (tmp_path / "readme.txt").write_text("CH1: displacement 5 mm/V\nCH2: force 300 N/V\n")
+    (refusal,) = import_files([tmp_path]).refusals
+    assert "[file] sample_rate_Hz" in refusal.error.remedy
+    expect(tmp_path, 0.6, profile="[file]\nsample_rate_Hz = 250\n")
+
+
+def test_a_folder_of_an_oscilloscope_has_a_file_for_each_channel_and_notes_beside_its_rows(tmp_path):
+    notes = ["Record Length,1001,", "Source,{},", "Vertical Units,V,", "Horizontal Units,s,", "Model Number,TDS2014,"]
+    for number, amperes in enumerate(CURRENTS):
+        folder = tmp_path / f"ALL{number:04d}"
+        folder.mkdir()
+        for channel, values in (("CH1", X / 4), ("CH2", force(amperes) / 100)):
+            beside = [note.format(channel) for note in notes] + [",,"] * (T.size - len(notes))
+            body = "".join(f"{note},{t - 2:.4f},{y:.6f},\n" for note, t, y in zip(beside, T, values, strict=True))
+            (folder / f"F{number:04d}{channel}.CSV").write_text(body)
+    listed = [f"ALL{number:04d}: {amperes} A, 1 Hz\n" for number, amperes in enumerate(CURRENTS)]
+    (tmp_path / "README.txt").write_text("CH1 = LVDT, 4 mm/V\nCH2 = load cell, 100 N/V\n" + "".join(listed))
+    expect(tmp_path, *CURRENTS)

@@ -52,7 +52,7 @@ _SAMPLING = "|".join(words("sampling"))
 _RATE = re.compile(rf"{_SAMPLING}|messrate|^(?:data )?rate$|scan|acquisition|^fs$|^f_s$", re.IGNORECASE)
 _STEP = re.compile(
     rf"{_SAMPLING}|^dt$|^d_t$|^delta[ _]?[tx]|^[dΔ] ?[tx]$|time ?step|step ?time|zeitschritt|increment"
-    r"|^[hx][ _-]?(?:resolution|interval|increment|step|delta)$",
+    r"|^interval$|^[hx][ _-]?(?:resolution|interval|increment|step|delta)$",
     re.IGNORECASE,
 )
 _SHARE = re.compile(

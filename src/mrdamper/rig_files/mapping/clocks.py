@@ -28,6 +28,7 @@ _CYCLE = re.compile(r"(?i)(?:cycle|zyklus|ciclo|cykl|цикл|サイクル|循�
 _AXIS_UNIT = re.compile(
     r"(?i)^[\s\"]*(?P<axis>[xyz])[ _-]?axis[ _-]?unit\"?\s*[;,:=\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s;,\"]*$"
 )
+_SAMPLE_TIME = re.compile(r"(?i)^\s*\"?sample ?time ?\[(?P<unit>[mµun]?s)\]")  # of traces of controllers
 _LONGEST_LINE = 300
 _DAY_S = 86_400.0
 _EPOCHS = (  # the years 2000 to 2100 by a clock: its first and last number, its unit, the factor to it, what it counts
@@ -44,6 +45,10 @@ _SAMPLES = 100_000  # looked at
 
 def with_axis_as_time(table: RawTable) -> RawTable:
     """Take the x axis as time where a line gives it a unit of time: of keyed rows, or X and Y."""
+    clock_of = {i: n for i, n in enumerate(table.names) if n.casefold() == "name"}
+    steps = {m["unit"] for line in table.remarks if (m := _SAMPLE_TIME.match(line[:_LONGEST_LINE]))}
+    if len(steps) == 1 and list(clock_of) == list(range(0, len(table.names), 2)):  # each before its channel
+        return table.named(dict.fromkeys(clock_of, ("time", steps.pop())))
     axes = [m for line in table.remarks if (m := _AXIS_UNIT.match(line[:_LONGEST_LINE])) and is_unit(m["unit"])]
     clocks = {m["unit"] for m in axes if m["axis"] in "xX" and split_name("", m["unit"]).dimension == "time"}
     if len(clocks) != 1 or not table.names:
@@ -68,10 +73,11 @@ def with_epoch(table: RawTable) -> RawTable:
     may also be the nanoseconds since a start.
     """
     clocks = table.columns("time")
-    values = table.try_read(*clocks) if 0 < len(clocks) < 3 and table.source.size <= _LARGEST else None
+    unsure = [i for i in clocks if not table.headers[i].unit or (len(clocks) == 2 and table.headers[i].unit != "s")]
+    values = table.try_read(*clocks) if unsure and len(clocks) < 3 and table.source.size <= _LARGEST else None
     if values is None:
         return table
-    for i, (begin, end, unit, factor, what) in itertools.product(clocks, _EPOCHS):
+    for i, (begin, end, unit, factor, what) in itertools.product(unsure, _EPOCHS):
         first, last = np.nanmin(values[i]), np.nanmax(values[i])
         duration = _DAY_S * factor * (last - first) if unit == "days" else 0.0
         dated = [np.ptp(values[k]) for k in clocks if k != i and table.headers[k].unit == "s"]

@@ -93,8 +93,9 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
 
 
 def number_of(path: Path) -> tuple[str, ...]:
-    """Return the numbers in a file's name, by which files of one test belong together."""
-    return str(path.parent), *(str(int(number)) for number in re.findall(r"[0-9]+", path.stem))
+    """Return the numbers in a file's name, by which files of one test belong together: not those of its channel."""
+    stem = re.sub(r"(?i)(?<![a-z])ch[ _]?[0-9]$|^c[0-9](?=--)", "", path.stem)
+    return str(path.parent), *(str(int(number)) for number in re.findall(r"[0-9]+", stem))
 
 
 def joined_files(parts: Sequence[Part], profile: Profile) -> Iterator[tuple[list[Part], list[Record] | InputError]]:

@@ -38,12 +38,12 @@ def with_unit_of_time(table: RawTable) -> RawTable:
 
     A table without a time has the sampling rate that is stated without its unit, if it is that in Hz.
     """
-    times, moved = table.columns("time"), table.columns("displacement")
+    times, moved = table.columns("time"), [i for i, h in enumerate(table.headers) if h.channel == "displacement"]
     if not times and len(moved) == 1:
         return _with_rate(table, moved[0])
     if len(times) != 1 or len(moved) != 1 or table.headers[times[0]].unit or table.source.size > _LARGEST:
         return table
-    rates = {q.value for q in table.quantities if q.unit.dimension == "frequency" and stated_rate([q])}
+    rates = {rate for q in table.quantities if (rate := stated_rate([q]))}
     stated = set(stated_frequencies(table)) - rates or {*rates}
     values = table.try_read(times[0], moved[0]) if len(stated) == 1 else None
     if values is None:

@@ -127,6 +127,9 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         "number" if unit else _kind(column) for column, unit in zip(columns, behind, strict=True)
     )
     above = lines[: min(first, len(lines)) if header is None else header]
+    notes = _notes_beside(rows)
+    if not any(names):
+        names, units = _of_scope(notes, columns, units)
     return Layout(
         separator,
         decimal,
@@ -139,7 +142,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         trailing,
         "" if header is None else lines[header],
         tuple(next(filter(None, c), "") if k == "text" else "" for c, k in zip(columns, kinds, strict=True)),
-        (*(line for line in (*above, *below) if line.strip()), *_notes_beside(rows)),
+        (*(line for line in (*above, *below) if line.strip()), *notes),
         titles or _titles(above, separator, width),
         _writes(rows),
         behind if any(behind) else (),
@@ -268,9 +271,24 @@ def _notes_beside(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
         (key, number, unit if is_unit(unit) else "")
         for row in rows[:_SAMPLE]
         for i, (key, number, unit) in enumerate(zip(row, row[1:], [*row[2:], ""], strict=False))
-        if key and number and i not in columns and not looks_numeric(key) and looks_numeric(number)
+        if key and number and not {i, i + 1} & columns and not looks_numeric(key)
     ]
     return tuple(f"{key}: {number} {unit}".rstrip() for key, number, unit in stated)[:_SAMPLE]
+
+
+def _of_scope(
+    notes: Sequence[str], columns: Sequence[Sequence[str]], units: tuple[str, ...]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return names and units of the two full columns beside the notes of an oscilloscope, which state them."""
+    says = {key.casefold(): text for key, _, text in (note.partition(": ") for note in notes)}
+    headings = [("time", says.get("horizontal units", "")), (says.get("source", ""), says.get("vertical units", ""))]
+    full = [i for i, cells in enumerate(columns) if all(cells)]
+    if len(full) != len(headings) or not all(is_unit(unit) for _, unit in headings):
+        return ("",) * len(columns), units
+    both = [("", unit) for unit in units]
+    for i, heading in zip(full, headings, strict=True):
+        both[i] = heading
+    return tuple(name for name, _ in both), tuple(unit for _, unit in both)
 
 
 def is_footer(line: str, layout: Layout) -> bool:
@@ -408,6 +426,8 @@ def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) ->
             return keyed or (i, cells)
         elif cells[0].strip('"').casefold() in _SCALES or (width > 2 and len(set(filter(None, cells[1:]))) == 1):
             keyed = None  # a key with the scales of the columns, or one value for all of them
+        elif len([cell for cell in cells if is_unit(cell)]) > 1:
+            keyed = None  # units beside a start and a step: Sequence, Volt, Volt, 0, 0.002
         elif len(cells) == width:
             keyed = keyed or (i, cells)
     first = keyed or worded
@@ -544,6 +564,7 @@ def _cells(line: str, separator: str, width: int) -> tuple[str, ...]:
 def _is_units(cells: Sequence[str]) -> bool:
     filled = [cell for cell in cells if cell and cell not in ("-", "--", "[-]", "(-)")]
     count = sum(is_unit(_unbracket(cell)) for cell in filled)
+    filled = [cell for cell in filled if not looks_numeric(cell)] if count > 1 else filled  # a start and a step
     letters = len(filled) > 2 and "".join(filled) == ascii_uppercase[: len(filled)]  # of the columns of a sheet
     return count >= 1 and 2 * count >= len(filled) and not letters
 
