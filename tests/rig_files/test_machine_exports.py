@@ -195,3 +195,12 @@ def test_a_folder_of_an_oscilloscope_has_a_file_for_each_channel_and_notes_besid
     listed = [f"ALL{number:04d}: {amperes} A, 1 Hz\n" for number, amperes in enumerate(CURRENTS)]
     (tmp_path / "README.txt").write_text("CH1 = LVDT, 4 mm/V\nCH2 = load cell, 100 N/V\n" + "".join(listed))
     expect(tmp_path, *CURRENTS)
+
+
+def test_a_long_table_is_known_by_what_stands_in_its_columns(tmp_path):
+    body = ""
+    for t, x, f in zip(T, X, force(0.6), strict=True):
+        for name, unit, value in (("Zdvih", "mm", x), ("Síla", "N", f), ("Proud cívky", "A", 0.6)):
+            body += f"{name};{t:.4f};{value:.4f};{unit}\n"
+    (tmp_path / "archiv.csv").write_text(f"Veličina;Čas [s];Naměřeno;Jedn.\n{body}")
+    expect(tmp_path, 0.6)

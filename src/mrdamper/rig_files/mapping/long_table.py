@@ -10,6 +10,8 @@ import numpy as np
 
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.readers.base import Content, RawTable, Words
+from mrdamper.rig_files.record import OPTIONAL, REQUIRED
+from mrdamper.rig_files.units import is_unit
 from mrdamper.rig_files.vocabulary import words
 
 _VALUE, _CHANNEL, _UNIT = words("value"), words("channel"), words("unit")
@@ -25,6 +27,9 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
     names = [name.strip(" _").casefold() for name in table.names]
     value = [i for i, name in enumerate(names) if name in _VALUE]
     channel = [i for i, name in enumerate(names) if name in _CHANNEL]
+    unit = [i for i, name in enumerate(names) if name in _UNIT][:1]
+    if len(value) != 1 or len(channel) != 1:
+        value, channel, unit = _by_content(table)
     if table.words is None or len(value) != 1 or len(channel) != 1:
         return table
     words = table.words(channel[0])
@@ -33,7 +38,6 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
     whole = {"displacement", "force"} <= set(roles) or sizes.min() >= _FEWEST_SAMPLES  # a list beside may name them
     if not whole or not 1 < len(words.labels) <= _MOST_CHANNELS:
         return table
-    unit = [i for i, name in enumerate(names) if name in _UNIT][:1]
     units = _units(table, words, unit)
     if units is None:
         return table
@@ -41,6 +45,18 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
     others.sort(key=lambda i: table.headers[i].role != "time")
     rows = [np.flatnonzero(words.codes == code) for code in range(len(words.labels))]
     return _pivoted(table, value[0], others, words.labels, units, rows, rows[roles.get("force", int(sizes.argmax()))])
+
+
+def _by_content(table: RawTable) -> tuple[list[int], list[int], list[int]]:
+    """Return the columns of values, channels and units by what stands in them, where no name of a column tells."""
+    texts = [i for i, text in enumerate(table.odd) if text]
+    if table.words is None or not texts or {"displacement", "force"} & {header.role for header in table.headers}:
+        return [], [], []
+    labels = {i: table.words(i).labels[: _MOST_CHANNELS + 1] for i in texts}
+    channels = [i for i in texts if len({split_name(label).role for label in labels[i]} & {*REQUIRED, *OPTIONAL}) > 1]
+    units = [i for i in texts if all(is_unit(label.strip("[]() ")) for label in labels[i])]
+    bare = [i for i, h in enumerate(table.headers) if i not in texts and not h.unit and h.role is None]
+    return bare, channels, units[:1]
 
 
 def _pivoted(

@@ -121,7 +121,7 @@ def _with_keys_above(source: Source) -> Source:
 
 def _keyed(line: bytes) -> tuple[tuple[bytes, ...], list[bytes]]:
     """Return the names with their units and the values of a line of at least two of them and nothing else."""
-    pieces = list(_KEYED.finditer(line[:LONGEST_LINE]))
+    pieces = list(_KEYED.finditer(line[:LONGEST_LINE])) if b"=" in line or b":" in line else []
     if len(pieces) < 2 or _KEYED.sub(b"", line).strip():
         return (), []
     names = (piece[1].strip() + (b" [" + piece[3] + b"]" if piece[3] else b"") for piece in pieces)
