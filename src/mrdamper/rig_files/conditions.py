@@ -199,7 +199,7 @@ def _only(values: Sequence[float], agree: float, shown: float, unit: str) -> flo
     return values[0] if values else None
 
 
-_BARE_RATE = re.compile(r"(?i)f_?s|(?:sampl(?:e|ing)|scan|abtast)[ _]?(?:rate|freq(?:uency)?)")
+BARE_RATE = re.compile(r"(?i)f_?s|(?:sampl(?:e|ing)|scan|abtast)[ _]?(?:rate|freq(?:uency)?)")
 _BARE_STEP = re.compile(
     r"(?i)d_?t|delta_?t|(?:sampl(?:e|ing)|time|wf|x)[ _]?(?:delta|step|inc(?:r(?:ement)?)?|interval)|delta_?x"
 )
@@ -216,7 +216,7 @@ def stated_clock(numbers: Mapping[str, float]) -> tuple[float, float, str] | Non
         header = split_name(name)
         dimension, factor = header.dimension, header.factor
         unit = "s" if dimension in ("time", "frequency") else ""
-        if number > 0 and dimension in (None, "frequency") and _BARE_RATE.fullmatch(header.name):
+        if number > 0 and dimension in (None, "frequency") and BARE_RATE.fullmatch(header.name):
             clock = 1 / (factor * number), unit
         elif number > 0 and dimension in (None, "time") and _BARE_STEP.fullmatch(header.name):
             clock = factor * number, unit

@@ -178,7 +178,7 @@ def currents_beside(
     by_test = by_test or (results.by_test(_called(tests)) if results else {})
     folders = [(file.parent.name,) for file, _ in tests]
     if results and len({*folders}) == len(tests):
-        by_test = by_test or results.by_test(folders)
+        by_test = by_test or results.by_test(folders, by_number=False)
     if results and len(by_test) == len(tests):
         return [(by_test[i], f"{path.name}, {results.title}") for i in range(len(tests))]
     lines = short_lines(path) if path.suffix.lower() in TEXTS else []

@@ -50,7 +50,7 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
 def _by_content(table: RawTable) -> tuple[list[int], list[int], list[int]]:
     """Return the columns of values, channels and units by what stands in them, where no name of a column tells."""
     texts = [i for i, text in enumerate(table.odd) if text]
-    if table.words is None or not texts or {"displacement", "force"} & {header.role for header in table.headers}:
+    if table.words is None or not texts or {"displacement", "force"} & {header.channel for header in table.headers}:
         return [], [], []
     labels = {i: table.words(i).labels[: _MOST_CHANNELS + 1] for i in texts}
     channels = [i for i in texts if len({split_name(label).role for label in labels[i]} & {*REQUIRED, *OPTIONAL}) > 1]

@@ -13,18 +13,15 @@ from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, InputError
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.columns import candidates_of, column_called
-from mrdamper.rig_files.conditions import stated_rate
+from mrdamper.rig_files.conditions import BARE_RATE, stated_rate
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding
 
 _FREQUENCY = re.compile(
     r"(?<![0-9A-Za-z.,])(?:f|freq|frequency)?[_ =]?([0-9]{1,3}(?:[.,px][0-9]{1,4})?)[ _]?(m?)Hz(?![A-Za-z])"
 )
-_BARE_RATE = re.compile(
-    r"(?i)[\s#%\"]*(?:f_?s|sampl(?:e|ing)[ _]?(?:rate|freq(?:uency)?))\"?"
-    r"\s*[=:;,\t]\s*\"?([0-9]+(?:\.[0-9]+)?)[\s;,\"]*"
-)
-_LONGEST_LINE = 300
+_KEYED = re.compile(r"[\s#%\"]*([^=:;,\t]{1,40}?)\"?\s*[=:;,\t]\s*\"?([0-9]{1,9}(?:\.[0-9]{1,9})?)[\s;,\"]*")
+_LONGEST_LINE = 80
 _CLOCK_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 _AGREE = 0.05  # of a frequency that is stated
 _LARGEST = 64 * 2**20  # bytes of a file whose columns are tried
@@ -61,7 +58,8 @@ def with_unit_of_time(table: RawTable) -> RawTable:
 def _with_rate(table: RawTable, moved: int) -> RawTable:
     """Add the sampling rate that a line or a number states without its unit, where the motion has the frequency so."""
     lines = (*table.remarks, *(f"{name}={number!r}" for name, number in table.constants.items()))
-    rates = {float(match[1]) for line in lines if (match := _BARE_RATE.fullmatch(line[:_LONGEST_LINE]))}
+    keyed = filter(None, (_KEYED.fullmatch(line) for line in lines if len(line) < _LONGEST_LINE))
+    rates = {float(match[2]) for match in keyed if BARE_RATE.fullmatch(match[1])}
     stated = {*stated_frequencies(table)}
     values = table.try_read(moved) if len(rates) == len(stated) == 1 and table.source.size <= _LARGEST else None
     if values is None or not (rate := rates.pop()) or any(stated_rate([q]) for q in table.quantities):

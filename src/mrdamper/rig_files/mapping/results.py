@@ -42,14 +42,15 @@ class Results:
     keys: tuple[str, ...] = ()  # headings of the columns of `cells`; empty for the number of the row
     counts_tests: bool = True  # so that a number in a test's name may be meant; Day 1: 0.5 A counts something else
 
-    def by_test(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
+    def by_test(self, tests: Sequence[Iterable[str]], *, by_number: bool = True) -> dict[int, float]:
         """Return the current [A] of each test by its number, where one column of the table tells all of them apart.
 
         Of each test all that it is called is given: its label, its file, the lines above it.
         """
         names = [_names(texts) for texts in tests]
         one_of_several = len(tests) == 1 < len(self.current)  # a number in its name alone may count anything
-        for exact in (True,) if one_of_several or not self.counts_tests else (True, False):
+        by_number = by_number and self.counts_tests and not one_of_several
+        for exact in (True,) if not by_number else (True, False):
             columns = list(zip(*self.cells, strict=True))
             columns = columns if self._counts_tests(columns, len(tests)) else columns[1:]
             matches = [match for column in columns if (match := _match(column, names, exact))]

@@ -6,13 +6,16 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.rig_files.column_names import holds
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import Stored, check_unpacked, damaged, load, refusing_damage
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
+from mrdamper.rig_files.vocabulary import words
 
 # pyright: reportMissingImports=false
 
+_SCALES = words("scale")
 _UNIT_NAMES = ("unit_string", "NI_UnitDescription", "unit", "units", "Unit", "Units")
 
 
@@ -50,7 +53,8 @@ def _group(group: Any, properties: dict[str, Any]) -> dict[str, Any]:
     starts = {c.properties["wf_start_time"] for c in channels if "wf_start_time" in c.properties}
     begin = min(starts, default=None)
     texts = {name: f"{value}" for name, value in properties.items() if isinstance(value, (str, int, float))}
-    texts |= {f"{c.name} {name}": v for c in channels for name, v in c.properties.items() if isinstance(v, str) and v}
+    scales = ((c.name, name, c.properties[name]) for c in channels for name in c.properties if holds(name, _SCALES))
+    texts |= {f"{channel} {name}": f"{value}" for channel, name, value in scales}
     return {**texts, "channels": [_channel(channel, {} if timed else _clock(channel, begin)) for channel in channels]}
 
 

@@ -127,7 +127,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         "number" if unit else _kind(column) for column, unit in zip(columns, behind, strict=True)
     )
     above = lines[: min(first, len(lines)) if header is None else header]
-    notes = _notes_beside(rows)
+    notes = _notes_beside(rows, texts=not any(names))
     if not any(names):
         names, units = _of_scope(notes, columns, units)
     return Layout(
@@ -263,15 +263,15 @@ def _roles(cells: Sequence[str]) -> set[str | None]:
     return {split_name(cell.strip('"')).role for cell in cells[:MOST_COLUMNS] if cell} - {None}
 
 
-def _notes_beside(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    """Names with a number and its unit behind them that stand beside the first rows, as lines."""
+def _notes_beside(rows: Sequence[Sequence[str]], *, texts: bool) -> tuple[str, ...]:
+    """Names with a number and its unit behind them, or with texts, that stand beside the first rows, as lines."""
     filled = Counter(i for row in rows for i, cell in enumerate(row) if cell)
     columns = {i for i, count in filled.items() if 2 * count > len(rows) > _SAMPLE}  # channels and labels, no notes
     stated = [
         (key, number, unit if is_unit(unit) else "")
         for row in rows[:_SAMPLE]
         for i, (key, number, unit) in enumerate(zip(row, row[1:], [*row[2:], ""], strict=False))
-        if key and number and not {i, i + 1} & columns and not looks_numeric(key)
+        if key and number and not {i, i + 1} & columns and not looks_numeric(key) and (texts or looks_numeric(number))
     ]
     return tuple(f"{key}: {number} {unit}".rstrip() for key, number, unit in stated)[:_SAMPLE]
 
@@ -523,7 +523,7 @@ def _keyed_lines(cells: Mapping[int, Sequence[str]], roles: Mapping[int, int]) -
     units = [i for i, row in cells.items() if row[0].casefold() in _UNIT_KEYS and _is_units(row[1:])]
     others = {i: row for i, row in cells.items() if i not in units and row[0].casefold() not in _NOTES}
     last = [i for i in others if i == max(cells) and split_name(others[i][0]).role == "time" and units]
-    if last and not any(looks_numeric(cell) or stamp(cell) is not None for cell in others[last[0]]):
+    if last and not any(not cell or looks_numeric(cell) or stamp(cell) is not None for cell in others[last[0]]):
         return last[0], units[-1]
     named = {i: (row[0].casefold() == "name", roles[i], i) for i, row in others.items()}
     return (max(named, key=lambda i: named[i]), units[-1]) if units and named else None
