@@ -19,6 +19,7 @@ from typing import Literal
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RigFileError, Source
+from mrdamper.rig_files.text.notes import with_notes_beside
 from mrdamper.rig_files.text.tokens import FORTRAN, MISSING, looks_numeric, stamp
 from mrdamper.rig_files.units import is_unit
 from mrdamper.rig_files.vocabulary import words
@@ -90,10 +91,9 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     separator = form.separator or _separator(lines, content, source)
     above = form.data_line - 1 if form.data_line else form.header_line or 0
     first, width, trailing = _first_row(content, above, separator, source)
-    if form.header_line is None and form.data_line is None:
-        again = _below_preamble(lines, first, separator)
-        if again:
-            first, width, trailing = _first_row(content, again, separator, source)
+    unstated = form.header_line is None and form.data_line is None
+    if unstated and (again := _below_preamble(lines, first, separator)):
+        first, width, trailing = _first_row(content, again, separator, source)
     if width > MOST_COLUMNS:
         raise source.refuse("E_TOO_MANY_COLUMNS", f"{width} columns", "is one sample one line?", line=first + 1)
     rows = _rows(lines[first:], separator, width, trailing)
@@ -127,9 +127,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         "number" if unit else _kind(column) for column, unit in zip(columns, behind, strict=True)
     )
     above = lines[: min(first, len(lines)) if header is None else header]
-    notes = _notes_beside(rows, texts=not any(names))
-    if not any(names):
-        names, units = _of_scope(notes, columns, units)
+    names, units, notes = with_notes_beside(rows, names, units)
     return Layout(
         separator,
         decimal,
@@ -261,34 +259,6 @@ def _below_preamble(lines: Sequence[str], first: int, separator: str) -> int:
 def _roles(cells: Sequence[str]) -> set[str | None]:
     """Return the channels that cells name."""
     return {split_name(cell.strip('"')).role for cell in cells[:MOST_COLUMNS] if cell} - {None}
-
-
-def _notes_beside(rows: Sequence[Sequence[str]], *, texts: bool) -> tuple[str, ...]:
-    """Names with a number and its unit behind them, or with texts, that stand beside the first rows, as lines."""
-    filled = Counter(i for row in rows for i, cell in enumerate(row) if cell)
-    columns = {i for i, count in filled.items() if 2 * count > len(rows) > _SAMPLE}  # channels and labels, no notes
-    stated = [
-        (key, number, unit if is_unit(unit) else "")
-        for row in rows[:_SAMPLE]
-        for i, (key, number, unit) in enumerate(zip(row, row[1:], [*row[2:], ""], strict=False))
-        if key and number and not {i, i + 1} & columns and not looks_numeric(key) and (texts or looks_numeric(number))
-    ]
-    return tuple(f"{key}: {number} {unit}".rstrip() for key, number, unit in stated)[:_SAMPLE]
-
-
-def _of_scope(
-    notes: Sequence[str], columns: Sequence[Sequence[str]], units: tuple[str, ...]
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names and units of the two full columns beside the notes of an oscilloscope, which state them."""
-    says = {key.casefold(): text for key, _, text in (note.partition(": ") for note in notes)}
-    headings = [("time", says.get("horizontal units", "")), (says.get("source", ""), says.get("vertical units", ""))]
-    full = [i for i, cells in enumerate(columns) if all(cells)]
-    if len(full) != len(headings) or not all(is_unit(unit) for _, unit in headings):
-        return ("",) * len(columns), units
-    both = [("", unit) for unit in units]
-    for i, heading in zip(full, headings, strict=True):
-        both[i] = heading
-    return tuple(name for name, _ in both), tuple(unit for _, unit in both)
 
 
 def is_footer(line: str, layout: Layout) -> bool:
