@@ -16,7 +16,7 @@ from mrdamper.physics.motion import Excitation
 
 @dataclass(frozen=True)
 class Tanh(Model):
-    """F = f0 + (k0 + k1 I) x + (c0 + c1 I) v |v|^p + cq |v| + fy(I) (S + q |S|) + m a, with
+    """F = f0 + (k0 + k1 I) x + (c0 + c1 I) v |v|^p + cq |v| + fy(I) (S + q |S|) + m a, S a sigmoid.
 
     S = (1 - w) tanh u + w (2/pi) arctan(pi u/2), u = (v + lambda x)/vy, fy(I) = fy0 + fy1 I/(1 + si |I|).
 
