@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
-from mrdamper.dampers.choice import identify_whole
+from mrdamper.dampers.choice import identify_jointly, identify_whole
 from mrdamper.dampers.fold_fits import FoldFits
 from mrdamper.data import Condition, Run
+from mrdamper.models.play_bypass import PlayBypass
 from mrdamper.models.tanh import Tanh
+from mrdamper.physics.motion import sine
+from mrdamper.physics.simulation import simulate, steady_loop
 
 MOTIONS = ((0.5, 0.025), (1.0, 0.025), (2.0, 0.010))
 
@@ -91,3 +94,23 @@ def test_runs_of_two_levels_of_three_are_fitted_without_saturation():
     without = FoldFits(choice.problem, [[0, 1, 2], [3, 4, 5], [6, 7, 8]]).refit(range(6))
     assert choice.fit.damper.model.si > 0.1
     assert without.damper.model.si == 0.0
+
+
+def test_three_levels_determine_the_saturation_of_play_and_bypass():
+    """And the force at 1.2 times the highest tested current is predicted."""
+    truth = PlayBypass(
+        f0=50.0, k=900.0, c0=700.0, c1=500.0, fy0=100.0, fy1=1600.0, d=2e-4, e=2.5e-5, cb=3.5e4, h0=0.4, h1=0.2,
+        vh=3e-3, T=5e-3, Ic=1e-4, si=0.9,
+    )  # fmt: skip
+    noise, runs = np.random.default_rng(7), []
+    for current in (0.0, 0.75, 1.5):
+        for frequency, amplitude in MOTIONS:
+            motion = sine(Condition(current, frequency, amplitude), 4, 300)
+            force = simulate(truth, motion).force + noise.normal(0, 4, len(motion))
+            name, window = f"{current}-{frequency}", (1 / frequency, 4 / frequency)
+            runs.append(Run(name, motion.time, motion.displacement, force, motion.current, window=window))
+    choice = identify_jointly(runs)
+    beyond = Condition(1.8, 1.0, 0.025)
+    assert choice.fit.damper.model.si == pytest.approx(0.9, rel=0.15)
+    found, known = (np.ptp(loop.force) for loop in (choice.fit.damper.predict(beyond), steady_loop(truth, beyond)))
+    assert found == pytest.approx(known, rel=0.02)

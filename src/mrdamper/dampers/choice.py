@@ -198,10 +198,12 @@ def _level_laws(problem: JointProblem) -> tuple[ModelTerm, ...]:
     """Forms of the level law that the currents of the tests determine, the shortest first.
 
     A law has a parameter fewer than there are levels; a current that changes passes through all. Two levels show no
-    more than a straight line.
+    more than a straight line. Three determine a saturation; runs at two of them are fitted without it.
     """
     levels = level_count(problem.currents)
-    return tuple(law for law in LEVEL_LAWS if len(law.names) + 2 < max(levels, 3))[: None if levels > 2 else 1]
+    free = {"si"} if levels == 3 else set[str]()
+    able = [law for law in LEVEL_LAWS if len(set(law.names) - free) + 2 < max(levels, 3)]
+    return tuple(able[: None if levels > 2 else 1])
 
 
 def _kept_terms(tried: Sequence[TermTrial], law: ModelTerm) -> str:

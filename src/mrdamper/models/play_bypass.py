@@ -62,7 +62,7 @@ class PlayBypass(Model):
         r"r = \frac{c_b (1 + q_b\,\mathrm{sgn}\,v) |v|}{f_y}"
     )
     source: ClassVar[str] = "derived from the bundled tests"
-    current_levels: ClassVar[Mapping[str, int]] = {"fy1": 2, "c1": 2, "h1": 2}
+    current_levels: ClassVar[Mapping[str, int]] = {"fy1": 2, "c1": 2, "h1": 2, "si": 3}
 
     f0: float = param("N", "offset force", linear=True)
     k: float = param("N/m", "stiffness within the free play", linear=True)
