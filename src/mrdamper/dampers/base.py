@@ -255,9 +255,9 @@ class Damper(Displayable):
         Parameters
         ----------
         at : Condition, Run or Excitation
-            An excitation is a motion without a measured force, as `sine` and `sweep` return it, and counts as a
-            run of its time, displacement and current. A motion in arrays is a run with any force:
-            ``Run("mine", time, displacement, np.zeros(time.size), current)`` in s, m, N and A.
+            An excitation is a motion about mid-stroke, as `sine` and `sweep` return it. A motion in arrays is a run
+            with any force, ``Run("mine", time, displacement, np.zeros(time.size), current)`` in s, m, N and A; its
+            displacements count from their middle.
 
         Returns
         -------
@@ -268,11 +268,12 @@ class Damper(Displayable):
         if isinstance(at, Condition):
             loop = self.loop(at)
             return Prediction(loop.excitation, loop.force, at, self.envelope.flags(at), steady=True)
+        run = at
         if isinstance(at, Excitation):
-            at = Run("excitation", at.time, at.displacement, np.zeros(len(at)), at.current)
-        sine = equivalent_sine(at)
-        motion = centred_motion(at)
-        if sine.is_sine and not at.current_changes:
+            run = Run("excitation", at.time, at.displacement, np.zeros(len(at)), at.current)
+        sine = equivalent_sine(run)
+        motion = at if isinstance(at, Excitation) else centred_motion(at)
+        if sine.is_sine and not run.current_changes:
             flags = self.envelope.flags(sine.condition)
         else:
             flags = (

@@ -91,7 +91,6 @@ def identify_jointly(runs: Sequence[Run]) -> JointChoice:
     ----------
     runs : sequence of Run
         Of one rig; any motion, any current.
-    progress : callable
 
     Raises
     ------
@@ -125,18 +124,28 @@ def identify_jointly(runs: Sequence[Run]) -> JointChoice:
         fixed = {**final.fixed, **dict.fromkeys(gone, 0.0)}
         final = JointProblem(runs, MODEL, fixed, free=final.free, coil=coil, parts=final.parts)
         best = final.fit(start=final.from_point(best), rounds=1, settled=_COARSE_TOLERANCE / 10)
-    left_out, before = (CrossValidation.of(p, f).everything() for p, f in ((final, best), (problem, fit)))
-    # What one step promised, the search may not keep: terms earn their place here too.
-    if not smaller_wins(left_out, before):
-        final, best = problem, fit
-    best = final.fit(start=best.point, rounds=1, settled=_COARSE_TOLERANCE / 10, to_the_last_digit=True)
-    left_out = CrossValidation.of(final, best).everything()
-    left_out = _means({**left_out, **current, **CrossValidation.of(final, best, _by_session).everything()})
     tried = (*tried, *more)
-    about = {**best.damper.provenance, "terms": _kept_terms(tried, law)}
-    about |= {f"left out, {what}": f"{100 * error:.2f} %" for what, error in left_out.items()}
+    return _conclude((problem, fit), (final, best), second, tried, _kept_terms(tried, law), current)
+
+
+def _conclude(
+    full: tuple[JointProblem, JointFit],
+    selected: tuple[JointProblem, JointFit],
+    second: LocalMinimum | None,
+    tried: tuple[TermTrial, ...],
+    terms: str,
+    current: Errors,
+) -> JointChoice:
+    """Return the selected model, or the full one where fits do not confirm the step that selected it."""
+    left_out, before = (CrossValidation.of(*each).everything() for each in (selected, full))
+    final, best = selected if smaller_wins(left_out, before) else full
+    best = final.fit(start=best.point, rounds=1, settled=_COARSE_TOLERANCE / 10, to_the_last_digit=True)
+    evidence = (CrossValidation.of(final, best), CrossValidation.of(final, best, _by_session))
+    means = _means({**evidence[0].everything(), **current, **evidence[1].everything()})
+    about = {**best.damper.provenance, "terms": terms}
+    about |= {f"left out, {what}": f"{100 * error:.2f} %" for what, error in means.items()}
     best = replace(best, damper=replace(best.damper, provenance=about), second=second)
-    return JointChoice(final, best, tried, left_out)
+    return JointChoice(final, best, tried, means)
 
 
 @on_one_blas_thread
@@ -163,10 +172,9 @@ def identify_whole(runs: Sequence[Run], model: type[Model]) -> JointChoice:
     evidence = CrossValidation.of(problem, fit)
     chosen, tried = evidence.choose([ModelTerm(optional[n], (n,), (0.0,)) for n in problem.free if n in optional])
     final = problem.with_free(tuple(chosen))
-    best = final.fit(start=evidence.start(final), rounds=1, settled=_COARSE_TOLERANCE / 10, to_the_last_digit=True)
-    about = {**best.damper.provenance, "terms": "; ".join(t.term for t in tried if t.kept) or _PLAIN}
-    best = replace(best, damper=replace(best.damper, provenance=about), second=short.second)
-    return JointChoice(final, best, tried, _means(CrossValidation.of(final, best).everything()))
+    best = final.fit(start=evidence.start(final), rounds=1, settled=_COARSE_TOLERANCE / 10)
+    terms = "; ".join(t.term for t in tried if t.kept) or _PLAIN
+    return _conclude((problem, fit), (final, best), short.second, tried, terms, {})
 
 
 def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, JointFit, tuple[TermTrial, ...]]:

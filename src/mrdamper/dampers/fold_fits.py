@@ -31,7 +31,7 @@ class FoldFits:
         Indices of runs that will be left out together.
     searched : sequence of str
         Presets that are free in the search as well, as in that over all runs: without them others make up for what
-        they do, and the search ends in another valley.
+        they do, and the search ends in another local minimum.
     """
 
     def __init__(self, problem: JointProblem, folds: Iterable[Sequence[int]], searched: Sequence[str] = ()):
@@ -70,7 +70,7 @@ class FoldFits:
         return min((self.problem.refit(start, rows, _FIT_TOLERANCE) for start in able), key=lambda fit: fit.error)
 
     def _search(self, block: frozenset[int]) -> list[JointFit]:
-        """Return ends of the search without a block: the best, and the best of other knees that come near it."""
+        """Return ends of the search without a block: the best, and others that come near it with another yield."""
         whole = self.problem
         rows = [i for i in range(len(whole.parts)) if i not in block]
         short = JointProblem(

@@ -283,7 +283,7 @@ class JointProblem:
     def promising(self) -> list[Floats]:
         """Points some steps down from the model's starts, the most promising first.
 
-        Each length of lost motion has a valley of its own: the best start in each. The first is the
+        Each length of lost motion has a local minimum of its own: the best start for each. The first is the
         likeliest: another must be clearly better.
         """
         grid = [np.array(u) for u in product(*([axis.coordinate(g) for g in axis.grid] for axis in self.axes))]

@@ -138,7 +138,7 @@ def read(item: Item, settings: Settings) -> tuple[Dataset, tuple[str, ...]]:
 
 def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[str, Any]:
     train = _usable(dataset)
-    problem = JointProblem(train, settings.model, {} if plan is None else plan.held)
+    problem = JointProblem(train, settings.model, {} if plan is None else plan.held).determined()
     lane = "reference" if plan is None else "cold" if settings.cold else "fast"
     start = np.array(plan.start) if plan is not None and lane == "fast" else None
     fit = _fit(problem, start)
@@ -152,7 +152,7 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
         more["loop_deviation"] = max((deviation(*pair) for pair in pairs), default=0.0)
         more["shape_deviation"] = max((shape_deviation(*pair) for pair in pairs), default=0.0)
         if _stands_out(fit, more["loop_deviation"], plan):
-            problem, lane = JointProblem(train, settings.model), "full"
+            problem, lane = JointProblem(train, settings.model).determined(), "full"
             fit = _fit(problem, None)
             more |= _study(dataset)
         more |= _beside_the_line(fit, own, plan)

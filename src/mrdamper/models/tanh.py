@@ -18,12 +18,13 @@ from mrdamper.physics.motion import Excitation
 class Tanh(Model):
     """F = f0 + (k0 + k1 I) x + (c0 + c1 I) v |v|^p + cq |v| + fy(I) (S + q |S|) + m a, S a sigmoid.
 
-    S = (1 - w) tanh u + w (2/pi) arctan(pi u/2), u = (v + lambda x)/vy, fy(I) = fy0 + fy1 I/(1 + si |I|).
+    S = (1 - w) tanh u + w (2/pi) arctan(pi u/2), u = (v + lambda x)/vy, fy(I) = fy0 + fy1 I/(1 + si I).
 
     Without memory and without jumps: the displacement, counted from mid-stroke, moves the yield
     to either side of the loop, in any motion. The viscous damping is c0 + c1 I at 1 m/s; p is
     negative for a fluid that thins with shear, 1 for quadratic damping. Of the parameters that
-    are preset to zero only what the tests show is freed (`dampers.choice`).
+    are preset to zero only those are determined that improve the cross-validation. I is the size of
+    the current.
 
     References
     ----------
@@ -36,7 +37,7 @@ class Tanh(Model):
     equation: ClassVar[str] = (
         r"F = f_0 + (k_0 + k_1 I) x + (c_0 + c_1 I) v |v|^p + c_q |v| + f_y (S + q |S|) + m a,\quad "
         r"S = (1 - w) \tanh u + w \frac{2}{\pi} \arctan\frac{\pi u}{2},\quad u = \frac{v + \lambda x}{v_y},\quad "
-        r"f_y = f_{y0} + \frac{f_{y1} I}{1 + s_i |I|}"
+        r"f_y = f_{y0} + \frac{f_{y1} I}{1 + s_i I}"
     )
     source: ClassVar[str] = "common practice in control"
     current_levels: ClassVar[Mapping[str, int]] = {"k1": 2, "c1": 2, "fy1": 2, "si": 3}
@@ -80,8 +81,8 @@ class Tanh(Model):
         return (1 - self.tail) * np.tanh(u) + self.tail * 2 / np.pi * np.arctan(np.pi / 2 * u)
 
     def force(self, motion: Excitation, state: Floats) -> Floats:
-        x, v, a, current = motion.displacement, motion.velocity, motion.acceleration, motion.current
-        yield_force = self.fy0 + self.fy1 * current / (1 + self.si * np.abs(current))
+        x, v, a, current = motion.displacement, motion.velocity, motion.acceleration, np.abs(motion.current)
+        yield_force = self.fy0 + self.fy1 * current / (1 + self.si * current)
         viscous = (self.c0 + self.c1 * current) * np.sign(v) * np.abs(v) ** (1 + self.p) + self.cq * np.abs(v)
         yielded = yield_force * (state + self.asymmetry * np.abs(state))
         return self.f0 + (self.k0 + self.k1 * current) * x + viscous + yielded + self.m * a
