@@ -268,11 +268,11 @@ class Damper(Displayable):
         if isinstance(at, Condition):
             loop = self.loop(at)
             return Prediction(loop.excitation, loop.force, at, self.envelope.flags(at), steady=True)
-        run = at
         if isinstance(at, Excitation):
-            run = Run("excitation", at.time, at.displacement, np.zeros(len(at)), at.current)
+            run, motion = Run("excitation", at.time, at.displacement, np.zeros(len(at)), at.current), at
+        else:
+            run, motion = at, centred_motion(at)
         sine = equivalent_sine(run)
-        motion = at if isinstance(at, Excitation) else centred_motion(at)
         if sine.is_sine and not run.current_changes:
             flags = self.envelope.flags(sine.condition)
         else:
