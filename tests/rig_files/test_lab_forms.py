@@ -319,6 +319,37 @@ def test_a_written_profile_does_not_leave_out_the_other_sheets(tmp_path):
     assert currents(import_files([tmp_path / "tests.xlsx"], profile).records) == [0.0, 0.5]
 
 
+@pytest.mark.parametrize("form", ["rows behind each other", "lists in rows", "an object in a text"])
+def test_tests_of_other_lengths_in_one_table_and_their_conditions(tmp_path, form):
+    tests = {0.3: slice(0, T.size - 200), 0.8: slice(0, T.size)}
+    if form == "rows behind each other":
+        with pytest.importorskip("scipy.io").netcdf_file(tmp_path / "t.nc", "w") as file:
+            file.createDimension("test", 2)
+            file.createDimension("obs", 2 * T.size - 200)
+            file.createVariable("row_size", "i4", ("test",))[:] = [T.size - 200, T.size]
+            file.createVariable("coil_current", "f8", ("test",))[:] = list(tests)
+            file.variables["coil_current"].units = "A"
+            for name, unit, values in (("time", "s", T), ("stroke", "mm", X), ("load", "N", None)):
+                own = [force(amperes)[part] if values is None else values[part] for amperes, part in tests.items()]
+                file.createVariable(name, "f8", ("obs",))[:] = np.concatenate(own)
+                file.variables[name].units = unit
+    elif form == "lists in rows":
+        rows = {"current_A": list(tests), "t_s": [T[p].tolist() for p in tests.values()]}
+        rows |= {"stroke_mm": [X[p].tolist() for p in tests.values()]}
+        rows |= {"load_N": [force(amperes)[p].tolist() for amperes, p in tests.items()]}
+        pytest.importorskip("polars").DataFrame(rows).write_parquet(tmp_path / "t.parquet")
+    else:
+        for amperes, part in tests.items():
+            says = {"columns": ["stroke", "load"], "units": ["mm", "N"], "coil": {"current": amperes, "unit": "A"}}
+            y = np.c_[X, force(amperes)][part]
+            np.savez(tmp_path / f"{amperes * 10:.0f}.npz", y=y, fs_Hz=200.0, meta=json.dumps(says))
+    records = import_files([tmp_path]).records
+    assert [float(np.mean(record.current)) for record in records] == pytest.approx(list(tests))
+    for record, (amperes, part) in zip(records, tests.items(), strict=True):
+        np.testing.assert_allclose(record.force, force(amperes)[part], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(record.displacement, 1e-3 * X[part], rtol=0, atol=1e-9)
+
+
 def test_texts_that_hold_no_usable_object_are_texts(tmp_path):
     arrays = {"time_s": T, "disp_mm": X, "force_N": force(0.5)}
     for text in ("{broken", '{"a": 1' + "0" * 400 + "}", '{"a": [1, 2], "b": null}'):

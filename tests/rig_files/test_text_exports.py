@@ -42,6 +42,20 @@ EXPORTS = {
     + lines(lambda i, t, x, f: f"{clock(t):%Y-%m-%d %H:%M:%S};{clock(t).microsecond};{x:.6f};{f:.4f}"),
     "the name of the index below the others": "level,stroke,load\nunits,mm,N\nt [s],,\n"
     + lines(lambda i, t, x, f: f"{t:.3f},{x:.6f},{f:.4f}"),
+    "units that change with the size of the number": "Time,Load,Stroke\n"
+    + lines(
+        lambda i, t, x, f: (
+            f"{clock(t):%Y-%m-%d %H:%M:%S.%f},{f / 1e3:.7f} kN,{x:.6f} mm"
+            if abs(f) >= 400
+            else f"{clock(t):%Y-%m-%d %H:%M:%S.%f},{f:.4f} N,{x * 1e3:.3f} um"
+        )
+    ),
+    "types of numbers below names with their devices": "time\tF_rod\\ES650:1\tz_piston\\ES650:1\tb_on\\DIO:1\n"
+    + "f8\tf8\tf8\tu1\ns\tN\tmm\t\n"
+    + lines(lambda i, t, x, f: f"{t:.3f}\t{f:.4f}\t{x:.6f}\t1"),
+    "a table of gains with units of direct current": "Channel,Name,Function,Gain,Offset,Label\n"
+    + "101,Coil,DC voltage,10,0,ADC\n\nScan,t (s),101 <Load> (LBF),102 <Stroke> (IN)\n"
+    + lines(lambda i, t, x, f: f"{i + 1},{t:.3f},{f / 4.4482216152605:.6f},{x / 25.4:.9f}"),
     "numbers of rows without a name": "t.s,stroke.mm,load.N\n"
     + lines(lambda i, t, x, f: f'"{i + 1}",{t:.3f},{x:.6f},{f:.4f}'),
     "a step for all channels, and a separator behind every line": '"Name","stroke","load",\n"VUnit","mm","N",\n'

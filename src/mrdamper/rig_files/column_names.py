@@ -34,6 +34,7 @@ _EAST_ASIAN = re.compile("[\u3040-\u30ff\u4e00-\u9fff\uac00-\ud7af]")
 _LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
 # Time  1 - default sample rate
 _RATE_GROUP = re.compile(r"\s+\d*\s*-\s*(?:default|fast|slow) sample rate", re.IGNORECASE)
+_DEVICE = re.compile(r"\\[\w.-]{1,30}:[0-9]{1,3}$")  # F_rod\ES650:1
 _FUSED = re.compile(r"[ _.:-]+")
 
 
@@ -81,7 +82,7 @@ def split_name(header: str, unit: str = "") -> Header:
     """Name and unit of a column whose header may hold both: `force_N`, `Force [kN]`, `Kraft in kN`."""
     if len(header) > _LONGEST_NAME:
         return Header(header, unit)
-    text = unicodedata.normalize("NFKC", header).strip()
+    text = _DEVICE.sub("", unicodedata.normalize("NFKC", header).strip())
     if unit:
         match = _BRACKETED.match(text)
         return Header(match["name"] if match and (parse_unit(match["unit"]) or ":" in match["unit"]) else text, unit)

@@ -259,6 +259,8 @@ def _quantities(line: str, decimal: str | None) -> Iterator[Quantity]:
         match = _LINE.match(part) or _SPACED.match(part)
         if match is None or _NUMERIC_CELL.search(match["key"]):  # a range or a calibration
             continue
+        if decimal != "," and "," in match["key"] and "," in match["number"]:  # two cells: gain, offset
+            continue
         key, unit = split_name(match["key"].strip().strip('"'))
         unit = match["unit"] or unit
         unit_of = parse_unit(unit)

@@ -76,10 +76,14 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, togeth
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
     tree = {key: _object_in(value) for key, value in tree.items()}
+    texts = [value for value in tree.values() if isinstance(value, _JsonText)]
+    lists = {f"{key} ": own.pop(key) for own in texts for key in list(own) if isinstance(own[key], list)}
+    tree |= {key: own for key, own in lists.items() if all(isinstance(item, str) for item in own)}
     keys = {"name", "unit", "data"}
     channels = {key: value for key, value in tree.items() if isinstance(value, Mapping) and {*value} == keys}
     arrays = {**tree, **{key: value["data"] for key, value in channels.items()}}
-    tests = _tests_of_arrays(arrays)
+    tests = _tests_of_rows(arrays)
+    tests = _tests_of_arrays(arrays) if tests is arrays else tests
     tree = _with_own_axes(_spread(tree) if tests is arrays else tests)
     stated = next((v for key, v in tree.items() if key.casefold() in KEYS["unit"] and isinstance(v, Mapping)), {})
     pairs = next((v for k, v in tree.items() if k.casefold() in KEYS["unit"] and isinstance(v, list)), [])
@@ -118,13 +122,16 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
         )
 
 
+class _JsonText(dict[str, Any]):
+    """An object that a text beside arrays holds: its lists of words are those of the arrays."""
+
+
 def _object_in(value: Any) -> Any:
     """Return the object that a text holds as JSON; any other value as it is."""
     if not isinstance(value, str) or not value.lstrip().startswith("{"):
         return value
     try:
-        says = json.loads(value)
-        return {str(key): float(v) if isinstance(v, (int, float)) else str(v) for key, v in says.items()}
+        return _JsonText(json.loads(value, parse_int=float))
     except (ValueError, RecursionError, OverflowError):
         return value
 
@@ -249,6 +256,27 @@ def _tests_of_arrays(tree: Mapping[str, Any]) -> Mapping[str, Any]:
         values = {_of_one_test(key): float(np.reshape(numeric[key], -1)[at[of]]) for key, of in conditions.items()}
         own.append({**clocks, **dict(zip(tables, test if clocks else _unpadded(test), strict=True)), **values})
     rest = {key: value for key, value in tree.items() if key not in shapes}
+    return {**rest, **{f"test_{i}": node for i, node in enumerate(own, 1)}}
+
+
+def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Split tests behind each other in long arrays into a node a test, by an array of their numbers of samples."""
+    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf" and v.ndim == 1}
+    samples = max((array.size for array in numeric.values()), default=0)
+    long = [key for key, array in numeric.items() if array.size == samples]
+    counts = [key for key, a in numeric.items() if 1 < a.size < samples and a.dtype.kind in "iu"]
+    counts = [key for key in counts if np.min(numeric[key]) > 1 and np.sum(numeric[key]) == samples]
+    if len(counts) != 1 or sum(split_name(key).role is not None for key in long) < 2:
+        return tree
+    ends = np.cumsum(numeric[counts[0]])
+    parts = {key: np.split(np.asarray(numeric[key]), ends[:-1]) for key in long}
+    short = {key: array for key, array in numeric.items() if array.size == ends.size and key != counts[0]}
+    values = {_of_one_test(key): np.asarray(array) for key, array in short.items()}
+    own = [
+        {key: of[i] for key, of in parts.items()} | {key: float(of[i]) for key, of in values.items()}
+        for i in range(ends.size)
+    ]
+    rest = {key: value for key, value in tree.items() if key not in (*long, *short, counts[0])}
     return {**rest, **{f"test_{i}": node for i, node in enumerate(own, 1)}}
 
 
@@ -401,6 +429,8 @@ def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
     number, unit = (next((lower[key] for key in keys if key in lower), None) for keys in (_VALUE, KEYS["unit"]))
     if above and isinstance(number, float) and isinstance(unit, str):  # {"current": {"value": 0.5, "unit": "A"}}
         says = {f"{above} [{unit}]": number}
+    elif above and isinstance(unit, str) and [float] == [type(v) for v in says.values() if not isinstance(v, str)]:
+        says = {f"{key} [{unit}]" if isinstance(v, float) else key: v for key, v in says.items()}
     for key, value in says.items():
         if isinstance(value, Mapping):
             _tell(node, value, key)

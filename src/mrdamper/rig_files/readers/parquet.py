@@ -14,6 +14,7 @@ import numpy as np
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, damaged, refusing_damage
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source, Words
+from mrdamper.rig_files.readers.nested import MOST_ITEMS, nested_tables
 
 if TYPE_CHECKING:
     import polars as pl
@@ -51,6 +52,13 @@ class _Frame(Reader):
         def loaded(name: str) -> pl.Series:
             return read(self.given(content), columns=[name], **self.options)[name]
 
+        lists = [name for name, kind in schema.items() if isinstance(kind, pl.List) and kind.inner.is_numeric()]
+        if len(lists) > 1 and rows <= MOST_ITEMS:
+            with refusing_damage(source, self.title):
+                frame = read(self.given(content), **self.options)
+                check_unpacked(source, sum(8 * int(frame[name].list.len().sum()) for name in lists))
+                tests = [{k: _of_test(frame[k][i]) for k in schema} for i in range(rows)]
+            return nested_tables(source, {"": tests}, self.title)
         return [_table(source, self.title, schema, rows, loaded)]
 
 
@@ -120,6 +128,13 @@ def words_in(values: pl.Series) -> Words:
     labels = values.unique(maintain_order=True)
     codes = values.replace_strict(labels, pl.int_range(labels.len(), eager=True), return_dtype=pl.Int32)
     return Words(codes.cast(pl.Int32).to_numpy(), tuple(labels.to_list()))  # of no rows they have no kind
+
+
+def _of_test(value: object) -> object:
+    """Return what one row holds of a test: its samples, a number or a text."""
+    if isinstance(value, (int, float)):
+        return float(value)
+    return _plain(value) if hasattr(value, "dtype") else str(value)  # type: ignore[arg-type]
 
 
 def _no_numbers(kind: pl.DataType) -> np.ndarray:

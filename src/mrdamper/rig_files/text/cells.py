@@ -12,9 +12,10 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import CombinedError
 from mrdamper.rig_files.readers.base import RigFileError
-from mrdamper.rig_files.text.layout import Layout, is_comment, split
+from mrdamper.rig_files.text.layout import QUANTITY, Layout, is_comment, split
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, too_long
 from mrdamper.rig_files.text.tokens import MISSING, NUMBER, number, stamp
+from mrdamper.rig_files.units import parse_unit
 
 _MARKS = "#%/"
 _MOST_SHOWN = 10  # wrong cells and rows of a file
@@ -132,8 +133,9 @@ def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: RowF
     matches, comma = NUMBER[mark].fullmatch, mark == ","
     for sign, meant in form.layout.writes:
         cells = [cell.replace(sign, meant) for cell in cells]
+    factors: dict[int, float] = {}
     if form.layout.behind and form.layout.behind[column]:
-        cells = [cell.removesuffix(form.layout.behind[column]).rstrip() for cell in cells]
+        cells, factors = _without_unit(cells, form.layout.behind[column])
     values = np.empty(len(cells))
     for i, cell in enumerate(cells):
         value = float(cell.replace(",", ".") if comma else cell) if matches(cell) else number(cell, mark)
@@ -149,8 +151,19 @@ def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: RowF
                     column=column + 1,
                 )
             )
-        values[i] = math.nan if value is None else value
+        values[i] = math.nan if value is None else value * factors.get(i, 1.0)
     return values
+
+
+def _without_unit(cells: Sequence[str], unit: str) -> tuple[list[str], dict[int, float]]:
+    """Return cells without the units behind their numbers, and the factors of those in another one: 1.2 kN, 850 N."""
+    bare, factors, usual = list(cells), {}, parse_unit(unit)
+    for i, cell in enumerate(cells):
+        match = QUANTITY.fullmatch(cell)
+        own = parse_unit(match[2]) if match else None
+        if match and own and usual and (own.dimension, own.offset) == (usual.dimension, usual.offset):
+            bare[i], factors[i] = match[1], 1.0 if own == usual else own.factor / usual.factor
+    return bare, factors
 
 
 def _stamps(cells: Sequence[str], column: int, lines: Sequence[int], form: RowFormat) -> Floats:

@@ -21,7 +21,7 @@ from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RigFileError, Source
 from mrdamper.rig_files.text.notes import with_notes_beside
 from mrdamper.rig_files.text.tokens import FORTRAN, MISSING, looks_numeric, stamp
-from mrdamper.rig_files.units import is_unit
+from mrdamper.rig_files.units import is_unit, parse_unit
 from mrdamper.rig_files.vocabulary import words
 
 Kind = Literal["number", "stamp", "text"]
@@ -40,11 +40,10 @@ _UNIT_KEYS, _NOTES, _SCALES = words("unit"), words("notes"), words("scale") | {"
 _MOST_LEVELS = 4  # lines of headings
 _TELLING = 2  # columns whose names tell what they are
 _LONGEST_HEADING = 6  # words
+_TYPE = re.compile(r"[a-z]{1,6}[0-9]{1,2}")  # f8, int16
 _WORD = re.compile(r"(?:[^\W\d_]-)?[^\W\d_]{3,}")  # also x-axis
 _NAME_AND_UNIT = re.compile(r"[^\s\[(<{]+(?:\s*\[[^\[\]]*\]|\s*\([^()]*\))?")
-_QUANTITY = re.compile(
-    r"([+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)[ \u00a0]?([^\W\d_]\S{0,6}|°\S)"
-)
+QUANTITY = re.compile(r"([+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)[ \u00a0]?([^\W\d_]\S{0,6}|°\S)")
 LISTED = re.compile(  # a numbered line that names a column and its unit: 1=Time;min, COL 2 FORCE (LBF)
     r"^[\s\"#%]*(?:ch(?:annel)?|column|col|spalte|kanal)?[\s#._]*(?P<number>[0-9]{1,3})\"?(?:\s*[=:;,\t]\s*|\s+)\"?"
     r"(?P<name>[^\d\W][^;,\t\[\](){}=]*?)\"?\s*[;,\t\[({]\s*\"?(?P<unit>[^;,\t\[\](){}\"]{1,12})\"?[\])}]?[\s;,\"]*$",
@@ -214,7 +213,7 @@ def _without_units(lines: Sequence[str]) -> Sequence[str]:
 def _bare_row(line: str, separator: str) -> str:
     """Return a row of which at least two cells are numbers with units, without the units; empty if it is none."""
     cells = cells_of(line, separator)
-    matches = [match if (match := _QUANTITY.fullmatch(cell)) and is_unit(match[2]) else None for cell in cells]
+    matches = [match if (match := QUANTITY.fullmatch(cell)) and is_unit(match[2]) else None for cell in cells]
     others = [cell for cell, match in zip(cells, matches, strict=True) if cell and not match]
     if len(cells) - cells.count("") - len(others) < 2 or any(stamp(cell) is None for cell in others):
         return ""
@@ -222,14 +221,11 @@ def _bare_row(line: str, separator: str) -> str:
 
 
 def _unit_behind(cells: Sequence[str]) -> str:
-    """Return the one unit that stands behind every number of a column, as it is written."""
-    units: set[str] = set()
-    for match in (_QUANTITY.fullmatch(cell) for cell in cells if cell):
-        units.add(match[2] if match else "")
-        if len(units) > 1 or "" in units:
-            return ""
-    unit = units.pop() if units else ""
-    return unit if is_unit(unit) else ""
+    """Return the first unit behind the numbers of a column, as it is written, where all are of its kind: N and kN."""
+    matches = [QUANTITY.fullmatch(cell) for cell in cells if cell]
+    units = list(dict.fromkeys(match[2] if match else "" for match in matches))
+    kinds = {(unit.dimension, unit.offset) if (unit := parse_unit(text)) else () for text in units}
+    return units[0] if len(kinds) == 1 and all(map(is_unit, units)) else ""
 
 
 def _writes(rows: Sequence[Sequence[str]]) -> tuple[tuple[str, str], ...]:
@@ -472,6 +468,9 @@ def _header_lines(
                 return named[-1], units
             if units == fitting[-2] and not naming:  # above the names
                 return last, units
+        naming = [
+            i for i in naming if 2 * len({*cells[i]}) > width or not all(map(_TYPE.fullmatch, cells[i]))
+        ] or naming
         if units is not None and (units == last or not roles[last]):
             return (naming[-1] if naming else None), units
         last = telling[-1] if telling and not roles[last] else last  # names of sensors or types below the names
