@@ -35,6 +35,19 @@ def require_the_tests(folder) -> None:
         np.testing.assert_allclose(record.force, force(amperes), rtol=0, atol=1e-2)
 
 
+def test_fields_and_a_description_of_a_data_package(tmp_path):
+    (tmp_path / "data").mkdir()
+    write(tmp_path / "data", "t,u,f\n")
+    titles = {"t": ("Time", "s"), "u": ("Piston displacement", "mm"), "f": ("Damper force", "N")}
+    fields = [{"name": name, "title": title, "unit": unit} for name, (title, unit) in titles.items()]
+    files = [
+        {"path": f"data/{n}.csv", "description": f"Coil current {a} A", "schema": {"fields": fields}}
+        for n, a in CURRENTS.items()
+    ]
+    (tmp_path / "datapackage.json").write_text(json.dumps({"name": "rig-7", "resources": files}))
+    require_the_tests(tmp_path)
+
+
 def test_units_and_current_of_a_json_file_of_the_same_name(tmp_path):
     write(tmp_path, "zeit,hub,kraft\n")
     for name, amperes in CURRENTS.items():

@@ -56,6 +56,21 @@ EXPORTS = {
     "a table of gains with units of direct current": "Channel,Name,Function,Gain,Offset,Label\n"
     + "101,Coil,DC voltage,10,0,ADC\n\nScan,t (s),101 <Load> (LBF),102 <Stroke> (IN)\n"
     + lines(lambda i, t, x, f: f"{i + 1},{t:.3f},{f / 4.4482216152605:.6f},{x / 25.4:.9f}"),
+    "a start and a step in keys of two words, and kinds of axes below": "Run\t:\t7\n\nPoint\t\tF:+Z\tX:+Z\n"
+    + "Quantity\tTime\tForce\tDisplacement\nUnit\ts\tN\tmm\nX start\t\t0\t0\nX increment\t\t0.005\t0.005\n"
+    + "Data\tX\tY\tY\n"
+    + lines(lambda i, t, x, f: f"\t{t:.3f}\t{f:.4f}\t{x:.6f}"),
+    "attributes above the rows": "% rig 7, units: time [s], stroke [mm], load [N]\n@RELATION rig\n\n"
+    + "@ATTRIBUTE time NUMERIC\n@ATTRIBUTE stroke NUMERIC\n@ATTRIBUTE load NUMERIC\n\n@DATA\n"
+    + lines(lambda i, t, x, f: f"{t:.3f},{x:.6f},{f:.4f}"),
+    "waves": "IGOR\nWAVES/D stroke, load\nBEGIN\n"
+    + lines(lambda i, t, x, f: f"\t{x:.6f}\t{f:.4f}")
+    + 'END\nX SetScale/P x 0,0.005,"s", stroke; SetScale y 0,0,"mm", stroke\n'
+    + 'X SetScale/P x 0,0.005,"s", load; SetScale y 0,0,"N", load\n',
+    "blocks of channels below each other": "Version\t2\n\n{Outing}\nCar\trig\n\n{ChannelBlock}\nTime\tDamper Force[N]\n"
+    + lines(lambda i, t, x, f: f"{t:.3f}\t{f:.4f}")
+    + "\n{ChannelBlock}\nTime\tDamper Position[mm]\n"
+    + lines(lambda i, t, x, f: f"{t:.3f}\t{x:.6f}"),
     "numbers of rows without a name": "t.s,stroke.mm,load.N\n"
     + lines(lambda i, t, x, f: f'"{i + 1}",{t:.3f},{x:.6f},{f:.4f}'),
     "a step for all channels, and a separator behind every line": '"Name","stroke","load",\n"VUnit","mm","N",\n'

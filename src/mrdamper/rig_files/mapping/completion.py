@@ -263,7 +263,7 @@ def _with_listed_units(table: RawTable) -> RawTable:
     listed: dict[int, set[str]] = {}
     for line in table.remarks if names else ():
         cells = [cell.strip(' "') for cell in re.split(r"[,;|\t]", line[:_LONGEST_LINE].lstrip("#%/ "))]
-        both = [*cells, cells[0].partition(": ")[2]]  # columns: time [s], load [N]
+        both = [*cells, *(cell.partition(": ")[2] for cell in cells)]  # rig 7, columns: time [s], load [N]
         for header in (split_name(_COLON.sub(r"\1 [\2]", cell)) for cell in both):
             i = wanted.get(header.name.strip().casefold())
             if i is not None and header.dimension and header.dimension == DIMENSION.get(header.role or ""):

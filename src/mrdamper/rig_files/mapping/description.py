@@ -20,7 +20,7 @@ from mrdamper.rig_files.mapping.signs import states_sign
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED
-from mrdamper.rig_files.text.short import short_lines
+from mrdamper.rig_files.text.short import packaged_lines, short_lines
 from mrdamper.rig_files.units import is_unit, parse_unit
 
 _LARGEST = 2**16  # bytes
@@ -109,6 +109,8 @@ def with_description(table: RawTable, path: Path, profile: Profile) -> RawTable:
     named = [p for p in named if (p.suffix in _STRUCTURES or is_description(p))]
     if named or (other is not None and is_description(other)):
         lines = short_lines(named[0] if named else other)  # type: ignore[arg-type]
+        return replace(table, remarks=(*table.remarks, *lines))
+    if lines := packaged_lines(path):
         return replace(table, remarks=(*table.remarks, *lines))
     elements = _elements(path, other)
     if not elements:

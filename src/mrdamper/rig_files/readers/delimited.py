@@ -17,6 +17,7 @@ from mrdamper.rig_files.text.blocks import Block, find_blocks
 from mrdamper.rig_files.text.bulk import read_bulk
 from mrdamper.rig_files.text.cells import RowFormat, field_count, read_cells, split_rows
 from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
+from mrdamper.rig_files.text.programs import as_plain_table
 from mrdamper.rig_files.text.spool import Spool
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, line_feeds, open_text, too_long
 from mrdamper.rig_files.text.tokens import looks_numeric
@@ -52,7 +53,7 @@ class DelimitedText(Reader):
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a block of rows."""
-        stream = open_text(_with_keys_above(_plain(source)), form)
+        stream = open_text(_with_keys_above(_plain(as_plain_table(source))), form)
         head = stream.head()
         whole = stream.start + len(head) >= stream.stop
         raw = head.split(b"\n", _HEAD_LINES)

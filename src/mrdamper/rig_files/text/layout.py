@@ -41,7 +41,7 @@ _MOST_LEVELS = 4  # lines of headings
 _TELLING = 2  # columns whose names tell what they are
 _LONGEST_HEADING = 6  # words
 _TYPE = re.compile(r"[a-z]{1,6}[0-9]{1,2}")  # f8, int16
-_WORD = re.compile(r"(?:[^\W\d_]-)?[^\W\d_]{3,}")  # also x-axis
+_WORD = re.compile(r"(?:[^\W\d_][- ])?[^\W\d_]{3,}")  # also x-axis, X start
 _NAME_AND_UNIT = re.compile(r"[^\s\[(<{]+(?:\s*\[[^\[\]]*\]|\s*\([^()]*\))?")
 QUANTITY = re.compile(r"([+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)[ \u00a0]?([^\W\d_]\S{0,6}|°\S)")
 LISTED = re.compile(  # a numbered line that names a column and its unit: 1=Time;min, COL 2 FORCE (LBF)

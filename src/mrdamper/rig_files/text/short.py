@@ -40,6 +40,20 @@ def short_lines(path: Path) -> list[str]:
     return [line for line in text.splitlines() if "|" not in line or not _RULE.fullmatch(line)]
 
 
+def packaged_lines(path: Path) -> list[str]:
+    """Return what the data package (datapackage.json) of a file's folder, or of the one above, states of the file."""
+    for folder in path.parents[:2]:
+        try:
+            content = (folder / "datapackage.json").read_bytes()[:_LARGEST]
+            entries = [e for e in json.loads(content)["resources"] if folder / e["path"] == path]
+            fields = [field for entry in entries for field in entry.get("schema", {}).get("fields", [])]
+            lines = ["; ".join(str(field.get(key, "")) for key in ("name", "title", "unit")) for field in fields]
+            return [*lines, *(f"description: {entry['description']}" for entry in entries if "description" in entry)]
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+            continue  # none, or no data package
+    return []
+
+
 def _mapping(lines: list[str]) -> dict[str, Any]:
     """Return pairs, pairs in braces, and lists of objects of a YAML text; all other structure is omitted."""
     tree: dict[str, Any] = {}

@@ -1,0 +1,76 @@
+"""Texts of programs that keep names, units and samples apart, as plain tables: ARFF, Igor waves, blocks of channels."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import zip_longest
+
+from mrdamper.rig_files.readers.base import Source, scratch
+
+_HEAD = 8192  # bytes
+_LARGEST = 50 * 10**6  # bytes
+_ARFF = re.compile(r"(?ims)^@relation\b.*?^@attribute\b.*?^@data\b[^\n]*\n")
+_ATTRIBUTE = re.compile(r"(?im)^@attribute\s+(?:'([^']+)'|\"([^\"]+)\"|(\S+))")
+_WAVES = re.compile(r"(?im)^waves(?:/\w+)*\s+([^\n]+)\nbegin\n(.*?)\nend\b", re.DOTALL)
+_X_SCALE = re.compile(r"(?i)setscale */p *x +([^,\n]+),([^,\n]+), *\"([^\"\n]*)\" *, *(\w+)")
+_Y_SCALE = re.compile(r"(?i)setscale *(?:/\w+ *)?[yd] +[^,\n]+,[^,\n]+, *\"([^\"\n]*)\" *, *(\w+)")
+_BLOCK = re.compile(r"(?m)^\{ChannelBlock\}\n(?:Time)\t([^\n]+)\n([^{]*)")
+
+
+def as_plain_table(source: Source) -> Source:
+    """Return a text of one of these programs as names above rows; any other as it is."""
+    head = source.head(_HEAD)
+    way = next((way for mark, way in _WAYS.items() if re.search(mark, head)), None)
+    if way is None or source.size > _LARGEST:
+        return source
+    source.file.seek(0)
+    text = source.file.read().decode("latin-1").replace("\r\n", "\n").replace("\r", "\n")
+    lines = list(way(text))
+    if not lines:
+        return source
+    file = scratch(source.keep)
+    file.write("\n".join([*lines, ""]).encode("latin-1"))
+    return replace(source, file=file, size=file.tell())
+
+
+def _arff(text: str) -> Iterator[str]:
+    head = _ARFF.search(text)
+    if head is None:
+        return
+    above = text[: head.end()].splitlines()[:-1]  # as comments, so that the numbers of lines stay
+    yield from (f"# {line.lstrip('%')}" if line.strip() else line for line in above)
+    yield ",".join(next(filter(None, match.groups())) for match in _ATTRIBUTE.finditer(head[0]))
+    yield text[head.end() :].rstrip("\n")
+
+
+def _igor(text: str) -> Iterator[str]:
+    waves = [(names.replace(",", " ").split(), rows.splitlines()) for names, rows in _WAVES.findall(text)]
+    units = {name: unit for unit, name in _Y_SCALE.findall(text)}
+    clocks = {name: scale for *scale, name in _X_SCALE.findall(text)}
+    names = [name for own, _ in waves for name in own]
+    if not waves or len({len(rows) for _, rows in waves}) > 1:
+        return
+    yield from (f"# {line}" for line in re.findall(r"(?im)^x +note[^\n]*?\"([^\"\n]*)\"", text))
+    step = {tuple(clocks.get(name, ())) for name in names}
+    start, dt, unit = step.pop() if len(step) == 1 and () not in step else ("", "", "")
+    yield "\t".join(([f"time [{unit}]"] if unit else []) + [f"{n} [{units[n]}]" if n in units else n for n in names])
+    for i, rows in enumerate(zip(*(rows for _, rows in waves), strict=True)):
+        yield "\t".join(([f"{float(start) + i * float(dt):.12g}"] if unit else []) + [row.strip() for row in rows])
+
+
+def _blocks(text: str) -> Iterator[str]:
+    blocks = [(name, [row.split("\t") for row in rows.strip().splitlines()]) for name, rows in _BLOCK.findall(text)]
+    if not blocks or any(len(row) != 2 for _, rows in blocks for row in rows):
+        return
+    yield "\t".join(f"Time_{name.partition('[')[0].strip()} [s]\t{name}" for name, _ in blocks)
+    for cells in zip_longest(*(rows for _, rows in blocks), fillvalue=("", "")):
+        yield "\t".join(cell for pair in cells for cell in pair)
+
+
+_WAYS = {
+    rb"(?im)^@relation\s": _arff,
+    rb"^IGOR\s": _igor,
+    rb"(?m)^\{ChannelBlock\}": _blocks,
+}
