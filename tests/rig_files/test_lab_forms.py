@@ -499,6 +499,24 @@ def test_a_number_of_hdf5_beside_the_channels_has_the_unit_of_its_attribute(tmp_
 NODES = "Node;Meaning;Unit\nPLC.PT07;Stroke;mm\nPLC.LC02;Load;kN\nPLC.FT01;Coil current;mA\n"
 
 
+def test_a_table_of_tags_beside_says_what_their_indices_mean(tmp_path):
+    columns = {"Main.Damper_Force_N": force(0.5), "Main.Position_mm": X, "Main.Coil_Current_A": np.full(T.size, 0.5)}
+    clock = [f"05/03/2023,14:20:0{int(t)},{round(t * 1e3) % 1000}" for t in T]
+    body = [f"{at},{i},{v:.6f}" for i, of in enumerate(columns.values()) for at, v in zip(clock, of, strict=True)]
+    (tmp_path / "1 (Float).csv").write_text("\n".join(["Date,Time,Millitm,TagIndex,Value", *body, ""]))
+    tags = [f'"[PLC]{name}","{i}","2"' for i, name in enumerate(columns)]
+    (tmp_path / "1 (Tagname).csv").write_text("\n".join(["TagName,TTagIndex,TagType", *tags, ""]))
+    (record,) = import_files([tmp_path]).records
+    np.testing.assert_allclose(record.force, force(0.5), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(record.time, T, rtol=0, atol=1e-9)
+    assert currents([record]) == [0.5]
+
+
+def test_numbers_of_samples_of_the_cycles_of_a_test_split_no_test(tmp_path):
+    np.savez(tmp_path / "0.5A.npz", time_s=T, disp_mm=X, force_N=force(0.5), per_cycle=np.full(4, T.size // 4))
+    assert [record.time.size for record in import_files([tmp_path]).records] == [T.size]
+
+
 @pytest.mark.parametrize("long", [True, False], ids=["a row a value", "a column a node"])
 def test_a_list_beside_says_what_the_names_of_a_controller_mean(tmp_path, long):
     names, columns = ("PLC.PT07", "PLC.LC02", "PLC.FT01"), (X, 1e-3 * force(0.5), np.full(T.size, 500.0))

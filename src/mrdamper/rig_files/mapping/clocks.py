@@ -22,7 +22,7 @@ from mrdamper.rig_files.text.tokens import stamp
 from mrdamper.rig_files.units import is_unit, parse_unit
 from mrdamper.rig_files.vocabulary import words
 
-_FRACTIONS = {"millisekunden": "ms"}
+_FRACTIONS = {"millisekunden": "ms", "millitm": "ms"}
 _DATES = words("date")
 _CYCLE = re.compile(r"(?i)(?:cycle|zyklus|ciclo|cykl|цикл|サイクル|循环)s?(?:[ ._]*(?:count|number|no|nr|#)\.?)?$")
 _AXIS_UNIT = re.compile(

@@ -92,6 +92,8 @@ def _of_channels(line: str) -> str:
     cells = [cell.strip().strip('"') for cell in re.split(r"[,;\t|]", line.strip(" |"))]
     if len(cells) > 2 and cells[0].isascii() and cells[0].isdigit() and parse_unit(cells[-1]):
         return f"channel {cells[0]}: {' '.join(cells[1:])}"
+    if len(cells) > 1 and split_name(cells[0]).role and all(c.isascii() and c.isdigit() for c in cells[1:]):
+        return f"channel {cells[1]}: {cells[0]}"  # a tag with its index, and its type
     units = [split_name(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]
     return (
         line
