@@ -87,6 +87,20 @@ def test_numbered_keys_state_names_units_scales_and_the_step(tmp_path):
     assert currents([record]) == [0.5]
 
 
+def test_curves_of_a_figure_are_channels_by_the_titles_of_their_axes(tmp_path):
+    axes = {"xaxis": "Time [s]", "yaxis": "Stroke [mm]", "xaxis2": "Time [s]", "yaxis2": "Force [N]"}
+    data = [
+        {"name": f"{a} A", "x": T.tolist(), "y": y.tolist(), "xaxis": f"x{n}", "yaxis": f"y{n}"}
+        for a in (0.2, 0.9)
+        for n, y in (("", X), ("2", force(a)))
+    ]
+    layout = {axis: {"title": {"text": title}} for axis, title in axes.items()}
+    (tmp_path / "fig.json").write_text(json.dumps({"data": data, "layout": layout}))
+    records = import_files([tmp_path]).records
+    assert currents(records) == [0.2, 0.9]
+    np.testing.assert_allclose(records[1].force, force(0.9), rtol=0, atol=1e-9)
+
+
 def test_points_of_time_and_value_are_channels(tmp_path):
     tests = [
         {

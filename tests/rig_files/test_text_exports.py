@@ -71,6 +71,9 @@ EXPORTS = {
     + lines(lambda i, t, x, f: f"{t:.3f}\t{f:.4f}")
     + "\n{ChannelBlock}\nTime\tDamper Position[mm]\n"
     + lines(lambda i, t, x, f: f"{t:.3f}\t{x:.6f}"),
+    "sections with a clock without colons": "[header]\ntime\nLoad N\n\n[channel units]\nN\nmm\n\n"
+    + "[column names]\ntime load stroke\n\n[data]\n"
+    + lines(lambda i, t, x, f: f"{clock(t):%H%M%S.%f} {f:+.9E} {x:+.9E}"),
     "numbers of rows without a name": "t.s,stroke.mm,load.N\n"
     + lines(lambda i, t, x, f: f'"{i + 1}",{t:.3f},{x:.6f},{f:.4f}'),
     "a step for all channels, and a separator behind every line": '"Name","stroke","load",\n"VUnit","mm","N",\n'

@@ -33,7 +33,7 @@ class Json(Reader):
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a node that holds lists of numbers."""
-        tree = _tree(_parsed(source, whole(source, self.title)))
+        tree = _of_figure(_tree(_parsed(source, whole(source, self.title))))
         if isinstance(tree, Mapping) and _SAVED_MODEL in map(str, tree.values()):
             remedy = "give it to mrdamper predict, validate or export; tests are what import reads"
             raise NoTableError("E_FORMAT", "a saved model", file=source.name, remedy=remedy)
@@ -77,6 +77,25 @@ def _parsed(source: Source, content: bytes) -> Any:
         raise source.refuse(
             "E_FORMAT", "nested too deeply, or a number without end", "export the samples as lists"
         ) from error
+
+
+def _of_figure(tree: Any) -> Any:
+    """Return the curves of a figure of Plotly by their names, each called by the title of its axis; else the tree."""
+    traces, layout = (tree.get("data"), tree.get("layout")) if isinstance(tree, Mapping) else (None, None)
+    listed = isinstance(traces, list) and all(isinstance(trace, Mapping) for trace in traces)
+    if not listed or not traces or not isinstance(layout, Mapping):
+        return tree
+    curves: dict[str, dict[str, Any]] = {}
+    for trace in traces:
+        for axis in "xy":
+            own = layout.get(str(trace.get(f"{axis}axis", axis)).replace(axis, f"{axis}axis", 1))
+            title = own.get("title", "") if isinstance(own, Mapping) else ""
+            title = title.get("text", "") if isinstance(title, Mapping) else title
+            curve, values = curves.setdefault(str(trace.get("name", "")), {}), trace.get(axis)
+            if not title or not isinstance(values, np.ndarray) or not np.array_equal(curve.get(title, values), values):
+                return tree  # no figure, or two curves of one name
+            curve[title] = values
+    return curves
 
 
 def _with_header(lines: list[Any]) -> Any:

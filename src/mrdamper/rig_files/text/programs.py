@@ -1,4 +1,4 @@
-"""Texts of programs that keep names, units and samples apart, as plain tables: ARFF, Igor waves, blocks of channels."""
+"""Texts of programs that keep names, units and samples apart, as plain tables: ARFF, Igor waves, blocks, sections."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ _LARGEST = 50 * 10**6  # bytes
 _ARFF = re.compile(r"(?ims)^@relation\b.*?^@attribute\b.*?^@data\b[^\n]*\n")
 _ATTRIBUTE = re.compile(r"(?im)^@attribute\s+(?:'([^']+)'|\"([^\"]+)\"|(\S+))")
 _WAVES = re.compile(r"(?im)^waves(?:/\w+)*\s+([^\n]+)\nbegin\n(.*?)\nend\b", re.DOTALL)
-_X_SCALE = re.compile(r"(?i)setscale */p *x +([^,\n]+),([^,\n]+), *\"([^\"\n]*)\" *, *(\w+)")
+_NUMBER = r"([+-]?[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,2})?)"
+_X_SCALE = re.compile(rf"(?i)setscale */p *x +{_NUMBER}, *{_NUMBER}, *\"([^\"\n]*)\" *, *(\w+)")
 _Y_SCALE = re.compile(r"(?i)setscale *(?:/\w+ *)?[yd] +[^,\n]+,[^,\n]+, *\"([^\"\n]*)\" *, *(\w+)")
+_CLOCK = r"[0-9]{6}(?:\.[0-9]+)?"  # 142003.25
 _BLOCK = re.compile(r"(?m)^\{ChannelBlock\}\n(?:Time)\t([^\n]+)\n([^{]*)")
 
 
@@ -69,7 +71,22 @@ def _blocks(text: str) -> Iterator[str]:
         yield "\t".join(cell for pair in cells for cell in pair)
 
 
+def _sections(text: str) -> Iterator[str]:
+    says = {
+        name: body.strip() for name, body in re.findall(r"(?m)^\[([^\]\n]+)\]\n((?:[^\[\n][^\n]*\n|\n)*)", f"{text}\n")
+    }
+    names, units = says.get("column names", "").split(), says.get("channel units", "").splitlines()
+    rows = [line.split() for line in says.get("data", "").splitlines() if line.strip()]
+    if len(names) <= len(units) or names[0] != "time" or any(not re.fullmatch(_CLOCK, row[0]) for row in rows):
+        return
+    yield "\t".join(names)
+    yield "\t".join(["s", *[""] * (len(names) - 1 - len(units)), *units])  # those of the last columns
+    for clock, *cells in rows:
+        yield "\t".join([f"{clock[:2]}:{clock[2:4]}:{clock[4:]}", *cells])
+
+
 _WAYS = {
+    rb"(?m)^\[column names\]\r?$": _sections,
     rb"(?im)^@relation\s": _arff,
     rb"^IGOR\s": _igor,
     rb"(?m)^\{ChannelBlock\}": _blocks,
