@@ -333,6 +333,28 @@ def test_a_written_profile_does_not_leave_out_the_other_sheets(tmp_path):
     assert currents(import_files([tmp_path / "tests.xlsx"], profile).records) == [0.0, 0.5]
 
 
+@pytest.mark.parametrize("form", ["numbers", "starts", "vectors"])
+def test_tests_of_hdf5_of_other_lengths(tmp_path, form):
+    h5py = pytest.importorskip("h5py")
+    sizes, amperes = [T.size - 200, T.size], [0.3, 0.8]
+    channels = {"time": ("s", [T, T]), "stroke": ("mm", [X, X]), "load": ("N", [force(a) for a in amperes])}
+    with h5py.File(tmp_path / "t.h5", "w") as file:
+        for name, (unit, values) in {**channels, "coil_current": ("A", [])}.items():
+            own = [v[:n] for v, n in zip(values, sizes, strict=False)]
+            if form == "vectors" and own:
+                data = file.create_dataset(name, (2,), dtype=h5py.vlen_dtype("f8"))
+                data[0], data[1] = own
+            else:
+                file[name] = np.concatenate(own) if own else np.array(amperes)
+            file[name].attrs["units"] = unit
+        if form != "vectors":
+            file["of_test"] = np.array(sizes if form == "numbers" else [0, sizes[0]])
+    records = import_files([tmp_path]).records
+    assert currents(records) == amperes
+    for record, a, n in zip(records, amperes, sizes, strict=True):
+        np.testing.assert_allclose(record.force, force(a)[:n], rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("form", ["rows behind each other", "lists in rows", "an object in a text"])
 def test_tests_of_other_lengths_in_one_table_and_their_conditions(tmp_path, form):
     tests = {0.3: slice(0, T.size - 200), 0.8: slice(0, T.size)}

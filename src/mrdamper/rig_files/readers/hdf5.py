@@ -108,6 +108,10 @@ class _Walk:
             references = np.reshape(item[()], -1) if _is_matlab(item) else []
             cells = [self._at(item.file, r, depth) for r in references] if len(references) <= MOST_STRUCTS else []
             return {name: cells or np.empty(2, dtype=object)}
+        vectors = h5py.check_vlen_dtype(item.dtype)
+        if vectors is not None and vectors.kind in "iuf" and item.ndim == 1 and item.size <= MOST_STRUCTS:
+            unit = next((_text(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), "")
+            return {name: list(item[()]), f"{name}_unit": unit}
         value = self._dataset(name, item)
         unit = next((_text(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), "")
         if not isinstance(value, Stored):

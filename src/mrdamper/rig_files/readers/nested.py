@@ -200,6 +200,7 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     at = np.indices(outer).reshape(len(outer), -1)
     beside = {}
     for key, value in tree.items():
+        value = value["data"] if isinstance(value, Mapping) and {*value} == {"name", "unit", "data"} else value
         if isinstance(value, Array) and value.dtype.kind in "iuf" and key not in chosen:
             shape = tuple(n for n in value.shape if n > 1)
             if shape == outer:
@@ -262,17 +263,18 @@ def _tests_of_arrays(tree: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     """Split tests behind each other in long arrays into a node a test, by an array of their numbers of samples."""
-    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf" and v.ndim == 1}
+    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf" and v.size in v.shape}
     samples = max((array.size for array in numeric.values()), default=0)
     long = [key for key, array in numeric.items() if array.size == samples]
-    counts = [key for key, a in numeric.items() if 1 < a.size < samples and a.dtype.kind in "iu"]
-    counts = [key for key in counts if np.min(numeric[key]) > 1 and np.sum(numeric[key]) == samples]
+    places = {key: _ends_of(a, samples) for key, a in numeric.items() if 1 < a.size < samples / _FEWEST_SAMPLES}
+    counts = [key for key, ends in places.items() if ends is not None]
     if len(counts) != 1 or sum(split_name(key).role is not None for key in long) < 2:
         return tree
-    ends = np.cumsum(numeric[counts[0]])
-    parts = {key: np.split(np.asarray(numeric[key]), ends[:-1]) for key in long}
+    ends = places[counts[0]]
+    assert ends is not None
+    parts = {key: np.split(np.reshape(numeric[key], -1), ends[:-1]) for key in long}
     short = {key: array for key, array in numeric.items() if array.size == ends.size and key != counts[0]}
-    values = {_of_one_test(key): np.asarray(array) for key, array in short.items()}
+    values = {_of_one_test(key): np.reshape(array, -1) for key, array in short.items()}
     clocks = [of for key, of in parts.items() if split_name(key).role == "time"]
     goes_on = any(after[0] > before[-1] for of in clocks for before, after in pairwise(of))
     if goes_on and not any(names_condition(split_name(key).name, "current") for key in values):  # cycles of one test
@@ -283,6 +285,17 @@ def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     ]
     rest = {key: value for key, value in tree.items() if key not in (*long, *short, counts[0])}
     return {**rest, **{f"test_{i}": node for i, node in enumerate(own, 1)}}
+
+
+def _ends_of(array: Array, samples: int) -> np.ndarray | None:
+    """Return where tests end, by their numbers of samples or by where they start, with or without the end of all."""
+    values = np.reshape(array, -1).astype(float)
+    if np.any(values != np.floor(values)):
+        return None
+    ends = np.cumsum(values) if np.sum(values) == samples else np.unique([*values[1:], samples])
+    apart = np.diff(ends, prepend=0).min() >= _FEWEST_SAMPLES and ends[-1] == samples
+    starts = values[0] == 0 and np.all(np.diff(values) > 0)
+    return ends.astype(int) if apart and (starts or np.sum(values) == samples) else None
 
 
 def _unpadded(matrix: np.ndarray) -> np.ndarray:
