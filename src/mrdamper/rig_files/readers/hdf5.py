@@ -109,7 +109,12 @@ class _Walk:
             cells = [self._at(item.file, r, depth) for r in references] if len(references) <= MOST_STRUCTS else []
             return {name: cells or np.empty(2, dtype=object)}
         vectors = h5py.check_vlen_dtype(item.dtype)
-        if vectors is not None and vectors.kind in "iuf" and item.ndim == 1 and item.size <= MOST_STRUCTS:
+        if (
+            isinstance(vectors, np.dtype)
+            and vectors.kind in "iuf"
+            and len(item.shape) == 1
+            and len(item) <= MOST_STRUCTS
+        ):
             unit = next((_text(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), "")
             return {name: list(item[()]), f"{name}_unit": unit}
         value = self._dataset(name, item)
