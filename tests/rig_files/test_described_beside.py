@@ -200,6 +200,16 @@ def test_codes_of_names_are_listed_on_lines_or_on_one(between, tmp_path):
     require_the_tests(tmp_path)
 
 
+@pytest.mark.parametrize("heading", ["Fuses: ", "Fuses:\n", "Supply limits. ", "Messbereich: "])
+def test_codes_below_a_heading_of_ratings_are_no_currents(heading, tmp_path):
+    write(tmp_path, "time [s],stroke [mm],load [N]\n")
+    codes = [f"{name} = {amperes} A" for name, amperes in CURRENTS.items()]
+    (tmp_path / "README.txt").write_text(heading + ", ".join(codes))
+    assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
+    (tmp_path / "README.txt").write_text(f"{heading}{codes[0]}\nTests:\n" + "\n".join(codes))
+    require_the_tests(tmp_path)
+
+
 def test_currents_in_a_line_below_the_units_belong_to_the_columns_beside_one_time(tmp_path):
     columns = [c for amperes in CURRENTS.values() for c in (X, force(amperes))]
     over = "".join(f"\tI = {amperes} A" * 2 for amperes in CURRENTS.values())

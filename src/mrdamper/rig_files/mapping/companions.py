@@ -13,7 +13,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import InputError
 from mrdamper.rig_files.coil_current import as_data, current_of, with_value_of_name
-from mrdamper.rig_files.column_names import role_of, split_name, words_of
+from mrdamper.rig_files.column_names import RATING, role_of, split_name, words_of
 from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.conditions import amperes
 from mrdamper.rig_files.file_records import digest_of, records_of_file
@@ -184,8 +184,12 @@ def currents_beside(
     lines = short_lines(path) if path.suffix.lower() in TEXTS else []
     rows = zip(results.cells, results.current, strict=True) if results else ()  # Level, Current (A): L1, 0.35
     lines += [f"{cells[1]}: {value:g} A" for cells, value in rows if len(cells) > 1]
-    codes_of = (part for line in dict.fromkeys(lines) for part in re.split(r"\s*[;|]\s*|,\s+|[.:]\s+(?=\w+ ?=)", line))
-    matches = [match for part in codes_of if (match := _CODE.match(part))]
+    matches, ratings = [], False
+    for line in lines:
+        parts = re.split(r"\s*[;|]\s*|,\s+|[.:]\s+(?=\w+ ?=)", line)
+        found, rating = [match for part in parts if (match := _CODE.match(part))], RATING.search(line) is not None
+        matches += [] if rating or ratings else found
+        ratings = bool(ratings and found) or (rating and not found and line.rstrip().endswith(":"))  # Fuses: and a list
     stated = {
         (f"{match[1].casefold()}{number}", amperes(match[4], match[5]))
         for match in matches
