@@ -175,9 +175,36 @@ def test_a_rate_in_a_sentence_of_a_readme_times_counted_samples_and_two_rates_ar
     says = "Alle Kanäle wurden mit einer Abtastrate von 200 Hz aufgezeichnet, Filter 50 Hz.\n"
     (tmp_path / "LIESMICH.txt").write_text(says, encoding="utf-8")
     require_the_tests(tmp_path)
-    assert import_files([tmp_path]).records[0].time[-1] == pytest.approx(5.0)
+    (record, *_) = import_files([tmp_path]).records
+    assert record.time[-1] == pytest.approx(5.0)
+    assert "W_CHOSEN" in {finding.code for finding in record.findings}
     (tmp_path / "LIESMICH.txt").write_text(says + "The force was sampled at 1 kHz.\n", encoding="utf-8")
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_AMBIGUOUS"}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Sampling with a 50 Hz low-pass filter.",
+        "recorded with a filter of 100 Hz",
+        "Sampled at 25 kHz, decimated to 250 Hz",
+        "Sampling rate: 25 kHz\nEvery 100th sample is kept: decimated",
+        "The sample oscillates at 1 Hz",
+        "échantillon testé à 1 Hz",
+        "Two samples (A and B) were driven with 1 Hz sines",
+        "sampling of temperature at 1 Hz",
+        "Tests were recorded at 1 Hz and 10 mm",
+    ],
+)
+def test_a_frequency_of_something_else_than_the_rows_is_no_sampling_rate(text, tmp_path):
+    rows = "".join(f"{x:.7f},{f:.6f}\n" for x, f in zip(X, force(0.5), strict=True))
+    (tmp_path / "a_0.5A.csv").write_text("stroke [mm],load [N]\n" + rows)
+    (tmp_path / "README.txt").write_text(text, encoding="utf-8")
+    found = import_files([tmp_path])
+    assert not found.records
+    assert found.refusals
+    (tmp_path / "README.txt").write_text("Sampling rate (all channels): 200 Hz, filter 50 Hz")
+    assert import_files([tmp_path]).records[0].time[-1] == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize("word", ["Signal", "Row", "column"])

@@ -19,7 +19,7 @@ from mrdamper.rig_files.mapping.scales import NUMBER_IS, scaled_columns, states_
 from mrdamper.rig_files.mapping.signs import states_sign
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import REQUIRED
+from mrdamper.rig_files.record import REQUIRED, Finding
 from mrdamper.rig_files.text.short import packaged_lines, short_lines
 from mrdamper.rig_files.units import is_unit, parse_unit
 
@@ -32,9 +32,16 @@ _STRUCTURES = (".json", ".yaml", ".yml")
 _READ = ("", ".txt", ".md", ".rst", ".csv", ".tsv", *_STRUCTURES)
 _LARGEST_LIST = 4096  # bytes of a list of channels
 _TEXTS = (".csv", ".txt", ".tsv", ".ini", ".cfg", ".par", ".set")
-_RATE = re.compile(  # all channels were sampled at 512 Hz
-    r"(?i)(?:sampl|abtast|échantillon|muestre|amostra|campion|(?:recorded|acquired|logged) (?:at|with))[^0-9;]{0,40}?"
-    r"(?P<rate>[0-9]+(?:[.,][0-9]+)? ?k?Hz)\b"
+_RATE = re.compile(  # all channels were sampled at 512 Hz; of "samples", which may be specimens, 100 or more
+    r"(?i)(?:(?:sampl(?:ed|ing)|sample[ _]?(?:rate|freq\w*)|ab(?:ge)?tast\w*|échantillonn\w*|muestre\w*|amostra[gd]\w*"
+    r"|campiona[mt]\w*)|(?:samples?|recorded|acquired|logged)\b(?=[^0-9]{0,40}(?:[0-9]{3}|[0-9.,]+ ?k)))"
+    r"(?:[\s:=()]|(?:rates?|freq\w*|is|was|were|at|with|by|of|for|about|all|both|the|every|each|channels?|tests?|signals?|data"
+    r"|force|logger|system|simultaneously|synchronously|von|mit|bei|beträgt|aller?|Kanäle|Tests|de|à|a|da|di|des|con|com|los)\b){0,15}"
+    r"(?P<rate>[0-9]+(?:[.,][0-9]+)? ?k?Hz)\b(?![^.;,]{0,15}(?:filt|pass|sine|sinus|motion|excit|mains))"
+)
+_OTHER_RATES = re.compile(  # than that of the rows
+    r"(?i)decim|dezim|resampl|down-?sampl|averaged (?:to|down)"
+    r"|(?:temper|thermo|\bpress)[^.,;]{0,30}(?:sampl|record|acqui|logg|tast)|sampl\w* (?:of )?(?:temper|thermo|press)"
 )
 _README = re.compile(
     r"(?i)(?:read[_ ]?me|lies_?mich|lisez[-_ ]?moi|l[eé]eme|leggimi|leia[-_ ]?me|notes?|info|说明|説明|설명)\b.*"
@@ -54,8 +61,11 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
         (lacking and _of_channels(line)) or (line if states_sign(line) or NUMBER_IS.search(line) else "")
         for line in lines
     ]
-    if table.names and not any("time" in (header.role, header.dimension) for header in table.headers):
-        stated += [f"sample rate: {match['rate']}" for line in lines for match in _RATE.finditer(line)]
+    timed = profile.file.sample_rate_Hz or any("time" in (h.role, h.dimension) for h in table.headers)
+    if table.names and not timed and not any(map(_OTHER_RATES.search, lines)):
+        rates = [match for line in lines for match in _RATE.finditer(line)]
+        stated += [f"sample rate: {match['rate']}" for match in rates]
+        table = table.noted(*(Finding("W_CHOSEN", f"a text beside the file says {match[0]!r}") for match in rates[:1]))
     calibrated = frozenset(role for role, channel in profile.channels.items() if channel.scale is not None)
     return replace(table, remarks=(*table.remarks, *filter(None, stated)), calibrated=calibrated)
 
