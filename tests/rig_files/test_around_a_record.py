@@ -115,6 +115,9 @@ RATINGS = [
     "coil driver: 100 % duty = 2 A", "shunt 60 mV = 10 A", "driver gain 1 A per V", "Current resolution: 0.01 A",
     "coil current tolerance 0.05 A", "PSU 30 V 5 A", "offset 0.02 A", "standby current 0.2 A", "I_ref = 2 A (100 %)",
     "current levels: 0, 0.5, 1.0 A", "Ströme 0; 0.5; 1 A", "driven at 0 and 1.5 A", "Strom von 0 bis 2 A",
+    "pwm 255 = 1.5 A", "U = 5 V -> 2 A", "2 A corresponds to 10 V", "20 mA = 5 kN", "load cell 4-20 mA", "Relay 5 A",
+    "coil 300 turns, 1 A nominal", "Damper type MR-2A", "Operating voltage 12 V (1 A)", "0 A at 0.4 V",
+    "coil monitor = (U - 2.5) / 0.625 A", "Coil heated with 1 A for 10 min",
 ]  # fmt: skip
 
 
@@ -123,7 +126,9 @@ def test_a_rating_a_scale_or_a_list_states_no_current(line):
     assert stated_in_titles([line]) == stated_by_lines([line]) == []
 
 
-@pytest.mark.parametrize("line", ["Test 3, 0.4 A", "2023/05/11, 0.4 A, 2 Hz", "Run 12 - 0.4 A", "10 mm, 1 Hz, 0.4 A"])
+@pytest.mark.parametrize(
+    "line", ["Test 3, 0.4 A", "2023/05/11, 0.4 A, 2 Hz", "Run 12 - 0.4 A", "10 mm, 1 Hz, 0.4 A", "Test 3 = 0.4 A"]
+)
 def test_a_number_before_a_current_makes_no_list(line):
     assert [statement.amperes for statement in stated_in_titles([line])] == [0.4]
 

@@ -39,8 +39,14 @@ _LINE = re.compile(
 CELL = re.compile(r"\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*((?:[^\W\d_]|°){0,8})\s*")  # a number, and a unit behind it
 _LONGEST_LINE, _MOST_PARTS = 300, 20
 _TOLERANCE = re.compile(r"\s*(?:\+\s?/?\s?[-−]|±)\s*[0-9]+(?:[.,][0-9]+)?\s*%?")
-_SCALE = re.compile(  # 60 mV = 10 A, 1 A per V, 0.5 A/V * U - 0.2 A
+_OF_SCALE = r"(?:m?[VA]|k?N|[mµ]?m|bar|counts?|bits?)"  # units
+_SCALE = re.compile(  # 60 mV = 10 A, 1 A per V, 0.5 A/V * U - 0.2 A, 2 A corresponds to 10 V, pwm 255 = 1.5 A
     r"[0-9]\s*(?:%|m?V\b|counts?\b|bits?\b)[^=:;]*=|\bper\b|\b100 ?%|A ?/ ?(?:m?V|%)[^=:;]*[-−–+] ?[0-9]"
+    rf"|[0-9] ?{_OF_SCALE}\s*(?:=|[-=]>|→|≙|corresponds?(?: to)?|entspricht)\s*[0-9.,]+ ?{_OF_SCALE}\b"
+    r"|[0-9] ?m?A at [0-9.,]+ ?m?V\b|[0-9] ?m?V at [0-9.,]+ ?m?A\b|\b4 ?(?:-|–|to|bis|\.{2,3}) ?20 ?mA\b|A nominal\b"
+    r"|(?<![\w.,])(?:100|1000|255|1023|4095|16383|32767|65535)\s*(?:=|->|entspricht)\s*[0-9.,]+ ?m?A\b"
+    r"|=\s*(?:\([A-Za-z]\w* ?[-−–+] ?[0-9.,]+\)|[A-Za-z]\w*) ?[/*×·] ?[0-9]"
+    r"|\b(?:[Tt]ype?|[Mm]odel)\b[ :=]*[A-Za-z]+-[0-9.,]+ ?m?A\b"
 )
 _LISTED = re.compile(
     r"[0-9]\s*(?:([,;/])\s*[0-9.]+\s*\1|\b(?:and|und|et|to|bis)\b|\.{2,3})\s*[0-9][0-9.]*\s*m?A\b"
