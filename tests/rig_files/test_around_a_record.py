@@ -115,9 +115,9 @@ RATINGS = [
     "coil driver: 100 % duty = 2 A", "shunt 60 mV = 10 A", "driver gain 1 A per V", "Current resolution: 0.01 A",
     "coil current tolerance 0.05 A", "PSU 30 V 5 A", "offset 0.02 A", "standby current 0.2 A", "I_ref = 2 A (100 %)",
     "current levels: 0, 0.5, 1.0 A", "Ströme 0; 0.5; 1 A", "driven at 0 and 1.5 A", "Strom von 0 bis 2 A",
-    "pwm 255 = 1.5 A", "U = 5 V -> 2 A", "2 A corresponds to 10 V", "20 mA = 5 kN", "load cell 4-20 mA", "Relay 5 A",
+    "pwm 255 = 1.5 A", "PWM 20 = 0 A", "U = 5 V -> 2 A", "2 A corresponds to 10 V", "20 mA = 5 kN", "load cell 4-20 mA",
     "coil 300 turns, 1 A nominal", "Damper type MR-2A", "Operating voltage 12 V (1 A)", "0 A at 0.4 V",
-    "coil monitor = (U - 2.5) / 0.625 A", "Coil heated with 1 A for 10 min",
+    "coil monitor = (U - 2.5) / 0.625 A", "Relay 5 A", "Coil heated with 1 A for 10 min",
 ]  # fmt: skip
 
 

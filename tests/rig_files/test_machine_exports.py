@@ -144,6 +144,24 @@ def test_rows_that_name_every_value_are_a_table(tmp_path, separator):
     assert "line 503" in str(refusal.error)
 
 
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        ("new driver: pwm 255 = 1.5 A\nold driver: pwm 255 = 3 A\n", "102"),
+        ("pwm 255 = 1.5 A, pwm 20 = 0 A\n", "102"),
+        ("pwm 255 = 1.5 A\npwm 20 = 0 A\n", "102"),
+        ("pwm 255 = 1.5 A\n", "0.6"),
+        ("dac 255 = 1.5 A\n", "102"),
+    ],
+    ids=["two drivers", "two points", "two points on lines", "no whole numbers", "another name"],
+)
+def test_numbers_of_a_converter_with_an_unclear_scale_are_asked_about(tmp_path, text, number):
+    body = rows(lambda t, x, f: f"{t:.4f},{x:.5f},{f:.3f},{number}")
+    (tmp_path / "a.csv").write_text("t [s],x [mm],F [N],pwm\n" + body)
+    (tmp_path / "README.txt").write_text(text)
+    assert not import_files([tmp_path]).records
+
+
 def test_a_list_beside_folders_names_them_by_their_currents(tmp_path):
     profile = '[file]\nnames = ["t [s]", "y"]\n'
     for role, number, unit in (("displacement", 1, "mm"), ("force", 2, "N")):

@@ -57,8 +57,9 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(p.name)]
     lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
+    names = {header.name.casefold() for header in table.headers}
     stated = [
-        (lacking and _of_channels(line)) or (line if states_sign(line) or NUMBER_IS.search(line) else "")
+        (lacking and _of_channels(line)) or (line if states_sign(line) or names & {*_counted(line)} else "")
         for line in lines
     ]
     timed = profile.file.sample_rate_Hz or any("time" in (h.role, h.dimension) for h in table.headers)
@@ -95,6 +96,10 @@ def _lacks_names_or_units(table: RawTable) -> bool:
     return not {"displacement", "force"} <= roles or any(
         table.headers[i].role in REQUIRED or NUMBERED.fullmatch(table.names[i].strip()) for i in bare
     )
+
+
+def _counted(line: str) -> list[str]:
+    return [match["name"].casefold() for match in NUMBER_IS.finditer(line)]
 
 
 def _of_channels(line: str) -> str:

@@ -6,6 +6,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from mrdamper.rig_files.column_names import Header, role_of, split_name, unknown_unit, words_of
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
@@ -40,8 +42,9 @@ _SIGNAL = re.compile(  # a number of volts or counts, and no end of a range
     r"(?P<before>(?:\.\.|[-−–±]|\b(?:to|bis|à|a)) ?)?(?<![\w.,])(?P<number>[0-9]+(?:[.,][0-9]+)?) ?"
     r"(?P<unit>[A-Za-zµ]{1,6})(?![\w/])"
 )
-NUMBER_IS = re.compile(  # pwm 255 = 1.5 A: the largest number of a converter
-    r"(?<!\w)(?P<name>[^\W\d]\w{0,20})[ =]+(?P<number>100|1000|255|1023|4095|16383|32767|65535)"
+_LARGEST = ("100", "1000", "255", "1023", "4095", "16383", "32767", "65535")  # numbers of converters
+NUMBER_IS = re.compile(  # pwm 255 = 1.5 A
+    r"(?<!\w)(?P<name>[^\W\d]\w{0,20})[ =]+(?P<number>[0-9]{1,5})"
     r"\s*(?:=|->|entspricht)\s*(?P<value>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>m?A)(?![\w/])"
 )
 _LONGEST_LINE = 300
@@ -56,10 +59,20 @@ def with_counts(table: RawTable) -> RawTable:
             bare = re.sub(r"[\s_]*(?:counts?|cnts?|raw)$", "", table.headers[i].name, flags=re.IGNORECASE)
             text = f"column {name!r} is scaled as its heading states"
             table = scaled(table, i, bare or table.headers[i].name, match["unit"], factor, text)
-    whole = {m["name"].casefold(): m for t in table.remarks if (m := NUMBER_IS.search(t[:_LONGEST_LINE]))}
-    bare = {i: (h.name, "counts") for i, h in enumerate(table.headers) if not h.unit and h.name.casefold() in whole}
-    lines = [f"{m['name']}: {m['number']} counts = {m['value']} {m['unit']}" for m in whole.values()]
-    return replace(table, remarks=(*table.remarks, *lines)).named(bare) if bare else table
+    stated = {m.groups() for line in table.remarks for m in NUMBER_IS.finditer(line[:_LONGEST_LINE])}
+    for i, header in enumerate(table.headers):
+        own = [of for of in stated if of[0].casefold() == header.name.casefold()]  # two: which, or a line through both
+        if len(own) == 1 and own[0][1] in _LARGEST and not header.unit and _is_whole(table, i):
+            name, number, value, unit = own[0]
+            table = replace(table, remarks=(*table.remarks, f"{name}: {number} counts = {value} {unit}"))
+            table = table.named({i: (header.name, "counts")})
+    return table
+
+
+def _is_whole(table: RawTable, column: int) -> bool:
+    """Tell if a column holds whole numbers alone, as a converter's are."""
+    values = table.try_read(column)
+    return values is not None and not np.any(np.nan_to_num(values[column]) % 1)
 
 
 def with_scales(table: RawTable) -> RawTable:
