@@ -330,6 +330,17 @@ def test_lines_among_the_rows_that_state_other_currents_begin_other_tests(title,
         ("# coil current = 0.25 A/V x (5 V - U_cmd)", None),
         ("# coil current = 0.5 A/V * U_cmd - 0.2 A", None),
         ("# coil current: 1.0 V = 2 A, range -10 to 10 V", 4.8),
+        ("# driver: 0.5 A/V\n# driver offset: 0.4 V", None),
+        ("# coil current: 0.5 A/V\n# U_cmd zero: 0.4 V", None),
+        ("# scale: 0.5 A/V\n# offset: 0.4 V", None),
+        ("# driver: 0.5 A/V\n# 0 A = 0.4 V", None),
+        ("# driver: 0.5 A/V\n# 0 A = 0 V", 1.2),
+        ("# driver: 0.5 A/V\n# force offset: 0.4 N\n# offset: 2 mm\n# 3 x 5 cycles", 1.2),
+        ("# driver gain: 0.5 A/V", 1.2),
+        ("# driver: 0.5 A/V, gain 1", 1.2),
+        ("# driver: 0.5 A/V, gain 100", None),
+        ("# driver: 0.5 A/V x 100", None),
+        ("# driver: 0.5 A/V\n# amplifier: gain 0.1", None),
     ],
 )
 def test_a_scale_with_a_zero_of_its_own_is_applied_about_it_or_asked_for(line, current, tmp_path):
@@ -338,6 +349,17 @@ def test_a_scale_with_a_zero_of_its_own_is_applied_about_it_or_asked_for(line, c
     assert (record.current is None) == (current is None)
     if current is not None:
         np.testing.assert_allclose(record.current, current, rtol=1e-6)
+
+
+@pytest.mark.parametrize("line", ["gain 100", "0 N = 0.4 V", "load cell zero: 0.4 V"])
+def test_a_gain_or_a_zero_in_a_text_beside_the_file_makes_its_scale_unclear(line, tmp_path):
+    write(
+        tmp_path, "a_0.5A.csv", table({**{n: v for n, v in NAMES.items() if "[N]" not in n}, "load cell [V]": F / 500})
+    )
+    write(tmp_path, "README.txt", "load cell: 2 mV/N\n")
+    assert len(import_files([tmp_path]).records) == 1
+    write(tmp_path, "README.txt", f"load cell: 2 mV/N\n{line}\n")
+    assert not import_files([tmp_path]).records
 
 
 def test_a_scale_of_the_profile_replaces_that_of_the_file(tmp_path):

@@ -15,7 +15,7 @@ from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_by_lines
 from mrdamper.rig_files.mapping.completion import NUMBERED, states_si
 from mrdamper.rig_files.mapping.results import numbered_tests
-from mrdamper.rig_files.mapping.scales import NUMBER_IS, scaled_columns, states_scale
+from mrdamper.rig_files.mapping.scales import NUMBER_IS, scaled_columns, states_scale, states_shift
 from mrdamper.rig_files.mapping.signs import states_sign
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
@@ -112,7 +112,10 @@ def _of_channels(line: str) -> str:
     units = [split_name(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]
     return (
         line
-        if states_scale(line) or states_si(line) or (any(map(is_unit, units)) and not stated_by_lines([line], "."))
+        if states_scale(line)
+        or states_shift(line)
+        or states_si(line)
+        or (any(map(is_unit, units)) and not stated_by_lines([line], "."))
         else ""
     )
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from mrdamper.rig_files.column_names import Header, role_of, split_name, unknown_unit, words_of
+from mrdamper.rig_files.conditions import stated_by_lines, stated_in_titles
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.spool import rescale
@@ -33,9 +34,11 @@ _ZERO = re.compile(  # zero at 32768; 0 A at 0.4 V; 0.5 A/V x (U - 0.4 V); 2.5 V
     rf"|\([^()]{{0,30}}[a-z_]\w{{0,30}} ?[-−–] ?{_AT.format('less', 'of')}\)"
     rf"|(?<![\w.,]){_AT.format('mid', 'volt')} (?:\w{{1,12}} )?(?:at|=) (?:zero|0(?:\.0+)? ?m?A)(?![\w.])"
 )
-_SHIFT = re.compile(  # of a scale, in words that may mean one thing or the other
+_SHIFT = re.compile(  # of a scale, or a gain beside it, in words that may mean one thing or the other
     r"(?i)\b(?:zero|offset|bias|tar[ae]|null\w*)\b[^0-9;,.]{0,12}[0.,]*[1-9]"
     r"|(?:[*×·]|\sx)\s?\(?[a-z_]\w{0,30} ?[-−–+] ?[0.,]*[1-9]"
+    r"|(?:(?:\w*amplifier|conditioner)\W+)?\b(?:gain|amplification|verstärkung)\b[^0-9;,.]{0,12}"
+    r"(?!1(?:\.0*)?(?![.\d]))[0-9]|(?<!\S)[x×] ?[0-9]"
 )
 _RANGE = re.compile(r"(?i)\b(?:range|max|limit|full|suppl|rated|bereich|plage|rango)")
 _SIGNAL = re.compile(  # a number of volts or counts, and no end of a range
@@ -47,7 +50,7 @@ NUMBER_IS = re.compile(  # pwm 255 = 1.5 A
     r"(?<!\w)(?P<name>[^\W\d]\w{0,20})[ =]+(?P<number>[0-9]{1,5})"
     r"\s*(?:=|->|entspricht)\s*(?P<value>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>m?A)(?![\w/])"
 )
-_LONGEST_LINE = 300
+_LONGEST_LINE, _MARKS = 300, ' #%/*"\t-'
 
 
 def with_counts(table: RawTable) -> RawTable:
@@ -86,9 +89,9 @@ def with_scales(table: RawTable) -> RawTable:
         header = table.headers[i]
         text = f"column {table.names[i]!r} is scaled as the file states: {line.strip()[:60]!r}"
         zero = _zero_of(line, header)
-        if zero is None:
-            continue
         role = next((role for role, dimension in DIMENSION.items() if dimension == parse_unit(unit).dimension), "")  # type: ignore[union-attr]
+        if zero is None or _shifted_elsewhere(table, i, line, role):
+            continue
         name = header.name if header.role == role else f"{role} {header.name}"
         name = name if role_of(name) == role else role
         table = scaled(table, i, name, unit, factor * header.factor, text, zero)
@@ -101,7 +104,7 @@ def _zero_of(line: str, header: Header) -> float | None:
     if match is None:
         others = [] if _RANGE.search(line) else _SIGNAL.finditer(SCALE.sub(" ", line))
         others = [m for m in others if not m["before"] and split_name("", m["unit"]).dimension == header.dimension]
-        return None if _SHIFT.search(line) or any(m["number"].strip("0.,") for m in others) else 0.0
+        return None if _SHIFT.search(SCALE.sub(" ", line)) or any(m["number"].strip("0.,") for m in others) else 0.0
     groups = (match[key] for key in ("at", "less", "mid", "its", "of", "volt"))
     text, unit_text = (*filter(None, groups), "")[:2]
     number, unit = float(text), parse_unit(unit_text)
@@ -110,6 +113,28 @@ def _zero_of(line: str, header: Header) -> float | None:
     if unit is None or not number:
         return number
     return number * unit.factor / header.factor if unit.dimension == header.dimension else None
+
+
+def _shifted_elsewhere(table: RawTable, column: int, own: str, role: str) -> bool:
+    """Tell if a line beside that of a column's scale, about the column or about none, states its zero or a gain."""
+    label = re.split(r"[:=0-9]", own)[0].strip(_MARKS) or own
+    for line in (part.strip(_MARKS) for part in _parts(table) if part not in own):
+        match = _ZERO.search(line) or _SHIFT.search(SCALE.sub(" ", line))
+        number = match and re.search(r"([0-9.,]+)\s*([^\W\d_]*|%)", match.string[match.start() :])
+        if not match or not number or not re.search("[1-9]", match[0] + number[1]):
+            continue
+        if split_name("", number[2]).dimension not in (None, *_SIGNALS, DIMENSION.get(role)):
+            continue
+        said = {i for i, header in enumerate(table.headers) if _names(line, header.name)}
+        roles = {role_of(word) for word in words_of(line) if len(word) > 2}
+        about_none = not said and not roles - {None, "voltage", role} and match.start() == 0
+        if column in said or _names(line, label) or about_none:
+            return True
+    return False
+
+
+def _names(line: str, name: str) -> bool:
+    return bool(name) and re.search(rf"(?<!\w){re.escape(name)}(?!\w)", line, re.IGNORECASE) is not None
 
 
 def scaled_columns(table: RawTable) -> list[int]:
@@ -122,13 +147,23 @@ def states_scale(line: str) -> bool:
     return bool(scales_in(line[:_LONGEST_LINE]))
 
 
+def states_shift(line: str) -> bool:
+    """Tell if a line states the zero or a gain of a scale, and no current: offset: 0.4 V; gain 100."""
+    shift = _ZERO.search(line[:_LONGEST_LINE]) or _SHIFT.search(line[:_LONGEST_LINE])
+    return bool(shift) and not (stated_by_lines([line], ".") or stated_in_titles([line]))
+
+
+def _parts(table: RawTable) -> list[str]:
+    """Return the lines beside a table, and the parts of those with several scales."""
+    beside = [line[:_LONGEST_LINE] for line in table.remarks]
+    return [part for t in beside for part in (re.split(r"[,;|\t]\s*", t) if len(scales_in(t)) > 1 else [t])]
+
+
 def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[str, float, str] | None:
     """Return unit, its number per volt and the line of a scale that can only be meant for a column; else None."""
     name = table.headers[column].name
     own = [table.names[column], *table.over[column : column + 1]]
-    beside = [line[:_LONGEST_LINE] for line in table.remarks]
-    parts = [part for t in beside for part in (re.split(r"[,;|\t]\s*", t) if len(scales_in(t)) > 1 else [t])]
-    for lines in (own, parts):
+    for lines in (own, _parts(table)):
         scales = []
         for line in lines:
             for unit, factor in scales_in(line):
