@@ -28,7 +28,10 @@ _HEADER_LINES, _BREAKS = 200, 12  # lines in which a quoted name may be broken, 
 _FOOTER = 8192  # bytes in which lines of words below the rows are looked for
 _ARRIVED = re.compile(rb"^\[?[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{1,6}\]? -> ?")
 _LATEX_ROW = re.compile(rb"^.*&.*\\\\\s*(?:\\hline)?\s*$")
-_LATEX = re.compile(rb" *(&) *|\$|\s*\\\\[^&]*$|^\s*\\(?!caption)[a-z]+.*$")
+_LATEX = re.compile(  # separators, ends of rows, lines of commands, commands of lines and colours before a row
+    rb" *(&) *|\$|\s*\\\\[^&]*$|^\s*\\(?!caption)(?:(?:begin|end|multi)[a-z]*.*|[a-z]+[^&]*)$"
+    rb"|^(?:\s*\\[a-z]*(?:rule|line|color|space|style)\b(?:\s*[\[({][^\])}]*[\])}])*)+\s*"
+)
 _KEYED = re.compile(
     rb"(?:(?<=[\s;,|])|^)[ \t]*([A-Za-z_\x80-\xff][^=:;,|\t]{0,30}?)[ \t]*[=:][ \t]*"
     rb"([+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]+)?)[ \t]?([A-Za-z\x80-\xff/%]{1,6}(?![=:]))?"
