@@ -157,7 +157,26 @@ def test_arrays_over_two_conditions_take_a_number_of_each_from_the_vectors_besid
     two = np.moveaxis(np.array([loops[0][0], loops[2][0]]), -1, 0)
     np.savez(tmp_path / "two.npz", data=two, current_A=[0.0, 0.6], columns=columns)
     assert currents(read_runs(tmp_path / "two.npz")) == [0.0, 0.6]
-    assert import_files([tmp_path / "first.npz"]).refusals  # three currents, three channels: which dimension is which?
+    tests = read_runs(tmp_path / "first.npz")  # three currents, three channels: the time increases along the latter
+    assert currents(tests) == [0.0, 0.0, 0.3, 0.3, 0.6, 0.6]
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)])
+def test_as_many_tests_as_channels_are_told_apart_by_their_time_and_refused_without_it(order, tmp_path):
+    cube = np.array([np.column_stack([T, X, force(amperes)]) for amperes in (0.0, 0.3, 0.6)]).transpose(order)
+    for names in (["t [s]", "x [mm]", "F [N]"], ["x [mm]", "F [N]", "v [mm/s]"]):
+        np.savez(tmp_path / f"{names[0][0]}.npz", data=cube, names=np.array(names), currents_A=[0.0, 0.3, 0.6])
+    tests = read_runs(tmp_path / "t.npz")
+    assert [(t.current[0], t.time.size) for t in tests] == [(0.0, T.size), (0.3, T.size), (0.6, T.size)]
+    with pytest.raises(InputError, match=r"x.npz: .* two dimensions of an array .* save each test"):
+        read_runs(tmp_path / "x.npz")
+
+
+@pytest.mark.parametrize("units", [[{"name": "force", "unit": "N"}], [["force", "N"]]])
+def test_units_in_lists_beside_named_columns_are_no_damage(units, tmp_path):
+    columns = {"time_s": [*T], "disp_mm": [*X], "force_N": [*force(0.6)], "current_A": 0.6}
+    (tmp_path / "a.json").write_text(json.dumps({**columns, "units": units}))
+    np.testing.assert_allclose(read_run(tmp_path / "a.json").force, force(0.6))
 
 
 def test_structs_with_a_matrix_and_its_conditions_are_tests_and_no_channels(tmp_path):

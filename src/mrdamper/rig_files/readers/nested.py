@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -61,7 +61,10 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, togeth
 
     The columns of all of them `together` are one more, for files with a node for each channel, if no node holds a test.
     """
-    every = list(_walk(tree, _Node("")))
+    try:
+        every = list(_walk(tree, _Node("")))
+    except RigFileError as error:  # which names no file
+        raise source.refuse(error.code, error.found, error.remedy) from None
     nodes = [node for node in every if node.columns]
     objects = [column.name for node in nodes for column in node.columns if column.array.dtype == object]
     if not any(column.array.dtype != object for node in nodes for column in node.columns):
@@ -88,7 +91,8 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     tree = _with_own_axes(_spread(tree) if tests is arrays else tests)
     stated = next((v for key, v in tree.items() if key.casefold() in KEYS["unit"] and isinstance(v, Mapping)), {})
     pairs = next((v for k, v in tree.items() if k.casefold() in KEYS["unit"] and isinstance(v, list)), [])
-    stated = stated or dict(zip(pairs[::2], pairs[1::2], strict=False) if {*pairs[::2]} <= {*tree} else ())
+    pairs = pairs if all(isinstance(item, str) for item in pairs) and {*pairs[::2]} <= {*tree} else []
+    stated = stated or dict(zip(pairs[::2], pairs[1::2], strict=False))
     own = {key[:-5]: unit for key, unit in tree.items() if key.casefold().endswith("_unit")} | dict(stated)
     own |= {key: channel["unit"] for key, channel in channels.items()}
     node.units = {**node.units, **{key: u for key, u in own.items() if isinstance(u, str) and is_unit(u)}}
@@ -159,16 +163,17 @@ def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     return {**{key: value for key, value in tree.items() if key not in (keys["x"], keys["y"])}, keys["y"]: timed}
 
 
-def _grid_of(value: Any, channels: Collection[int]) -> tuple[tuple[int, ...], list[Array]]:
+def _grid_of(value: Any, channels: Mapping[int, int | None]) -> tuple[tuple[int, ...], list[Array]]:
     """Return the conditions' dimensions and the arrays of samples of a list, or of an array over conditions.
 
-    The channels of such an array stand along the only dimension of a length of `channels`, else along one of the last.
+    The channels of such an array stand along the dimension of a length of `channels`, else along one of the last two.
     """
     if isinstance(value, Array) and value.ndim > 2 and min(value.shape) > 1 and value.dtype.kind in "iuf":
-        across = [i for i, n in enumerate(value.shape) if n in channels]
-        along = int(np.argmax(value.shape))
-        last = (along, *across) if len(across) == 1 and across != [along] else (-2, -1)
-        array = np.moveaxis(np.asarray(value), last, (-2, -1))
+        array, along = np.asarray(value), int(np.argmax(value.shape))
+        across = _dimension_of_channels(array, along, channels)
+        if across is None and along < array.ndim - 2:
+            return (), []
+        array = np.moveaxis(array, (-2, -1) if across is None else (along, across), (-2, -1))
         outer = array.shape[:-2]
         matrices = np.reshape(array, (-1, *array.shape[-2:]))
         return (outer, [_unpadded(matrix) for matrix in matrices]) if len(matrices) <= MOST_ITEMS else ((), [])
@@ -179,6 +184,22 @@ def _grid_of(value: Any, channels: Collection[int]) -> tuple[tuple[int, ...], li
     return (len(rows), len(flat) // len(rows)) if len(flat) > len(rows) else (len(rows),), flat
 
 
+def _dimension_of_channels(array: np.ndarray, along: int, channels: Mapping[int, int | None]) -> int | None:
+    """Return the only dimension of a length of `channels`, the number and the place of the time; of two, whose time
+    increases along the samples. None if there is none; E_AMBIGUOUS if both may be meant.
+    """
+    across = [i for i, n in enumerate(array.shape) if n in channels and i != along]
+    if len(across) > 1:
+        timed = [(i, time) for i in across if (time := channels[array.shape[i]]) is not None]
+        steps = {i: np.diff(np.moveaxis(array, (i, along), (0, -1))[time].astype(float)) for i, time in timed}
+        across = [i for i, step in steps.items() if not (step <= 0).any()]
+        if len(across) != 1:
+            problem = f"the channels may stand along two dimensions of an array of {' x '.join(map(str, array.shape))}"
+            remedy = "save each test as an array of its own, or the time among the channels"
+            raise RigFileError("E_AMBIGUOUS", problem, remedy=remedy)
+    return across[0] if across else None
+
+
 def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     """Split lists of arrays, or arrays over conditions, into a node a test, each with its own of the numbers beside.
 
@@ -186,7 +207,8 @@ def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     X{i, j}. Beside them stand vectors of conditions, one for every test or one for every dimension.
     """
     words = {k: v for k, v in tree.items() if isinstance(v, list) and all(isinstance(i, str) for i in v)}
-    channels = {len(names) for names in words.values() if sum(split_name(n).role is not None for n in names) > 1}
+    named = [[split_name(name).role for name in names] for names in words.values()]
+    channels = {len(r): r.index("time") if "time" in r else None for r in named if len(r) - r.count(None) > 1}
     grids = {key: grid for key, value in tree.items() if (grid := _grid_of(value, channels))[1]}
     shapes = {key: [tuple(n for n in item.shape if n > 1) for item in items] for key, (_, items) in grids.items()}
     flat = {k: grids[k][1] if k in grids and isinstance(v, list) else v for k, v in tree.items()}
