@@ -339,3 +339,4 @@ def test_conditions_beside_a_mapping_of_data_and_in_a_path_are_read(tests, tmp_p
     assert faults(tests, to_dataset(found.records)) == []
     assert currents_in("res/I_0p6A/f_0p5Hz") == (0.6,)
     assert currents_in("coil 2 A/V") == ()
+    assert currents_in("test 3-0.6A") == currents_in("10mm-1.5Hz-0.6A") == currents_in("10-0.5-0.6A") == (0.6,)

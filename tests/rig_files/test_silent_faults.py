@@ -248,7 +248,13 @@ def test_what_may_be_a_slip_of_the_unit_is_said(columns, noticed, tmp_path):
     assert noticed in {finding.code for finding in record.findings}
 
 
-@pytest.mark.parametrize("name", ["2A_fuse_1", "supply 5A max", "run_04A", "specimen1A", "0.5A_1.0A", "0A8"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("2A_fuse_1", "supply 5A max", "run_04A", "specimen1A", "0.5A_1.0A", "0A8", "−0.5 to 0.5 A", "1.2.3 to 4A"),
+        *("sweep 0 to 0.6 A", "0_to_0p6A", "0to2A", "0 and 0.6 A", "0-600mA", "0.2-0.6A", "I0..0.6A", "0.3, 0.6, 1 A"),
+    ],
+)
 def test_a_name_that_may_mean_another_current_states_none(name):
     assert len(currents_in(name)) != 1
 

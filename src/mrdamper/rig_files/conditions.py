@@ -49,9 +49,11 @@ _SCALE = re.compile(  # 60 mV = 10 A, 1 A per V, 0.5 A/V * U - 0.2 A, 2 A corres
     r"|=\s*(?:\([A-Za-z]\w* ?[-−–+] ?[0-9.,]+\)|[A-Za-z]\w*) ?[/*×·] ?[0-9]"
     r"|\b(?:[Tt]ype?|[Mm]odel)\b[ :=]*[A-Za-z]+-[0-9.,]+ ?m?A\b"
 )
-_LISTED = re.compile(
-    r"[0-9]\s*(?:([,;/])\s*[0-9.]+\s*\1|\b(?:and|und|et|to|bis)\b|\.{2,3})\s*[0-9][0-9.]*\s*m?A\b"
-)  # 0, 1, 2 A
+_NUMBER = r"[0-9]+(?:[.,xp][0-9]+)?"
+_LISTED = re.compile(  # 0, 1, 2 A; 0 to 2 A; 0-2A; 0.5-2A: of 3-2A, 3 may be the number of a test
+    rf"(?:(-?{_NUMBER})[\s_-]*(?:([,;/])\s*{_NUMBER}\s*\2|(?<![A-Za-z])(?:and|und|et|to|bis)(?![A-Za-z])|\.{{2,3}})[\s_-]*"
+    rf"|(?<![0-9A-Za-z.,-])(0|[0-9]+[.,xp][0-9]+)\s?[-–]\s?)({_NUMBER})[\s_]*(m?A)(?![A-Za-z0-9])"
+)
 _LABELLED_RATING = re.compile(
     "|".join([r"fuse|suppl|amplif|rated|range|clamp|(?<![a-z])(?:max|limit)(?![a-z])", *words("probe")]), re.IGNORECASE
 )
@@ -90,7 +92,7 @@ def currents_in(text: str) -> tuple[float, ...]:
     `1200mA`, `1.2 A`, `0p4A`, `0x25A`, `-0.3A-`, `I0.4A`; 0_5A may be five or half an ampere and states
     none, nor does what stands beside a fuse, a supply or a limit.
     """
-    text = unicodedata.normalize("NFKC", text[:255])
+    text = unicodedata.normalize("NFKC", text[:255]).replace("−", "-")
     if re.search(r"(?<![0-9])[0-9]_[0-9]+ ?m?A(?![A-Za-z0-9])", text) or _LABELLED_RATING.search(text):
         return ()
     # 04A may be four or 0.4 amperes; 0400mA is padded.
@@ -99,6 +101,8 @@ def currents_in(text: str) -> tuple[float, ...]:
     stated = [m for m in stated if m[0] != f"{m[1]}_A" or amperes(m[1], "A") <= LARGEST_STATED]  # damper_7731_A: a code
     signs = [-1.0 if _NEGATIVE.search(text[: match.start()]) else 1.0 for match in stated]
     currents = [sign * amperes(match[1], f"{match[2]}A") + 0.0 for sign, match in zip(signs, stated, strict=True)]
+    listed = _LISTED.search(text)
+    currents += [amperes(number, listed[5]) for number in (listed[1] or listed[3], listed[4])] if listed else []
     return tuple(dict.fromkeys(currents))
 
 
@@ -143,7 +147,7 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
     """Return the current in free text of lines that name no limit or range, if all state one: "Test 3: 0.4 A"."""
     statements = []
     for line in lines:
-        several = RATING.search(line) or _SCALE.search(line) or _LISTED.search(line)
+        several = RATING.search(line) or _SCALE.search(line)
         stated = () if several else currents_in(_TOLERANCE.sub("", line))
         if len(stated) == 1:
             statements.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))

@@ -118,7 +118,8 @@ def results_in(lines: Sequence[str]) -> Results | None:
 
 def numbered_tests(lines: Iterable[str]) -> Results | None:
     """Return the tests that lines list by their numbers, with one current each: Step 3: sine, 2 Hz, coil at 0.4 A."""
-    stated = [(match, currents_in(line)) for line in lines if (match := _LISTED_TEST.match(line[:_LONGEST_LINE]))]
+    matches = [match for line in lines if (match := _LISTED_TEST.match(line[:_LONGEST_LINE]))]
+    stated = [(match, currents_in(match.string[match.end() :])) for match in matches]
     rows = [(m["name"].strip(), m["number"], of[0]) for m, of in stated if len(of) == 1 and not holds(m["name"], COIL)]
     numbers = {(name.casefold(), int(number)) for name, number, _ in rows}
     if len(numbers) < _FEWEST_ROWS or len(numbers) < len(rows) or len({name for name, _ in numbers}) > 1:
