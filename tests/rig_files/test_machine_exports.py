@@ -162,6 +162,18 @@ def test_numbers_of_a_converter_with_an_unclear_scale_are_asked_about(tmp_path, 
     assert not import_files([tmp_path]).records
 
 
+def test_rows_with_another_unit_of_the_same_quantity_are_scaled_and_others_named(tmp_path):
+    def write(unit, factor):
+        row = "t={:.4f} s; pos={:.5f} mm; F={:.7f} {}".format
+        return rows(lambda t, x, f: row(t, x, f if abs(f) < 300 else factor * f, "N" if abs(f) < 300 else unit))
+
+    (tmp_path / "run_0.6A.log").write_text(write("kN", 1e-3))
+    expect(tmp_path, 0.6)
+    (tmp_path / "run_0.6A.log").write_text(write("V", 1.0))
+    (refusal,) = import_files([tmp_path]).refusals
+    assert "line 47: F in N, in other rows in V; export" in str(refusal.error)
+
+
 def test_a_list_beside_folders_names_them_by_their_currents(tmp_path):
     profile = '[file]\nnames = ["t [s]", "y"]\n'
     for role, number, unit in (("displacement", 1, "mm"), ("force", 2, "N")):

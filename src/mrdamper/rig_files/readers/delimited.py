@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from mrdamper.errors import printable
+from mrdamper.rig_files.column_names import Header, split_name
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words, scratch
 from mrdamper.rig_files.record import Finding, LineNumbers
@@ -116,8 +117,13 @@ def _with_keys_above(source: Source) -> Source:
         return source
     file, above = scratch(source.keep), b"\t".join(names) + b"\n"
     source.file.seek(0)
-    for line in source.file:
+    for at, line in enumerate(source.file, 1):
         own, values = _keyed(line)
+        if own != names and len(own) == len(names) and line.endswith(b"\n"):  # else the row may be cut
+            headers = [[split_name(name.decode(errors="replace")) for name in of] for of in (own, names)]
+            if all(one.name == other.name for one, other in zip(*headers, strict=True)):
+                values = [_rescaled(*each, source, at) for each in zip(values, *headers, strict=True)]
+                own = names
         file.write(above + b"\t".join(values) + b"\n" if own == names else line)
         above = b"" if own == names else above
     return replace(source, file=file, size=file.tell(), added=1)
@@ -130,6 +136,17 @@ def _keyed(line: bytes) -> tuple[tuple[bytes, ...], list[bytes]]:
         return (), []
     names = (piece[1].strip() + (b" [" + piece[3] + b"]" if piece[3] else b"") for piece in pieces)
     return tuple(names), [piece[2] for piece in pieces]
+
+
+def _rescaled(value: bytes, own: Header, channel: Header, source: Source, line: int) -> bytes:
+    """Return a value in the unit that most rows have: 0.39 kN among N."""
+    if own.unit == channel.unit:
+        return value
+    if own.dimension != channel.dimension or any(u is None or u.offset for u in (own.known, channel.known)):
+        problem = f"{own.name} in {own.unit or 'no unit'}, in other rows in {channel.unit or 'no unit'}"
+        raise source.refuse("E_UNITS_DIMENSION", problem, "export all rows with the same units", line=line)
+    scaled = repr(float(value.replace(b",", b".")) * own.factor / channel.factor).encode()
+    return scaled.replace(b".", b",") if b"," in value else scaled
 
 
 def _with_whole_quotes(lines: list[str]) -> list[str]:
