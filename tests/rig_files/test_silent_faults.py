@@ -382,3 +382,5 @@ def test_notes_beside_the_tests_are_refused_by_no_profile(tmp_path):
     profile = Profile.model_validate({"file": {"separator": ";"}})
     imported = import_files([tmp_path], profile)
     assert (len(imported.records), imported.refusals, imported.left_out) == (1, (), ("README.txt",))
+    write(tmp_path, "info 3 0.3A.csv", table(NAMES, ";").replace("0.400000;", "zzz;"))
+    assert [refusal.error.code for refusal in import_files([tmp_path]).refusals] == ["E_NUMBER"]

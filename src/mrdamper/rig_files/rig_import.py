@@ -24,6 +24,7 @@ from mrdamper.rig_files.mapping.agreement import contradictions, repeated
 from mrdamper.rig_files.mapping.companions import (
     TEXTS,
     currents_beside,
+    holds_channels,
     is_list,
     joined_files,
     number_of,
@@ -203,7 +204,7 @@ class _Intake:
         records, refusals = _unchecked(path, profile)
         self.met += [] if records else [(path, "")]
         no_table = not records and not given and [type(refusal.error) for refusal in refusals] == [NoTableError]
-        no_table |= not records and not given and is_readme(path)
+        no_table |= not records and not given and is_readme(path) and not holds_channels(path, profile.file)
         (self.notes if no_table else self.refusals).extend(refusals)
         split = profile.file.blocks == "split" or (self._table and self._table.of_file(path))
         if refusals or split or not goes_on(records):

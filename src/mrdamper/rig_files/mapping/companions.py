@@ -16,6 +16,7 @@ from mrdamper.rig_files.coil_current import as_data, current_of, with_value_of_n
 from mrdamper.rig_files.column_names import RATING, role_of, split_name, words_of
 from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.conditions import amperes
+from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.file_records import digest_of, records_of_file
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.description import with_notes
@@ -49,6 +50,15 @@ class Part:
     key: tuple[str, ...]  # by which parts of one test belong together
     test: Path  # of which the name is that of the test, where this part has its force
     columns: str  # what was taken for its channels
+
+
+def holds_channels(path: Path, form: FileForm) -> bool:
+    """Tell if a table of a file has columns of a displacement and a force."""
+    try:
+        with raw_tables(path, form) as tables:
+            return any({"displacement", "force"} <= {header.channel for header in table.headers} for table in tables)
+    except InputError:
+        return False
 
 
 def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
