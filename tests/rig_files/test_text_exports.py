@@ -238,7 +238,7 @@ def test_counts_and_shares_of_a_full_scale_are_scaled_as_the_file_states(tmp_pat
 @pytest.mark.parametrize("before", ["", "\\rowcolor{gray!10}", "\\rowcolor[gray]{0.9} ", "\\cmidrule(lr){1-2}\\hline "])
 def test_a_table_of_latex_is_read_with_the_current_of_its_caption(before, tmp_path):
     head = "\\begin{table}\n\\caption{Loop at $I = 0.5$ A}\n\\begin{tabular}{rrr}\n\\hline\n"
-    head += "$t$ [s] & $x$ [mm] & $F$ [N] \\\\\n\\hline\n"
+    head += "\\textbf{$t$ [s]} & $x$ [mm] & \\textbf{$F$ [N]} \\\\\n\\hline\n"
     body = lines(lambda i, t, x, f: f"{before * (i % 3 == 0)}{t:.3f} & {x:.6f} & {f:.4f} \\\\")
     (tmp_path / "table.tex").write_text(head + body + "\\hline\n\\end{tabular}\n\\end{table}\n", encoding="utf-8")
     (record,) = import_files([tmp_path]).records

@@ -29,9 +29,10 @@ _HEADER_LINES, _BREAKS = 200, 12  # lines in which a quoted name may be broken, 
 _FOOTER = 8192  # bytes in which lines of words below the rows are looked for
 _ARRIVED = re.compile(rb"^\[?[0-9]{2}:[0-9]{2}:[0-9]{2}[.,][0-9]{1,6}\]? -> ?")
 _LATEX_ROW = re.compile(rb"^.*&.*\\\\\s*(?:\\hline)?\s*$")
-_LATEX = re.compile(  # separators, ends of rows, lines of commands, commands of lines and colours before a row
+_LATEX = re.compile(  # separators, ends of rows, lines of commands, lines and colours before a row, words in bold
     rb" *(&) *|\$|\s*\\\\[^&]*$|^\s*\\(?!caption)(?:(?:begin|end|multi)[a-z]*.*|[a-z]+[^&]*)$"
     rb"|^(?:\s*\\[a-z]*(?:rule|line|color|space|style)\b(?:\s*[\[({][^\])}]*[\])}])*)+\s*"
+    rb"|\\(?:text|math)[a-z]{2}\{([^{}&]*)\}"
 )
 _KEYED = re.compile(
     rb"(?:(?<=[\s;,|])|^)[ \t]*([A-Za-z_\x80-\xff][^=:;,|\t]{0,30}?)[ \t]*[=:][ \t]*"
@@ -100,12 +101,12 @@ def _plain(source: Source) -> Source:
     file = scratch(source.keep)
     source.file.seek(0)
     for line in source.file:
-        file.write(_ARRIVED.sub(b"", line) if arrived else _LATEX.sub(_as_tab, line.rstrip()) + b"\n")
+        file.write(_ARRIVED.sub(b"", line) if arrived else _LATEX.sub(_without_command, line.rstrip()) + b"\n")
     return replace(source, file=file, size=file.tell())
 
 
-def _as_tab(match: re.Match[bytes]) -> bytes:
-    return b"\t" if match[1] else b""
+def _without_command(match: re.Match[bytes]) -> bytes:
+    return b"\t" if match[1] else match[2] or b""
 
 
 def _with_keys_above(source: Source) -> Source:
