@@ -51,7 +51,8 @@ _SCALE = re.compile(  # 60 mV = 10 A, 1 A per V, 0.5 A/V * U - 0.2 A, 2 A corres
 )
 _NUMBER = r"[0-9]+(?:[.,xp][0-9]+)?"
 _LISTED = re.compile(  # 0, 1, 2 A; 0 to 2 A; 0-2A; 0.5-2A: of 3-2A, 3 may be the number of a test
-    rf"(?:(-?{_NUMBER})[\s_-]*(?:([,;/])\s*{_NUMBER}\s*\2|(?<![A-Za-z])(?:and|und|et|to|bis)(?![A-Za-z])|\.{{2,3}})[\s_-]*"
+    rf"(?:(-?{_NUMBER})[\s_-]*(?:([,;/])\s*{_NUMBER}\s*\2|(?<![A-Za-z])(?:and|und|et|to|bis)(?![A-Za-z])"
+    r"|\.{2,3})[\s_-]*"
     rf"|(?<![0-9A-Za-z.,-])(0|[0-9]+[.,xp][0-9]+)\s?[-–]\s?)({_NUMBER})[\s_]*(m?A)(?![A-Za-z0-9])"
 )
 _LABELLED_RATING = re.compile(
