@@ -125,10 +125,10 @@ def _shifted_elsewhere(table: RawTable, column: int, own: str, role: str) -> boo
             continue
         if split_name("", number[2]).dimension not in (None, *_SIGNALS, DIMENSION.get(role)):
             continue
-        said = {i for i, header in enumerate(table.headers) if _names(line, header.name)}
+        columns = {i for i, header in enumerate(table.headers) if _names(line, header.name)}
         roles = {role_of(word) for word in words_of(line) if len(word) > 2}
-        about_none = not said and not roles - {None, "voltage", role} and match.start() == 0
-        if column in said or _names(line, label) or about_none:
+        about_none = not columns and not roles - {None, "voltage", role} and match.start() == 0
+        if column in columns or _names(line, label) or about_none:
             return True
     return False
 
