@@ -482,3 +482,11 @@ def test_an_excitation_is_predicted_about_its_own_mid_stroke():
     np.testing.assert_allclose(prediction.force, simulate(damper.model, motion).force, rtol=1e-12)
     assert damper.predict(sine(Condition(0.5, 1.0, 0.01), 3)).extrapolation == ()
     assert "not a sine" not in prediction.extrapolation  # the model takes any motion
+
+
+def test_effects_of_the_current_that_its_levels_do_not_determine_are_held_at_zero(problem):
+    assert problem.determined() is problem
+    one_level = problem.determined([i for i, current in enumerate(problem.currents) if current == 1.0])
+    assert one_level.fixed == dict.fromkeys(("fy1", "c1", "h1", "si"), 0.0)
+    assert set(one_level.free) == set(problem.free) - set(one_level.fixed)
+    assert len(one_level.parts) == len(problem.parts)
