@@ -74,10 +74,11 @@ def part(current, changes=False, is_sine=True):
     return SimpleNamespace(condition=Condition(current, 1.0, 0.01), changes=changes, is_sine=is_sine)
 
 
-def test_levels_are_runs_of_constant_current_a_two_hundredth_apart():
+def test_levels_are_runs_of_constant_current_from_the_lowest():
     currents = [1.0, 0.0, 0.5, 1.004, 0.004, 0.3]
     assert levels_of([*currents, None]) == [[1, 4], [5], [2], [0, 3]]
-    assert levels_of([0.0, 2.0, 1.989]) == [[0], [2], [1]]
+    assert levels_of([0.0, 2.0, 1.9, None, -2.0]) == [[0], [2], [1, 4]]
+    assert levels_of([None]) == []
 
 
 @pytest.mark.parametrize(
