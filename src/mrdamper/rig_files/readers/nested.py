@@ -12,26 +12,23 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import names_condition, split_name
+from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
+from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES, MOST_ITEMS, with_tests_apart
 from mrdamper.rig_files.units import is_unit, parse_unit
 from mrdamper.rig_files.vocabulary import KEYS, words
 
 _VALUE = words("value")
 DEEPEST = 8  # levels
-MOST_ITEMS = 2000  # of a list
 _MOST_TEXT = 200  # characters
-_FEWEST_SAMPLES = 50  # of channels beside which as many words are a column
 _HEAD = re.compile(r"_?(?:header|info|properties|attributes|meta(?:data)?)$", re.IGNORECASE)
 _BODY = re.compile(r"_?(?:data|values)$", re.IGNORECASE)
-_OF_TESTS = re.compile(r"(?i)(?:s|_?(?:vec(?:tor)?|list|values|levels|array|grid|axis))(?=$|_m?a$|\s*[\[(])")
 _CLOCK = re.compile(r"(^|[_. ])time[_. ]", re.IGNORECASE)
 
 
@@ -86,9 +83,7 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     keys = {"name", "unit", "data"}
     channels = {key: value for key, value in tree.items() if isinstance(value, Mapping) and {*value} == keys}
     arrays = {**tree, **{key: value["data"] for key, value in channels.items()}}
-    tests = _tests_of_rows(arrays)
-    tests = _tests_of_arrays(arrays) if tests is arrays else tests
-    tree = _with_own_axes(_spread(tree) if tests is arrays else tests)
+    tree = _with_own_axes(with_tests_apart(tree, arrays))
     stated = next((v for key, v in tree.items() if key.casefold() in KEYS["unit"] and isinstance(v, Mapping)), {})
     pairs = next((v for k, v in tree.items() if k.casefold() in KEYS["unit"] and isinstance(v, list)), [])
     pairs = pairs if all(isinstance(item, str) for item in pairs) and {*pairs[::2]} <= {*tree} else []
@@ -96,7 +91,7 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     own = {key[:-5]: unit for key, unit in tree.items() if key.casefold().endswith("_unit")} | dict(stated)
     own |= {key: channel["unit"] for key, channel in channels.items()}
     node.units = {**node.units, **{key: u for key, u in own.items() if isinstance(u, str) and is_unit(u)}}
-    sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= _FEWEST_SAMPLES}
+    sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= FEWEST_SAMPLES}
     for key, value in _paired(tree, node.units).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
             if split_name(key).role is not None or len(value) in sizes:
@@ -161,170 +156,6 @@ def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
         at = int(number) - 1 if 1 <= number <= len(axes) else 0
         timed.append({**channel, "xdata": axes[at]["data"], "xunit": units[at]})
     return {**{key: value for key, value in tree.items() if key not in (keys["x"], keys["y"])}, keys["y"]: timed}
-
-
-def _grid_of(value: Any, channels: Mapping[int, int | None]) -> tuple[tuple[int, ...], list[Array]]:
-    """Return the conditions' dimensions and the arrays of samples of a list, or of an array over conditions.
-
-    The channels of such an array stand along the dimension of a length of `channels`, else along one of the last two.
-    """
-    if isinstance(value, Array) and value.ndim > 2 and min(value.shape) > 1 and value.dtype.kind in "iuf":
-        array, along = np.asarray(value), int(np.argmax(value.shape))
-        across = _dimension_of_channels(array, along, channels)
-        if across is None and along < array.ndim - 2:
-            return (), []
-        array = np.moveaxis(array, (-2, -1) if across is None else (along, across), (-2, -1))
-        outer = array.shape[:-2]
-        matrices = np.reshape(array, (-1, *array.shape[-2:]))
-        return (outer, [_unpadded(matrix) for matrix in matrices]) if len(matrices) <= MOST_ITEMS else ((), [])
-    rows = value if isinstance(value, list) and len(value) > 1 else []
-    flat = [item for row in rows for item in (row if isinstance(row, list) else [row])]
-    if not flat or not all(isinstance(item, Array) for item in flat):
-        return (), []
-    return (len(rows), len(flat) // len(rows)) if len(flat) > len(rows) else (len(rows),), flat
-
-
-def _dimension_of_channels(array: np.ndarray, along: int, channels: Mapping[int, int | None]) -> int | None:
-    """Return the only dimension of a length of `channels`, the number and the place of the time; of two, whose time
-    increases along the samples. None if there is none; E_AMBIGUOUS if both may be meant.
-    """
-    across = [i for i, n in enumerate(array.shape) if n in channels and i != along]
-    if len(across) > 1:
-        timed = [(i, time) for i in across if (time := channels[array.shape[i]]) is not None]
-        steps = {i: np.diff(np.moveaxis(array, (i, along), (0, -1))[time].astype(float)) for i, time in timed}
-        across = [i for i, step in steps.items() if not (step <= 0).any()]
-        if len(across) != 1:
-            problem = f"the channels may stand along two dimensions of an array of {' x '.join(map(str, array.shape))}"
-            remedy = "save each test as an array of its own, or the time among the channels"
-            raise RigFileError("E_AMBIGUOUS", problem, remedy=remedy)
-    return across[0] if across else None
-
-
-def _spread(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Split lists of arrays, or arrays over conditions, into a node a test, each with its own of the numbers beside.
-
-    These are a list of matrices, data[current, frequency, sample, channel], or several lists of vectors: T{i, j},
-    X{i, j}. Beside them stand vectors of conditions, one for every test or one for every dimension.
-    """
-    words = {k: v for k, v in tree.items() if isinstance(v, list) and all(isinstance(i, str) for i in v)}
-    named = [[split_name(name).role for name in names] for names in words.values()]
-    channels = {len(r): r.index("time") if "time" in r else None for r in named if len(r) - r.count(None) > 1}
-    grids = {key: grid for key, value in tree.items() if (grid := _grid_of(value, channels))[1]}
-    shapes = {key: [tuple(n for n in item.shape if n > 1) for item in items] for key, (_, items) in grids.items()}
-    flat = {k: grids[k][1] if k in grids and isinstance(v, list) else v for k, v in tree.items()}
-    chosen = [key for key, of in shapes.items() if {len(shape) for shape in of} == {2}]
-    vectors = [key for key, of in shapes.items() if {len(shape) for shape in of} == {1}]
-    if not chosen and sum(split_name(key).role is not None for key in vectors) > 1:
-        chosen = vectors if all(shapes[key] == shapes[vectors[0]] for key in vectors) else []
-    if not chosen or len({grids[key][0] for key in chosen}) > 1 or (len(chosen) > 1 and chosen is not vectors):
-        return flat
-    outer, count = grids[chosen[0]][0], len(grids[chosen[0]][1])
-    at = np.indices(outer).reshape(len(outer), -1)
-    beside = {}
-    for key, value in tree.items():
-        value = value["data"] if isinstance(value, Mapping) and {*value} == {"name", "unit", "data"} else value
-        if isinstance(value, Array) and value.dtype.kind in "iuf" and key not in chosen:
-            shape = tuple(n for n in value.shape if n > 1)
-            if shape == outer:
-                beside[_of_one_test(key)] = np.reshape(value, -1)
-            elif len(shape) == 1 and outer.count(*shape) == 1:
-                beside[_of_one_test(key)] = np.reshape(value, -1)[at[outer.index(*shape)]]
-    rest = {k: v for k, v in flat.items() if k not in chosen and _of_one_test(k) not in beside and k not in words}
-    title = chosen[0] if len(chosen) == 1 else "test"
-    own = [
-        {**{k: grids[k][1][i] for k in chosen}, **words, **{k: float(v[i]) for k, v in beside.items()}}
-        for i in range(count)
-    ]
-    return {**rest, **{f"{title}_{i}": node for i, node in enumerate(own, 1)}}
-
-
-def _of_one_test(key: str) -> str:
-    """Return the name of one of the currents of a vector, currents_A or I_vec_A, as that of a current."""
-    one = _OF_TESTS.sub("", key, count=1)
-    return one if names_condition(split_name(one).name, "current") else key
-
-
-def _tests_of_arrays(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Split arrays over conditions and samples, force[current, frequency, time], into a node a test.
-
-    Two arrays or more, no two dimensions of one length, each but that of the samples with a vector of a condition.
-    The time may be the same for all or some conditions: time[frequency, sample].
-    """
-    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf" and v.size > 1}
-    shapes = {key: tuple(n for n in array.shape if n != 1) for key, array in numeric.items()}
-    shape = max(shapes.values(), key=len, default=())
-    times = {own for key, own in shapes.items() if split_name(key).role == "time"}
-    times -= {shape[:1]} if len(shape) == 2 else set()  # when each test began
-    if len(shape) < 2 or len({*shape}) < len(shape) or len(times) != 1 or not {*max(times)} <= {*shape}:
-        return tree
-    samples = shape[-1] if len(shape) == 2 else max(max(times))
-    outer = [n for n in shape if n != samples]
-    tables = [key for key, own in shapes.items() if len(own) > 1 and samples in own and {*own} <= {*shape}]
-    clocks = {key: numeric[key] for key, own in shapes.items() if own == (samples,)}
-    conditions = {key: outer.index(*own) for key, own in shapes.items() if len(own) == 1 and own[0] in outer}
-    if (
-        {*conditions.values()} != {*range(len(outer))}
-        or {*tables, *clocks, *conditions} != {*shapes}
-        or len(tables) < 2
-    ):
-        return tree
-    rows = []
-    for key in tables:
-        there = [n for n in (*outer, samples) if n in shapes[key]]
-        array = np.transpose(np.squeeze(numeric[key]), [shapes[key].index(n) for n in there])
-        array = np.reshape(array, [n if n in there else 1 for n in (*outer, samples)])
-        rows.append(np.broadcast_to(array, (*outer, samples)).reshape(-1, samples))
-    own = []
-    for i, at in enumerate(np.ndindex(*outer)):
-        test = np.array([row[i] for row in rows])
-        values = {_of_one_test(key): float(np.reshape(numeric[key], -1)[at[of]]) for key, of in conditions.items()}
-        own.append({**clocks, **dict(zip(tables, test if clocks else _unpadded(test), strict=True)), **values})
-    rest = {key: value for key, value in tree.items() if key not in shapes}
-    return {**rest, **{f"test_{i}": node for i, node in enumerate(own, 1)}}
-
-
-def _tests_of_rows(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Split tests behind each other in long arrays into a node a test, by an array of their numbers of samples."""
-    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf" and v.size in v.shape}
-    samples = max((array.size for array in numeric.values()), default=0)
-    long = [key for key, array in numeric.items() if array.size == samples]
-    places = {key: _ends_of(a, samples) for key, a in numeric.items() if 1 < a.size < samples / _FEWEST_SAMPLES}
-    counts = [key for key, ends in places.items() if ends is not None]
-    if len(counts) != 1 or sum(split_name(key).role is not None for key in long) < 2:
-        return tree
-    ends = places[counts[0]]
-    assert ends is not None
-    parts = {key: np.split(np.reshape(numeric[key], -1), ends[:-1]) for key in long}
-    short = {key: array for key, array in numeric.items() if array.size == ends.size and key != counts[0]}
-    values = {_of_one_test(key): np.reshape(array, -1) for key, array in short.items()}
-    clocks = [of for key, of in parts.items() if split_name(key).role == "time"]
-    goes_on = any(after[0] > before[-1] for of in clocks for before, after in pairwise(of))
-    if goes_on and not any(names_condition(split_name(key).name, "current") for key in values):  # cycles of one test
-        return tree
-    own = [
-        {key: of[i] for key, of in parts.items()} | {key: float(of[i]) for key, of in values.items()}
-        for i in range(ends.size)
-    ]
-    rest = {key: value for key, value in tree.items() if key not in (*long, *short, counts[0])}
-    return {**rest, **{f"test_{i}": node for i, node in enumerate(own, 1)}}
-
-
-def _ends_of(array: Array, samples: int) -> np.ndarray | None:
-    """Return where tests end, by their numbers of samples or by where they start, with or without the end of all."""
-    values = np.reshape(array, -1).astype(float)
-    if np.any(values != np.floor(values)):
-        return None
-    ends = np.cumsum(values) if np.sum(values) == samples else np.unique([*values[1:], samples])
-    apart = np.diff(ends, prepend=0).min() >= _FEWEST_SAMPLES and ends[-1] == samples
-    starts = values[0] == 0 and np.all(np.diff(values) > 0)
-    return ends.astype(int) if apart and (starts or np.sum(values) == samples) else None
-
-
-def _unpadded(matrix: np.ndarray) -> np.ndarray:
-    """Return the samples of some channels without those at the end that no channel has: other tests are longer."""
-    matrix = matrix if matrix.shape[0] <= matrix.shape[1] else matrix.T
-    there = np.flatnonzero(~np.isnan(matrix.astype(float)).all(axis=0))
-    return matrix[:, : there[-1] + 1] if there.size else matrix
 
 
 def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, Any]:

@@ -14,7 +14,8 @@ import numpy as np
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, damaged, refusing_damage
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source, Words
-from mrdamper.rig_files.readers.nested import MOST_ITEMS, nested_tables
+from mrdamper.rig_files.readers.nested import nested_tables
+from mrdamper.rig_files.readers.several_tests import MOST_ITEMS
 
 if TYPE_CHECKING:
     import polars as pl
