@@ -18,9 +18,8 @@ COIL, COMPUTED, WEIGHT = words("coil"), words("computed"), words("weight")
 _SET, _NOT_MEASURED, _ELSEWHERE = words("set"), words("not_measured"), words("elsewhere")
 _MEANINGFUL = frozenset().union(_ROLES, _NOT_MEASURED, COMPUTED, _ELSEWHERE, _SET)
 _COMMANDED = re.compile("|".join(words("commanded")))
-RATING = re.compile(
-    "(?i)" + "|".join(words("rating") | words("probe"))
-)  # of a line or a number that is not the value of the test
+# Of a line or a number that is not the value of the test.
+RATING = re.compile("(?i)" + "|".join(words("rating") | words("probe")))
 _COMPRESSION = tuple(words("compression"))
 _FACTOR = re.compile(r"[\s_][x×*·]\s?10+(?![0-9])|\bp-p\b")  # Force x10, Force p-p
 _CONDITION = re.compile(r"=\s*[+-]?[0-9]")  # stroke = 40

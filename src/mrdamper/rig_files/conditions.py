@@ -39,12 +39,13 @@ _LINE = re.compile(
 CELL = re.compile(r"\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*((?:[^\W\d_]|°){0,8})\s*")  # a number, and a unit behind it
 _LONGEST_LINE, _MOST_PARTS = 300, 20
 _TOLERANCE = re.compile(r"\s*(?:\+\s?/?\s?[-−]|±)\s*[0-9]+(?:[.,][0-9]+)?\s*%?")
+FULL_SCALES = ("100", "1000", "255", "1023", "4095", "16383", "32767", "65535")  # largest numbers of converters
 _OF_SCALE = r"(?:m?[VA]|k?N|[mµ]?m|bar|counts?|bits?)"  # units
 _SCALE = re.compile(  # 60 mV = 10 A, 1 A per V, 0.5 A/V * U - 0.2 A, 2 A corresponds to 10 V, pwm 255 = 1.5 A
     r"[0-9]\s*(?:%|m?V\b|counts?\b|bits?\b)[^=:;]*=|\bper\b|\b100 ?%|A ?/ ?(?:m?V|%)[^=:;]*[-−–+] ?[0-9]"
     rf"|[0-9] ?{_OF_SCALE}\s*(?:=|[-=]>|→|≙|corresponds?(?: to)?|entspricht)\s*[0-9.,]+ ?{_OF_SCALE}\b"
     r"|[0-9] ?m?A at [0-9.,]+ ?m?V\b|[0-9] ?m?V at [0-9.,]+ ?m?A\b|\b4 ?(?:-|–|to|bis|\.{2,3}) ?20 ?mA\b|A nominal\b"
-    r"|(?:(?<![\w.,])(?:100|1000|255|1023|4095|16383|32767|65535)|(?i:pwm|dac|adc|duty)[ =]+[0-9.]+)"
+    rf"|(?:(?<![\w.,])(?:{'|'.join(FULL_SCALES)})|(?i:pwm|dac|adc|duty)[ =]+[0-9.]+)"
     r"\s*(?:=|->|entspricht)\s*[0-9.,]+ ?m?A\b"
     r"|=\s*(?:\([A-Za-z]\w* ?[-−–+] ?[0-9.,]+\)|[A-Za-z]\w*) ?[/*×·] ?[0-9]"
     r"|\b(?:[Tt]ype?|[Mm]odel)\b[ :=]*[A-Za-z]+-[0-9.,]+ ?m?A\b"
@@ -148,8 +149,8 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
     """Return the current in free text of lines that name no limit or range, if all state one: "Test 3: 0.4 A"."""
     statements = []
     for line in lines:
-        several = RATING.search(line) or _SCALE.search(line)
-        stated = () if several else currents_in(_TOLERANCE.sub("", line))
+        no_test = RATING.search(line) or _SCALE.search(line)
+        stated = () if no_test else currents_in(_TOLERANCE.sub("", line))
         if len(stated) == 1:
             statements.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))
     return statements if len({statement.amperes for statement in statements}) == 1 else []

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from mrdamper.rig_files.column_names import Header, role_of, split_name, unknown_unit, words_of
-from mrdamper.rig_files.conditions import stated_by_lines, stated_in_titles
+from mrdamper.rig_files.conditions import FULL_SCALES, stated_by_lines, stated_in_titles
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.spool import rescale
@@ -45,7 +45,6 @@ _SIGNAL = re.compile(  # a number of volts or counts, and no end of a range
     r"(?P<before>(?:\.\.|[-−–±]|\b(?:to|bis|à|a)) ?)?(?<![\w.,])(?P<number>[0-9]+(?:[.,][0-9]+)?) ?"
     r"(?P<unit>[A-Za-zµ]{1,6})(?![\w/])"
 )
-_LARGEST = ("100", "1000", "255", "1023", "4095", "16383", "32767", "65535")  # numbers of converters
 NUMBER_IS = re.compile(  # pwm 255 = 1.5 A
     r"(?<!\w)(?P<name>[^\W\d]\w{0,20})[ =]+(?P<number>[0-9]{1,5})"
     r"\s*(?:=|->|entspricht)\s*(?P<value>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>m?A)(?![\w/])"
@@ -65,7 +64,7 @@ def with_counts(table: RawTable) -> RawTable:
     stated = {m.groups() for line in table.remarks for m in NUMBER_IS.finditer(line[:_LONGEST_LINE])}
     for i, header in enumerate(table.headers):
         own = [of for of in stated if of[0].casefold() == header.name.casefold()]  # two: which, or a line through both
-        if len(own) == 1 and own[0][1] in _LARGEST and not header.unit and _is_whole(table, i):
+        if len(own) == 1 and own[0][1] in FULL_SCALES and not header.unit and _is_whole(table, i):
             name, number, value, unit = own[0]
             table = replace(table, remarks=(*table.remarks, f"{name}: {number} counts = {value} {unit}"))
             table = table.named({i: (header.name, "counts")})
@@ -99,7 +98,7 @@ def with_scales(table: RawTable) -> RawTable:
 
 
 def _zero_of(line: str, header: Header) -> float | None:
-    """Return the number of a column at which a line of its scale sees zero; None if the line states an unclear one."""
+    """Return the number of a column that the line of its scale states for zero; None if that is unclear."""
     match = _ZERO.search(line)
     if match is None:
         others = [] if _RANGE.search(line) else _SIGNAL.finditer(SCALE.sub(" ", line))
@@ -204,5 +203,5 @@ def scaled(table: RawTable, column: int, name: str, unit: str, factor: float, te
     """Return the table with a column multiplied by a number, in another unit; a scale of the profile replaces it."""
     if role_of(name) in table.calibrated:
         return table.named({column: (name, unit)})
-    scaled = table.computed(column, (column,), lambda values: rescale(values[column], factor, -zero * factor))
-    return scaled.named({column: (name, unit)}).noted(Finding("W_SCALE", text))
+    computed = table.computed(column, (column,), lambda values: rescale(values[column], factor, -zero * factor))
+    return computed.named({column: (name, unit)}).noted(Finding("W_SCALE", text))
