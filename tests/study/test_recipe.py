@@ -268,15 +268,13 @@ def test_joint_ways_hand_on_what_their_fits_make(monkeypatch):
         ("ab", identifications, {"method": "balance", "identification runs": "2", "functions": "global fit"})
     ]
     folds = SimpleNamespace(refit=lambda rows: SimpleNamespace(damper=("without", rows)))
-    monkeypatch.setattr(recipes, "identify_jointly", lambda runs: SimpleNamespace(problem="problem", fit=fit))
-    monkeypatch.setattr(recipes, "identify_whole", lambda *given: SimpleNamespace(problem=given, fit=fit))
+    choice = SimpleNamespace(problem="problem", fit=fit, searched=("leak",))
+    monkeypatch.setattr(recipes, "identify_jointly", lambda runs, model: asked.append((runs, model)) or choice)
     monkeypatch.setattr(recipes, "all_folds", lambda runs: [[0], [1]])
     monkeypatch.setattr(recipes, "FoldFits", lambda *given: asked.append(given) or folds)
-    made_ = recipes.fit_whole_damper(model_type("play-bypass"), "ab", [])
+    made_ = recipes.fit_whole_damper("tanh", "ab", [])
     assert (made_.damper, made_.fit, made_.refit([1])) == ("damper", fit, ("without", [1]))
-    assert asked[-1] == ("problem", [[0], [1]], recipes.SEARCHED)
-    recipes.fit_whole_damper(model_type("tanh"), "ab", [])
-    assert asked[-1] == (("ab", model_type("tanh")), [[0], [1]], ())
+    assert asked[-2:] == [("ab", "tanh"), ("problem", [[0], [1]], ("leak",))]
     law = SimpleNamespace(basis="spencer", fit=lambda *given: given)
     made_ = recipes.fit_published(law, "abc", [7, 8, 9])
     assert made_.damper == (["a", "b", "c"], [7, 8, 9], {"identification runs": "3"})
@@ -411,7 +409,7 @@ def test_every_recipe_says_what_it_is():
     assert (ours.basis, ours.way, ours.title, ours.source) == (
         None, "global fit", "play and bypass", model_type("play-bypass").source,
     )  # fmt: skip
-    assert (ours.make.func, ours.make.args) == (recipes.fit_whole_damper, (model_type("play-bypass"),))
+    assert (ours.make.func, ours.make.args) == (recipes.fit_whole_damper, ("play-bypass",))
     assert (ali.make.func, ali.make.args) == (recipes.fit_published, (all_published()["ali-type"],))
     paper = PaperOptions(functions="shorter").recipe(runs_with(1400.0, 12.0, (0.5, 1.0, 2.0)))
     assert (paper.name, paper.make.func, paper.pure) == ("paper", fit_paper_functions, True)

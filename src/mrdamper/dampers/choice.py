@@ -19,7 +19,7 @@ from mrdamper.dampers.fold_fits import FoldFits
 from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem, LocalMinimum
 from mrdamper.data import SESSIONS_NEEDED, Floats, Run, same_condition, session_of
 from mrdamper.errors import InputError
-from mrdamper.models import Model
+from mrdamper.models import model_type
 from mrdamper.statistics.functions.selection import Errors, smaller_wins
 from mrdamper.statistics.linear import on_one_blas_thread, solve_linear
 
@@ -81,22 +81,30 @@ class JointChoice:
     fit: JointFit
     tried: tuple[TermTrial, ...]
     left_out: Mapping[str, float]  # mean cross-validated nrmse_pp by kind of fold: "condition", "current", "session"
+    searched: tuple[str, ...] = ()  # presets that a search without a fold has free, too
 
 
 @on_one_blas_thread
-def identify_jointly(runs: Sequence[Run]) -> JointChoice:
+def identify_jointly(runs: Sequence[Run], model: str = MODEL) -> JointChoice:
     """Identify one damper from all runs, with the terms selected by cross-validation.
 
     Parameters
     ----------
     runs : sequence of Run
         Of one rig; any motion, any current.
+    model : str
+        One with `current_levels`. Of all but play and bypass, each parameter that is preset to zero is a term.
 
     Raises
     ------
     IdentificationError, RunError
         As `JointProblem`.
     """
+    return _of_play_and_bypass(runs) if model == MODEL else _with_presets_as_terms(runs, model)
+
+
+def _of_play_and_bypass(runs: Sequence[Run]) -> JointChoice:
+    """Select the free play, the law of the current and the terms, in this order."""
     problem = JointProblem(runs, MODEL).determined()
     fixed = problem.fixed
     laws = _level_laws(problem)
@@ -125,7 +133,8 @@ def identify_jointly(runs: Sequence[Run]) -> JointChoice:
         final = JointProblem(runs, MODEL, fixed, free=final.free, coil=coil, parts=final.parts)
         best = final.fit(start=final.from_point(best), rounds=1, settled=_COARSE_TOLERANCE / 10)
     tried = (*tried, *more)
-    return _conclude((problem, fit), (final, best), second, tried, _kept_terms(tried, law), current)
+    choice = _conclude((problem, fit), (final, best), second, tried, _kept_terms(tried, law), current)
+    return replace(choice, searched=SEARCHED)
 
 
 def _conclude(
@@ -143,28 +152,15 @@ def _conclude(
     evidence = (CrossValidation.of(final, best), CrossValidation.of(final, best, _by_session))
     means = _means({**evidence[0].everything(), **current, **evidence[1].everything()})
     about = {**best.damper.provenance, "terms": terms}
-    about |= {f"left out, {what}": f"{100 * error:.2f} %" for what, error in means.items()}
+    about |= {f"cross-validation, {what}": f"{100 * error:.2f} %" for what, error in means.items()}
     best = replace(best, damper=replace(best.damper, provenance=about), second=second)
     return JointChoice(final, best, tried, means)
 
 
-@on_one_blas_thread
-def identify_whole(runs: Sequence[Run], model: type[Model]) -> JointChoice:
-    """Identify one damper from all runs with a model of a whole damper, its optional terms selected as above.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        Of one rig; any motion, any current.
-    model : type of Model
-        One with `current_levels`. Each parameter that is preset to zero is a term of its own.
-
-    Raises
-    ------
-    IdentificationError, RunError
-        As `JointProblem`.
-    """
-    optional = {info.name: info.meaning for info in model.parameters() if info.preset and info.default == 0.0}
+def _with_presets_as_terms(runs: Sequence[Run], model: str) -> JointChoice:
+    """Select the presets of a model that are zero, beginning with all of them."""
+    infos = model_type(model).parameters()
+    optional = {info.name: info.meaning for info in infos if info.preset and info.default == 0.0}
     problem = JointProblem(runs, model, free=tuple(optional)).determined()
     ends = problem.with_parts([part.steady_end() for part in problem.parts])
     short = ends.search(rounds=2, most_steps=15, settled=_COARSE_TOLERANCE)

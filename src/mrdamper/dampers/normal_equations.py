@@ -305,7 +305,7 @@ def fit_jointly(
 
 @on_one_blas_thread
 def leave_out_errors(data: Condensed, fit: JointFunctionFit, forms: Mapping[str, str | Law]) -> dict[str, Floats]:
-    """Calculate nrmse_pp of the runs of every fold left out of the linear coefficients, by kind of fold.
+    """Calculate nrmse_pp of the runs of every fold, cross-validated in the linear coefficients, by kind of fold.
 
     The shape function stays that of the whole fit: quick, for choosing forms, not a final score.
     """

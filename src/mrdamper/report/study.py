@@ -340,9 +340,9 @@ def _scatter(rig: RigStudy) -> str:
         else f"a correction for the session is not possible: {rig.session_known}."
     )
     omitted = "".join(
-        f"Mean error with a {name.removeprefix('left out, ')} omitted in cross-validation: {value}. "
+        f"Mean error with a {name.removeprefix('cross-validation, ')} omitted in cross-validation: {value}. "
         for name, value in rig.damper.provenance.items()
-        if name.startswith("left out, ")
+        if name.startswith("cross-validation, ")
     )
     return omitted + (
         f"Scatter between runs: gain {100 * drift.gain:.1f} %, offset {drift.offset:.0f} N (standard deviations of "

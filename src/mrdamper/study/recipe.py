@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.choice import MODEL, SEARCHED, identify_jointly, identify_whole
+from mrdamper.dampers.choice import MODEL, identify_jointly
 from mrdamper.dampers.fold_fits import FoldFits
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
@@ -28,7 +28,7 @@ from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import Identification
 from mrdamper.identification.basis import Basis
 from mrdamper.identification.methods import values_of_fields
-from mrdamper.models import Model, Scale, all_models, model_type
+from mrdamper.models import Scale, all_models, model_type
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.study.cross_validation import all_folds, cross_validate, cross_validate_by_kind, stretches
@@ -277,11 +277,10 @@ def fit_current_laws(runs: Sequence[Run], identifications: Sequence[Identificati
     return FitResult(fit.damper, refit, fit)
 
 
-def fit_whole_damper(model: type[Model], runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
+def fit_whole_damper(model: str, runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
     """One set of parameters for every condition, of a model that takes the current as an input."""
-    ours = model.name == MODEL
-    choice = identify_jointly(runs) if ours else identify_whole(runs, model)
-    without = FoldFits(choice.problem, all_folds(runs), SEARCHED if ours else ())
+    choice = identify_jointly(runs, model)
+    without = FoldFits(choice.problem, all_folds(runs), choice.searched)
     return FitResult(choice.fit.damper, lambda rows: without.refit(rows).damper, choice.fit)
 
 
@@ -325,7 +324,7 @@ def current_only(name: str) -> Recipe:
 def whole_damper(name: str) -> Recipe:
     """Return a model whose one set of parameters holds for every condition."""
     cls, limits = model_type(name), "takes any motion and a current that varies"
-    return Recipe(name, None, partial(fit_whole_damper, cls), "global fit", cls.title, cls.source, limits)
+    return Recipe(name, None, partial(fit_whole_damper, name), "global fit", cls.title, cls.source, limits)
 
 
 def conditioned(cls: Published) -> Recipe:

@@ -44,7 +44,7 @@ class _Fitted:
 
     @property
     def penalty(self) -> float:
-        """Factor on the errors for the rates, which saw the values left out."""
+        """Factor on the errors for the rates, which are fitted to the omitted values, too."""
         return self.residual.size / (self.residual.size - len(self.fit.function.rates))
 
 
@@ -274,7 +274,7 @@ def _folds(conditions: tuple[Condition, ...]) -> dict[str, tuple[list[NDArray[np
 def _fold_errors(
     bases: Floats, residuals: Floats, groups: Sequence[NDArray[np.intp]], order: NDArray[np.intp]
 ) -> Floats:
-    """(M, N) magnitudes of errors at values left out in groups, exact for the linear part by the hat matrix.
+    """(M, N) sizes of cross-validated errors of values omitted in groups, exact for the linear part by the hat matrix.
 
     Of M fits: (M, N, terms) bases, and (M, N) residuals.
     """

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from mrdamper.dampers.choice import identify_jointly, identify_whole
+from mrdamper.dampers.choice import identify_jointly
 from mrdamper.dampers.fold_fits import FoldFits
 from mrdamper.data import Condition, Run
 from mrdamper.models.play_bypass import PlayBypass
-from mrdamper.models.tanh import Tanh
 from mrdamper.physics.motion import sine
 from mrdamper.physics.simulation import simulate, steady_loop
 
@@ -55,7 +54,7 @@ def rig(law, currents=(0.0, 0.5, 1.0, 1.5)):
 @pytest.mark.parametrize("law", [tangent, arctangent, saturating, thinning])
 def test_untested_corners_and_currents_are_predicted(law):
     """At twice the tested velocity, and between and beyond the tested currents, within 3 % of the peak."""
-    damper = identify_whole(rig(law), Tanh).fit.damper
+    damper = identify_jointly(rig(law), "tanh").fit.damper
     for current, frequency, amplitude in ((0.0, 2.0, 0.025), (1.5, 2.0, 0.025), (0.75, 1.5, 0.02), (1.7, 1.0, 0.02)):
         _, x, v = motion(frequency, amplitude)
         truth = np.ptp(law(current, x, v))
@@ -64,7 +63,7 @@ def test_untested_corners_and_currents_are_predicted(law):
 
 
 def test_its_parameters_are_found_and_absent_terms_are_removed():
-    choice = identify_whole(rig(tangent), Tanh)
+    choice = identify_jointly(rig(tangent), "tanh")
     values = choice.fit.damper.model.values()
     known = {"c0": 600, "c1": 500, "fy0": 60, "fy1": 900, "vy": 0.04, "shift": 1.2, "k0": 800, "f0": 80}
     assert {name: values[name] for name in known} == pytest.approx(known, rel=0.03)
@@ -73,7 +72,7 @@ def test_its_parameters_are_found_and_absent_terms_are_removed():
 
 
 def test_terms_that_the_runs_show_are_kept_and_named():
-    choice = identify_whole(rig(saturating), Tanh)
+    choice = identify_jointly(rig(saturating), "tanh")
     assert {"si", "asymmetry"} <= set(choice.problem.free)
     assert "surplus of the yield force in extension" in choice.fit.damper.provenance["terms"]
     assert choice.left_out["condition"] < 0.02
@@ -81,16 +80,16 @@ def test_terms_that_the_runs_show_are_kept_and_named():
 
 def test_effects_of_the_current_need_its_levels():
     """One level determines no rise with current, two determine no saturation."""
-    one = identify_whole(rig(tangent, (1.0,)), Tanh)
+    one = identify_jointly(rig(tangent, (1.0,)), "tanh")
     assert not {"c1", "k1", "fy1", "si"} & set(one.problem.free)
-    two = identify_whole(rig(saturating, (0.0, 1.0)), Tanh)
+    two = identify_jointly(rig(saturating, (0.0, 1.0)), "tanh")
     assert {"c1", "fy1"} <= set(two.problem.free)
     assert "si" not in two.problem.free
-    assert "si" in identify_whole(rig(saturating, (0.0, 0.5, 1.5)), Tanh).problem.free
+    assert "si" in identify_jointly(rig(saturating, (0.0, 0.5, 1.5)), "tanh").problem.free
 
 
 def test_runs_of_two_levels_of_three_are_fitted_without_saturation():
-    choice = identify_whole(rig(saturating, (0.0, 0.5, 1.5)), Tanh)
+    choice = identify_jointly(rig(saturating, (0.0, 0.5, 1.5)), "tanh")
     without = FoldFits(choice.problem, [[0, 1, 2], [3, 4, 5], [6, 7, 8]]).refit(range(6))
     assert choice.fit.damper.model.si > 0.1
     assert without.damper.model.si == 0.0
