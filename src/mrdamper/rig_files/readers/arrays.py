@@ -40,7 +40,7 @@ _TELLING = 2  # words that name channels make a list of names
 _NO_NUMBERS = {"b": "truth values", "c": "complex numbers", "V": "bytes"}
 _EARLY_END = (
     "truncat", "end of file", "eof", "unexpected end", "could not read", "not enough", "incomplete", "short",
-    "requires a buffer", "out of range",
+    "requires a buffer", "out of range", "no element found",
 )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import math
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from mrdamper.errors import InputError
@@ -50,28 +50,31 @@ class Workbook(Reader):
             check_sizes(source, members)
         with refusing_damage(source, self.title):
             sheets = _sheets(source, form)
-        form = form.model_copy(update={"separator": "\t", "encoding": "utf-8"})
-        all_tables: list[RawTable] = []
-        lists: list[RawTable] = []
-        beside: list[str] = []
-        first: InputError | None = None
-        for name, sheet in sheets:
-            try:
-                tables = DelimitedText().tables(sheet, form)
-            except InputError as error:
-                first = first or error
-                tables = []
-            tables = [
-                replace(t, label=t.label or name, form={"sheet": name}) for t in tables if len(t.names) >= _FEWEST
-            ]
-            noted = sheet.size <= _NOTES and all(map(_is_list, tables))
-            beside += sheet.head(_NOTES).decode("utf-8", "replace").splitlines() if noted or not tables else ()
-            (lists if noted else all_tables).extend(tables)
-        all_tables = all_tables or lists
-        if not all_tables:
-            raise first or source.refuse("E_NO_DATA", "no sheet holds data", "export the file again")
-        all_tables = [replace(table, remarks=(*table.remarks, *beside)) for table in all_tables]
-        return all_tables if len(all_tables) > 1 else [replace(all_tables[0], label="")]
+        return tables_of_sheets(source, sheets, form)
+
+
+def tables_of_sheets(source: Source, sheets: Sequence[tuple[str, Source]], form: FileForm) -> list[RawTable]:
+    """Return the tables of sheets that were written as text, with the notes of sheets without a test."""
+    form = form.model_copy(update={"separator": "\t", "encoding": "utf-8"})
+    all_tables: list[RawTable] = []
+    lists: list[RawTable] = []
+    beside: list[str] = []
+    first: InputError | None = None
+    for name, sheet in sheets:
+        try:
+            tables = DelimitedText().tables(sheet, form)
+        except InputError as error:
+            first = first or error
+            tables = []
+        tables = [replace(t, label=t.label or name, form={"sheet": name}) for t in tables if len(t.names) >= _FEWEST]
+        noted = sheet.size <= _NOTES and all(map(_is_list, tables))
+        beside += sheet.head(_NOTES).decode("utf-8", "replace").splitlines() if noted or not tables else ()
+        (lists if noted else all_tables).extend(tables)
+    all_tables = all_tables or lists
+    if not all_tables:
+        raise first or source.refuse("E_NO_DATA", "no sheet holds data", "export the file again")
+    all_tables = [replace(table, remarks=(*table.remarks, *beside)) for table in all_tables]
+    return all_tables if len(all_tables) > 1 else [replace(all_tables[0], label="")]
 
 
 def _is_list(table: RawTable) -> bool:
@@ -90,7 +93,7 @@ def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
         )
     texts = []
     for name in names if form.sheet is None else [form.sheet]:
-        text = _as_text(source, name, book.get_sheet_by_name(name).iter_rows())
+        text = as_text(source, name, book.get_sheet_by_name(name).iter_rows())
         if text.size:
             texts.append((name, text))
     if not texts:
@@ -98,7 +101,8 @@ def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
     return texts
 
 
-def _as_text(source: Source, title: str, rows: Iterable[list]) -> Source:
+def as_text(source: Source, title: str, rows: Iterable[list]) -> Source:
+    """Return the cells of a sheet as a text with tabs between them."""
     ragged = scratch(source.keep)
     width, blank = 0, 0
     for number, row in enumerate(rows, 1):
