@@ -20,6 +20,8 @@ import zipfile
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
+
 from mrdamper.errors import InputError
 from mrdamper.rig_files.rig_import import read_runs
 
@@ -61,10 +63,22 @@ def seeds(formats: list[str] | None = None) -> dict[str, bytes]:
         "version4.mat": lambda: rig.mat_bytes(named, format="4"),
         "new.mat": lambda: rig.mat73_bytes(named),
         "a.h5": lambda: rig.hdf5_bytes(short, units, "test"),
+        "a.xml": lambda: elements(table),
+        "page.xls": lambda: page([rig.NAMES, *table]),
         "a.tdms": lambda: rig.tdms_bytes(short, units),
         "a.mf4": lambda: rig.mf4_bytes([(short["time"], {n: short[n] for n in ("disp", "force")})], units),
     }
     return {name: make() for name, make in makers.items() if not formats or name in formats}
+
+
+def elements(table: np.ndarray) -> bytes:
+    samples = "".join('<s time_s="{:g}" displacement_mm="{:g}" force_N="{:g}"/>\n'.format(*row) for row in table)
+    return f'<?xml version="1.0"?><test><current unit="A">0.5</current>{samples}</test>'.encode()
+
+
+def page(table: list) -> bytes:
+    rows = ["".join(f"<td>{cell}</td>" for cell in row) for row in table]
+    return f"<html><table><tr>{'</tr><tr>'.join(rows)}</tr></table></html>".encode()
 
 
 def zipped(content: bytes) -> bytes:
