@@ -79,7 +79,7 @@ def _parts(record: Record) -> Iterator[tuple[int, Record]]:
         channels = {name: np.array(values[inside]) for name, values in named.items()}
         for values in named.values():
             drop_pages(values)
-        lines = None if record.lines is None else record.lines.part(inside.start, inside.stop)
+        lines = None if record.lines is None else record.lines[inside]
         yield at, replace(record, lines=lines, findings=(), segments=(), **channels)
 
 

@@ -17,7 +17,6 @@ from mrdamper.rig_files.columns import column_called
 from mrdamper.rig_files.conditions import currents_in, currents_in_cells
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable
-from mrdamper.rig_files.record import LineNumbers
 from mrdamper.rig_files.units import DIMENSION
 from mrdamper.rig_files.vocabulary import words
 
@@ -132,19 +131,11 @@ def _part(
     def part(wanted: Sequence[int]) -> Content:
         content, inside = read(tuple(columns[i] for i in wanted)), rows()
         values = {i: np.array(content.values[columns[i]][inside]) for i in wanted}
-        return Content(values, _lines(content.lines, inside), content.findings)
+        return Content(values, None if content.lines is None else content.lines[inside], content.findings)
 
     several = tuple(line for line in table.remarks if len(set(currents_in_cells(line))) > 1)
     name = "_".join(part for part in (table.label, label) if part)
     return replace(table.picked(columns, part), titles=several, label=name)
-
-
-def _lines(lines: LineNumbers | None, rows: slice | np.ndarray) -> LineNumbers | None:
-    if lines is None:
-        return None
-    if isinstance(rows, slice):
-        return lines.part(rows.start, rows.stop)
-    return LineNumbers.of(np.asarray(lines[rows]))
 
 
 def _groups(table: RawTable, form: FileForm) -> list[RawTable]:

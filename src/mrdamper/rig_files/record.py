@@ -6,10 +6,8 @@ Nothing is filled in or moved: missing samples stay NaN here and are left out of
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from itertools import accumulate, pairwise
-from typing import overload
 
 import numpy as np
 
@@ -31,61 +29,6 @@ class Finding:
 
     def __str__(self) -> str:
         return f"{self.text} [{self.code}]"
-
-
-@dataclass(frozen=True, slots=True)
-class LineNumbers:
-    """Line of every sample in its file, kept as the few places where lines were skipped."""
-
-    size: int  # samples
-    starts: tuple[int, ...]  # first sample of every stretch of adjacent lines, increasing from 0
-    lines: tuple[int, ...]  # line of that sample, counted from one
-
-    def __len__(self) -> int:
-        return self.size
-
-    @overload
-    def __getitem__(self, sample: int | np.integer) -> int: ...
-    @overload
-    def __getitem__(self, sample: slice | np.ndarray) -> np.ndarray: ...
-
-    def __getitem__(self, sample):
-        """Return the line of one sample, or of several."""
-        index = np.arange(self.size)[sample] if isinstance(sample, slice) else np.asarray(sample)
-        if index.dtype == bool:
-            index = np.flatnonzero(index)
-        index = np.where(index < 0, index + self.size, index)
-        stretch = np.searchsorted(self.starts, index, side="right") - 1
-        line = np.asarray(self.lines)[stretch] + index - np.asarray(self.starts)[stretch]
-        return int(line) if np.ndim(line) == 0 else line
-
-    def part(self, start: int, stop: int) -> LineNumbers:
-        """Return the lines of the samples start..stop-1."""
-        inner = [i for i, at in enumerate(self.starts) if start < at < stop]
-        starts = (0, *(self.starts[i] - start for i in inner))
-        return LineNumbers(stop - start, starts, (self[start], *(self.lines[i] for i in inner)))
-
-    @classmethod
-    def of(cls, lines: np.ndarray) -> LineNumbers:
-        """Return the lines of samples from an array of them."""
-        starts = np.flatnonzero(np.diff(lines, prepend=-2) != 1) if lines.size else np.empty(0, dtype=int)
-        return cls(lines.size, tuple(map(int, starts)), tuple(map(int, lines[starts])))
-
-    @classmethod
-    def concatenated(cls, parts: Sequence[LineNumbers]) -> LineNumbers:
-        """Return the lines of samples behind each other."""
-        begins = accumulate((part.size for part in parts), initial=0)
-        both = [
-            (at + s, line)
-            for at, p in zip(begins, parts, strict=False)
-            for s, line in zip(p.starts, p.lines, strict=True)
-        ]
-        goes_on = [line == last + at - start for (start, last), (at, line) in pairwise([(0, -1), *both])]
-        kept = [entry for entry, same in zip(both, goes_on, strict=True) if not same]
-        return cls(sum(part.size for part in parts), tuple(at for at, _ in kept), tuple(line for _, line in kept))
-
-    def __array__(self, dtype=None, copy=None):
-        return np.asarray(self[:], dtype=dtype)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +60,7 @@ class Record:
     excitation: str = "sine"
     split: str = "train"
     segments: tuple[tuple[int, int], ...] = ()  # sample ranges without a gap in time; empty before the checks looked
-    lines: LineNumbers | None = None  # of every sample, where the file is text
+    lines: np.ndarray | None = None  # (N,) line of every sample, counted from one, where the file is text
     window: tuple[float, float] | None = None  # steady window of a stored run [s]; of a new record it is found
     steady: SteadyPart | None = None  # found by the checks; of a long record, checked in parts, found afterwards
 
@@ -145,7 +88,7 @@ def part_of_record(record: Record, rows: slice, name: str = "") -> Record:
     """Return the samples of some rows of a record, under its name or another."""
     channels = {channel: values[rows] for channel, values in record.channels.items()}
     further = {channel: values[rows] for channel, values in record.further.items()}
-    lines = None if record.lines is None else record.lines.part(rows.start, rows.stop)
+    lines = None if record.lines is None else record.lines[rows]
     return replace(record, id=name or record.id, lines=lines, further=further, **channels)  # type: ignore[arg-type]
 
 

@@ -81,7 +81,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     for number, stretch in enumerate(stretches, 1):
         part = {name: values[stretch] for name, values in channels.items()}
         others = {name: values[stretch] for name, values in further.items()}
-        part, its_lines = _aligned(part, assigned, None if lines is None else lines.part(stretch.start, stretch.stop))
+        part, its_lines = _aligned(part, assigned, None if lines is None else lines[stretch])
         if its_lines is not None and len(its_lines) != stretch.stop - stretch.start:
             others = {}  # delays were subtracted: the samples are no longer those of the file
         if profile.correction is not None:
@@ -275,7 +275,7 @@ def _aligned(channels: dict[str, Floats], assigned: dict[str, Assigned], lines):
         raise ColumnError("the delays of the profile are longer than the record", remedy="correct delay_ms")
     inside = slice(int(keep[0]), int(keep[-1]) + 1)
     cut = {name: values[inside] for name, values in {**channels, **shifted}.items()}
-    return cut, None if lines is None else lines.part(inside.start, inside.stop)
+    return cut, None if lines is None else lines[inside]
 
 
 def _remarks(table: RawTable, assigned: dict[str, Assigned]) -> dict[str, str]:

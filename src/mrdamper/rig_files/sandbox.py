@@ -32,7 +32,7 @@ from mrdamper.rig_files.readers.base import (
     Source,
     Words,
 )
-from mrdamper.rig_files.record import Finding, LineNumbers
+from mrdamper.rig_files.record import Finding
 
 _SECONDS = 0.6  # processor time of the child for the smallest file; a busy machine makes three of each second
 _BYTES, _BYTES_PER_BYTE = 96 * 2**20, 3 * MOST_RATIO  # memory the child may write to beyond what its library holds
@@ -92,7 +92,7 @@ class _Asked:
         def read(columns: Sequence[int]) -> Content:
             answer = self({"table": index, "columns": list(columns)})
             values = {c: self._sandbox.receive(n) for c, n in zip(columns, answer["sizes"], strict=True)}
-            lines = answer["lines"] and LineNumbers(answer["lines"][0], *map(tuple, answer["lines"][1:]))
+            lines = self._sandbox.receive(answer["lines"]) if answer["lines"] else None
             return Content(values, lines, tuple(Finding(*finding) for finding in answer["findings"]))
 
         def words(column: int) -> Words:

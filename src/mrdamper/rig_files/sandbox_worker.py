@@ -93,13 +93,13 @@ def _limit(seconds: float | None, size: float = 0) -> None:
 def _send_columns(replies: BinaryIO, table: RawTable, columns: list[int]) -> None:
     content = table.read(columns)
     values = [content.values[column] for column in columns]
-    lines = content.lines
+    lines = [] if content.lines is None else [content.lines]
     answer = {
         "sizes": [array.size for array in values],
-        "lines": None if lines is None else [lines.size, lines.starts, lines.lines],
+        "lines": sum(array.size for array in lines),
         "findings": [[finding.code, finding.text] for finding in content.findings],
     }
-    send(replies, answer, values)
+    send(replies, answer, [*values, *lines])
 
 
 def _send_words(replies: BinaryIO, table: RawTable, column: int) -> None:

@@ -16,7 +16,7 @@ from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.mapping.session import OFF_S, OFF_STEPS, stretches_of_session
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import OPTIONAL, Finding, LineNumbers, Record, part_of_record
+from mrdamper.rig_files.record import OPTIONAL, Finding, Record, part_of_record
 
 _HZ = re.compile(r"(?<![\w.,])([0-9]{1,4}(?:[.,][0-9]{1,4})?) ?Hz(?![A-Za-z])")
 _NUMBERED = re.compile(
@@ -101,7 +101,7 @@ def _concatenated(records: Sequence[Record]) -> Record:
     channels: dict[str, Floats | None] = dict.fromkeys(OPTIONAL)
     channels |= {name: np.concatenate([getattr(record, name) for record in records]) for name in names}
     numbers = [record.lines for record in records if record.lines is not None]
-    lines = LineNumbers.concatenated(numbers) if len(numbers) == len(records) else None
+    lines = np.concatenate(numbers) if len(numbers) == len(records) else None
     if channels["current"] is None and "current_from" in records[0].provenance:  # a page's heading states it once
         stated = {float(r.current[0]) for r in records if r.current is not None}
         channels["current"] = constant(stated.pop(), channels["time"]) if len(stated) == 1 else None  # type: ignore[arg-type]

@@ -22,7 +22,7 @@ from mrdamper.errors import InputError, printable
 from mrdamper.rig_files.column_names import Header, split_name
 from mrdamper.rig_files.conditions import Quantity, stated_quantities
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.record import Finding, LineNumbers
+from mrdamper.rig_files.record import Finding
 
 MOST_COLUMNS = 1000
 MOST_UNPACKED = 10**9  # bytes
@@ -95,7 +95,7 @@ class Content:
     """Columns that were asked for."""
 
     values: Mapping[int, Floats]  # (N,) by position of the column, NaN where a cell is missing
-    lines: LineNumbers | None = None  # for text
+    lines: np.ndarray | None = None  # (N,) of every row, counted from one, for text
     findings: tuple[Finding, ...] = ()
 
 

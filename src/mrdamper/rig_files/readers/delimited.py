@@ -13,7 +13,7 @@ from mrdamper.errors import printable
 from mrdamper.rig_files.column_names import Header, split_name
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words, scratch
-from mrdamper.rig_files.record import Finding, LineNumbers
+from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.blocks import Block, find_blocks
 from mrdamper.rig_files.text.bulk import read_bulk
 from mrdamper.rig_files.text.cells import RowFormat, field_count, read_cells, split_rows
@@ -41,6 +41,7 @@ _KEYED = re.compile(
 )
 _FEWEST_KEYED = 20  # rows
 _HEAD_LINES = 4000  # in which the data must have begun
+_LINES = -1  # stands for a column of the numbers of lines
 BULK_FROM = 2**16  # bytes; below, reading cell by cell takes less time than loading the fast reader
 
 
@@ -179,8 +180,7 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
     block, findings = _without_footer(form, block)
     block, cut = _without_cut_row(form, block)
     findings += cut
-    spool, odd, line = Spool(columns), False, block.line
-    numbers: list[LineNumbers] = []
+    spool, odd, line = Spool((*columns, _LINES)), False, block.line
     fast = block.stop - block.start > BULK_FROM
     at = block.start
     for chunk in stream.chunks(block.start, block.stop):
@@ -189,18 +189,19 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
         rows = read_bulk(chunk, line, form) if fast else None
         if rows is None:
             rows = read_cells(chunk, line, form, final=at >= stream.stop)
-        spool.add(rows.values)
-        numbers.append(LineNumbers.of(rows.lines))
+        spool.add({**rows.values, _LINES: rows.lines})
         odd |= rows.odd
         line += line_feeds(chunk)
     form.refuse_wrong()
-    if not any(map(len, numbers)):
+    values = spool.arrays()
+    lines = values.pop(_LINES)
+    if not lines.size:
         raise stream.source.refuse("E_NO_DATA", "a header without data", "export the file again")
     damaged = any(_ODD.search(name) for i, name in enumerate(layout.names) if i not in columns)
     if odd or damaged:
         text = f"bytes that are no {'UTF-8' if stream.encoding == 'utf-8' else 'ASCII'} in columns that are not needed"
         findings = (*findings, Finding("W_ENCODING", text))
-    return Content(spool.arrays(), LineNumbers.concatenated(numbers), findings)
+    return Content(values, lines, findings)
 
 
 def _words(stream: TextStream, layout: Layout, block: Block, column: int) -> Words:

@@ -39,7 +39,9 @@ def read_bulk(block: bytes, line: int, form: RowFormat) -> Rows | None:
         for value, cell in zip(values, cells, strict=True):
             value[row] = cell
     return Rows(
-        dict(zip(form.wanted, values, strict=True)), np.arange(line, line + ends.size), form.stream.is_odd(block)
+        dict(zip(form.wanted, values, strict=True)),
+        np.arange(line, line + ends.size, dtype=float),
+        form.stream.is_odd(block),
     )
 
 

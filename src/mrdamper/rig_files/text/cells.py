@@ -26,7 +26,7 @@ class Rows:
     """Cells of adjacent rows as numbers."""
 
     values: dict[int, Floats]  # by column
-    lines: np.ndarray  # (N,), of every row
+    lines: Floats  # (N,), of every row
     odd: bool = False  # a cell that was not asked for holds bytes that are not in the text's encoding
 
 
@@ -70,7 +70,7 @@ def read_cells(block: bytes, line: int, form: RowFormat, *, final: bool = False)
         cells = [row[column] for row in rows]
         read = _stamps if form.layout.kinds[column] == "stamp" else _numbers
         values[column] = read(cells, column, lines, form)
-    return Rows(values, np.array(lines, dtype=np.int64), form.stream.is_odd(block))
+    return Rows(values, np.array(lines, dtype=float), form.stream.is_odd(block))
 
 
 def read_row(text: str, line: int, form: RowFormat) -> list[float]:
