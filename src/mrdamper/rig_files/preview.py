@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,24 +21,6 @@ from mrdamper.rig_files.record import SIGNED
 
 _ROWS_SHOWN, _MOST_SHOWN = 6, 30  # rows and columns of a preview
 _MOST_COLUMNS, _MOST_REMARKS, _MOST_NAMES = 40, 6, 3  # of a tree that is shown
-
-
-@dataclass(frozen=True, slots=True)
-class Node:
-    """A table within a file."""
-
-    path: str  # within the file, empty for its only table
-    columns: tuple[Header, ...]
-    beside: tuple[str, ...]  # numbers and lines beside the columns
-
-
-@dataclass(frozen=True, slots=True)
-class FileTree:
-    """A file, its tables, and why it could not be opened."""
-
-    name: str
-    nodes: tuple[Node, ...]
-    problem: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,40 +111,28 @@ def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable,
     return table, channels
 
 
-def scan(paths: Iterable[str | Path], profile: Profile | str | Path | None = None) -> tuple[FileTree, ...]:
-    """List the contents of files and folders: the tables of every file, their columns, and the text beside them."""
+def tree_lines(paths: Iterable[str | Path], profile: Profile | str | Path | None = None) -> list[str]:
+    """List the contents of files and folders as lines: tables, their columns, and the text beside them.
+
+    Tables that hold the same columns are one entry with a count.
+    """
     profile = profile_of(profile)
-    trees = []
+    alike: dict[
+        tuple[Header, ...], tuple[list[str], list[str]]
+    ] = {}  # by columns: tables, lines beside one
+    problems = []
     with unpacked(paths) as given:
         for path in files_in(given)[0]:
             try:
                 with raw_tables(path, profile.file) as tables:
-                    trees.append(FileTree(path.name, _nodes_of(tables)))
+                    for table in [table for table in tables if not table.fallback]:
+                        beside = [*(f"{name} = {value:g}" for name, value in table.constants.items()), *table.remarks]
+                        names, _ = alike.setdefault(table.headers, ([], beside))
+                        names.append(f"{path.name}: {table.label}" if table.label else path.name)
             except InputError as error:
-                trees.append(FileTree(path.name, (), f"{error.found} [{error.code}]"))
-    return tuple(trees)
-
-
-def _nodes_of(tables: Iterable[RawTable]) -> tuple[Node, ...]:
-    """Return the tables of a file as nodes of its tree."""
-    nodes = []
-    for table in tables:
-        if table.fallback:
-            continue
-        beside = [f"{name} = {value:g}" for name, value in table.constants.items()]
-        nodes.append(Node(table.label, table.headers, (*beside, *table.remarks)))
-    return tuple(nodes)
-
-
-def tree_lines(trees: Sequence[FileTree]) -> list[str]:
-    """Return the trees as lines: files and tables that hold the same columns are one entry with a count."""
-    alike: dict[tuple, list[tuple[str, Node]]] = defaultdict(list)
+                problems.append(f"{path.name}: {error.found} [{error.code}]")
     lines: list[str] = []
-    for tree in trees:
-        for node in tree.nodes:
-            alike[node.columns].append((tree.name, node))
-    for columns, places in alike.items():
-        names = [f"{file}: {node.path}" if node.path else file for file, node in places]
+    for columns, (names, beside) in alike.items():
         shown = listed(names, _MOST_NAMES)
         lines.append(shown if len(names) == 1 else f"{len(names)} tables with the same columns: {shown}")
         lines += [
@@ -172,9 +141,8 @@ def tree_lines(trees: Sequence[FileTree]) -> list[str]:
         ]
         if columns[_MOST_COLUMNS:]:
             lines.append(f"  ... and {len(columns) - _MOST_COLUMNS} more columns")
-        lines += [f"  beside them: {text[:100]}" for text in places[0][1].beside[:_MOST_REMARKS]]
-    lines += [f"{tree.name}: {tree.problem}" for tree in trees if tree.problem]
-    return lines
+        lines += [f"  beside them: {text[:100]}" for text in beside[:_MOST_REMARKS]]
+    return lines + problems
 
 
 def columns_of(path: str | Path, profile: Profile | str | Path | None = None) -> tuple[str, ...]:

@@ -244,10 +244,10 @@ def _reads_alike(one: Run, other: Run) -> bool:
 
 
 def _print_tree(files: list[Path], settings: Profile) -> None:
-    from mrdamper.rig_files.preview import scan, tree_lines
+    from mrdamper.rig_files.preview import tree_lines
 
     print("In the files:")
-    for line in tree_lines(scan(files, settings)):
+    for line in tree_lines(files, settings):
         print(f"  {line}")
 
 
