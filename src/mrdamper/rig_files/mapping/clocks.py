@@ -6,7 +6,6 @@ import contextlib
 import itertools
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -53,16 +52,13 @@ def with_axis_as_time(table: RawTable) -> RawTable:
     clocks = {m["unit"] for m in axes if m["axis"] in "xX" and split_name("", m["unit"]).dimension == "time"}
     if len(clocks) != 1 or not table.names:
         return table
-    names, units = list(table.names), list(table.units)
-    if names[0].casefold() == "name" and units[0].casefold() == "unit":
-        names[0], units[0] = "time", clocks.pop()
-        return replace(table, names=tuple(names), units=tuple(units))
+    if (table.names[0].casefold(), table.units[0].casefold()) == ("name", "unit"):
+        return table.named({0: ("time", clocks.pop())})
     others = {m["unit"] for m in axes if m["axis"] not in "xX"}
-    named = split_name(table.source.name.partition(".")[0])  # a channel a file: Run1_Force.txt
-    if len(others) != 1 or names[-2:-1] not in (["X"], ["x"]) or any(units) or named.role is None:
+    role, last = split_name(table.source.name.partition(".")[0]).role, len(table.names) - 1  # Run1_Force.txt
+    if len(others) != 1 or table.names[-2:-1] not in (("X",), ("x",)) or any(table.units) or role is None:
         return table
-    names[-2:], units[-2:] = ["time", named.role], [clocks.pop(), others.pop()]
-    return replace(table, names=tuple(names), units=tuple(units))
+    return table.named({last - 1: ("time", clocks.pop()), last: (role, others.pop())})
 
 
 def with_epoch(table: RawTable) -> RawTable:

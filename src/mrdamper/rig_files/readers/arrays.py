@@ -284,9 +284,11 @@ def stated_array(source: Source, file: IO[bytes], what: str, size: int) -> tuple
     return shape, kind
 
 
-def twice(source: Source, name: str) -> RigFileError:
-    """Return the refusal of a file that holds two things of one name, of which a library gives either."""
-    return source.refuse("E_DUPLICATE_COLUMN", f"{name!r} is stored twice", "save the file again, with one of them")
+def refuse_twice(source: Source, names: Sequence[str]) -> None:
+    """Refuse a file that holds two things of one name, of which a library gives either."""
+    if len(set(names)) < len(names):
+        problem = f"{next(name for name in names if names.count(name) > 1)!r} is stored twice"
+        raise source.refuse("E_DUPLICATE_COLUMN", problem, "save the file again, with one of them")
 
 
 def damaged(source: Source, title: str, why: str) -> RigFileError:

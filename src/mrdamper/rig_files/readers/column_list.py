@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from typing import ClassVar
 
-from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import RawTable, Source
 from mrdamper.rig_files.readers.delimited import DelimitedText
@@ -52,12 +50,10 @@ class ColumnList(DelimitedText):
             match = _STATED.fullmatch(heading)
             name, unit = (match["name"], match["unit"]) if match else (heading, "*")
             wanted[name.casefold()] = role, "" if unit == "*" else unit
-        names, units = list(table.names), list(table.units)
-        for i, name in enumerate(table.names):
-            header = split_name(name, table.units[i])
+        headings = {}
+        for i, (name, header) in enumerate(zip(table.names, table.headers, strict=True)):
             bare = {text.casefold() for text in (name, header.name, header.name.rpartition("/")[2])}
             role, unit = next((wanted[text] for text in bare if text in wanted), ("", ""))
-            if role:
-                names[i] = name if header.role == role and not unit else f"{header.name} {role}"
-                units[i] = table.units[i] if names[i] == name else unit or header.unit
-        return replace(table, names=tuple(names), units=tuple(units))
+            if role and (header.role != role or unit):
+                headings[i] = f"{header.name} {role}", unit or header.unit
+        return table.named(headings)

@@ -108,17 +108,11 @@ class _Walk:
             references = np.reshape(item[()], -1) if _is_matlab(item) else []
             cells = [self._at(item.file, r, depth) for r in references] if len(references) <= MOST_STRUCTS else []
             return {name: cells or np.empty(2, dtype=object)}
-        vectors = h5py.check_vlen_dtype(item.dtype)
-        if (
-            isinstance(vectors, np.dtype)
-            and vectors.kind in "iuf"
-            and len(item.shape) == 1
-            and len(item) <= MOST_STRUCTS
-        ):
-            unit = next((_text(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), "")
+        unit = next((_text(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), "")
+        kind = getattr(h5py.check_vlen_dtype(item.dtype), "kind", "")  # of vectors of samples
+        if kind and kind in "iuf" and len(item.shape) == 1 and len(item) <= MOST_STRUCTS:
             return {name: list(item[()]), f"{name}_unit": unit}
         value = self._dataset(name, item)
-        unit = next((_text(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), "")
         if not isinstance(value, Stored):
             stated = f"{name} [{unit}]" if isinstance(value, float) and is_unit(unit) else name
             return {stated: value} if value is not None else {}
@@ -157,11 +151,8 @@ class _Walk:
             return float(value) if kind.kind in "iuf" else _text(value)[:_MOST_TEXT]
         if dataset.size == 1:
             return None
-        if (
-            1 < dataset.size <= MOST_COLUMNS
-            and dataset.ndim == 1
-            and (h5py.check_string_dtype(kind) or kind.kind == "S")
-        ):
+        texts = h5py.check_string_dtype(kind) or kind.kind == "S"
+        if texts and 1 < dataset.size <= MOST_COLUMNS and dataset.ndim == 1:
             return _words(dataset[()])
         check_unpacked(self._source, int(dataset.size) * max(8, kind.itemsize if not kind.names else 8))
         turned = bool(says) and dataset.ndim == 2  # MATLAB stores its matrices so

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import damaged, twice, whole
+from mrdamper.rig_files.readers.arrays import damaged, refuse_twice, whole
 from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, RigFileError, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 from mrdamper.rig_files.text.tokens import stamp
@@ -53,8 +53,7 @@ def _parsed(source: Source, content: bytes) -> Any:
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         members = dict(pairs)
         if len(members) < len(pairs):
-            names = [name for name, _ in pairs]
-            raise twice(source, next(name for name in names if names.count(name) > 1))
+            refuse_twice(source, [name for name, _ in pairs])
         return members
 
     text = ""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.readers.arrays import check_unpacked, refusing_damage, twice, value_of
+from mrdamper.rig_files.readers.arrays import check_unpacked, refuse_twice, refusing_damage, value_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, MOST_STRUCTS, hdf5_tables
 from mrdamper.rig_files.readers.nested import DEEPEST, nested_tables
@@ -41,8 +41,7 @@ class Matlab(Reader):
             source.file.seek(0)
             variables = whosmat(source.file)
             names = [name for name, _, _ in variables]
-            if len(set(names)) < len(names):
-                raise twice(source, next(name for name in names if names.count(name) > 1))
+            refuse_twice(source, names)
             check_unpacked(source, 8 * sum(int(np.prod(shape, dtype=object)) for _, shape, _ in variables))
             wanted = [name for name, _, kind in variables if kind in (*_NUMERIC, "struct", "char", "cell")]
             source.file.seek(0)

@@ -16,9 +16,9 @@ from mrdamper.rig_files.readers.arrays import (
     damaged,
     expand,
     pick,
+    refuse_twice,
     refusing_damage,
     stated_array,
-    twice,
     value_of,
 )
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
@@ -100,8 +100,7 @@ def _check_headers(source: Source) -> dict[str, tuple[str, ...]]:
         members = archive.infolist()
         check_sizes(source, members)
         names = [member.filename.removesuffix(".npy") for member in members]
-        if len(set(names)) < len(names):
-            raise twice(source, next(name for name in names if names.count(name) > 1))
+        refuse_twice(source, names)
         for member, name in zip(members, names, strict=True):
             with archive.open(member) as stream:
                 _, dtype = stated_array(source, stream, f"array {name!r}", member.file_size)
