@@ -12,8 +12,8 @@ from mrdamper.data.arrays import chunks
 from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.conditions import (
+    LARGEST_STATED,
     Statement,
-    agreed,
     contradicted,
     contradicts,
     currents_in,
@@ -55,12 +55,7 @@ def current_of(
         statements = [] if current is None else [Statement(current, "name by the profile's pattern")]
     elif not statements and channel is None:
         statements = _set_points(table, rows) or stated_in_titles(table.remarks) or _folders(table, path)
-    try:
-        stated = agreed(statements)
-    except ValueError as error:
-        code, remedy = "E_AMBIGUOUS", "correct the name or the line that is wrong"
-        code = "E_RANGE" if "no coil current" in str(error) else code
-        raise ColumnError(printable(str(error)), where=where, remedy=remedy, code=code) from None
+    stated = _agreed(statements, where)
     mean = None if channel is None or stated is None else contradicted(channel, stated.amperes)
     if stated is not None and mean is not None:
         problem = printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A")
@@ -69,6 +64,21 @@ def current_of(
     if stated is None or (channel is not None and (source is None or source.pattern is None)):
         return None, {}
     return stated.amperes, {"current_from": as_data(stated.whence)}
+
+
+def _agreed(statements: list[Statement], where: str) -> Statement | None:
+    """Return the first of statements that agree; None if there is none."""
+    over = [statement for statement in statements if abs(statement.amperes) > LARGEST_STATED]
+    others = [statement for statement in statements[1:] if contradicts(statement.amperes, statements[0].amperes)]
+    if over:
+        code, problem = "E_RANGE", f"{over[0].whence} gives {over[0].amperes:g} A, which is no coil current of a damper"
+    elif others:
+        first, other = statements[0], others[0]
+        code, problem = "E_AMBIGUOUS", f"{first.whence} gives {first.amperes:g} A, {other.whence} {other.amperes:g} A"
+    else:
+        return statements[0] if statements else None
+    remedy = "correct the name or the line that is wrong"
+    raise ColumnError(printable(problem), where=where, remedy=remedy, code=code)
 
 
 def with_value_of_name(record: Record, path: Path, profile: Profile) -> Record:

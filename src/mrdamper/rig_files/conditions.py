@@ -291,22 +291,6 @@ def _value(number: str, decimal: str | None) -> float | None:
     return float(number.replace(",", "."))
 
 
-def agreed(statements: Sequence[Statement]) -> Statement | None:
-    """Return the first of statements that agree; None if there is none.
-
-    Raises ValueError with what was found, if two contradict each other or one is no coil current.
-    """
-    for statement in statements:
-        if abs(statement.amperes) > LARGEST_STATED:
-            raise ValueError(f"{statement.whence} gives {statement.amperes:g} A, which is no coil current of a damper")
-    for other in statements[1:]:
-        if contradicts(other.amperes, statements[0].amperes):
-            raise ValueError(
-                f"{statements[0].whence} gives {statements[0].amperes:g} A, {other.whence} {other.amperes:g} A"
-            )
-    return statements[0] if statements else None
-
-
 def contradicted(channel: Floats, stated: float) -> float | None:
     """Return the mean of a constant current channel that contradicts what is stated [A]; None where it does not."""
     finite = channel[np.isfinite(channel)]

@@ -13,9 +13,8 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from mrdamper.data.temporary import temporary_folder
-from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import COMPUTED, holds, words_of
-from mrdamper.rig_files.readers import raw_tables, suffixes
+from mrdamper.rig_files.readers import ask_tables, suffixes
 from mrdamper.rig_files.readers.archive import (
     UNREADABLE_ZIP,
     as_it_is,
@@ -26,7 +25,7 @@ from mrdamper.rig_files.readers.archive import (
     opened,
     zip_members,
 )
-from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RigFileError, Source
+from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RawTable, RigFileError, Source
 from mrdamper.rig_files.tests_table import NAME as TESTS
 
 _MOST_MEMBERS = 10_000
@@ -64,7 +63,7 @@ def files_in(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
         inside = [file for file in inside if file.is_file() and not _is_packed_folder(file)]  # no pipes
         recognised = [file for file in inside if file.suffix.lower() in suffixes()]
         # Suffixes of a laboratory's own: run.001
-        recognised = recognised or [file for file in inside if _is_table(file)]
+        recognised = recognised or [file for file in inside if ask_tables(file, _are_named, False)]
         recognised = _measured(recognised, path)
         files += recognised
         read = set(recognised)
@@ -90,12 +89,8 @@ def _measured(files: list[Path], top: Path) -> list[Path]:
     return [file for file in files if file not in computed or names[file] not in measured]
 
 
-def _is_table(path: Path) -> bool:
-    try:
-        with raw_tables(path) as tables:
-            return any(table.names for table in tables)
-    except InputError:
-        return False
+def _are_named(tables: list[RawTable]) -> bool:
+    return any(table.names for table in tables)
 
 
 def _is_packed_folder(path: Path) -> bool:

@@ -15,7 +15,7 @@ from mrdamper.rig_files.columns import assign, column_called, propose, rate_of, 
 from mrdamper.rig_files.file_records import tables_of_tests, test_tables
 from mrdamper.rig_files.folder import files_in, unpacked
 from mrdamper.rig_files.profile import Channel, Profile, current_pattern, profile_of
-from mrdamper.rig_files.readers import raw_tables
+from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED
 
@@ -117,9 +117,7 @@ def tree_lines(paths: Iterable[str | Path], profile: Profile | str | Path | None
     Tables that hold the same columns are one entry with a count.
     """
     profile = profile_of(profile)
-    alike: dict[
-        tuple[Header, ...], tuple[list[str], list[str]]
-    ] = {}  # by columns: tables, lines beside one
+    alike: dict[tuple[Header, ...], tuple[list[str], list[str]]] = {}  # by columns: tables, lines beside one
     problems = []
     with unpacked(paths) as given:
         for path in files_in(given)[0]:
@@ -148,8 +146,4 @@ def tree_lines(paths: Iterable[str | Path], profile: Profile | str | Path | None
 def columns_of(path: str | Path, profile: Profile | str | Path | None = None) -> tuple[str, ...]:
     """Names of the columns of a file's first table; empty if it cannot be opened."""
     profile = profile_of(profile)
-    try:
-        with raw_tables(path, profile.file) as tables:
-            return test_tables(tables, profile)[0].names
-    except InputError:
-        return ()
+    return ask_tables(path, lambda tables: test_tables(tables, profile)[0].names, (), profile.file)

@@ -268,7 +268,7 @@ def _asked(
             break
         typer.echo(question.text)
         for number, answer in enumerate(question.answers, 1):
-            typer.echo(f"  {number}  {answer.shown}")
+            typer.echo(f"  {number}  {answer.value}")
         chosen = typer.prompt("Number, 0 to stop", type=int, default=0)
         if not 1 <= chosen <= len(question.answers):
             break

@@ -23,7 +23,7 @@ from mrdamper.rig_files.mapping.description import with_notes
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
 from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
 from mrdamper.rig_files.profile import Channel, Profile
-from mrdamper.rig_files.readers import raw_tables
+from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.arrays import array_table
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding, Record, part_of_record
@@ -54,11 +54,11 @@ class Part:
 
 def holds_channels(path: Path, form: FileForm) -> bool:
     """Tell if a table of a file has columns of a displacement and a force."""
-    try:
-        with raw_tables(path, form) as tables:
-            return any({"displacement", "force"} <= {header.channel for header in table.headers} for table in tables)
-    except InputError:
-        return False
+
+    def both(tables: list[RawTable]) -> bool:
+        return any({"displacement", "force"} <= {header.channel for header in table.headers} for table in tables)
+
+    return ask_tables(path, both, False, form)
 
 
 def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
@@ -168,12 +168,8 @@ def results_of(path: Path) -> Results | None:
     """Return the table of results that a file holds; None if it holds none."""
     if path.suffix.lower() in TEXTS:
         return results_in(short_lines(path))
-    try:
-        with raw_tables(path) as tables:
-            tables_of_results = [results for table in tables[:20] if (results := results_in(lines_of(table)))]
-            return tables_of_results[0] if len(tables_of_results) == 1 else None
-    except InputError:
-        return None
+    found = ask_tables(path, lambda tables: [r for t in tables[:20] if (r := results_in(lines_of(t)))], [])
+    return found[0] if len(found) == 1 else None
 
 
 def currents_beside(
@@ -247,11 +243,11 @@ def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:
 
 def is_list(path: Path) -> bool:
     """Tell if a file holds only short tables without a time, or a displacement and a force: a plan, peak values."""
-    try:
-        with raw_tables(path) as tables:
-            rows = [table.words(0).codes.size if table.words is not None else _FEWEST_ROWS for table in tables]
-            named = all(any(table.names) for table in tables)
-            roles = [{header.role for header in table.headers} for table in tables]
-    except InputError:
-        return False
-    return named and max(rows) < _FEWEST_ROWS and not any("time" in r or {"displacement", "force"} <= r for r in roles)
+
+    def short(table: RawTable) -> bool:
+        rows = table.words(0).codes.size if table.words is not None else _FEWEST_ROWS
+        roles = {header.role for header in table.headers}
+        record = "time" in roles or {"displacement", "force"} <= roles
+        return any(table.names) and rows < _FEWEST_ROWS and not record
+
+    return ask_tables(path, lambda tables: all(map(short, tables)), False)

@@ -28,11 +28,6 @@ class Answer:
     key: str
     value: str | int
 
-    @property
-    def shown(self) -> str:
-        """The answer as it is listed."""
-        return str(self.value)
-
     def applied(self, profile: Profile) -> Profile:
         """Return the profile with this answer."""
         settings = profile.channel(self.channel).model_dump(exclude_unset=True, exclude_none=True)

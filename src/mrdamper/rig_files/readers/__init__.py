@@ -7,17 +7,19 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from mrdamper.discovery import Registry
+from mrdamper.errors import InputError
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.archive import opened
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.sandbox import guarded_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
+T = TypeVar("T")
 _FOREIGN = MappingProxyType(
     {
         b"%PDF": "PDF", b"\x89PNG": "PNG image", b"\xff\xd8\xff": "JPEG image", b"GIF8": "GIF image",
@@ -46,6 +48,15 @@ def raw_tables(path: str | Path, form: FileForm | None = None) -> Iterator[list[
             return
         with guarded_tables(source, reader, form or FileForm()) as tables:
             yield _renamed(tables, form)
+
+
+def ask_tables(path: str | Path, ask: Callable[[list[RawTable]], T], otherwise: T, form: FileForm | None = None) -> T:
+    """Return what a question about the tables of a file gives, or something else where it cannot be read."""
+    try:
+        with raw_tables(path, form) as tables:
+            return ask(tables)
+    except InputError:
+        return otherwise
 
 
 def _renamed(tables: list[RawTable], form: FileForm | None) -> list[RawTable]:
