@@ -130,7 +130,6 @@ class Axes:
     size: float = _SIZE  # of title and names [pt]
     raised: float = 6.0  # title over the frame [pt]
     tick_size: float = _SMALL
-    visible: bool = True
     series: list[Curve] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -140,6 +139,11 @@ class Axes:
         self._bars: list[tuple[Floats, Floats, str]] = []
         self._texts: list[tuple[float, float, str, str, float, str]] = []
         self._legend: tuple[str, float, int] | None = None
+
+    @property
+    def filled(self) -> bool:
+        """True where something is drawn; an empty panel has no frame either."""
+        return bool(self.series or self._lines or self._bars or self._texts)
 
     def plot(
         self, x: ArrayLike, y: ArrayLike, mark: str = "", *, label: str = "", shift: float = 0.0, **look: Any
@@ -349,7 +353,7 @@ class Figure:
 
     def drawn(self) -> Drawing:
         """Lay out the figure."""
-        panels = [axes for axes in self.axes if axes.visible]
+        panels = [axes for axes in self.axes if axes.filled]
         if self._share_y:
             ends = np.array([axes.ends()[1] for axes in panels])
             for number, axes in enumerate(panels):

@@ -67,10 +67,6 @@ def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
         over_x.size = over_v.size = 9.0 if columns == 2 else 7.0  # a condition as title fits its column
         over_x.label("Displacement (mm)", "Force (N)" if column == 0 else "", str(prediction.condition))
         over_v.label("Velocity (m/s)", "Force (N)" if column == 0 else "")
-    for unused in range(len(runs), columns * -(-len(runs) // columns)):
-        row, column = divmod(unused, columns)
-        axes[2 * row * columns + column].visible = False
-        axes[(2 * row + 1) * columns + column].visible = False
     axes[0].legend("center", size=7)
     return figure
 
@@ -103,8 +99,6 @@ def parameter_curves(fit: ModifiedFit) -> Figure:
             panel.plot(dense, more * curve, lw=0.9, color=shades[condition.peak_velocity] if few else MEASURED)
         panel.y.log = function.log
         panel.label("Current (A)", text)
-    for panel in axes[len(names) :]:
-        panel.visible = False
     if few:
         axes[min(1, len(names) - 1)].legend("right")
     return figure

@@ -48,7 +48,6 @@ def quality_figure(panels: Sequence[LoopPanel]) -> Figure:
         place.text(0, 1.03, panel.note, size=6, color=_FLAG)
         place.x.most, place.y.most = 3, 4
     for i, place in enumerate(figure.axes):
-        place.visible = i < len(shown)
         if i + columns >= len(shown):
             place.x.name = "Displacement (mm)"
         if i % columns == 0:

@@ -19,15 +19,12 @@ def profile_curves(profiles: Sequence[LikelihoodProfile]) -> Figure:
     columns = min(3, len(profiles))
     rows = -(-len(profiles) // columns)
     figure = Figure(rows, columns, 0.9 + 2.1 * rows)
-    panels = figure.axes
-    for axes, profile in zip(panels, profiles, strict=False):
+    for axes, profile in zip(figure.axes, profiles, strict=False):
         axes.plot(profile.values, profile.fall, ".", ls="-", color=PALETTE[1])
         axes.line("x", CHI_SQUARED_95, color=PALETTE[2], lw=0.8)
         axes.line("y", profile.estimate, color=PALETTE[0], lw=0.6, ls=":")
         axes.y.low, axes.y.high = 0.0, 3 * CHI_SQUARED_95
         axes.label(f"{profile.name} ({profile.unit or '–'})", "−2 Δ ln L (–)", profile.kind)
-    for axes in panels[len(profiles) :]:
-        axes.visible = False
     return figure
 
 
@@ -37,7 +34,7 @@ def corner(samples: Samples) -> Figure:
     figure = Figure(size, size, WIDTH, left=0.4, right=0.1, top=0.1, bottom=0.4, gap=0.08, lettered=False)
     for number, axes in enumerate(figure.axes):
         i, j = divmod(number, size)
-        axes.visible, axes.size, axes.x.places, axes.y.places = j <= i, 7.0, (), ()
+        axes.size, axes.x.places, axes.y.places = 7.0, (), ()
         if j < i:
             axes.plot(samples.values[:, j], samples.values[:, i], ",", color=PALETTE[1])
         elif i == j:
