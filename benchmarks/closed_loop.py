@@ -93,7 +93,7 @@ def main() -> None:
     file, quake = load_system("dyke1996"), load_input("elcentro", time_scale=5)
     spread = load_input("elcentro", time_scale=53.74 / 30)
     envelope = Envelope((0.0, 1.0), (0.5, 4.0), (0.004, 0.02), (0.02, 0.3))
-    dashpot = JointDamper("bench", model_type("bingham")(c=C, fy=0.0), ("c",), envelope, {})
+    dashpot = JointDamper(model_type("bingham")(c=C, fy=0.0), ("c",), rig="bench", envelope=envelope)
     real = JointProblem(load_dataset().rig("labcontrol").split("train"), "play-bypass").fit().damper
     car, road = load_system("quarter-car").system, load_input("iso8608-b", {"length_s": 60.0})
     rows = []

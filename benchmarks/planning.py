@@ -37,7 +37,7 @@ _FIRST = [Condition(i, f, a) for i in (0.0, 0.5, 1.0) for f, a in ((0.5, 0.02), 
 def rig(seed: int) -> Damper:
     """A damper known from six records, two on each of three days, each day with a gain of its own."""
     envelope = Envelope.of(_FIRST)
-    truth = JointDamper("virtual", TRUTH, tuple(n for n in TRUTH.values() if TRUTH.values()[n]), envelope, {})
+    truth = JointDamper(TRUTH, tuple(n for n in TRUTH.values() if TRUTH.values()[n]), rig="virtual", envelope=envelope)
     rng, runs = np.random.default_rng(seed), []
     gains = 1 + GAIN * rng.standard_normal(_DAYS)
     for number, condition in enumerate(_FIRST):

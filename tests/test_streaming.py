@@ -165,7 +165,7 @@ def test_a_damper_without_a_form_for_one_sample_says_so():
     from mrdamper.dampers.kernel import KernelDamper, KernelLaw
 
     law = KernelLaw(np.zeros((1, 4)), np.ones(1), np.ones(4), 0.0, 1.0)
-    damper = KernelDamper("bench", law, joint_damper().envelope)
+    damper = KernelDamper(law, rig="bench", envelope=joint_damper().envelope)
     with pytest.raises(ParameterError, match="one sample"):
         stepper(damper)
 

@@ -31,7 +31,7 @@ def model(tmp_path):
         "f0": ParameterFunction("constant", (50.0,)),
     }
     envelope = Envelope((0.0, 1.0), (0.5, 5.0), (0.002, 0.03), (0.03, 0.25))
-    save_model(ModifiedModel("utfsm", ParameterMap(Bingham, functions), envelope), tmp_path / "model.json")
+    save_model(ModifiedModel(ParameterMap(Bingham, functions), rig="utfsm", envelope=envelope), tmp_path / "model.json")
     return tmp_path / "model.json"
 
 

@@ -45,7 +45,7 @@ def damper(known=KNOWN):
     envelope = SimpleNamespace(
         distance=lambda condition, current: AWAY, nearest=lambda condition: condition, flags=lambda condition: ()
     )
-    return JointDamper("rig", model, ("c", "fy"), envelope, uncertainty=known)  # type: ignore[arg-type]
+    return JointDamper(model, ("c", "fy"), rig="rig", envelope=envelope, uncertainty=known)  # type: ignore[arg-type]
 
 
 PREDICTION = Prediction(MOTION, FORCE, CONDITION, ())

@@ -23,7 +23,7 @@ from mrdamper.physics.motion import sine
 
 
 def bingham(c, fy, f0):
-    return JointDamper("bench", Bingham(c=float(c), fy=float(fy), f0=float(f0)), ("c", "fy", "f0"), UNTESTED)
+    return JointDamper(Bingham(c=float(c), fy=float(fy), f0=float(f0)), ("c", "fy", "f0"), envelope=UNTESTED)
 
 
 TRUTH = bingham(2000.0, 150.0, 20.0)
@@ -84,7 +84,7 @@ class OfFunctions(JointDamper):
 def test_of_a_run_beside_parameter_functions_the_last_four_cycles_enter_evenly(window):
     (run,) = runs_of(conditions=CONDITIONS[:1])
     run = replace(run, window=window, force=run.force + 40.0)
-    part = RunResiduals.of(OfFunctions("bench", TRUTH.model, TRUTH.free, UNTESTED), run)
+    part = RunResiduals.of(OfFunctions(TRUTH.model, TRUTH.free, envelope=UNTESTED), run)
     time, end = part.prediction.motion.time, window[1] if window else run.time[-1]
     at = np.searchsorted(run.time, time[part.picked])
     assert part.measured == pytest.approx(run.force[at])

@@ -169,7 +169,7 @@ def test_constants_of_other_dampers_count_among_the_numbers(problem, fit):
     # fy1 I (1 − exp(−I/Ic)): the 0.12 A are a number, though these tests did not give it; cq, qb, leak, si are none.
     assert (len(fit.damper.free), fit.damper.parameter_count) == (15, 16)
     freed = JointProblem(problem.runs, "play-bypass", free=("Ic",), parts=problem.parts)
-    assert JointDamper("", fit.damper.model, freed.free, fit.damper.envelope).parameter_count == 16
+    assert JointDamper(fit.damper.model, freed.free, envelope=fit.damper.envelope).parameter_count == 16
 
 
 def test_own_numbers_are_those_the_tests_gave_with_their_units_and_scales(fit):

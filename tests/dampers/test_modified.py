@@ -254,12 +254,14 @@ def damper():
         "c": ParameterFunction("decaying-current", (0.5, 7.0), (2.0,), log=True),
         "f0": ParameterFunction("constant", (-12.0,)),
     }
-    return ModifiedModel("bench", ParameterMap(Bingham, functions), Envelope.of(CONDITIONS), {"a": "b"})
+    return ModifiedModel(
+        ParameterMap(Bingham, functions), rig="bench", envelope=Envelope.of(CONDITIONS), provenance={"a": "b"}
+    )
 
 
 def test_a_saved_model_is_the_same_again_and_numbers_have_their_places():
     one, at = damper(), Condition(0.7, 1.0, 0.02)
-    again = ModifiedModel.from_saved(one.to_saved(), "bench", one.envelope, {"a": "b"}, None)
+    again = ModifiedModel.from_saved(one.to_saved(), rig="bench", envelope=one.envelope, provenance={"a": "b"})
     assert again.model_at(at).values() == one.model_at(at).values()
     assert (again.rig, again.envelope, dict(again.provenance)) == (one.rig, one.envelope, {"a": "b"})
     assert one.model_at(at).values() == pytest.approx(
@@ -298,11 +300,11 @@ def test_outside_the_tested_motions_the_parameters_are_those_of_the_nearest_one(
     functions = {"c": slope, "fy": slope, "k": ParameterFunction("constant", (0.0,)), "f0": slope}
     functions = {name: f for name, f in functions.items() if name in Bingham.map_forms()}
     motions = MotionHull(CORNERS)
-    damper = ModifiedModel("bench", ParameterMap(Bingham, functions, motions), Envelope.of(CONDITIONS), {})
+    damper = ModifiedModel(ParameterMap(Bingham, functions, motions), rig="bench", envelope=Envelope.of(CONDITIONS))
     nearest = Condition(0.7, *(float(v) for v in motions.nearest(*outside)))
     assert damper.model_at(Condition(0.7, *outside)) == damper.model_at(nearest)
     assert damper.holding({"c": 700.0}).tested_motions == motions
-    again = ModifiedModel.from_saved(damper.to_saved(), "bench", damper.envelope, {}, None)
+    again = ModifiedModel.from_saved(damper.to_saved(), rig="bench", envelope=damper.envelope)
     assert again.parameters.motions == motions
     assert any("convex hull" in line for line in equations(damper))
 
@@ -312,7 +314,7 @@ def test_a_stream_holds_the_parameters_outside_the_tested_motions_too():
     still = ParameterFunction("constant", (0.0,))
     functions = {name: slope if name in ("c", "fy") else still for name in Bingham.map_forms()}
     tested = [Condition(i, f, A) for i in (0.0, 1.0) for f, A in CORNERS]
-    damper = ModifiedModel("bench", ParameterMap(Bingham, functions, MotionHull(CORNERS)), Envelope.of(tested), {})
+    damper = ModifiedModel(ParameterMap(Bingham, functions, MotionHull(CORNERS)), envelope=Envelope.of(tested))
     outside = Condition(0.7, 2.5, 0.018)
     motion = sine(outside, 40, 200)
     wanted, streamed = damper.force_along(motion, outside), causal_force(damper, motion)

@@ -25,7 +25,7 @@ CASES = {
 def falling(name):
     coordinate, _, values = CASES[name]
     functions = {key: ParameterFunction("constant", (value,)) for key, value in values.items()}
-    return ModifiedModel("bench", ParameterMap(model_type(name), {**functions, coordinate: FALLING}), ENVELOPE)
+    return ModifiedModel(ParameterMap(model_type(name), {**functions, coordinate: FALLING}), envelope=ENVELOPE)
 
 
 @pytest.mark.parametrize("name", CASES)

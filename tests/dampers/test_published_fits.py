@@ -46,7 +46,7 @@ def identified(models, conditions=CONDITIONS):
 def regressed(name, coefficients, conditions=CONDITIONS):
     """Coefficients from the models that a damper with known ones has at the conditions."""
     cls = all_published()[name]
-    truth = cls("bench", coefficients, REFERENCE, Envelope.of(conditions))
+    truth = cls(coefficients, REFERENCE, rig="bench", envelope=Envelope.of(conditions))
     return cls.regressed(
         identified([truth.model_at(c) for c in conditions], conditions), {"identification runs": "16"}
     ), truth
@@ -155,12 +155,12 @@ def test_refining_on_runs_finds_the_coefficients_they_were_made_with():
     runs = []
     for condition in (Condition(I, f, A) for I in (0.0, 0.9, 1.7) for f, A in ((1.0, 0.02), (2.0, 0.005))):
         motion = sine(condition, 2, 101)  # no sample stands still, where the sign of its speed would be chance
-        damper = cls("bench", truth, REFERENCE, Envelope.of(CONDITIONS))
+        damper = cls(truth, REFERENCE, rig="bench", envelope=Envelope.of(CONDITIONS))
         force = damper.force_along(motion, condition)
         window = (1 / condition.frequency_Hz, float(motion.time[-1]))
         runs.append(Run(f"{condition}", motion.time, motion.displacement, force, condition.current_A, window=window))
     start = {**truth, "fy0": 180.0, "fy1": 800.0, "m": 0.8, "f0": -11.0}
-    found = cls("bench", start, REFERENCE, Envelope.of(CONDITIONS)).refined(runs)
+    found = cls(start, REFERENCE, rig="bench", envelope=Envelope.of(CONDITIONS)).refined(runs)
     assert found.coefficients == pytest.approx(truth, rel=0.02)
     assert AT_BOUNDS not in found.provenance
     far = replace(found, coefficients={**truth, "fy1": 300.0}).refined(runs)  # truth is three times the start
@@ -178,7 +178,7 @@ def a_run(condition, cycles=2):
 @pytest.mark.parametrize(("name", "own"), [("lei-type", LEI), ("lv-type", LV), ("dominguez-type", DOMINGUEZ)])
 def test_residuals_and_slopes_of_all_runs_at_once_are_those_of_single_ones(name, own, monkeypatch):
     own = {**own, "gamma1": 3.1e6, "gamma2": 2e5} if name == "dominguez-type" else own  # else gamma is beta, a corner
-    damper = all_published()[name]("bench", own, REFERENCE, Envelope.of(CONDITIONS))
+    damper = all_published()[name](own, REFERENCE, envelope=Envelope.of(CONDITIONS))
     pieces = Pieces([a_run(condition) for condition in CONDITIONS])
     exchanged = replace(damper, coefficients=dict(reversed(own.items())))
     assert pieces.residual(exchanged) == pytest.approx(pieces.residual(damper), abs=1e-12)
@@ -224,8 +224,8 @@ def test_three_identifications_of_its_own_model_are_needed():
 )  # fmt: skip
 def test_one_run_far_off_moves_no_parameter_that_all_conditions_share(name, own, common):
     cls, envelope = all_published()[name], Envelope.of(CONDITIONS)
-    other = cls("bench", own | {n: 0.7 * own[n] for n in common}, REFERENCE, envelope)
-    models = [cls("bench", own, REFERENCE, envelope).model_at(c) for c in CONDITIONS]
+    other = cls(own | {n: 0.7 * own[n] for n in common}, REFERENCE, rig="bench", envelope=envelope)
+    models = [cls(own, REFERENCE, rig="bench", envelope=envelope).model_at(c) for c in CONDITIONS]
     models[3] = other.model_at(CONDITIONS[3])
     close(cls.regressed(identified(models)).coefficients, {n: own[n] for n in common})
 
@@ -235,9 +235,9 @@ def test_a_saved_damper_has_the_same_laws_and_damaged_ones_are_refused(name):
     ali = {**ALI, "c1_floor": 1.0, "c0_floor": 1.0, "yield_force_floor": 1.0}
     own = {"ali-type": ali, "lei-type": LEI, "dominguez-type": DOMINGUEZ, "lv-type": LV}
     cls, envelope = all_published()[name], Envelope.of(CONDITIONS)
-    one = cls("bench", own[name], REFERENCE, envelope)
+    one = cls(own[name], REFERENCE, rig="bench", envelope=envelope)
     saved = one.to_saved()
-    again = cls.from_saved(saved, "bench", envelope, {"a": "b"}, None)
+    again = cls.from_saved(saved, rig="bench", envelope=envelope, provenance={"a": "b"})
     at = Condition(0.7, 0.9, 0.017)
     assert again.model_at(at).values() == one.model_at(at).values()
     assert (again.rig, again.envelope, again.reference, dict(again.provenance)) == (
@@ -245,4 +245,4 @@ def test_a_saved_damper_has_the_same_laws_and_damaged_ones_are_refused(name):
     )  # fmt: skip
     missing = replace(saved, coefficients={k: v for k, v in own[name].items() if k != "f0"})
     with pytest.raises(ParameterError, match="coefficients do not fit"):
-        cls.from_saved(missing, "bench", envelope, {}, None)
+        cls.from_saved(missing, envelope=envelope)

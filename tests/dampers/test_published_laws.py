@@ -17,7 +17,7 @@ CONDITIONS = [Condition(0.1, 2.2, 0.012), Condition(0.9, 1.1, 0.036), Condition(
 
 
 def damper(name, coefficients):
-    return all_published()[name]("made", coefficients, REFERENCE, ENVELOPE)
+    return all_published()[name](coefficients, REFERENCE, envelope=ENVELOPE)
 
 
 def quadratic(c, name, current):

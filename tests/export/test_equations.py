@@ -85,7 +85,7 @@ def test_a_modified_model_prints_its_coordinates_and_their_functions():
 def test_a_regression_has_no_equation():
     law = KernelLaw(np.zeros((1, 4)), np.ones(1), np.ones(4), 0.0, 1.0)
     with pytest.raises(ParameterError, match="no equations"):
-        equations(KernelDamper("bench", law, joint_damper().envelope))
+        equations(KernelDamper(law, rig="bench", envelope=joint_damper().envelope))
 
 
 def test_names_and_numbers_as_latex():

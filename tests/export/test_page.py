@@ -361,4 +361,4 @@ def test_without_a_compiler_the_note_says_what_to_install(monkeypatch):
 
 
 def _joint(model):
-    return JointDamper("bench", model, ("alpha",), joint_damper().envelope, {})
+    return JointDamper(model, ("alpha",), rig="bench", envelope=joint_damper().envelope)

@@ -20,7 +20,9 @@ def damper():
         "f0": ParameterFunction("constant", (5e-324,)),
     }
     envelope = Envelope((0.0, 1.0), (0.5, 2.0), (0.01, 0.02), (0.03, 0.25))
-    return ModifiedModel("rig <b>", ParameterMap(Bingham, functions), envelope, {"dataset": "=cmd()"})
+    return ModifiedModel(
+        ParameterMap(Bingham, functions), rig="rig <b>", envelope=envelope, provenance={"dataset": "=cmd()"}
+    )
 
 
 def test_round_trip_is_bit_exact(damper, tmp_path):

@@ -218,7 +218,7 @@ def conditioned(dataset):
     train, dampers = dataset.split("train"), {}
     for name, cls in sorted(all_published().items(), reverse=True):
         if name == "ali-type":
-            dampers[name] = cls("made", ALI, Condition(0.5, 1.0, 0.01), dampers["lei-type"].envelope)
+            dampers[name] = cls(ALI, Condition(0.5, 1.0, 0.01), rig="made", envelope=dampers["lei-type"].envelope)
         elif cls.basis:
             dampers[name] = cls.regressed([identify(run, cls.basis, free=cls.basis_free) for run in train])
         else:

@@ -25,5 +25,5 @@ class Fading(Bingham):
 
 
 def test_a_fifth_beyond_the_highest_current_is_looked_at():
-    found = gains_energy(JointDamper("rig", Fading(c=100.0, fy=50.0), ("c",), TESTED))
+    found = gains_energy(JointDamper(Fading(c=100.0, fy=50.0), ("c",), rig="rig", envelope=TESTED))
     assert "gains energy at 1.2 A" in found

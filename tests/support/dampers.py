@@ -30,7 +30,7 @@ def all_bare_models():
 @cache  # who asks again gets the same one, which is compiled already
 def joint_damper(name="play-bypass"):
     model = model_type(name).build(EXAMPLES[name])
-    return JointDamper("bench", model, tuple(EXAMPLES[name]), ENVELOPE, {})
+    return JointDamper(model, tuple(EXAMPLES[name]), rig="bench", envelope=ENVELOPE)
 
 
 @cache
@@ -42,7 +42,7 @@ def modified_damper():
         "k1": ParameterFunction("plane", (0.0, 100.0, 50.0, 1e3, 400.0)),
         "f0": ParameterFunction("constant", (30.0,)),
     }
-    return ModifiedModel("bench", ParameterMap(model_type("bouc-wen"), functions), ENVELOPE, {})
+    return ModifiedModel(ParameterMap(model_type("bouc-wen"), functions), rig="bench", envelope=ENVELOPE)
 
 
 @cache
@@ -54,7 +54,7 @@ def conditioned_damper():
         **{"c1": 1500.0, "c2": 900.0, "c3": 2.0, "c4": 800.0},
     }
     reference = Condition(0.25, 1.0, 0.013)
-    return conditioned_type("dominguez-type")("bench", coefficients, reference, joint_damper().envelope)
+    return conditioned_type("dominguez-type")(coefficients, reference, rig="bench", envelope=joint_damper().envelope)
 
 
 def all_dampers():

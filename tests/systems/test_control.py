@@ -130,7 +130,7 @@ def linear_in_current(*fy, c=(800.0,), f0=(30.0,), coil=None):
     forms = ("constant", "linear-current", "quadratic-current")
     functions = {name: ParameterFunction(forms[len(values) - 1], values)
                  for name, values in (("c", c), ("fy", fy), ("f0", f0))}  # fmt: skip
-    return ModifiedModel("bench", ParameterMap(model_type("bingham"), functions), ENVELOPE, coil=coil)
+    return ModifiedModel(ParameterMap(model_type("bingham"), functions), rig="bench", envelope=ENVELOPE, coil=coil)
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])

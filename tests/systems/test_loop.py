@@ -20,7 +20,7 @@ ENVELOPE = Envelope((0.0, 1.0), (0.5, 4.0), (0.004, 0.02), (0.02, 0.3))
 
 
 def dashpot(c=1500.0, fy=0.0):
-    return JointDamper("bench", model_type("bingham")(c=c, fy=fy), ("c",), ENVELOPE, {})
+    return JointDamper(model_type("bingham")(c=c, fy=fy), ("c",), rig="bench", envelope=ENVELOPE)
 
 
 def pulse(peak=2.0, end=2.0):
@@ -97,7 +97,7 @@ def test_a_record_walked_in_parts_is_the_record_walked_at_once(machine, monkeypa
     bump = load_input("bump", {"height_m": 0.12, "bump_m": 1.0, "speed_m_s": 8.0, "length_s": 1.0})
     values = {"f0": 0, "k": 1e3, "c0": 800, "c1": 200, "fy0": 150, "fy1": 600, "d": 2e-4, "e": 5e-5, "cb": 3e4}
     model = model_type("play-bypass").build({**values, "h0": 0.4, "h1": 0.1, "vh": 0.01, "T": 5e-3})
-    damper = JointDamper("bench", model, ("c0",), ENVELOPE, {})
+    damper = JointDamper(model, ("c0",), rig="bench", envelope=ENVELOPE)
     loop = SystemLoop(car, bump, {"damper": damper}, controller_type("skyhook")(), 0.5)
     whole = loop.run(5e-4, machine)
     for module in (simulate, result):

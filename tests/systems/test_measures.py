@@ -31,7 +31,7 @@ def ride():
     car = quarter_car("car", 300, 40, 20e3, 200e3)
     car = replace(car, links=tuple(replace(k, damping=150.0) if k.role == "tyre" else k for k in car.links))
     road = load_input("sweep", {"amplitude_m": 0.08, "lowest_Hz": 3, "highest_Hz": 3, "length_s": 2})
-    damper = JointDamper("bench", Bingham(c=1500.0, fy=50.0), ("c",), UNTESTED)
+    damper = JointDamper(Bingham(c=1500.0, fy=50.0), ("c",), rig="bench", envelope=UNTESTED)
     return SystemLoop(car, road, {"damper": damper}, Passive(0.3)).run(STEP, machine=False)
 
 
@@ -41,7 +41,7 @@ def shaken():
     frame = shear_building("frame", [100.0, 80.0], [4e5, 3e5], [50.0, 40.0], [link])
     time = np.arange(0, 2, 0.01)
     base = record(time, 2 * np.sin(6 * np.pi * time) * (time < 1), "acceleration_m_s2")
-    damper = JointDamper("bench", Bingham(c=8e3, fy=0.0), ("c",), UNTESTED)
+    damper = JointDamper(Bingham(c=8e3, fy=0.0), ("c",), rig="bench", envelope=UNTESTED)
     return [SystemLoop(frame, base, given, Passive()).run(STEP, machine=False) for given in ({"d": damper}, {})]
 
 

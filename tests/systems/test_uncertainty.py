@@ -189,7 +189,7 @@ def test_rise_times_are_those_of_the_coil():
         "f0": ParameterFunction("constant", (30.0,)),
     }
     parameters = ParameterMap(model_type("bingham"), functions)
-    damper = ModifiedModel("bench", parameters, ENVELOPE, {}, coil=Coil(0.02, 0.05))
+    damper = ModifiedModel(parameters, rig="bench", envelope=ENVELOPE, coil=Coil(0.02, 0.05))
     found = rise_times(damper)
     assert found.rise_63 == pytest.approx(0.02, rel=0.02)
     assert found.rise_90 == pytest.approx(0.02 * np.log(10), rel=0.02)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -51,6 +51,7 @@ class Saved:
     __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Damper(Displayable):
     """An identified damper. Subclasses are frozen dataclasses, found by their file.
 
@@ -69,6 +70,7 @@ class Damper(Displayable):
     envelope : Envelope
         Ranges of the tests it was identified from.
     provenance : mapping of str to str
+        What it was made from.
     coil : Coil or None
     uncertainty : Uncertainty or None
         How sure its numbers and predictions are, where that is known.
@@ -83,18 +85,17 @@ class Damper(Displayable):
     True
     """
 
-    __dataclass_fields__: ClassVar[dict[str, Any]]  # what `dataclasses.replace` takes
     read_by: ClassVar = "mrdamper.load_model(file)"
     kind: ClassVar[str]
     saved: ClassVar[type[Saved]]
     conditional: ClassVar[bool] = False
     streams: ClassVar[bool] = True
 
-    rig: str
+    rig: str = ""
     envelope: Envelope
-    provenance: Mapping[str, str]
-    coil: Coil | None
-    uncertainty: Uncertainty | None
+    provenance: Mapping[str, str] = field(default_factory=dict[str, str])
+    coil: Coil | None = None
+    uncertainty: Uncertainty | None = None
 
     @property
     @abstractmethod
@@ -204,10 +205,8 @@ class Damper(Displayable):
         raise InputError("this kind of damper is not saved", where=self.title, remedy="save another damper")
 
     @classmethod
-    def from_saved(
-        cls, saved: Any, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
-    ) -> Self:
-        """Return the damper of what `to_saved` gave and what all kinds share.
+    def from_saved(cls, saved: Any, **shared: Any) -> Self:
+        """Return the damper of what `to_saved` gave and of the fields that all kinds share.
 
         Raises
         ------

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.concatenated_runs import JointResiduals, Linearisation, RunRows
 from mrdamper.dampers.current_levels import undetermined
 from mrdamper.dampers.envelope import UNTESTED, Envelope
-from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
+from mrdamper.dampers.uncertainty import FittedParameter
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
@@ -66,13 +66,8 @@ class JointDamper(Damper):
     kind: ClassVar[str] = "joint"
     saved: ClassVar[type[Saved]] = SavedJoint
 
-    rig: str
     model: Model  # takes the current from the motion
     free: tuple[str, ...]  # parameters determined from the data
-    envelope: Envelope
-    provenance: Mapping[str, str] = field(default_factory=dict[str, str])
-    coil: Coil | None = None
-    uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:
@@ -124,20 +119,18 @@ class JointDamper(Damper):
         return SavedJoint(self.model.name, self.model.values(), units, self.free)
 
     @classmethod
-    def from_saved(
-        cls, saved: SavedJoint, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
-    ) -> Self:
+    def from_saved(cls, saved: SavedJoint, **shared: Any) -> Self:
         try:
             model = model_type(saved.model)(**saved.parameters)
         except TypeError as error:
             raise ParameterError(f"parameters do not fit the model: {error}", remedy="write the model again") from error
-        return cls(rig, model, saved.free, envelope, provenance, coil)
+        return cls(model, saved.free, **shared)
 
 
 def damper_of(given: Damper | Model) -> Damper:
     """Return a damper as it is; a bare model as a damper of no rig, tested nowhere."""
     if isinstance(given, Model):
-        return JointDamper("", given, (), UNTESTED)
+        return JointDamper(given, (), envelope=UNTESTED)
     require(given, Damper, "a damper or a model", "load_model(file) gives one")
     return given
 
@@ -436,14 +429,8 @@ class JointProblem:
 
     def _damper(self, model: Model, point: Floats, parts: Sequence[RunRows]) -> JointDamper:
         about = {"runs": str(len(parts)), "fit": "global fit, all runs"}
-        return JointDamper(
-            self.rig,
-            model,
-            self.free,
-            _envelope(parts),
-            about,
-            self.coil_at(point),
-        )
+        coil, envelope = self.coil_at(point), _envelope(parts)
+        return JointDamper(model, self.free, rig=self.rig, envelope=envelope, provenance=about, coil=coil)
 
     def coil_at(self, point: Floats) -> Coil | None:
         """Return the coil at a point of the search axes."""

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import ClassVar, Self
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Saved
-from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.piece import Piece
-from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import IdentificationError, ParameterError
@@ -89,12 +87,7 @@ class KernelDamper(Damper):
     basis_free: ClassVar[tuple[str, ...]] = ()
     limits: ClassVar[str] = "no memory, no extrapolation, hundreds of numbers"
 
-    rig: str
     law: KernelLaw
-    envelope: Envelope
-    provenance: Mapping[str, str] = field(default_factory=dict[str, str])
-    coil: Coil | None = None
-    uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:
@@ -132,23 +125,21 @@ class KernelDamper(Damper):
         weights = np.asarray(np.linalg.solve(stiff, right), dtype=float)
         conditions = [piece.condition for piece in pieces]
         law = KernelLaw(centres, weights, spread, mean, size)
-        return cls(runs[0].rig, law, Envelope.of(conditions), dict(provenance or {}))
+        return cls(law, rig=runs[0].rig, envelope=Envelope.of(conditions), provenance=dict(provenance or {}))
 
     def to_saved(self) -> SavedKernel:
         law = self.law
         return SavedKernel(law.centres.tolist(), law.weights.tolist(), law.spread.tolist(), law.mean, law.size)
 
     @classmethod
-    def from_saved(
-        cls, saved: SavedKernel, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
-    ) -> Self:
+    def from_saved(cls, saved: SavedKernel, **shared: Any) -> Self:
         try:
             centres, weights, spread = (np.array(v, dtype=float) for v in (saved.centres, saved.weights, saved.spread))
         except ValueError:
             centres, weights, spread = np.zeros((0, 0)), np.zeros(0), np.zeros(0)
         if spread.shape != (_INPUTS,) or centres.shape != (weights.size, _INPUTS) or not np.all(spread > 0):
             raise ParameterError("centres, weights and spreads do not fit together", remedy="write the model again")
-        return cls(rig, KernelLaw(centres, weights, spread, saved.mean, saved.size), envelope, provenance, coil)
+        return cls(KernelLaw(centres, weights, spread, saved.mean, saved.size), **shared)
 
 
 def _inputs(motion: Excitation) -> Floats:

@@ -259,7 +259,8 @@ def parse_model(text: str, where: str = "model") -> Damper:
         require_name("rig", document.rig)
         coil = _restore_coil(document.coil) if document.coil else None
         envelope = Envelope(**document.envelope.model_dump(exclude_none=True))
-        damper = kind.from_saved(saved, document.rig, envelope, document.provenance, coil)
+        about = document.provenance
+        damper = kind.from_saved(saved, rig=document.rig, envelope=envelope, provenance=about, coil=coil)
         return _with_uncertainty(damper, document.covariance, where) if document.covariance else damper
     except InputError as error:
         package = document.provenance.get(_PACKAGE)

@@ -10,16 +10,15 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Saved, not_held
-from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.normal_equations import ABSENT, Condensed, Law, choose_forms, condense, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
-from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
+from mrdamper.dampers.uncertainty import FittedParameter
 from mrdamper.data import Condition, Floats, Run, same_motion
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification import Identification
@@ -64,12 +63,7 @@ class ModifiedModel(Damper):
     saved: ClassVar[type[Saved]] = SavedModified
     conditional: ClassVar[bool] = True
 
-    rig: str
     parameters: ParameterMap
-    envelope: Envelope
-    provenance: Mapping[str, str] = field(default_factory=dict[str, str])  # what it was made from
-    coil: Coil | None = None
-    uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:
@@ -156,14 +150,12 @@ class ModifiedModel(Damper):
         return SavedModified(self.parameters.model_type.name, functions, motions.corners if motions else ())
 
     @classmethod
-    def from_saved(
-        cls, saved: SavedModified, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
-    ) -> Self:
+    def from_saved(cls, saved: SavedModified, **shared: Any) -> Self:
         functions = {n: ParameterFunction(f.form, f.coefficients, f.rates, f.log) for n, f in saved.functions.items()}
         motions = MotionHull(saved.tested_motions) if saved.tested_motions else None
-        damper = cls(rig, ParameterMap(model_type(saved.model), functions, motions), envelope, provenance, coil)
+        damper = cls(ParameterMap(model_type(saved.model), functions, motions), **shared)
         try:
-            damper.model_at(envelope.middle)
+            damper.model_at(damper.envelope.middle)
         except (TypeError, KeyError) as error:
             raise ParameterError(f"functions do not fit the model: {error}", remedy="write the model again") from error
         return damper
@@ -283,7 +275,8 @@ def fit_modified_jointly(
 
     def model(part: Condensed, parameters: ParameterMap) -> ModifiedModel:
         held = replace(parameters, motions=MotionHull.of(part.conditions))
-        return ModifiedModel(identifications[0].rig, held, Envelope.of(part.conditions), dict(about))
+        rig, envelope = identifications[0].rig, Envelope.of(part.conditions)
+        return ModifiedModel(held, rig=rig, envelope=envelope, provenance=dict(about))
 
     def refit(rows: Sequence[int]) -> ModifiedModel:
         part = data.only(rows)

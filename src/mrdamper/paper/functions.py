@@ -42,7 +42,8 @@ def paper_functions(
     values = {name: np.array([float(getattr(i.model, name)) for i in identifications]) for name in PAPER_FORMS}
     functions = {name: _fit(form, conditions, values[name], log=name == "beta") for name, form in forms.items()}
     parameters = ParameterMap(BoucWen, {name: fit.function for name, fit in functions.items()})
-    damper = ModifiedModel(identifications[0].rig, parameters, Envelope.of(conditions), dict(provenance or {}))
+    rig, envelope = identifications[0].rig, Envelope.of(conditions)
+    damper = ModifiedModel(parameters, rig=rig, envelope=envelope, provenance=dict(provenance or {}))
     return ModifiedFit(damper, functions, values, conditions, functions_at_bounds(damper.parameters, conditions))
 
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.modified import ModifiedFit, fit_modified
 from mrdamper.dampers.published import all_published
-from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition, Run
 from mrdamper.identification import Identification
 from mrdamper.identification.basis import Basis
@@ -123,18 +121,14 @@ class OnePerCurrent(Damper):
 
     kind: ClassVar[str] = "one-per-current"
 
-    rig: str
     models: tuple[tuple[float, BoucWen], ...]  # current [A] and model
-    envelope: Envelope
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    coil: Coil | None = None
-    uncertainty: Uncertainty | None = None
 
     @classmethod
     def of(cls, identifications: Sequence[Identification]) -> OnePerCurrent:
         """Take the models of identifications at different currents."""
         models = tuple((i.condition.current_A, i.model) for i in identifications if isinstance(i.model, BoucWen))
-        return cls(identifications[0].rig, models, Envelope.of([i.condition for i in identifications]))
+        envelope = Envelope.of([i.condition for i in identifications])
+        return cls(models, rig=identifications[0].rig, envelope=envelope)
 
     @property
     def title(self) -> str:

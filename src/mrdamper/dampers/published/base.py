@@ -5,15 +5,14 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field, fields, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Saved
-from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.piece import Pieces
-from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
+from mrdamper.dampers.uncertainty import FittedParameter
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification.problem import Identification
@@ -54,13 +53,8 @@ class ConditionedDamper(Damper):
     basis_free: ClassVar[tuple[str, ...]] = ()
     limits: ClassVar[str]  # what it cannot do, for tables
 
-    rig: str
     coefficients: Mapping[str, float]  # numbers determined from the data, SI
     reference: Condition  # frequency, amplitude and current that powers and breaks count from
-    envelope: Envelope
-    provenance: Mapping[str, str] = field(default_factory=dict[str, str])
-    coil: Coil | None = field(default=None, kw_only=True)
-    uncertainty: Uncertainty | None = field(default=None, kw_only=True)
 
     @property
     def title(self) -> str:
@@ -113,13 +107,9 @@ class ConditionedDamper(Damper):
             )
         conditions = [i.condition for i in identifications]
         reference = _middle(conditions)
-        return cls(
-            identifications[0].rig,
-            cls.start(identifications, reference),
-            reference,
-            Envelope.of(conditions),
-            dict(provenance or {}),
-        )
+        envelope, about = Envelope.of(conditions), dict(provenance or {})
+        start = cls.start(identifications, reference)
+        return cls(start, reference, rig=identifications[0].rig, envelope=envelope, provenance=about)
 
     def refined(self, runs: Sequence[Run]) -> Self:
         """Refine all coefficients on the last cycle of every run at once, each by its own force scale."""
@@ -164,18 +154,16 @@ class ConditionedDamper(Damper):
         return SavedConditioned(self.name, dict(self.coefficients), astuple(self.reference), tables)
 
     @classmethod
-    def from_saved(
-        cls, saved: SavedConditioned, rig: str, envelope: Envelope, provenance: Mapping[str, str], coil: Coil | None
-    ) -> Self:
+    def from_saved(cls, saved: SavedConditioned, **shared: Any) -> Self:
         from mrdamper.dampers.published import conditioned_type  # imports every file, this one among them
 
         kind = conditioned_type(saved.model)
         reference = Condition(*saved.reference)
         tables = {name: np.array(table) for name, table in saved.tables.items()}
         try:
-            damper = kind(rig, saved.coefficients, reference, envelope, provenance, coil=coil, **tables)  # type: ignore[arg-type]
+            damper = kind(saved.coefficients, reference, **tables, **shared)
             damper.force_along(sine(reference, 1, 8), reference)
-            for condition in envelope.corners:
+            for condition in damper.envelope.corners:
                 damper.force_along(sine(condition, 1, 8), condition)
         except (KeyError, TypeError, ValueError, IndexError, ArithmeticError) as error:
             raise ParameterError(
