@@ -88,6 +88,16 @@ def test_scales_of_numbered_channels_in_a_list_of_channels(tmp_path):
     require_the_tests(tmp_path)
 
 
+def test_the_scale_of_an_amplifier_of_the_load_cell_is_not_that_of_the_current(tmp_path):
+    for name, amperes in CURRENTS.items():
+        rows = zip(T, X / 10, force(amperes) / 400, np.full(T.size, 100 * amperes), strict=True)
+        head = "Time,Channel A,Channel B,Channel C\n(s),(V),(V),(mV)\n"
+        (tmp_path / f"{name}.csv").write_text(head + "".join("%.3f,%.7f,%.7f,%.3f\n" % row for row in rows))
+    notes = "A: LVDT, 1 V = 10 mm\nChannel B: load cell amplifier, 1 V = 400 N\nChannel C: clamp, 100 mV per A\n"
+    (tmp_path / "notes.txt").write_text(f"Channel {notes}")
+    require_the_tests(tmp_path)
+
+
 def test_a_list_of_tests_without_anything_that_names_them_is_not_applied(tmp_path):
     write(tmp_path, "time [s],stroke [mm],load [N]\n")
     (tmp_path / "tests.csv").write_text("Remark;Current / A\nfirst;0.2\nsecond;0.9\nthird;0.0\n")

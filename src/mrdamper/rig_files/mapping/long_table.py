@@ -74,7 +74,7 @@ def _pivoted(
     column = cache(lambda i: table.read([i]).values[i])
     clocks = [i for i in others if table.headers[i].role == "time"]
     apart = [n for n, own in enumerate(rows) if not _alike(own, base, [column(i) for i in clocks])]
-    tests = [i for i in others if i not in clocks and len(of_table(i).labels) > 1]
+    tests = [i for i in others if i not in clocks and len(np.unique(of_table(i).codes[base])) > 1]
     if apart and (len(clocks) != 1 or tests):
         problem = f"{labels[apart[0]]!r} has other times than the force"
         raise table.source.refuse("E_RASTER", problem, "export one column a channel")

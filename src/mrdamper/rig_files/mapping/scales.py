@@ -28,6 +28,7 @@ _PER_COUNT = re.compile(
     re.IGNORECASE,
 )
 _SIGNALS = ("voltage", "count")  # what a scale leads from
+_UNKNOWN = (None, "voltage")  # channels of columns that may be the monitor of a current
 _AT = r"(?P<{}>[+-]?[0-9]{{1,10}}(?:\.[0-9]{{1,6}})?)(?![.,]?[0-9])\s*(?P<{}>[a-zµ]{{0,6}}|%)"
 _ZERO = re.compile(  # zero at 32768; 0 A at 0.4 V; 0.5 A/V x (U - 0.4 V); 2.5 V at 0 A
     rf"(?i)(?<![\w.,])(?:zero|0(?:\.0+)? ?[a-z]{{1,3}}) (?:is )?(?:at|=) {_AT.format('at', 'its')}"
@@ -172,8 +173,8 @@ def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[s
                     continue
                 words = {word.casefold() for word in words_of(name)}
                 meant = role_of(name) == role or lines is own or name.casefold() in line.casefold()
-                meant = meant or (role == "current" and bool(words & _MONITOR))
-                alone = len(volts) == 1 and role_of(name) in (None, "voltage") and role == "current"
+                meant = meant or (role == "current" and role_of(name) in _UNKNOWN and bool(words & _MONITOR))
+                alone = len(volts) == 1 and role_of(name) in _UNKNOWN and role == "current"
                 has = any(header.dimension == unit_of.dimension for header in table.headers) if unit_of else True
                 if (meant or alone) and not has:
                     scales.append((unit, factor, line))
