@@ -83,6 +83,13 @@ def test_units_and_rates_that_lines_state_are_taken(tmp_path, head):
     assert currents_of(tmp_path) == [0.5]
 
 
+def test_ranges_below_the_units_are_no_row(tmp_path):
+    head = "Sample rate;500;Hz\nCoil current;0.5;A\nName;Weg;Kraft\nUnits;mm;N\nFull scale;50;25000\n"
+    (tmp_path / "a.csv").write_text(head + rows(np.arange(1, T.size + 1), X, force(0.5)))
+    (record,) = import_files([tmp_path]).records
+    np.testing.assert_allclose(record.force, force(0.5), atol=1e-3)
+
+
 def test_signs_apart_and_days_are_numbers(tmp_path):
     signed = [f"{t / 86400 + 45363:.11f};{x:+9.4f};{f:+9.2f}" for t, x, f in zip(T, X, force(0.5), strict=True)]
     signed = [line.replace("+", "+ ").replace("-", "- ") for line in signed]

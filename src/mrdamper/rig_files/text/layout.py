@@ -381,16 +381,21 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
 
 
 def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) -> tuple[int, list[str]]:
-    """Index and cells of the first row; a key with numbers behind it is none if lines of another kind follow."""
+    """Index and cells of the first row; a key with numbers behind it is none if lines of another kind follow.
+
+    Nor is it below units behind a key: Units, mm, kN; Full scale, 50, 25.
+    """
     worded: tuple[int, list[str]] | None = None
     keyed: tuple[int, list[str]] | None = None
+    keys = False
     for i, line in content:
         cells = cells_of(line, separator)
         if not _is_row(cells):
             keyed, worded = None, worded or (i, cells)
+            keys |= cells[0].strip('"').casefold() in _UNIT_KEYS and _is_units(cells[1:])
         elif len(cells) == width and not _is_key(cells[0].strip('"')):
             return keyed or (i, cells)
-        elif cells[0].strip('"').casefold() in _SCALES or (width > 2 and len(set(filter(None, cells[1:]))) == 1):
+        elif keys or cells[0].strip('"').casefold() in _SCALES or (width > 2 and len({*filter(None, cells[1:])}) == 1):
             keyed = None  # a key with the scales of the columns, or one value for all of them
         elif len([cell for cell in cells if is_unit(cell)]) > 1:
             keyed = None  # units beside a start and a step: Sequence, Volt, Volt, 0, 0.002
