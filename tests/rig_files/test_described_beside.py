@@ -88,11 +88,31 @@ def test_scales_of_numbered_channels_in_a_list_of_channels(tmp_path):
     require_the_tests(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("header", "head", "offset", "codes"),
+    [
+        ("time [s],ch1 [V],ch2 [V]", "Unit,Sensitivity [unit/V],Offset", 0, set()),
+        ("time [s],ch1 [V],ch2 [V]", "Unit,Sensitivity [unit/V],Offset", 3, {"E_UNITS_DIMENSION"}),
+        ("time [s],ch1,ch2", "Unit,Scale (EU per V),Offset", 0, {"E_UNITS_MISSING"}),
+        ("time [s],ch1,ch2", "Unit,Factor,Offset", 0, {"E_COLUMN"}),
+    ],
+)
+def test_a_list_of_channels_gives_scales_of_volts_and_no_unit_of_bare_numbers(tmp_path, header, head, offset, codes):
+    write(tmp_path, f"{header}\n", scale=(5.0, 400.0))
+    rows = f"ch1,Stroke,LVDT,mm,5,{offset}\nch2,Load,U9C,N,400,{offset}\n"
+    (tmp_path / "channels.csv").write_text(f"Channel,Measurand,Sensor,{head}\n{rows}")
+    (tmp_path / "tests.csv").write_text("file,current_A\n" + "".join(f"{n}.csv,{i:g}\n" for n, i in CURRENTS.items()))
+    if not codes:
+        require_the_tests(tmp_path)
+    assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == codes
+
+
 def test_the_scale_of_an_amplifier_of_the_load_cell_is_not_that_of_the_current(tmp_path):
     for name, amperes in CURRENTS.items():
         rows = zip(T, X / 10, force(amperes) / 400, np.full(T.size, 100 * amperes), strict=True)
         head = "Time,Channel A,Channel B,Channel C\n(s),(V),(V),(mV)\n"
-        (tmp_path / f"{name}.csv").write_text(head + "".join("%.3f,%.7f,%.7f,%.3f\n" % row for row in rows))
+        lines = ["{:.3f},{:.7f},{:.7f},{:.3f}\n".format(*row) for row in rows]
+        (tmp_path / f"{name}.csv").write_text(head + "".join(lines))
     notes = "A: LVDT, 1 V = 10 mm\nChannel B: load cell amplifier, 1 V = 400 N\nChannel C: clamp, 100 mV per A\n"
     (tmp_path / "notes.txt").write_text(f"Channel {notes}")
     require_the_tests(tmp_path)

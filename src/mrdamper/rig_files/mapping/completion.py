@@ -217,12 +217,13 @@ def _with_explained_names(table: RawTable) -> RawTable:
     lines = [[cell.strip(' "') for cell in re.split(r"[,;|\t=:]", line[:_LONGEST_LINE])] for line in table.remarks]
     headings = {}
     for i, (name, header) in enumerate(zip(table.names, table.headers, strict=True)):
-        own = [cells[1:] for cells in lines if name and header.role is None and cells[0].casefold() == name.casefold()]
+        called = {name.casefold(), header.name.casefold()} - {""}
+        own = [cells[1:] for cells in lines if header.role is None and cells[0].casefold() in called]
         cells = own[0] if own and own.count(own[0]) == len(own) else []
         named = [cell for cell in cells if split_name(cell).role]
-        units = [cell for cell in cells if is_unit(cell.strip("[]()"))]
-        if len(named) == 1 and len(units) < 2:
-            headings[i] = named[0], (*units, table.units[i])[0].strip("[]()")
+        units = [] if any(map(scales_in, cells)) else [cell for cell in cells if is_unit(cell.strip("[]()"))]
+        if len({split_name(cell).role for cell in named}) == 1 and len(units) < 2:
+            headings[i] = named[0], (header.unit, *units, "")[0 if header.unit else 1].strip("[]()")
     return table.named(headings) if len(headings) > 1 else table
 
 
@@ -272,7 +273,7 @@ def _with_listed_units(table: RawTable) -> RawTable:
         if match and len(times) == 1 and times[0] in bare and split_name("", match["unit"]).dimension == "time":
             behind.setdefault(times[0], set()).add(match["unit"])
         named = [wanted[cell.casefold()] for cell in cells if cell.casefold() in wanted]
-        if len(named) == 1:
+        if len(named) == 1 and not any(map(scales_in, cells)):
             role = role_of(names[named[0]])
             units = [bare_cell for cell in cells if is_unit(bare_cell := cell.strip("[]()"))]
             units = [unit for unit in units if role is None or split_name("", unit).dimension == DIMENSION[role]]
