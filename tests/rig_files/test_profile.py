@@ -233,6 +233,15 @@ def test_a_guessed_profile_reads_the_same_record(tmp_path, name, header, separat
     assert guess_profile(path, saved) == guess
 
 
+def test_the_profile_of_columns_that_the_samples_decide_on_names_those_of_the_file(tmp_path):
+    samples = np.random.default_rng(1).normal(0, 0.02, 600)  # of an actuator at rest
+    header = ("time [s],Axial displacement [mm],force [N],Vertical displacement [mm]",)
+    path = write(tmp_path, "a_0.5A.csv", text(np.column_stack([rows(), samples]), header))
+    saved = write(tmp_path, "rig.toml", profile_text(guess_profile(path)))
+    assert load_profile(saved).channel("displacement").column == "Axial displacement [mm]"
+    np.testing.assert_array_equal(read_run(path, saved).displacement, read_run(path).displacement)
+
+
 @pytest.mark.parametrize("header", [(), ("time\tdisp\tforce\tcount",)])
 def test_the_guess_of_a_file_that_says_too_little_is_there_to_be_completed(tmp_path, header):
     path = write(tmp_path, "a_1A.dat", text(np.column_stack([rows(), np.arange(600)]), header, "\t"))

@@ -75,6 +75,7 @@ REFUSED = {
     "overflow": (lines_of({100: "0.49,1e999,3.0"}), "E_NONFINITE", 100),
     "no units": (text(header=("time,displacement,force",)), "E_UNITS_MISSING", None),
     "one unit missing": (text(header=("time_s,displacement_mm,force",)), "E_UNITS_MISSING", None),
+    "symbols that differ in capitals only": (text(DIFFERENT, ("t,x,F,T",)), "E_UNITS_MISSING", None),
     "unknown unit": (text(header=("time_s,displacement_mm,force [blub]",)), "E_UNITS_MISSING", None),
     "no header": (text(header=()), "E_UNITS_MISSING", None),
     "wrong dimension": (text(header=("time_s,displacement_mm,force_mm",)), "E_UNITS_DIMENSION", None),

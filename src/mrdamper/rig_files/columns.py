@@ -88,7 +88,7 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
     for role, column in columns.items():
         channel = profile.channel(role)
         try:
-            if role in REQUIRED and not isinstance(channel.column, int):
+            if role in REQUIRED and role not in table.chosen and not isinstance(channel.column, int):
                 _refuse_two_values(table, column)
             entry = _convert(table, role, column, profile)
         except InputError as error:
@@ -189,6 +189,8 @@ def candidates_of(table: RawTable, role: str) -> list[int]:
 
 
 def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
+    if role in table.chosen:
+        return table.chosen[role]
     headers = table.headers
     named = [i for i, header in enumerate(headers) if i not in taken and header.role == role]
     fitting = [i for i in named if headers[i].dimension == DIMENSION[role]]
@@ -367,8 +369,8 @@ def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> Non
 def _refuse_two_values(table: RawTable, column: int) -> None:
     """Columns of one name must hold one thing, in whatever units."""
     own = table.headers[column]
-    key = own.name.casefold(), own.dimension
-    same = [i for i, other in enumerate(table.headers) if own.name and (other.name.casefold(), other.dimension) == key]
+    keys = [(header.name.casefold(), header.role, header.dimension) for header in table.headers]  # t is no T
+    same = [i for i, key in enumerate(keys) if own.name and key == keys[column]]
     if len(same) < 2:
         return
     values = table.try_read(*same)

@@ -72,7 +72,7 @@ def _with_rate(table: RawTable, moved: int) -> RawTable:
 
 
 def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -> RawTable:
-    """Return the table with the columns named that alone make a damper's loop, where names leave open which they are.
+    """Return the table with the columns chosen that alone make a damper's loop, where names leave open which they are.
 
     The columns that are `stated`, by channel, are not open.
     """
@@ -97,16 +97,10 @@ def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -
     good = [columns for columns, score in scores.items() if score >= _CLEAR]
     if len(good) != 1 or any(_POOR <= score < _CLEAR for score in scores.values()):
         return table
-    headings, chosen = {}, []
-    for own, (role, columns) in zip(good[0], open_roles.items(), strict=True):
-        if len(columns) < 2:
-            continue
-        chosen.append(f"{table.names[own] or f'column {own + 1}'} as the {role}")
-        for column in columns:
-            name = role if column == own else f"other {column + 1}"
-            headings[column] = f"{name} [{table.headers[column].unit}]", ""
-    text = f"{' and '.join(chosen)}: only so the force takes energy in phase with the velocity"
-    return table.named(headings).noted(Finding("W_CHOSEN", text))
+    chosen = {role: own for own, (role, columns) in zip(good[0], open_roles.items(), strict=True) if len(columns) > 1}
+    named = " and ".join(f"{table.names[own] or f'column {own + 1}'} as the {role}" for role, own in chosen.items())
+    text = f"{named}: only so the force takes energy in phase with the velocity"
+    return replace(table, chosen=chosen).noted(Finding("W_CHOSEN", text))
 
 
 def damping_share(time: Floats, displacement: Floats, force: Floats) -> float:

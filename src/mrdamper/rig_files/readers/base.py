@@ -128,6 +128,7 @@ class RawTable:
     findings: tuple[Finding, ...] = ()  # what was decided on the way from the file to this table
     # of displacement and force where a text states them: 1, -1 if compression is positive, 0 if the text is unclear
     senses: Mapping[str, int] = field(default_factory=dict)
+    chosen: Mapping[str, int] = field(default_factory=dict)  # columns by channel that the samples decide on
     calibrated: frozenset[str] = frozenset()  # channels whose scale the profile states
     stated_in: str = ""  # where a constant that was added on that way stands
 
