@@ -105,6 +105,11 @@ def test_a_time_of_day_goes_on_past_midnight_where_it_falls_back_by_a_day(tmp_pa
 
 def test_nanoseconds_since_1970_need_no_unit_and_smaller_counts_do(tmp_path):
     columns = (20 * np.sin(PHASE), force(PHASE))
+    body = "\n".join(f"{t:.3f},{x:.7g},{f:.7g}" for t, x, f in zip(1_714_644_732 + TIME, *columns, strict=True))
+    (tmp_path / "c_0.5A.csv").write_text(f"%time,displacement [mm],force [N]\n{body}\n")
+    (seconds,) = import_files([tmp_path / "c_0.5A.csv"]).records
+    np.testing.assert_allclose(seconds.time - seconds.time[0], TIME, atol=1e-6)
+    (tmp_path / "c_0.5A.csv").unlink()
     for name, begin, step in (("a_0.5A", 1_714_644_732_000_700_000, 5_000_000), ("b_0.5A", 1_714_644_732_001, 5)):
         rows = zip((begin + step * np.arange(TIME.size)).tolist(), *columns, strict=True)
         body = "\n".join(f"{t},{x:.7g},{f:.7g}" for t, x, f in rows)

@@ -38,6 +38,16 @@ def test_no_record_of_json_lines_is_cut(tmp_path):
     assert record.time.size == len(lines) > 2000
 
 
+def test_json_lines_of_events_are_notes_about_the_records(tmp_path):
+    lines = [{"ts": 1.7e9 + t, "pos_mm": x, "load_N": f} for t, x, f in zip(T, X, force(0.5), strict=True)]
+    events = [{"event": "start", "run": 3, "current_A": 0.5}, {"event": "stop", "run": 3}]
+    (tmp_path / "a.jsonl").write_text("\n".join(map(json.dumps, [events[0], *lines, events[1]])))
+    assert currents_of(tmp_path / "a.jsonl") == [0.5]
+    (tmp_path / "a.jsonl").write_text("\n".join(map(json.dumps, [*events, *lines, {"current_A": 1.5}])))
+    (refusal,) = import_files([tmp_path / "a.jsonl"]).refusals
+    assert refusal.error.code == "E_CURRENT_MISSING"
+
+
 @pytest.mark.parametrize(
     "title",
     ["corrente 0,5 A", "Courant 0,5 A", "Versuch 3, Strom 0,5 A", "Versuch 3, Strom 0,5 A, Frequenz 1 Hz",

@@ -32,9 +32,11 @@ _LONGEST_LINE = 300
 _DAY_S = 86_400.0
 _EPOCHS = (  # the years 2000 to 2100 by a clock: its first and last number, its unit, the factor to it, what it counts
     (9.4e17, 4.2e18, "ns", 1.0, "nanoseconds from the year 1970"),
+    (9.4e8, 4.2e9, "s", 1.0, "seconds from the year 1970"),
     (3.65e10, 7.31e10, "days", 1e-6, "millionths of days from the year 1900"),  # Time_ms of process control systems
     (3.65e4, 7.31e4, "days", 1.0, "days from the year 1900"),
 )
+_FRACTION_S = 0.1  # [s] between samples: in a smaller unit no logger would be as fast
 _COARSE_S = 2.0  # [s] between the durations of a clock and of one of whole seconds
 _LARGEST = 64 * 2**20  # bytes of a file whose clock without a unit is looked at
 _LONGEST = 5_000_000  # samples; a longer record lies in a file and is not read as a whole
@@ -64,7 +66,7 @@ def with_axis_as_time(table: RawTable) -> RawTable:
 def with_epoch(table: RawTable) -> RawTable:
     """Return the table with a time in the unit of its numbers, where they are of this century since 1970 or 1900.
 
-    Nanoseconds without a unit; days without one, of a record shorter than half a day; millionths of days, also under
+    Nanoseconds without a unit, and seconds with a fraction; days without one, of a record shorter than half a day; millionths of days, also under
     another unit, whose duration a clock of dates has, too. No other clock counts so far: thousandths of nanoseconds
     may also be the nanoseconds since a start.
     """
@@ -78,7 +80,8 @@ def with_epoch(table: RawTable) -> RawTable:
         duration = _DAY_S * factor * (last - first) if unit == "days" else 0.0
         dated = [np.ptp(values[k]) for k in clocks if k != i and table.headers[k].unit == "s"]
         stated = table.headers[i].unit and not any(abs(duration - of_dates) <= _COARSE_S for of_dates in dated)
-        if begin < first <= last < end and duration < _DAY_S / 2 and not stated:
+        whole = unit == "s" and values[i].size > 1 and np.nanmedian(np.diff(values[i])) > _FRACTION_S
+        if begin < first <= last < end and duration < _DAY_S / 2 and not stated and not whole:
             note = Finding("W_UNITS", f"the unit of {table.names[i]!r} is {unit}: its numbers count {what}")
             scaled = table.computed(i, (i,), lambda values, i=i, factor=factor: factor * values[i])
             return scaled.named({i: (table.names[i] if len(clocks) == 1 else "time", unit)}).noted(note)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
@@ -64,7 +65,7 @@ def _parsed(source: Source, content: bytes) -> Any:
         except json.JSONDecodeError as error:
             if not error.msg.startswith("Extra data"):
                 raise
-            return _with_header(
+            return _with_notes(
                 [json.loads(line, object_pairs_hook=unique) for line in text.splitlines() if line.strip()]
             )
     except json.JSONDecodeError as error:
@@ -97,14 +98,17 @@ def _of_figure(tree: Any) -> Any:
     return curves
 
 
-def _with_header(lines: list[Any]) -> Any:
-    """Return the records of a text with one a line, under the first line's entries where that is no such record."""
-    head, *records = lines
-    same = len(records) >= _FEWEST and all(isinstance(r, dict) and r.keys() == records[0].keys() for r in records)
-    if not same or not isinstance(head, dict) or head.keys() == records[0].keys() or head.keys() & records[0].keys():
+def _with_notes(lines: list[Any]) -> Any:
+    """Return the records of a text with one a line, under what its other lines state: of start and end, of an event."""
+    forms = Counter(frozenset(line) for line in lines if isinstance(line, dict))
+    keys, count = forms.most_common(1)[0] if forms else (frozenset(), 0)
+    others = [line for line in lines if not isinstance(line, dict) or line.keys() != keys]
+    if not 0 < len(others) < count >= _FEWEST or any(not isinstance(o, dict) or o.keys() & keys for o in others):
         return lines
-    columns = {key: [record[key] for record in records] for key in records[0]}
-    return {**head, **columns}
+    stated = {key: [other[key] for other in others if key in other] for other in others for key in other}
+    notes = {key: values[0] for key, values in stated.items() if values.count(values[0]) == len(values)}
+    records = [line for line in lines if line.keys() == keys]
+    return {**notes, **{key: [record[key] for record in records] for key in records[0]}}
 
 
 def _tree(value: Any) -> Any:
