@@ -105,33 +105,46 @@ def _weight_count(outputs: int) -> int:
 
 
 def _network(weights: Floats, inputs: Sequence[Any], outputs: int) -> list[Any]:
-    """One value, or one array of values, an output; inputs likewise. Weights (W,), or (W, S, 1) for S networks."""
-    cut = _HIDDEN * (_INPUTS + 1)
-    first = weights[:cut].reshape(_HIDDEN, _INPUTS + 1, *weights.shape[1:])
-    second = weights[cut:].reshape(outputs, _HIDDEN + 1, *weights.shape[1:])
+    """One value, or one array of values, an output; inputs likewise."""
+    first, second = _layers(weights, outputs)
     hidden = [np.tanh(_weighted(row, inputs)) for row in first]
     return [_weighted(row, hidden) for row in second]
 
 
+def _layers(weights: Floats, outputs: int) -> tuple[Floats, Floats]:
+    """Weights of the hidden units and of the outputs, the offset of each last."""
+    cut = _HIDDEN * (_INPUTS + 1)
+    return weights[:cut].reshape(_HIDDEN, -1), weights[cut:].reshape(outputs, -1)
+
+
 def _weighted(row: Floats, values: Sequence[Any]) -> Any:
-    *factors, offset = row.tolist() if row.ndim == 1 else row
+    *factors, offset = row.tolist()
     return sum((factor * value for factor, value in zip(factors, values, strict=True)), offset)
 
 
 def _train(inputs: Floats, targets: Floats) -> Floats:
-    count = _weight_count(targets.shape[1])
+    runs, outputs = targets.shape
+    count = _weight_count(outputs)
     begin = 0.3 * np.random.default_rng(_SEED).standard_normal(count)
+    given = np.column_stack([inputs, np.ones(runs)])
 
-    def residuals(networks: Floats) -> Floats:
-        """(S, R) of (S, W) weights."""
-        outputs = _network(networks.T[..., None], list(inputs.T), targets.shape[1])
-        error = np.stack(outputs, axis=-1) - targets
-        return np.concatenate([error.reshape(len(networks), -1), _DECAY * networks], axis=1)
+    def residuals(weights: Floats) -> Floats:
+        error = np.stack(_network(weights, list(inputs.T), outputs), axis=-1) - targets
+        return np.concatenate([error.ravel(), _DECAY * weights])
 
     def slopes(weights: Floats) -> Floats:
-        """Forward differences by all weights at once."""
-        moved = weights + _WEIGHT_STEP * np.eye(count)
-        return np.ascontiguousarray(((residuals(moved) - residuals(weights[None])) / _WEIGHT_STEP).T)
+        """Forward differences: a weight of the first layer moves one hidden unit, one of the second one output."""
+        first, second = _layers(weights, outputs)
+        sums = (given @ first.T)[:, :, None]
+        hidden = np.tanh(sums)
+        moved = (np.tanh(sums + _WEIGHT_STEP * given[:, None]) - hidden) / _WEIGHT_STEP  # (runs, hidden, inputs + 1)
+        units = np.column_stack([hidden[:, :, 0], np.ones(runs)])
+        by_layer = (
+            np.einsum("oh,rhi->rohi", second[:, :-1], moved),
+            np.einsum("ok,rh->rokh", np.eye(outputs), units),
+        )
+        by_weight = np.hstack([part.reshape(runs * outputs, -1) for part in by_layer])
+        return np.vstack([by_weight, _DECAY * np.eye(count)])
 
     box = np.full(count, _MAX_WEIGHT)
-    return least_squares(lambda w: residuals(w[None])[0], begin, -box, box, most_steps=60, slopes=slopes).point
+    return least_squares(residuals, begin, -box, box, most_steps=60, slopes=slopes).point
