@@ -66,9 +66,9 @@ def with_axis_as_time(table: RawTable) -> RawTable:
 def with_epoch(table: RawTable) -> RawTable:
     """Return the table with a time in the unit of its numbers, where they are of this century since 1970 or 1900.
 
-    Nanoseconds without a unit, and seconds with a fraction; days without one, of a record shorter than half a day; millionths of days, also under
-    another unit, whose duration a clock of dates has, too. No other clock counts so far: thousandths of nanoseconds
-    may also be the nanoseconds since a start.
+    Nanoseconds without a unit, and seconds with a fraction; days without one, of a record shorter than half a day;
+    millionths of days, also under another unit, whose duration a clock of dates has, too. No other clock counts so
+    far: thousandths of nanoseconds may also be the nanoseconds since a start.
     """
     clocks = table.columns("time")
     unsure = [i for i in clocks if not table.headers[i].unit or (len(clocks) == 2 and table.headers[i].unit != "s")]
