@@ -177,7 +177,7 @@ def test_an_answer_changes_the_profile():
     question = question_of(error)
     assert question is not None
     for answer in question.answers:
-        assert answer.applied(Profile()).channel("force").unit == answer.shown
+        assert answer.applied(Profile()).channel("force").unit == str(answer.value)
 
 
 def test_physics_tells_a_dampers_force_in_any_units_and_with_the_right_sign_only(tests):
