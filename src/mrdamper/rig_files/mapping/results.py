@@ -13,8 +13,7 @@ from mrdamper.rig_files.column_names import COIL, holds, names_condition, split_
 from mrdamper.rig_files.conditions import contradicts, currents_in, quantity_in_cell
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.text.layout import cells_of
-from mrdamper.rig_files.units import is_unit
+from mrdamper.rig_files.text.layout import cells_of, is_units
 from mrdamper.rig_files.vocabulary import words
 
 _SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
@@ -209,7 +208,7 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
             continue
         below = at + 1
         unit = ""
-        if below < len(rows) and _is_units_row(rows[below], len(row)):
+        if below < len(rows) and is_units(rows[below]) and not any(map(_NUMBER.fullmatch, rows[below])):
             unit = rows[below][columns[0]].strip("[]()") if columns[0] < len(rows[below]) else ""
             below += 1
         body = []
@@ -239,12 +238,6 @@ def _is_current(cell: str) -> bool:
     named = names_condition(header.name, "current") and header.dimension in (None, "current")
     named = named or (header.dimension == "current" and holds(header.name, COIL))  # coil_mA
     return named and not currents_in(cell)  # coil current 0.5 A heads no column
-
-
-def _is_units_row(cells: Sequence[str], width: int) -> bool:
-    filled = [cell.strip("[]()") for cell in cells if cell and cell not in ("-", "[-]", "(-)")]
-    units = [cell for cell in filled if is_unit(cell)]  # beside a heading of the rows, or J: No, A, Hz, J
-    return 0 < len(filled) <= min(width, 2 * len(units)) and not any(map(_NUMBER.fullmatch, filled))
 
 
 def _amperes(cell: str, unit: str) -> float | None:

@@ -295,7 +295,7 @@ def split(line: str, separator: str) -> list[str]:
 def units_in(line: str, layout: Layout) -> tuple[str, ...]:
     """Return the units a line states, one a column; empty if it is no row of units."""
     cells = _cells(line, layout.separator, layout.width)
-    return tuple(map(_unbracket, cells)) if len(cells) == layout.width and _is_units(cells) else ()
+    return tuple(map(_unbracket, cells)) if len(cells) == layout.width and is_units(cells) else ()
 
 
 def is_comment(line: str) -> bool:
@@ -392,7 +392,7 @@ def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) ->
         cells = cells_of(line, separator)
         if not _is_row(cells):
             keyed, worded = None, worded or (i, cells)
-            keys |= cells[0].strip('"').casefold() in _UNIT_KEYS and _is_units(cells[1:])
+            keys |= cells[0].strip('"').casefold() in _UNIT_KEYS and is_units(cells[1:])
         elif len(cells) == width and not _is_key(cells[0].strip('"')):
             return keyed or (i, cells)
         elif keys or cells[0].strip('"').casefold() in _SCALES or (width > 2 and len({*filter(None, cells[1:])}) == 1):
@@ -464,7 +464,7 @@ def _header_lines(
         last, telling = fitting[-1], [i for i in fitting if roles[i] >= _TELLING]
         if candidates is plain and last != plain[-1] and _names_columns(lines[plain[-1]], separator):
             break
-        stated = [i for i in reversed(fitting) if _is_units(cells[i])]
+        stated = [i for i in reversed(fitting) if is_units(cells[i])]
         units = next((i for i in stated if not _is_times(cells[i])), (*stated, None)[0])
         naming = [i for i in fitting if i != units and (units is None or i < units)]
         if units is not None and units != last:  # keys with one cell a column: TraceName, VUnit, HUnit
@@ -479,7 +479,7 @@ def _header_lines(
         if units is not None and (units == last or not roles[last]):
             return (naming[-1] if naming else None), units
         last = telling[-1] if telling and not roles[last] else last  # names of sensors or types below the names
-        below = [i for i in marked if i > last and i in cells and _is_units(cells[i])]  # #, deg, mm, N
+        below = [i for i in marked if i > last and i in cells and is_units(cells[i])]  # #, deg, mm, N
         below = below if candidates is plain else []
         return last, (form.units_line - 1 if form.units_line else (*below, None)[0])
     naming = [i for i in plain if _names_columns(lines[i], separator)]
@@ -494,7 +494,7 @@ def _keyed_lines(cells: Mapping[int, Sequence[str]], roles: Mapping[int, int]) -
 
     A last line that begins with a time holds the names: Channel, Position, Force; Unit, mm, N; Time (s), C1, C2.
     """
-    units = [i for i, row in cells.items() if row[0].casefold() in _UNIT_KEYS and _is_units(row[1:])]
+    units = [i for i, row in cells.items() if row[0].casefold() in _UNIT_KEYS and is_units(row[1:])]
     others = {i: row for i, row in cells.items() if i not in units and row[0].casefold() not in _NOTES}
     last = [i for i in others if i == max(cells) and split_name(others[i][0]).role == "time" and units]
     if last and not any(not cell or looks_numeric(cell) or stamp(cell) is not None for cell in others[last[0]]):
@@ -535,7 +535,8 @@ def _cells(line: str, separator: str, width: int) -> tuple[str, ...]:
     return tuple(cell.strip().strip('"') for cell in _fields(line, separator, width))
 
 
-def _is_units(cells: Sequence[str]) -> bool:
+def is_units(cells: Sequence[str]) -> bool:
+    """Tell if at least half of the cells of a line are units."""
     filled = [cell for cell in cells if cell and cell not in ("-", "--", "[-]", "(-)")]
     count = sum(is_unit(_unbracket(cell)) for cell in filled)
     filled = [cell for cell in filled if not looks_numeric(cell)] if count > 1 else filled  # a start and a step
@@ -553,7 +554,7 @@ def _is_keyed(cells: Sequence[str]) -> bool:
     """Tell if a line is a key followed by units, by numbers, or by one text for all columns."""
     rest = cells[1:]
     return _WORD.match(cells[0]) is not None and (
-        _is_units(rest) or len(set(rest)) == 1 or all(looks_numeric(cell) for cell in rest)
+        is_units(rest) or len(set(rest)) == 1 or all(looks_numeric(cell) for cell in rest)
     )
 
 
