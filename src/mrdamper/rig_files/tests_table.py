@@ -46,6 +46,15 @@ class StatedTest:
     rig: str | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def what(self) -> str:
+        """The file and the run as they are named."""
+        return " ".join(filter(None, (self.file, self.run)))
+
+    def names(self, path: Path, run: str) -> bool:
+        """Tell if the entry is that of a run of a file, or of all runs of the file."""
+        return _is_file(self.file, path) and self.run in ("", run)
+
 
 @dataclass(frozen=True, slots=True)
 class TestsTable:
@@ -57,9 +66,8 @@ class TestsTable:
 
     def of(self, path: Path, run: str) -> StatedTest | None:
         """Return the row of a test: of its run, else of its file."""
-        own = [row for row in self.rows if _is_file(row.file, path) and row.run in ("", run)]
-        own.sort(key=lambda row: row.run == "")
-        return own[0] if own else None
+        own = [row for row in self.rows if row.names(path, run)]
+        return min(own, key=lambda row: row.run == "", default=None)
 
     def of_file(self, path: Path) -> tuple[StatedTest, ...]:
         """Return the rows of a file's tests."""
@@ -72,21 +80,20 @@ class TestsTable:
         """
         tests = list(tests)
         for row in self.rows:
-            fitting = {path for path, run in tests if run and _is_file(row.file, path) and row.run in ("", run)}
+            fitting = {path for path, run in tests if run and row.names(path, run)}
             if len(fitting) > 1:
-                what = " ".join(filter(None, (row.file, row.run)))
                 shown = ", ".join(sorted("/".join(path.parts[-2:]) for path in fitting)[:4])
-                problem = f"{what!r} names tests of {len(fitting)} files: {shown}"
+                problem = f"{row.what!r} names tests of {len(fitting)} files: {shown}"
                 remedy = "write the file with its folder, and one row for each"
                 raise TestsTableError(problem, where=f"{self.path.name}, line {row.line}", remedy=remedy)
         absent = [
             row
             for row in self.rows
-            if not any(_is_file(row.file, path) and row.run in ("", run) for path, run in tests)
+            if not any(row.names(path, run) for path, run in tests)
             and not (row.file and (self.path.parent / row.file).is_file() and not row.run)
         ]
         if absent:
-            shown = listed([f"{' '.join(filter(None, (r.file, r.run)))!r} (line {r.line})" for r in absent], 10)
+            shown = listed([f"{row.what!r} (line {row.line})" for row in absent], 10)
             remedy = "correct the names, or remove the rows"
             raise TestsTableError(f"no such test: {shown}", where=self.path.name, remedy=remedy)
 
@@ -130,11 +137,10 @@ def load_tests(path: str | Path) -> TestsTable:
     stated = [_row(line, cells, names, keys, wrong) for line, cells in rows[1:]]
     lines_of: dict[tuple[str, str], int] = {}
     for row in stated:
-        what = " ".join(filter(None, (row.file, row.run)))
-        if not what:
+        if not row.what:
             wrong(row.line, "names neither file nor run", "fill the cell or remove the row")
         elif (row.file, row.run) in lines_of:
-            wrong(row.line, f"{what!r} stands in line {lines_of[row.file, row.run]} already", "remove one row")
+            wrong(row.line, f"{row.what!r} stands in line {lines_of[row.file, row.run]} already", "remove one row")
         lines_of.setdefault((row.file, row.run), row.line)
     CombinedError.raise_from(problems)
     return TestsTable(path, tuple(stated))

@@ -17,7 +17,6 @@ from mrdamper.rig_files.units import SI
 _NINES = (9.99, 9.999, 9.9999, 9.99999, 9.999999, 9.9925, 9.91)
 _ENDS = (3.2767, 3.2768, 6.5535, 8.388607, 8.388608, 2.147483647, 2.147483648, 4.294967295)
 _DIGITS = np.sort([*_NINES, *_ENDS])
-_MIDDLES = 0.5 * (_DIGITS[1:] + _DIGITS[:-1])
 _LEAP = 0.25  # of the channel's range: a code stands that far from the samples around it
 _FAR = 2.0  # times as far as all but a hundredth of the channel's own leaps
 _PULSES = 9  # times as far, a value that no logger writes for missing ones is no pulse of a supply
@@ -180,18 +179,12 @@ def _repeated_leaps(values: Floats, leap: float) -> list[tuple[float, int]]:
 
 
 def _known(value: float) -> bool:
-    return bool(_are_known(np.array([value]))[0])
-
-
-def _are_known(values: Floats) -> np.ndarray:
-    """(N,) mask of the values that are codes in use."""
-    size = np.abs(values)
-    is_code = size >= 1e20
-    there = np.flatnonzero(~is_code & (size > 0))
-    digits = size[there] / 10.0 ** np.floor(np.log10(size[there]))
-    nearest = np.searchsorted(_MIDDLES, digits)
-    is_code[there] = np.abs(digits / _DIGITS[nearest] - 1) < 1e-9
-    return is_code
+    """Tell if a value is a code in use."""
+    size = abs(value)
+    if size == 0 or size >= 1e20:
+        return size > 0
+    digits = size / 10.0 ** np.floor(np.log10(size))
+    return bool(np.min(np.abs(digits / _DIGITS - 1)) < 1e-9)
 
 
 def _scattered(values: Floats, value: float, leap: float) -> tuple[int, float]:
