@@ -107,6 +107,18 @@ def test_a_list_of_channels_gives_scales_of_volts_and_no_unit_of_bare_numbers(tm
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == codes
 
 
+@pytest.mark.parametrize("variable", ["Coil Current\tCoilCurrent\t{}\tA\t", "Coil Current\tCoilCurrent\tA\t{}\t"])
+def test_a_list_of_variables_beside_the_only_record_of_a_folder_states_its_current(tmp_path, variable):
+    write(tmp_path, "time [s],stroke [mm],load [N]\n")
+    order = "Value\tUnit" if variable.endswith("A\t") else "Unit\tValue"
+    for name, amperes in CURRENTS.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / f"{name}.csv").rename(tmp_path / name / "timed.csv")
+        text = f"Display Name\tInternal Name\t{order}\tComment\n{variable.format(amperes)}\nMass\tMass\t3.4\tkg\t\n"
+        (tmp_path / name / "variables.txt").write_text(text)
+    require_the_tests(tmp_path)
+
+
 def test_the_scale_of_an_amplifier_of_the_load_cell_is_not_that_of_the_current(tmp_path):
     for name, amperes in CURRENTS.items():
         rows = zip(T, X / 10, force(amperes) / 400, np.full(T.size, 100 * amperes), strict=True)

@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
 
-from mrdamper.rig_files.column_names import split_name, words_of
+from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_by_lines
 from mrdamper.rig_files.mapping.completion import NUMBERED, states_si
 from mrdamper.rig_files.mapping.results import numbered_tests
@@ -21,8 +21,7 @@ from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding
 from mrdamper.rig_files.text.short import packaged_lines, short_lines
-from mrdamper.rig_files.units import DIMENSION, is_unit, parse_unit
-from mrdamper.rig_files.vocabulary import words
+from mrdamper.rig_files.units import is_unit, parse_unit
 
 _LARGEST = 2**16  # bytes
 _PLACES = ("column", "number", "index", "no", "position", "channel")
@@ -49,13 +48,6 @@ _README = re.compile(
 )
 
 
-_SCALES, _UNITS = words("scale"), words("unit")
-_EU = re.compile(r"(?i)\b(?:EU|units?)\b")  # engineering units, those of the row
-_PER = re.compile(rf"{_EU.pattern} ?(?:/|per) ?m?V\b|\bm?V ?(?:/|per) ?{_EU.pattern[4:]}")
-_MEASURED = {*DIMENSION.values()}
-_SHIFT = re.compile(r"(?i)offset|zero")
-
-
 def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Add what short texts beside the file state of signs, and of names, units and scales where they lack."""
     lacking = bool(scaled_columns(table)) or _lacks_names_or_units(table)
@@ -64,7 +56,7 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     texts = texts + (structures if lacking or len(structures) <= _FEW_FILES else [])
     texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(p.name)]
-    lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in _with_scales(own)]
+    lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
     names = {header.name.casefold() for header in table.headers}
     stated = [
         (lacking and _of_channels(line)) or (line if states_sign(line) or names & {*_counted(line)} else "")
@@ -104,30 +96,6 @@ def _lacks_names_or_units(table: RawTable) -> bool:
     return not {"displacement", "force"} <= roles or any(
         table.headers[i].role in REQUIRED or NUMBERED.fullmatch(table.names[i].strip()) for i in bare
     )
-
-
-def _with_scales(lines: list[str]) -> list[str]:
-    """Return lines, in those of a list of channels the scale with its unit last: Channel, Unit, Sensitivity [unit/V].
-
-    Where the heading does not tell what a scale is per, the unit beside it is omitted: it may be that of the product.
-    """
-    scaled, heads, scale, unit = [], list[str](), 0, 0
-    for line in lines:
-        cells = [cell.strip(' "') for cell in re.split(r"[,;\t|]", line.strip(" |"))]
-        keys = [{word.casefold() for word in words_of(cell)} for cell in cells]
-        places = [next((i for i, key in enumerate(keys) if key & of), 0) for of in (_SCALES, _UNITS)]
-        if all(places):
-            heads, (scale, unit) = cells, places
-        elif len(cells) == len(heads) and split_name("", cells[unit]).dimension in _MEASURED:
-            per = _PER.search(heads[scale])
-            rest = [
-                f"{key} {cell}" if _SHIFT.search(key) else cell
-                for i, (key, cell) in enumerate(zip(heads, cells, strict=True))
-                if i not in (scale, unit)
-            ]
-            line = "; ".join([*rest, f"{cells[scale]} {_EU.sub(cells[unit], per[0])}" if per else ""])
-        scaled.append(line)
-    return scaled
 
 
 def _counted(line: str) -> list[str]:

@@ -8,14 +8,22 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from mrdamper.rig_files.column_names import split_name, words_of
 from mrdamper.rig_files.text.stream import decoded
-from mrdamper.rig_files.units import is_unit
+from mrdamper.rig_files.units import DIMENSION, is_unit
+from mrdamper.rig_files.vocabulary import words
 
 _LARGEST = 2**18  # bytes
 _RULE = re.compile(r"[\s|:+=-]*")  # below the names of columns of a table in Markdown
 _PAIR = re.compile(r"""\s*["']?(?P<key>[^:"'{}\[\]#,]{1,60}?)["']?\s*:\s+["']?(?P<value>[^"'{},#]*?)["']?\s*""")
 _ITEM = re.compile(r"\s*-\s+(?=\S)")
 _DEEPEST, _FEWEST_TESTS = 6, 2
+_MOST_LISTED = 200  # quantities or channels
+_VALUE, _SCALE, _UNIT = words("value"), words("scale"), words("unit")
+_EU = re.compile(r"(?i)\b(?:EU|units?)\b")  # engineering units, those of the row
+_PER = re.compile(rf"{_EU.pattern} ?(?:/|per) ?m?V\b|\bm?V ?(?:/|per) ?{_EU.pattern[4:]}")
+_SHIFT = re.compile(r"(?i)offset|zero")
+_MEASURED = {*DIMENSION.values(), "frequency"}
 
 
 def short_lines(path: Path) -> list[str]:
@@ -37,7 +45,35 @@ def short_lines(path: Path) -> list[str]:
             return []
     if suffix in (".yaml", ".yml"):
         return list(_stated(_mapping(text.splitlines()), ""))
-    return [line for line in text.splitlines() if "|" not in line or not _RULE.fullmatch(line)]
+    lines = [line for line in text.splitlines() if "|" not in line or not _RULE.fullmatch(line)]
+    return _by_headings(lines) if len(lines) <= _MOST_LISTED else lines
+
+
+def _by_headings(lines: list[str]) -> list[str]:
+    """Return lines, in those of a list the number and its unit last: Name, Unit, Value; Channel, Unit, Scale [unit/V].
+
+    Where a heading does not tell what a scale is per, the unit beside it is omitted: it may be that of the product.
+    """
+    written, heads, number, unit = [], list[str](), 0, 0
+    for line in lines:
+        cells = [cell.strip(' "') for cell in re.split(r"[,;\t|]", line.strip(" |"))]
+        keys = [{word.casefold() for word in words_of(cell)} for cell in cells]
+        places = [next((i for i, key in enumerate(keys) if key & of), 0) for of in (_VALUE | _SCALE, _UNIT)]
+        if all(places):
+            heads, (number, unit) = cells, places
+        elif len(cells) == len(heads) and split_name("", cells[unit]).dimension in _MEASURED:
+            head, per = heads[number], _PER.search(heads[number])
+            rest = [
+                f"{key} {cell}" if _SHIFT.search(key) else cell
+                for i, (key, cell) in enumerate(zip(heads, cells, strict=True))
+                if i not in (number, unit)
+            ]
+            if {word.casefold() for word in words_of(head)} & _VALUE:
+                line = f"{next((cell for cell in rest if not cell.isdigit()), '')}: {cells[number]} {cells[unit]}"
+            else:
+                line = "; ".join([*rest, f"{cells[number]} {_EU.sub(cells[unit], per[0])}" if per else ""])
+        written.append(line)
+    return written
 
 
 def packaged_lines(path: Path) -> list[str]:
