@@ -269,6 +269,17 @@ def test_codes_of_names_are_listed_on_lines_or_on_one(between, tmp_path):
     require_the_tests(tmp_path)
 
 
+@pytest.mark.parametrize("line", ["Pliki p0{} - p0{}: prąd {} A", "Tests {} to {}: coil at {} A"])
+def test_tests_from_one_number_to_another_have_the_current_of_their_line(tmp_path, line):
+    for i, amperes in enumerate((0.0, 0.0, 0.9, 0.9), 1):
+        lines = zip(T, (1 + i) / 5 * X, force(amperes), strict=True)
+        text = "time [s],stroke [mm],load [N]\n" + "".join(f"{t:.3f},{x:.7f},{f:.6f}\n" for t, x, f in lines)
+        (tmp_path / f"p0{i}.csv").write_text(text)
+    (tmp_path / "CZYTAJ.txt").write_text(f"Rig 4\n{line.format(1, 2, 0)}\n{line.format(3, 4, '0,9')}\n", "cp1250")
+    result = import_files([tmp_path])
+    assert [float(np.mean(record.current)) for record in result.records] == pytest.approx([0.0, 0.0, 0.9, 0.9])
+
+
 @pytest.mark.parametrize("heading", ["Fuses: ", "Fuses:\n", "Supply limits. ", "Messbereich: "])
 def test_codes_below_a_heading_of_ratings_are_no_currents(heading, tmp_path):
     write(tmp_path, "time [s],stroke [mm],load [N]\n")

@@ -22,9 +22,12 @@ _QUANTITY = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s*(m?A)")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
-_LISTED_TEST = re.compile(r"[\s#%*\"-]*(?P<name>[^\W\d_][^\d:=]{0,30}?)[\s_.#-]*(?P<number>[0-9]{1,6})\s*[:=;,\t)]")
+_LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: ...
+    r"[\s#%*\"-]*(?P<name>[^\W\d_][^\d:=]{0,30}?)[\s_.#-]*(?P<number>[0-9]{1,6})"
+    r"(?:\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até)\b)\s*(?:[^\W\d_]{1,30}[\s_.#]*)?(?P<last>[0-9]{1,6}))?\s*[:=;,\t)]"
+)
 _STARTS, _ENDS = words("start"), words("end")
-_COUNTED = words("run") | words("run_number")  # what the number in a test's name may be
+_COUNTED = words("run") | words("run_number") | words("table_file")  # what the number in a test's name may be
 _NUMBERED = _COUNTED | {"step", "schritt", "#"}
 _SPECIMEN = re.compile(
     r"(?i)^(?:specimen|probe|prüfkörper|test|versuch|run|sample|essai|éprouvette|ensayo|no|nr)\b[\s.:#]*"
@@ -119,12 +122,17 @@ def numbered_tests(lines: Iterable[str]) -> Results | None:
     """Return the tests that lines list by their numbers, with one current each: Step 3: sine, 2 Hz, coil at 0.4 A."""
     matches = [match for line in lines if (match := _LISTED_TEST.match(line[:_LONGEST_LINE]))]
     stated = [(match, currents_in(match.string[match.end() :])) for match in matches]
-    rows = [(m["name"].strip(), m["number"], of[0]) for m, of in stated if len(of) == 1 and not holds(m["name"], COIL)]
+    rows = [
+        (m["name"].strip(), f"{number:0{len(m['number'])}d}", of[0])
+        for m, of in stated
+        for number in range(int(m["number"]), int(m["last"] or m["number"]) + 1)[:_MOST_ROWS]
+        if len(of) == 1 and not holds(m["name"], COIL)
+    ]
     numbers = {(name.casefold(), int(number)) for name, number, _ in rows}
     if len(numbers) < _FEWEST_ROWS or len(numbers) < len(rows) or len({name for name, _ in numbers}) > 1:
         return None
-    cells = tuple((str(i), f"{name}{number}", number) for i, (name, number, _) in enumerate(rows, 1))
-    counts = bool({word.casefold() for word in words_of(rows[0][0])} & _COUNTED)
+    cells = tuple((str(i), f"{name.split()[-1]}{number}", number) for i, (name, number, _) in enumerate(rows, 1))
+    counts = any({word.casefold(), word.casefold().rstrip("s")} & _COUNTED for word in words_of(rows[0][0]))
     return Results(tuple(row[2] for row in rows), cells, "a line for each test", ("", "", rows[0][0]), counts)
 
 
