@@ -40,6 +40,16 @@ EXPORTS = {
     + lines(lambda i, t, x, f: f'"{clock(t):%Y-%m-%d %H:%M:%S.%f}","{f:.4f} N","{x:.6f} mm"'),
     "stamps of seconds with microseconds": "date and time;us;stroke;load\n;;mm;N\n"
     + lines(lambda i, t, x, f: f"{clock(t):%Y-%m-%d %H:%M:%S};{clock(t).microsecond};{x:.6f};{f:.4f}"),
+    "lines of a key with numbers, and short keys": "サンプリング周波数（Hz）,200\nレンジ,2000,20000,10V\n"
+    "校正係数,0.01,0.002,0.5\nオフセット,0,0,0\nCH No.,1-1,1-2,1-3\nCH名称,変位計,荷重計,温度\n単位,mm,N,℃\n\n"
+    + lines(lambda i, t, x, f: f"{t:.3f},{x:.6f},{f:.4f},24.0"),
+    "a start in a key of one letter": "LabVIEW Measurement\t\n***End_of_Header***\t\n\t\nChannels\t2\t\t\n"
+    "Y_Unit_Label\tmm\tN\t\nX_Dimension\tTime\tTime\t\nX0\t0,00E+0\t0,00E+0\t\nDelta_X\t0,005\t0,005\t\n"
+    "***End_of_Header***\t\t\t\nX_Value\tKonum\tKuvvet\tComment\n"
+    + lines(lambda i, t, x, f: f"{t:.6f}\t{x:.6f}\t{f:.4f}\t".replace(".", ",")),
+    "units behind a key, one a column": "Active channels:\tTime\tDISP\tLOAD\nSample rate:\t200\n"
+    "Channel units:\tsec\tmm\tN\nChannel description:\tTime\tStroke\tLoad cell\n\nTime\tDISP\tLOAD\n"
+    + lines(lambda i, t, x, f: f"{t:.6f}\t{x:.6f}\t{f:.4f}"),
     "the name of the index below the others": "level,stroke,load\nunits,mm,N\nt [s],,\n"
     + lines(lambda i, t, x, f: f"{t:.3f},{x:.6f},{f:.4f}"),
     "units that change with the size of the number": "Time,Load,Stroke\n"

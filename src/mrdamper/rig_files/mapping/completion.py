@@ -157,8 +157,9 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
             roles = {split_name(cell).role for cell in cells} - {None}
             if (key and len(roles) > 1) or (stated and all(map(currents_in, stated))):
                 table = replace(table, over=("", *cells))
-        elif _UNITS_KEY.fullmatch(key) and not any(table.units) and all(map(is_unit, cells[: width - 1])):
-            table = replace(table, units=("", *cells[: width - 1])) if len(cells) >= width - 1 else table
+        elif _UNITS_KEY.fullmatch(key.rstrip(" :")) and not any(table.units) and all(map(is_unit, cells[: width - 1])):
+            units = tuple(cells if len(cells) == width and cells[-1] else ("", *cells[: width - 1]))  # one a column
+            table = replace(table, units=units) if len(cells) >= width - 1 else table
         elif header.dimension == "current" and names_condition(header.name, "current") and len(stated) > 1:
             if not width - 2 <= len(cells) <= width or not all(map(_PLAIN.fullmatch, stated)):
                 continue

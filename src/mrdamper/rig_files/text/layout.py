@@ -407,9 +407,8 @@ def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) ->
 
 
 def _is_key(cell: str) -> bool:
-    """Tell if the first cell of a line of numbers is a word, or a name with its unit: dx [s]."""
-    header = split_name(cell)
-    return _WORD.match(cell) is not None or (header.unit != "" and header.name[:1].isalpha())
+    """Tell if the first cell of a line of numbers is a text, as X0 is: no number, nor a date."""
+    return cell[:1].isalpha() and not looks_numeric(cell)
 
 
 def _rows(lines: Sequence[str], separator: str, width: int, trailing: bool) -> list[list[str]]:

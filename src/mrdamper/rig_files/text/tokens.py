@@ -78,6 +78,7 @@ def _looks_numeric(token: str) -> bool:
         return True
     if (
         len(token) > _LONGEST
+        or token[0] in "eExX"  # X0
         or _CELLS_APART.search(token)
         or not any(unicodedata.decimal(c, None) is not None for c in token)
     ):
