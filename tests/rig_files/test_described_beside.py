@@ -79,6 +79,17 @@ def test_currents_of_a_table_in_a_readme_are_taken_and_those_of_names_compared_w
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_CONTRADICTS"}
 
 
+def test_a_table_of_symbols_in_a_readme_gives_their_units_to_columns_that_differ_in_capitals(tmp_path):
+    for name, amperes in CURRENTS.items():
+        rows = zip(T, X, force(amperes), strict=True)
+        body = "".join(f"{t:.3f},{x:.7f},{f:.6f},24.5\n" for t, x, f in rows)
+        (tmp_path / f"{name}_{amperes}A.csv").write_text("t,x,F,T\n" + body)
+    units = {"t": "time | s", "x": "stroke | mm", "F": "force | N", "T": "oil | °C"}
+    table = "".join(f"| `{symbol}` | {text} |\n" for symbol, text in units.items())
+    (tmp_path / "README.md").write_text("| column | quantity | unit |\n|---|---|---|\n" + table)
+    require_the_tests(tmp_path)
+
+
 def test_scales_of_numbered_channels_in_a_list_of_channels(tmp_path):
     write(tmp_path, "x-axis,1,2\nsecond,Volt,Volt\n", scale=(5.0, 400.0))
     (tmp_path / "channels.csv").write_text("ch,what,factor,unit\n1,stroke,5,mm/V\n2,load,400,N/V\n")

@@ -50,6 +50,8 @@ EXPORTS = {
     "units behind a key, one a column": "Active channels:\tTime\tDISP\tLOAD\nSample rate:\t200\n"
     "Channel units:\tsec\tmm\tN\nChannel description:\tTime\tStroke\tLoad cell\n\nTime\tDISP\tLOAD\n"
     + lines(lambda i, t, x, f: f"{t:.6f}\t{x:.6f}\t{f:.4f}"),
+    "colons of full width": "采样频率：200.00Hz\n通道数：2\n\n位移(mm)\t阻尼力(kN)\n"
+    + lines(lambda i, t, x, f: f"{x:.6f}\t{f / 1e3:.7f}"),
     "the name of the index below the others": "level,stroke,load\nunits,mm,N\nt [s],,\n"
     + lines(lambda i, t, x, f: f"{t:.3f},{x:.6f},{f:.4f}"),
     "units that change with the size of the number": "Time,Load,Stroke\n"

@@ -265,7 +265,7 @@ def stated_speed(quantities: Iterable[Quantity]) -> float | None:
 
 def _quantities(line: str, decimal: str | None) -> Iterator[Quantity]:
     """Yield what a line states: one quantity, or several behind each other."""
-    line = _TOLERANCE.sub("", line[:_LONGEST_LINE])
+    line = _TOLERANCE.sub("", unicodedata.normalize("NFKC", line[:_LONGEST_LINE]))  # a colon of full width
     match = _LINE.match(line) or _SPACED.match(line)
     parts = [line] if match else re.split(r"[,;|]\s+|[{}\t]|\s{2,}", re.sub(r" *= +", "=", line))
     for part in parts[:_MOST_PARTS]:

@@ -261,19 +261,21 @@ def _with_listed_units(table: RawTable) -> RawTable:
     bare = [i for i, header in enumerate(table.headers) if header.name and not header.unit]
     names = {i: name for i, name in enumerate((*table.names, *table.constants)) if i in bare or i >= len(table.names)}
     wanted, times = {name.strip().casefold(): i for i, name in names.items()}, table.columns("time")
+    wanted |= {name.strip(): i for i, name in names.items()}  # t is no T
     behind: dict[int, set[str]] = {}
     listed: dict[int, set[str]] = {}
     for line in table.remarks if names else ():
         cells = [cell.strip(' "') for cell in re.split(r"[,;|\t]", line[:_LONGEST_LINE].lstrip("#%/ "))]
         both = [*cells, *(cell.partition(": ")[2] for cell in cells)]  # rig 7, columns: time [s], load [N]
         for header in (split_name(_COLON.sub(r"\1 [\2]", cell)) for cell in both):
-            i = wanted.get(header.name.strip().casefold())
+            name = header.name.strip()
+            i = wanted.get(name, wanted.get(name.casefold()))
             if i is not None and header.dimension and header.dimension == DIMENSION.get(header.role or ""):
                 behind.setdefault(i, set()).add(header.unit)
         match = _TIME_UNIT.match(line[:_LONGEST_LINE])
         if match and len(times) == 1 and times[0] in bare and split_name("", match["unit"]).dimension == "time":
             behind.setdefault(times[0], set()).add(match["unit"])
-        named = [wanted[cell.casefold()] for cell in cells if cell.casefold() in wanted]
+        named = [wanted.get(cell, wanted[cell.casefold()]) for cell in cells if cell.casefold() in wanted]
         if len(named) == 1 and not any(map(scales_in, cells)):
             role = role_of(names[named[0]])
             units = [bare_cell for cell in cells if is_unit(bare_cell := cell.strip("[]()"))]

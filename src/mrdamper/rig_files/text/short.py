@@ -45,6 +45,7 @@ def short_lines(path: Path) -> list[str]:
             return []
     if suffix in (".yaml", ".yml"):
         return list(_stated(_mapping(text.splitlines()), ""))
+    text = text.replace("`", "") if suffix == ".md" else text
     lines = [line for line in text.splitlines() if "|" not in line or not _RULE.fullmatch(line)]
     return _by_headings(lines) if len(lines) <= _MOST_LISTED else lines
 
