@@ -133,6 +133,7 @@ ACCEPTED = {
              separator=";", decimal=","), "cp1252", "",
     ),
     "one name, one value": (text(TWICE, ("time_s,displacement_mm,force_N,force_N",)), "utf-8", ""),
+    "a force in two units": (text(TWICE * [1, 1, 1, 0.001], ("time_s,displacement_mm,force_N,load_kN",)), "utf-8", ""),
     "further columns": (text(TWICE, ("time_s,displacement_mm,force_N,=cmd()<b>",)), "utf-8", ""),
     "a missing cell": (CLEAN.replace(CLEAN.splitlines()[300], CLEAN.splitlines()[300].rsplit(",", 1)[0] + ","),
                        "utf-8", "W_MISSING"),

@@ -214,7 +214,8 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
             return min(fitting, key=lambda i: _TOTAL.search(headers[i].name) is None)
         if role not in REQUIRED:
             return None
-        raise _ambiguous(table, role, [table.names[i] for i in candidates])
+        if len({headers[i].unit for i in candidates}) < len(candidates) or not _are_alike(table, candidates):
+            raise _ambiguous(table, role, [table.names[i] for i in candidates])
     return candidates[0]
 
 
@@ -373,8 +374,7 @@ def _refuse_two_values(table: RawTable, column: int) -> None:
     same = [i for i, key in enumerate(keys) if own.name and key == keys[column]]
     if len(same) < 2:
         return
-    values = table.try_read(*same)
-    if values is None or any(not _agree(values[i], table.headers[i], values[column], own) for i in same):
+    if not _are_alike(table, same):
         problem = f"{len(same)} columns are called {own.name!r} and differ"
         remedy = "rename one, or set its number: column = 2 in a profile"
         raise table.source.refuse("E_DUPLICATE_COLUMN", problem, remedy, line=table.line, column=same[1] + 1)
@@ -400,6 +400,14 @@ def _second_clock(table: RawTable, time: Assigned) -> list[InputError]:
         if np.ptp(two) > 0 and np.max(np.abs(one - two)) > 1.5 * coarse + 1e-3 * float(np.ptp(one)):
             return [_ambiguous(table, "time", [table.names[time.column], table.names[other]])]
     return []
+
+
+def _are_alike(table: RawTable, columns: Sequence[int]) -> bool:
+    """Tell if columns hold the same, each in its unit: a load in kgf, and that in N."""
+    values, first = table.try_read(*columns), columns[0]
+    return values is not None and all(
+        _agree(values[i], table.headers[i], values[first], table.headers[first]) for i in columns[1:]
+    )
 
 
 def _agree(a: Floats, one: Header, b: Floats, other: Header) -> bool:
