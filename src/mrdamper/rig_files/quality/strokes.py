@@ -11,6 +11,9 @@ from mrdamper.data.arrays import Floats
 _PROMINENCE = 0.1  # of the peak-to-peak motion: smaller turns are noise or a ramp
 _ALIKE = 0.2  # strokes of a steady motion agree in length and duration to this share
 _RAMP = 0.03  # a stroke at the end that is off by more belongs to a ramp
+_REST = 0.01  # of a stroke: a motion within so much of its last value rests
+_WITHIN = 0.9  # of a stroke: beyond, a sine turns as slowly as it rests
+_LONGEST_REST = 0.03  # of a stroke's duration: three times that of a sine there
 _SHARE = 0.5  # of the strokes must be steady for a motion to be called periodic
 
 
@@ -81,9 +84,9 @@ def _steady(
     first, last = _without_ramps(lengths, first, last)
     start, stop = int(reversals[first]), int(reversals[last]) + 1
     if first == 0:
-        start = _reach(time, x, start, -1, duration)
+        start = _reach(time, x, start, -1, duration, length)
     if last == lengths.size:
-        stop = _reach(time, x, stop - 1, 1, duration) + 1
+        stop = _reach(time, x, stop - 1, 1, duration, length) + 1
     return start, stop
 
 
@@ -101,10 +104,15 @@ def _without_ramps(lengths: Floats, first: int, last: int) -> tuple[int, int]:
     return first, last
 
 
-def _reach(time: Floats, x: Floats, reversal: int, direction: int, duration: float) -> int:
-    """Go on from an outermost reversal to the record's end, if that is about a stroke away.
+def _reach(time: Floats, x: Floats, reversal: int, direction: int, duration: float, length: float) -> int:
+    """Go on from an outermost reversal to the record's end, if that is about a stroke away, or to a rest within it.
 
     About: a reversal close to the record's end does not stand out and is not found.
     """
     end = 0 if direction < 0 else time.size - 1
-    return end if abs(time[end] - time[reversal]) <= 1.25 * duration else reversal
+    if abs(time[end] - time[reversal]) > 1.25 * duration:
+        return reversal
+    away = np.abs(x[reversal::direction] - x[end]) > _REST * length
+    rest = reversal + direction * int(np.max(np.flatnonzero(away), initial=-1) + 1)
+    stops = abs(x[end] - x[reversal]) < _WITHIN * length and abs(time[end] - time[rest]) > _LONGEST_REST * duration
+    return rest if stops else end
