@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from mrdamper.dampers import fold_fits
+from mrdamper.dampers.current_levels import levels_of
 from mrdamper.dampers.fold_fits import FoldFits
+from mrdamper.dampers.joint import JointProblem
 
 FOLDS = [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11], [0, 3, 6, 9], [1, 4], [11]]
 COUNT = 12
@@ -49,3 +51,13 @@ def test_no_start_saw_what_is_left_out_and_the_best_end_is_taken(fold, monkeypat
     assert fits.refit(rows) is found
     assert len(searched) == 1
     assert followed == [0.3, 0.2]  # the third start describes the remaining runs worse by more than a twentieth
+
+
+def test_a_search_frees_no_effect_of_the_current_that_its_runs_do_not_determine(bundled):
+    runs = [run for run in bundled.rig("utfsm").split("train") if run.excitation == "sine"]
+    levels = levels_of(JointProblem(runs, "tanh").currents)
+    few = [runs[i] for level in levels[:3] for i in level[:2]]
+    problem = JointProblem(few, "tanh", free=("si",))
+    assert [axis.name for axis in problem.axes] == ["vy", "shift", "si"]
+    (start, *_) = FoldFits(problem, [[4, 5]])._search(frozenset([4, 5]))
+    assert start.searched == ("vy", "shift")

@@ -80,7 +80,7 @@ class FoldFits:
             free=(*whole.free, *self.searched),
             coil=whole.given_coil,
             parts=[whole.parts[i].steady_end() for i in rows],
-        )
+        ).determined()
         ends = [
             short.fit(start=start, rounds=_SEARCH_ROUNDS, most_steps=_SEARCH_STEPS, settled=_SEARCH_TOLERANCE)
             for start in short.promising[:_START_COUNT]
