@@ -17,6 +17,7 @@ from mrdamper.physics.motion import Excitation, sine
 from mrdamper.statistics.levenberg_marquardt import forward_differences
 from mrdamper.tracing import Tape, TraceError, program
 from mrdamper.tracing.compiled import RecordProgram
+from mrdamper.tracing.program import postorder
 from mrdamper.tracing.tangent import with_tangents
 
 NAMES = ("fy0", "fy1", "d", "e", "cb", "h0", "h1", "vh", "T", "qb", "Ic", "leak", "si")
@@ -81,6 +82,26 @@ def test_every_operation_has_the_slope_of_its_values():
 
     difference = (along(0.4 + 1e-6)[0] - along(0.4 - 1e-6)[0]) / 2e-6
     assert along(0.4)[1] == pytest.approx(difference, rel=1e-7)
+
+
+def test_parameters_that_move_through_one_expression_share_its_factor():
+    tape = Tape()
+    p, q, x = cast(Any, tape.parameter("p", 0.4)), cast(Any, tape.parameter("q", 0.1)), cast(Any, tape.input("x"))
+    ratio = p * x + q
+    outputs = with_tangents(tape, np.tanh(ratio / np.sqrt(1 + ratio * ratio)) - ratio, ["q", "p"])
+    by_q = postorder([outputs["q"]])
+    assert len(postorder([outputs["q"], outputs["p"]])) == len(by_q) + 1  # times x
+
+
+def test_a_branch_that_is_not_taken_has_no_part_in_a_slope():
+    tape = Tape()
+    p, x = cast(Any, tape.parameter("p", 0.4)), cast(Any, tape.input("x"))
+    root = tape.select(x > 0.0, np.sqrt(p * x * x), 0.0)
+    record = RecordProgram(program(tape, with_tangents(tape, 3 * root, ["p"])))
+    xs = np.array([-1.0, 0.0, 0.25])
+    along = record.interpreted_along((0.4,), record.prepare((0.4,)) or (), record.starts, [xs])
+    assert along.failed == -1
+    assert along.outputs[1] == pytest.approx([0.0, 0.0, 1.5 * 0.25 / np.sqrt(0.4)])
 
 
 def test_a_loop_has_the_slope_of_its_passes():

@@ -2,7 +2,8 @@
 
 Every operation on the tape is followed by its derivative, and every memory that depends on a parameter has a
 derivative that is remembered beside it; so has what a loop carries, but for what its steps are measured by. Where a
-function has a corner the derivative is that of the branch taken.
+function has a corner the derivative is that of the branch taken. An expression that moves through one earlier
+expression alone has the derivative of that one times a factor, which all parameters share.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ _BY_ARGUMENT: Mapping[str, Callable[[Any, Any], Any]] = {
     "arctanh": lambda a, y: 1.0 / (1.0 - a * a),
 }
 _FLAT = frozenset({"sign", "input"})
+_BRANCHING = frozenset({"select", "minimum", "maximum"})  # they discard a derivative that may not be finite
 _TINY = 1e-300
 
 
@@ -42,29 +44,83 @@ def with_tangents(tape: Tape, output: Any, along: Sequence[str]) -> dict[str, An
     updates = dict(tape.updates)
     loops = {id(node): (node.start, node.updates) for node in nodes if isinstance(node, TracedLoop)}
     outputs = {"value": output}
+    chains = _Chains(tape)
     for name in along:
         moving = _moving(nodes, updates, loops, name)
         slopes: dict[int, Any] = {id(tape.parameters[name]): 1.0}
         held = {m: tape.remember(f"{m}_by_{name}") for m, value in updates.items() if id(value) in moving}
         slopes |= {id(tape.memory[m]): slope for m, slope in held.items()}
         opened: dict[int, dict[int, int]] = {}  # by loop: where the derivative of what is carried at a place is carried
+        chains.begin(moving, slopes)
         for node in nodes:
             if isinstance(node, TracedLoop):
                 _, after = loops[id(node)]
-                node.updates = (*node.updates, *(slopes.get(id(after[i]), 0.0) for i in opened.get(id(node), ())))
+                node.updates = (*node.updates, *(chains.slope(after[i]) for i in opened.get(id(node), ())))
             elif id(node) not in moving or id(node) in slopes:
                 continue
             elif node.op in ("carry", "result"):
                 loop, place = node.args
                 if id(loop) not in opened:
-                    opened[id(loop)] = _open(loop, *loops[id(loop)], moving, slopes)
+                    opened[id(loop)] = _open(loop, *loops[id(loop)], moving, chains)
                 slopes[id(node)] = Expression(tape, node.op, (loop, opened[id(loop)][place]), SAMPLE)
             else:
-                slopes[id(node)] = _slope(tape, node, slopes)
+                chains.add(node)
         for memory, slope in held.items():
-            tape.update(slope, slopes[id(updates[memory])])
-        outputs[name] = slopes.get(id(output), 0.0)
+            tape.update(slope, chains.slope(updates[memory]))
+        outputs[name] = chains.slope(output)
     return outputs
+
+
+class _Chains:
+    """Derivatives by one parameter after the other: some written out, the others as factors of these."""
+
+    def __init__(self, tape: Tape):
+        self.tape = tape
+        self.factors: dict[tuple[int, int], Any] = {}  # derivatives by an expression through which all of it moves
+
+    def begin(self, moving: set[int], slopes: dict[int, Any]) -> None:
+        """Begin with another parameter."""
+        self.moving, self.slopes = moving, slopes
+        self.above: dict[int, Expression] = {}  # by expression: the last one before it through which all of it moves
+        self.depth: dict[int, int] = {}
+
+    def add(self, node: Expression) -> None:
+        """Note what an expression moves through; where that is more than one, write its derivative out."""
+        first, *others = parts = [part for part in node.args if id(part) in self.moving]
+        above: Expression | None = None if node.op in _BRANCHING else first
+        for part in others:
+            above = self._meet(above, part)
+        if above is None:
+            self.slopes[id(node)] = _slope(self.tape, node, {id(part): self.slope(part) for part in parts})
+        else:
+            self.above[id(node)], self.depth[id(node)] = above, 1 + self.depth.get(id(above), 0)
+
+    def slope(self, node: Any) -> Any:
+        """Return the derivative of an expression by the parameter."""
+        root = node
+        while id(root) in self.above:
+            root = self.above[id(root)]
+        return _times(self.slopes.get(id(root), 0.0), self._factor(node, root))
+
+    def _meet(self, one: Expression | None, other: Expression) -> Expression | None:
+        while one is not None and one is not other:
+            if self.depth.get(id(one), 0) < self.depth.get(id(other), 0):
+                one, other = other, one
+            one = self.above.get(id(one))
+        return one
+
+    def _factor(self, node: Any, root: Any) -> Any:
+        """Return the derivative of an expression by one on its chain."""
+        value, at = 1.0, node
+        while at is not root:
+            above = self.above[id(at)]
+            if (id(node), id(above)) not in self.factors:
+                if (id(at), id(above)) not in self.factors:
+                    parts = {id(part): self._factor(part, above) for part in at.args if id(part) in self.moving}
+                    self.factors[id(at), id(above)] = _slope(self.tape, at, parts)
+                self.factors[id(node), id(above)] = _times(value, self.factors[id(at), id(above)])
+            value, at = self.factors[id(node), id(above)], above
+        return value
 
 
 def derivatives(tape: Tape, values: Sequence[Any], by: Any) -> list[Any]:
@@ -104,12 +160,12 @@ def _moving(
 
 
 def _open(
-    loop: TracedLoop, start: Sequence[Any], updates: Sequence[Any], moving: set[int], slopes: Mapping[int, Any]
+    loop: TracedLoop, start: Sequence[Any], updates: Sequence[Any], moving: set[int], chains: _Chains
 ) -> dict[int, int]:
     """Let a loop carry derivatives, from those of its start; their places by the places of what is carried."""
     moved = [i for i in range(loop.still, len(start)) if {id(start[i]), id(updates[i])} & moving]
     places = {place: len(loop.start) + k for k, place in enumerate(moved)}
-    loop.start = (*loop.start, *(slopes.get(id(start[i]), 0.0) for i in moved))
+    loop.start = (*loop.start, *(chains.slope(start[i]) for i in moved))
     return places
 
 
