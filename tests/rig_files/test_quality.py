@@ -240,10 +240,12 @@ def test_a_rest_before_or_behind_the_motion_is_no_part_of_its_cycles(rest):
     rng, phase = np.random.default_rng(1), 2 * np.pi * np.clip(np.arange(-rest, 4 + rest, 0.002), 0, 4)
     moves = (phase > 0) & (phase < 8 * np.pi)
     x = 0.01 * np.sin(phase) + rng.normal(0, 1e-6, phase.size)
-    force = np.where(moves, 400 * np.tanh(4 * np.cos(phase)) + 100 * np.cos(phase), 0.0) + rng.normal(0, 1.0, phase.size)
+    moving = 400 * np.tanh(4 * np.cos(phase)) + 100 * np.cos(phase)
+    force = np.where(moves, moving, 0.0) + rng.normal(0, 1.0, phase.size)
     record = check_record(Record("a", 0.002 * np.arange(phase.size), x, force))
     assert not record.findings
-    assert record.steady is not None and record.steady.window is not None
+    assert record.steady is not None
+    assert record.steady.window is not None
     assert record.steady.window == pytest.approx((rest, rest + 4), abs=0.01)
     assert record.steady.repeatability == pytest.approx(0, abs=0.01)
 
