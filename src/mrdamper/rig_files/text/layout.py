@@ -383,19 +383,22 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
 def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) -> tuple[int, list[str]]:
     """Index and cells of the first row; a key with numbers behind it is none if lines of another kind follow.
 
-    Nor is it below units behind a key: Units, mm, kN; Full scale, 50, 25.
+    Nor is it below units behind a key, if a line below has another: Units, mm, kN; Full scale, 50, 25.
     """
     worded: tuple[int, list[str]] | None = None
     keyed: tuple[int, list[str]] | None = None
     keys = False
-    for i, line in content:
+    for (i, line), (_, below) in zip(content, [*content[1:], (0, "")], strict=True):
         cells = cells_of(line, separator)
+        ranges = keys and cells_of(below, separator)[:1] not in ([], [""], cells[:1])
         if not _is_row(cells):
             keyed, worded = None, worded or (i, cells)
             keys |= cells[0].strip('"').casefold() in _UNIT_KEYS and is_units(cells[1:])
         elif len(cells) == width and not _is_key(cells[0].strip('"')):
             return keyed or (i, cells)
-        elif keys or cells[0].strip('"').casefold() in _SCALES or (width > 2 and len({*filter(None, cells[1:])}) == 1):
+        elif (
+            ranges or cells[0].strip('"').casefold() in _SCALES or (width > 2 and len({*filter(None, cells[1:])}) == 1)
+        ):
             keyed = None  # a key with the scales of the columns, or one value for all of them
         elif len([cell for cell in cells if is_unit(cell)]) > 1:
             keyed = None  # units beside a start and a step: Sequence, Volt, Volt, 0, 0.002
