@@ -9,7 +9,6 @@ from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
 from pathlib import Path
-from xml.etree import ElementTree
 
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_by_lines
@@ -23,12 +22,11 @@ from mrdamper.rig_files.record import REQUIRED, Finding
 from mrdamper.rig_files.text.short import packaged_lines, short_lines
 from mrdamper.rig_files.units import is_unit, parse_unit
 
-_LARGEST = 2**16  # bytes
-_PLACES = ("column", "number", "index", "no", "position", "channel")
 _MOST = 200  # elements
 _FEWEST_ROWS = 50  # of a record
 _FEW_FILES = 10  # that describe a folder, not a test each
 _STRUCTURES = (".json", ".yaml", ".yml")
+_NAMED = (*_STRUCTURES, ".xml")  # structures that describe the record of their name
 _READ = ("", ".txt", ".md", ".rst", ".csv", ".tsv", *_STRUCTURES)
 _LARGEST_LIST = 4096  # bytes of a list of channels
 _TEXTS = (".csv", ".txt", ".tsv", ".ini", ".cfg", ".par", ".set")
@@ -110,49 +108,19 @@ def _of_channels(line: str) -> str:
     if len(cells) > 1 and split_name(cells[0]).role and all(c.isascii() and c.isdigit() for c in cells[1:]):
         return f"channel {cells[1]}: {cells[0]}"  # a tag with its index, and its type
     units = [split_name(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]
-    return (
-        line
-        if states_scale(line)
-        or states_shift(line)
-        or states_si(line)
-        or (any(map(is_unit, units)) and not stated_by_lines([line], "."))
-        else ""
-    )
+    stated = states_scale(line) or states_shift(line) or states_si(line)
+    return line if stated or (any(map(is_unit, units)) and not stated_by_lines([line], ".")) else ""
 
 
 def with_description(table: RawTable, path: Path, profile: Profile) -> RawTable:
-    """Return the table with what the text or XML file of its name, or the only other file of its folder, states."""
+    """Return the table with what the text or structure of its name, or the only other file of its folder, states."""
     other = _only_other(path)
     other = None if other is None or profile.leaves_out(other.name) else other
-    beside = [path.with_suffix(suffix) for suffix in (*_STRUCTURES, *_TEXTS)]
+    beside = [path.with_suffix(suffix) for suffix in (*_NAMED, *_TEXTS)]
     named = [p for p in beside if p != path and p.is_file() and not profile.leaves_out(p.name)]
-    named = [p for p in named if (p.suffix in _STRUCTURES or is_description(p))]
-    if named or (other is not None and is_description(other)):
-        lines = short_lines(named[0] if named else other)  # type: ignore[arg-type]
-        return replace(table, remarks=(*table.remarks, *lines))
-    if lines := packaged_lines(path):
-        return replace(table, remarks=(*table.remarks, *lines))
-    elements = _elements(path, other)
-    if not elements:
-        return table
-    says = [(e, {key.casefold(): value.strip() for key, value in e.attrib.items()}) for e in elements]
-    leaves = [(e, a) for e, a in says if e.text and e.text.strip() and not len(e)]
-    lines = [f"{e.tag.rpartition('}')[2]}: {(e.text or '').strip()} {_unit(a)}".strip() for e, a in leaves]
-    table = replace(table, remarks=(*table.remarks, *lines))
-    channels = [a for _, a in says if a.get("name") and is_unit(_unit(a))]
-    if any(table.names) or len(channels) != len(table.names):
-        return table
-    places = [next((a[key] for key in _PLACES if a.get(key, "").isdigit()), "") for a in channels]
-    if sorted(places) == sorted(map(str, range(1, len(channels) + 1))):
-        channels = [channel for _, channel in sorted(zip(map(int, places), channels, strict=True), key=lambda e: e[0])]
-    elif any(places):
-        return table
-    units = tuple(map(_unit, channels))
-    return replace(table, names=tuple(a["name"] for a in channels), units=units)
-
-
-def _unit(attributes: dict[str, str]) -> str:
-    return attributes.get("unit", attributes.get("units", ""))
+    named = [p for p in (*named, *([other] if other else ())) if p.suffix.lower() in _NAMED or is_description(p)]
+    lines = short_lines(named[0]) if named else packaged_lines(path)
+    return replace(table, remarks=(*table.remarks, *lines))
 
 
 def is_description(path: Path) -> bool:
@@ -176,19 +144,3 @@ def _only_other(path: Path) -> Path | None:
     except OSError:
         return None
     return others[0] if len(others) == 1 else None
-
-
-def _elements(path: Path, other: Path | None) -> list[ElementTree.Element]:
-    """Return the elements of the description of a file; empty if it has none, or one that could be hostile."""
-    beside = path.with_suffix(".xml")
-    if not beside.is_file():
-        beside = other if other and other.suffix.lower() == ".xml" and other.is_file() else path
-    if beside == path or beside.stat().st_size > _LARGEST:
-        return []
-    content = beside.read_bytes()
-    if b"<!" in content.replace(b"<!--", b""):  # definitions of entities grow without end
-        return []
-    try:
-        return list(ElementTree.fromstring(content).iter())[:_MOST]
-    except (ElementTree.ParseError, ValueError, LookupError):
-        return []

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from html.parser import HTMLParser
-from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 
@@ -14,15 +11,11 @@ from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.arrays import refusing_damage, whole
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, Reader, RigFileError, Source
 from mrdamper.rig_files.readers.nested import nested_tables
-from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES
 from mrdamper.rig_files.readers.workbook import as_text, tables_of_sheets
+from mrdamper.rig_files.text.elements import Elements, Sheets, value_of
 
 _BEGINS = re.compile(rb"\s*<[?!A-Za-z]")
-_SHEETS = "{urn:schemas-microsoft-com:office:spreadsheet}"
 _PAGE = re.compile(rb"\s*(?:<!--.*?-->\s*)?<(?:!doctype\s+html|html|head|body|table|meta)\b", re.IGNORECASE | re.DOTALL)
-_BETWEEN = re.compile(r"[\s;,]+")
-_MOST_LEVELS = 100
-_Sheets = list[tuple[str, list[list[str]]]]  # rows of cells by the name of the sheet
 
 
 class Markup(Reader):
@@ -44,13 +37,10 @@ class Markup(Reader):
             page = _Page()
             page.feed(content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8", "replace"))
             return _of_cells(source, page.sheets, form)
-        elements = _Elements()
-        tables: list[RawTable] = []
+        elements, tables = Elements(), list[RawTable]()
         try:
             with refusing_damage(source, self.title):
-                parser = ElementTree.XMLParser(target=elements)
-                parser.feed(content)
-                parser.close()
+                elements.read(content)
             tables = [] if elements.sheets else nested_tables(source, elements.root, self.title)
         except RigFileError as error:
             if error.code != "E_NO_DATA":
@@ -66,7 +56,7 @@ def _plain(head: bytes) -> bytes:
     return head.replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe")
 
 
-def _of_cells(source: Source, sheets: _Sheets, form: FileForm) -> list[RawTable]:
+def _of_cells(source: Source, sheets: Sheets, form: FileForm) -> list[RawTable]:
     texts = [(name, as_text(source, name, rows)) for name, rows in sheets if any(map(any, rows))]
     if not texts:
         raise NoTableError(
@@ -80,7 +70,7 @@ class _Page(HTMLParser):
 
     def __init__(self) -> None:
         super().__init__()
-        self.sheets: _Sheets = []
+        self.sheets: Sheets = []
         self._open = False
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -90,7 +80,7 @@ class _Page(HTMLParser):
         elif tag == "tr" and self.sheets:
             self.sheets[-1][1].append([])
         elif tag in ("td", "th") and self.sheets:
-            row, across = self.sheets[-1][1][-1], _value(dict(attrs).get("colspan") or "")
+            row, across = self.sheets[-1][1][-1], value_of(dict(attrs).get("colspan") or "")
             self._at = len(row)
             row += [""] * (int(np.clip(across, 1, MOST_COLUMNS)) if isinstance(across, float) else 1)
         self._open = tag in ("td", "th") or (self._open and tag not in ("table", "tr"))
@@ -104,94 +94,3 @@ class _Page(HTMLParser):
     def handle_endtag(self, tag: str) -> None:
         """End a cell, and what stands around it."""
         self._open &= tag not in ("td", "th", "tr", "table")
-
-
-class _Elements:
-    """A target of the parser that keeps the value of every element, and the cells of workbooks of Excel 2003."""
-
-    def __init__(self) -> None:
-        self.root: dict[str, Any] = {}
-        self.sheets: _Sheets = []
-        self._levels: list[tuple[dict[str, Any], dict[str, list[Any]], list[str]]] = [({}, {}, [])]
-
-    def doctype(self, name: str, public: str | None, system: str | None) -> None:
-        """Refuse a document type: it defines entities."""
-        raise RigFileError("E_UNSAFE", f"XML with a document type ({name})", remedy="export it without one")
-
-    def start(self, tag: str, attributes: Mapping[str, str]) -> None:
-        """Begin an element, or a sheet or row of a workbook."""
-        if len(self._levels) > _MOST_LEVELS:
-            raise RigFileError("E_FORMAT", "XML nested too deeply", remedy="export it as CSV")
-        own = {_local(key): _value(text) for key, text in attributes.items()}
-        self._levels.append((own, {}, []))
-        if tag == f"{_SHEETS}Worksheet":
-            self.sheets.append((str(own.get("Name", "")), []))
-        elif tag == f"{_SHEETS}Row" and self.sheets:
-            rows = self.sheets[-1][1]
-            rows += [[] for _ in range(min(_place(own) - len(rows), MOST_COLUMNS))] or [[]]
-
-    def data(self, text: str) -> None:
-        """Add to the text of the element."""
-        self._levels[-1][2].append(text)
-
-    def end(self, tag: str) -> None:
-        """Hand the value of the element to the one around it."""
-        own, within, texts = self._levels.pop()
-        if self.sheets and tag.startswith(_SHEETS):
-            rows = self.sheets[-1][1]
-            if tag == f"{_SHEETS}Cell" and rows:
-                rows[-1] += [""] * min(_place(own) - len(rows[-1]) - 1, MOST_COLUMNS)
-                rows[-1].append(str(within.get("Data", [""])[0]))
-            elif tag == f"{_SHEETS}Data":
-                self._levels[-1][1]["Data"] = ["".join(texts).strip()]
-            return
-        value = _value("".join(texts).strip())
-        inner = {name: _together(values) for name, values in within.items()}
-        if own or inner:
-            text = {} if value == "" else {"data" if isinstance(value, np.ndarray) else "value": value}
-            value = {**own, **inner, **text}
-        self._levels[-1][1].setdefault(_local(tag), []).append(value)
-
-    def close(self) -> None:
-        """Take what the outermost element holds."""
-        self.root = {name: _together(values) for name, values in self._levels[0][1].items()}
-        self.root = next((value for value in self.root.values() if isinstance(value, dict)), self.root)
-
-
-def _place(attributes: Mapping[str, Any]) -> int:
-    """Return the number of a row or cell, where the workbook states it because others before it are empty."""
-    stated = attributes.get("Index", 0)
-    return int(stated) if isinstance(stated, float) else 0
-
-
-def _local(name: str) -> str:
-    return name.rpartition("}")[2]
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
-
-
-def _value(text: str) -> Any:
-    """Return a text as the number or numbers that it lists, or as it is."""
-    number = _number(text)
-    if number is not None:
-        return number
-    if not text[:1].isdigit() and text[:1] not in ("+", "-", "."):
-        return text
-    listed = [_number(part) for part in _BETWEEN.split(text)]
-    return np.array(listed) if len(listed) >= FEWEST_SAMPLES and None not in listed else text
-
-
-def _together(values: list[Any]) -> Any:
-    """Return the values of elements of one name: an array of numbers, rows of numbers as a matrix, else a list."""
-    if len(values) == 1:
-        return values[0]
-    if all(isinstance(value, float) for value in values):
-        return np.array(values)
-    rows = [next(iter(value.values())) if isinstance(value, dict) and len(value) == 1 else value for value in values]
-    same = len({row.shape if isinstance(row, np.ndarray) else None for row in rows}) == 1
-    return np.array(rows) if same and isinstance(rows[0], np.ndarray) else values

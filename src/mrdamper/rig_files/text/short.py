@@ -1,4 +1,4 @@
-"""Short texts beside records, as lines: legends, lists of tests, descriptions, also in Markdown, JSON and YAML."""
+"""Short texts beside records, as lines: legends, lists of tests, descriptions, also in Markdown, JSON, YAML and XML."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import split_name, words_of
+from mrdamper.rig_files.text.elements import Elements
 from mrdamper.rig_files.text.stream import decoded
 from mrdamper.rig_files.units import DIMENSION, is_unit
 from mrdamper.rig_files.vocabulary import words
@@ -24,6 +28,7 @@ _EU = re.compile(r"(?i)\b(?:EU|units?)\b")  # engineering units, those of the ro
 _PER = re.compile(rf"{_EU.pattern} ?(?:/|per) ?m?V\b|\bm?V ?(?:/|per) ?{_EU.pattern[4:]}")
 _SHIFT = re.compile(r"(?i)offset|zero")
 _MEASURED = {*DIMENSION.values(), "frequency"}
+_PLACES = ("column", "number", "index", "no", "position", "channel")  # of a column among the others
 
 
 def short_lines(path: Path) -> list[str]:
@@ -38,10 +43,10 @@ def short_lines(path: Path) -> list[str]:
         return []
     text = decoded(content) if len(content) <= _LARGEST else ""
     suffix = path.suffix.lower()
-    if suffix == ".json":
+    if suffix in (".json", ".xml"):
         try:
-            return list(_stated(json.loads(text), ""))
-        except (ValueError, RecursionError):
+            return list(_stated(json.loads(text) if suffix == ".json" else _elements(text), ""))
+        except (ValueError, RecursionError, SyntaxError, InputError):
             return []
     if suffix in (".yaml", ".yml"):
         return list(_stated(_mapping(text.splitlines()), ""))
@@ -75,6 +80,12 @@ def _by_headings(lines: list[str]) -> list[str]:
                 line = "; ".join([*rest, f"{cells[number]} {_EU.sub(cells[unit], per[0])}" if per else ""])
         written.append(line)
     return written
+
+
+def _elements(text: str) -> dict[str, Any]:
+    elements = Elements()
+    elements.read(text)
+    return elements.root
 
 
 def packaged_lines(path: Path) -> list[str]:
@@ -127,6 +138,7 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
         node = [{**item, **dict(pairs)} for item, pairs in zip(node, inner, strict=True)]
         plain = [name for name in node[0] if all(isinstance(item.get(name), (str, int, float)) for item in node)]
         yield "\t".join(f"{name} [{units[name]}]" if isinstance(units.get(name), str) else name for name in plain)
+        yield from _channels([{str(key).casefold(): value for key, value in item.items()} for item in node])
         for item in node:
             yield "\t".join(f"{v:g}" if isinstance(v := item[name], (int, float)) else v for name in plain)
     if not isinstance(node, dict) or depth > _DEEPEST:
@@ -146,8 +158,17 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
     for name, value in node.items():
         if isinstance(value, (dict, list)):
             yield from _stated(value, str(name), own, depth + 1)
-        elif not unit:
+        elif not unit and not isinstance(value, np.ndarray):
             stated = own.get(name) if isinstance(own.get(name), str) and own is not node else None
             yield (
                 f"{name}: {value:g} {stated or ''}".rstrip() if isinstance(value, (int, float)) else f"{name}: {value}"
             )
+
+
+def _channels(items: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield the place, the name and the unit of each item, where every item has a name and a unit: 1=Force;kN."""
+    units = [str(item.get("unit", item.get("units", ""))) for item in items]
+    for at, (item, unit) in enumerate(zip(items, units, strict=True), 1):
+        places = (item[key] for key in _PLACES if isinstance(item.get(key), (int, float)))
+        if all(map(is_unit, units)) and isinstance(item.get("name"), str):
+            yield f"{next(places, at):g}={item['name']};{unit}"
