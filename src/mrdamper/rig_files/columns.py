@@ -300,13 +300,9 @@ def _convert(table: RawTable, role: str, column: int, profile: Profile) -> Assig
         _refuse_two_units(table, role, column, unit)
     name = table.names[column]
     if not sign and role in SIGNED and (sign == 0 or names_compression(name)):
-        raise _refusal(
-            ColumnError,
-            table,
-            f"column {name!r} may count compression positive",
-            f"set [channels.{role}] sign = -1 in a profile, or sign = 1 if it counts extension positive",
-            "E_SIGN_CONVENTION",
-        )
+        problem = f"column {name!r} may count compression positive"
+        remedy = f"set [channels.{role}] sign = -1 in a profile, or sign = 1 if it counts extension positive"
+        raise _refusal(ColumnError, table, problem, remedy, "E_SIGN_CONVENTION")
     if role in SIGNED and channel.scale is None:
         _refuse_factor(table, role, unit)
     si = parse_unit(unit) or Unit("", 1.0)

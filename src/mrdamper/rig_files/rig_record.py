@@ -111,13 +111,9 @@ def _read(table: RawTable, assigned: dict[str, Assigned], profile: Profile):
     raw = dict(content.values)
     for column, values in raw.items():
         if content.lines is not None and thousands_in(values):
-            raise table.source.refuse(
-                "E_AMBIGUOUS",
-                f"column {table.names[column] or column + 1!r} goes from hundreds to ones with three decimals: "
-                "points of thousands?",
-                "export it without separators of thousands",
-                column=column + 1,
-            )
+            problem = f"column {table.names[column] or column + 1!r} goes from hundreds to ones with three decimals"
+            remedy = "export it without separators of thousands"
+            raise table.source.refuse("E_AMBIGUOUS", f"{problem}: points of thousands?", remedy, column=column + 1)
     _refuse_unscaled(table, assigned, raw, profile)
     findings = [*table.findings, *content.findings]
     for name in [name for name in assigned if name in _LENIENT]:

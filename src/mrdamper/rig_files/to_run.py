@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from mrdamper.data.arrays import chunks, drop_pages
 from mrdamper.errors import ColumnError, RunError
 from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.quality.loop import steady_part
+from mrdamper.rig_files.quality.presence import USED
 from mrdamper.rig_files.quality.view import SHORTEST, View
 from mrdamper.rig_files.record import FURTHER, Record
 
@@ -46,17 +48,11 @@ def to_run(record: Record) -> Run:
     steady = record.steady or steady_part(View(record))
     codes = " ".join(dict.fromkeys(finding.code for finding in record.findings))
     further = {f"{name}_{unit}": getattr(record, name) for name, unit in FURTHER.items()} | dict(record.further)
+    own: dict[str, Any] = {name: getattr(record, name) for name in ("id", "rig", "excitation", "split")}
+    own |= {name: values[keep] for name, values in record.channels.items() if name in USED}
     run = Run(
-        id=record.id,
-        time=record.time[keep],
-        displacement=record.displacement[keep],
-        force=record.force[keep],
-        current=record.current[keep],
-        velocity=None if record.velocity is None else record.velocity[keep],
+        **own,
         further={name: values[keep] for name, values in further.items() if values is not None},
-        rig=record.rig,
-        excitation=record.excitation,
-        split=record.split,  # type: ignore[arg-type]
         window=steady.window,
         repeatability=steady.repeatability,
         segments=tuple(pairwise(bounds)),

@@ -29,31 +29,25 @@ def exchanged_or_out_of_range(view: View) -> None:
         for values in (record.force, record.current)
     )
     speed = float(np.median(strokes.lengths / strokes.durations)) if strokes.durations.size else 0.0
-    moves, exchanged = (
-        f"displacement moves {stroke:.4g} m peak to peak",
-        'set its unit in a profile: [channels.displacement] unit = "mm"?',
-    )
-    if force < LONGEST_STROKE:
-        moves += f", force {force:.4g} N"
-        exchanged = "displacement and force look exchanged: name the columns the other way round"
-    changes = "check the load cell, the unit of force (kN?), or whether columns are exchanged"
-    for wrong, problem, remedy in (
-        (stroke > LONGEST_STROKE, moves, exchanged),
-        (largest > LARGEST_FORCE, f"force reaches {largest:.4g} N", "set its unit in a profile: [channels.force] unit"),
-        (force < SMALLEST_FORCE, f"force changes by {force:.3g} N in the whole record", changes),
-        (
-            current > LARGEST_CURRENT,
-            f"current reaches {current:.4g} A",
-            'set its unit in a profile: [channels.current] unit = "mA"?',
-        ),
-        (
-            speed > FASTEST,
-            f"the mean speed of the strokes is {speed:.4g} m/s",
-            "check the units of time and displacement",
-        ),
-    ):
-        if wrong:
-            raise view.refused("E_RANGE", problem, remedy)
+    unit = "set its unit in a profile: [channels.{}] unit{}"
+    if stroke > LONGEST_STROKE:
+        problem, remedy = f"displacement moves {stroke:.4g} m peak to peak", unit.format("displacement", ' = "mm"?')
+        if force < LONGEST_STROKE:
+            problem += f", force {force:.4g} N"
+            remedy = "displacement and force look exchanged: name the columns the other way round"
+    elif largest > LARGEST_FORCE:
+        problem, remedy = f"force reaches {largest:.4g} N", unit.format("force", "")
+    elif force < SMALLEST_FORCE:
+        problem = f"force changes by {force:.3g} N in the whole record"
+        remedy = "check the load cell, the unit of force (kN?), or whether columns are exchanged"
+    elif current > LARGEST_CURRENT:
+        problem, remedy = f"current reaches {current:.4g} A", unit.format("current", ' = "mA"?')
+    elif speed > FASTEST:
+        problem = f"the mean speed of the strokes is {speed:.4g} m/s"
+        remedy = "check the units of time and displacement"
+    else:
+        return
+    raise view.refused("E_RANGE", problem, remedy)
 
 
 def unusual(view: View) -> Iterator[Finding]:

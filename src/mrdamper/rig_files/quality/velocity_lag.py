@@ -37,6 +37,8 @@ def velocity_channel(view: View) -> None:
     period = view.strokes.period or float(np.ptp(run.time))  # a record without two reversals is a cycle at most
     delay = delay_between(run.time, view.moving.velocity, measured, period)
     late = abs(delay.delay) > max(SAMPLES * view.step, OF_PERIOD * period)
+    sign = f"set [channels.velocity] sign = {1 if view.has_changed_sign('velocity') else -1} in a profile"
+    remedy = sign if delay.gain < 0 else "correct its unit in a profile"
     if delay.unexplained > UNLIKE:
         what = "is not the derivative of displacement, at any delay"
     elif delay.gain < 0:
@@ -44,22 +46,12 @@ def velocity_channel(view: View) -> None:
     elif late:
         side = "behind" if delay.delay > 0 else "ahead of"
         what = f"is {1e3 * abs(delay.delay):.4g} ms {side} the derivative of displacement"
+        remedy = f"set [channels.velocity] delay_ms = {1e3 * delay.delay:.4g} in a profile"
     elif abs(delay.gain - 1) > GAIN:
         what = f"is {delay.gain:.3g} times the derivative of displacement"
     else:
         return
-    raise view.refused(
-        "E_CHANNEL_LAG",
-        f"velocity {what}",
-        (
-            f"set [channels.velocity] delay_ms = {1e3 * delay.delay:.4g} in a profile"
-            if late and delay.gain > 0 and delay.unexplained <= UNLIKE
-            else f"set [channels.velocity] sign = {1 if view.has_changed_sign('velocity') else -1} in a profile"
-            if delay.gain < 0
-            else "correct its unit in a profile"
-        )
-        + ", or leave the column out",
-    )
+    raise view.refused("E_CHANNEL_LAG", f"velocity {what}", f"{remedy}, or leave the column out")
 
 
 def delay_between(time: Floats, reference: Floats, signal: Floats, period: float) -> Delay:

@@ -327,20 +327,16 @@ def _table(source: Source, node: _Node, title: str) -> RawTable:
         titles = titles_of(len(across), node.lists) if len(across) > 1 else None
         for i, column in enumerate(across):
             name, unit = (titles[0][i], titles[1][i]) if titles else (column.name, column.unit)
-            columns.append(_Column(name, unit, column.array, column.part, column.over))
+            columns.append(replace(column, name=name, unit=unit))
     columns = _one_time(columns)
-    over = tuple(column.over or column.name for column in columns) if any(c.over for c in columns) else ()
-    return array_table(
-        source,
-        [column.name for column in columns],
-        [column.unit for column in columns],
-        lambda column: pick(columns[column].array, columns[column].part),
-        label=node.label,
-        title=title,
-        constants=node.constants,
-        remarks=node.remarks,
-        over=over,
-    )
+    names, units = [column.name for column in columns], [column.unit for column in columns]
+    over = [column.over or column.name for column in columns] if any(c.over for c in columns) else []
+
+    def load(column: int) -> np.ndarray:
+        return pick(columns[column].array, columns[column].part)
+
+    table = array_table(source, names, units, load, title=title, over=over)
+    return replace(table, label=node.label, constants=node.constants, remarks=tuple(node.remarks))
 
 
 def _one_time(columns: list[_Column]) -> list[_Column]:
@@ -352,5 +348,4 @@ def _one_time(columns: list[_Column]) -> list[_Column]:
     )
     if not same:
         return columns
-    time = _Column("time", times[0].unit, times[0].array)
-    return [time, *(_Column(c.name, c.unit, c.array, c.part) for c in columns if not any(c is t for t in times))]
+    return [replace(c, over="") for c in (times[0], *(c for c in columns if not any(c is t for t in times)))]

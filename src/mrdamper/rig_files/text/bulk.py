@@ -38,11 +38,8 @@ def read_bulk(block: bytes, line: int, form: RowFormat) -> Rows | None:
             return None
         for value, cell in zip(values, cells, strict=True):
             value[row] = cell
-    return Rows(
-        dict(zip(form.wanted, values, strict=True)),
-        np.arange(line, line + ends.size, dtype=float),
-        form.stream.is_odd(block),
-    )
+    lines = np.arange(line, line + ends.size, dtype=float)
+    return Rows(dict(zip(form.wanted, values, strict=True)), lines, form.stream.is_odd(block))
 
 
 def _even_lines(block: bytes, separator: int, count: int) -> np.ndarray | None:

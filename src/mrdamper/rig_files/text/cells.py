@@ -86,15 +86,10 @@ def field_count(form: RowFormat, fields: int, line: int, final: bool) -> RigFile
         problem = f"the file ends inside a row: {fields} of {width} fields"
         remedy = "copy or export the file again, or remove the last line"
         return form.stream.source.refuse("E_TRUNCATED", problem, remedy, line=line)
-    comma = fields > width and form.layout.separator == ","
-    return form.stream.source.refuse(
-        "E_FIELD_COUNT",
-        f"{fields} fields where the other rows have {width}",
-        "correct this line; numbers with decimal commas need semicolons between the fields"
-        if comma
-        else "correct or remove this line",
-        line=line,
-    )
+    problem, remedy = f"{fields} fields where the other rows have {width}", "correct or remove this line"
+    if fields > width and form.layout.separator == ",":
+        remedy = "correct this line; numbers with decimal commas need semicolons between the fields"
+    return form.stream.source.refuse("E_FIELD_COUNT", problem, remedy, line=line)
 
 
 def split_rows(texts: Sequence[str], line: int, form: RowFormat, final: bool) -> tuple[list[list[str]], list[int]]:
@@ -142,15 +137,9 @@ def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: RowF
         if value is None:
             form.note(_no_number(cell, column, lines[i], form))
         elif math.isinf(value):
-            form.note(
-                form.stream.source.refuse(
-                    "E_NONFINITE",
-                    f"{_shown(cell)} in {_named(form, column)} is beyond every number",
-                    "export the channel again: an amplifier in overload is no measurement",
-                    line=lines[i],
-                    column=column + 1,
-                )
-            )
+            problem = f"{_shown(cell)} in {_named(form, column)} is beyond every number"
+            remedy = "export the channel again: an amplifier in overload is no measurement"
+            form.note(form.stream.source.refuse("E_NONFINITE", problem, remedy, line=lines[i], column=column + 1))
         values[i] = math.nan if value is None else value * factors.get(i, 1.0)
     return values
 
@@ -186,14 +175,10 @@ def _stamps(cells: Sequence[str], column: int, lines: Sequence[int], form: RowFo
 def _no_number(cell: str, column: int, line: int, form: RowFormat) -> RigFileError:
     strange = any("\udc80" <= c <= "\udcff" or c == "\ufffd" for c in cell)
     strange |= not cell.isascii() and form.stream.encoding != "utf-8"
-    return form.stream.source.refuse(
-        "E_ENCODING" if strange else "E_NUMBER",
-        f"{_shown(cell)} in {_named(form, column)} is no number",
-        f"write digits with a decimal {'comma' if form.layout.decimal == ',' else 'point'}, "
-        "without separators of thousands",
-        line=line,
-        column=column + 1,
-    )
+    code, problem = "E_ENCODING" if strange else "E_NUMBER", f"{_shown(cell)} in {_named(form, column)} is no number"
+    mark = "comma" if form.layout.decimal == "," else "point"
+    remedy = f"write digits with a decimal {mark}, without separators of thousands"
+    return form.stream.source.refuse(code, problem, remedy, line=line, column=column + 1)
 
 
 def _shown(cell: str) -> str:
