@@ -33,11 +33,8 @@ def order_of_time(view: View) -> None:
             if len(wrong) > COARSE_CLOCK * view.record.time.size
             else "write time with more decimals, or drop the repeated rows",
         )
-    raise view.refused(
-        "E_TIME_ORDER",
-        f"time runs backwards {where}, from {before:.9g} s to {after:.9g} s{more}",
-        _turning_back(before - after),
-    )
+    problem = f"time runs backwards {where}, from {before:.9g} s to {after:.9g} s{more}"
+    raise view.refused("E_TIME_ORDER", problem, _turning_back(before - after))
 
 
 def _turning_back(seconds: float) -> str:

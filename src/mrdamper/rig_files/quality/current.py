@@ -24,10 +24,8 @@ def change_of(record: Record, window: tuple[float, float] | None) -> Iterator[Fi
     """Yield the finding that a record's current changes within a window of time."""
     change = held_in(record, window)[1]
     if change:
-        yield Finding(
-            "W_CURRENT_VARIES",
-            f"{change}: only methods that take a current channel use the run, nothing is identified from it alone",
-        )
+        text = f"{change}: only methods that take a current channel use the run, nothing is identified from it alone"
+        yield Finding("W_CURRENT_VARIES", text)
 
 
 def held_in(record: Record, window: tuple[float, float] | None) -> tuple[float, str]:

@@ -23,30 +23,22 @@ def motion_is_told(view: View) -> None:
     for name in ("displacement", "force"):
         values = getattr(view.run, name) if long else view.channels[name]
         if sample_noise(values) > _NOISE * float(np.nanstd(values)):
-            raise view.refused(
-                "E_NOISE",
-                f"the {name} is noise: it does not go on from sample to sample",
-                "check the sensor's cable and amplifier, and that the record has enough samples per cycle",
-            )
+            remedy = "check the sensor's cable and amplifier, and that the record has enough samples per cycle"
+            raise view.refused("E_NOISE", f"the {name} is noise: it does not go on from sample to sample", remedy)
     x = view.channels["displacement"]
     steps = np.abs(np.diff(x[np.isfinite(x)]))
     leaps = float(np.sum(steps[steps > _LEAP * float(np.nanmax(x) - np.nanmin(x))]))
     if leaps > _LEAPS * float(np.sum(steps)):
-        raise view.refused(
-            "E_UNRESOLVED",
-            "the displacement leaps from sample to sample: the speed cannot be determined",
-            "record at least eight samples per cycle, and a motion that the drive can follow",
-        )
+        problem = "the displacement leaps from sample to sample: the speed cannot be determined"
+        remedy = "record at least eight samples per cycle, and a motion that the drive can follow"
+        raise view.refused("E_UNRESOLVED", problem, remedy)
 
 
 def force_follows(view: View) -> None:
     """Refuse a force that takes no energy, or that differs from cycle to cycle of the same motion and current."""
     if cycles_of(view) >= LEAST_CYCLES and abs(damping_share(view)) < _NO_ENERGY:
-        raise view.refused(
-            "E_NO_ENERGY",
-            "the force takes no energy out of the motion: that of a spring, or of no damper",
-            "check the load cell, and that the damper is mounted",
-        )
+        problem = "the force takes no energy out of the motion: that of a spring, or of no damper"
+        raise view.refused("E_NO_ENERGY", problem, "check the load cell, and that the damper is mounted")
     _force_rests_with_the_motion(view)
     repeated = repeatability(view)
     if (
@@ -80,8 +72,5 @@ def _force_rests_with_the_motion(view: View) -> None:
             continue
         still = float(np.ptp(run.displacement[rest])) < _STILL * stroke
         if still and float(np.ptp(run.force[rest])) > _GOES_ON * swing:
-            raise view.refused(
-                "E_UNRELATED",
-                f"the force goes on from {time[rest.start]:.4g} s on while the displacement rests",
-                "check the displacement channel there, or cut the record",
-            )
+            problem = f"the force goes on from {time[rest.start]:.4g} s on while the displacement rests"
+            raise view.refused("E_UNRELATED", problem, "check the displacement channel there, or cut the record")

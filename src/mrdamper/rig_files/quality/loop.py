@@ -36,11 +36,8 @@ def dissipates(view: View) -> None:
         return
     share = damping_share(view)
     if _is_rectified(view):
-        raise view.refused(
-            "E_RECTIFIED",
-            "the force has the size of a damper's but one sign in both directions: an absolute value",
-            "export the channel with its sign",
-        )
+        problem = "the force has the size of a damper's but one sign in both directions: an absolute value"
+        raise view.refused("E_RECTIFIED", problem, "export the channel with its sign")
     if share < GIVING:
         if _exchanged(view):
             what = "displacement and force look exchanged"
@@ -52,11 +49,8 @@ def dissipates(view: View) -> None:
             if len(changed) == 1:
                 (other,) = {*SIGNED} - {*changed}
                 remedy = f"set [channels.{other}] sign = -1 in a profile, or [channels.{changed[0]}] sign = 1"
-        raise view.refused(
-            "E_DISSIPATION_SIGN",
-            f"negative dissipated energy ({-100 * share:.0f} % of the force acts along the motion): {what}",
-            remedy,
-        )
+        problem = f"negative dissipated energy ({-100 * share:.0f} % of the force acts along the motion): {what}"
+        raise view.refused("E_DISSIPATION_SIGN", problem, remedy)
 
 
 def _is_rectified(view: View) -> bool:
@@ -136,21 +130,19 @@ def _keeps_its_scale(view: View, starts: Floats, folded: Floats) -> None:
             old, new = sizes[:at], sizes[at + within :]
             leap = float(np.mean(new) - np.mean(old))
             if max(np.ptp(old), np.ptp(new)) < _EVEN and abs(leap) > _GAIN:
-                raise view.refused(
-                    "E_UNRELATED",
+                problem = (
                     f"the force is {np.exp(leap):.3g} times as large from about {starts[at]:.4g} s on: a range, a unit "
-                    "or the current was changed over",
-                    "cut the record there, or name the channel of the current",
+                    "or the current was changed over"
                 )
+                raise view.refused("E_UNRELATED", problem, "cut the record there, or name the channel of the current")
 
 
 def _flip(view: View, time: float, count: int, cycles: int) -> QualityError:
-    return view.refused(
-        "E_DISSIPATION_SIGN",
+    problem = (
         f"the force changes its sign within the record, from {time:.4g} s on ({count} of {cycles} cycles): the load "
-        "cell or its amplifier was changed over",
-        "cut the record there",
+        "cell or its amplifier was changed over"
     )
+    return view.refused("E_DISSIPATION_SIGN", problem, "cut the record there")
 
 
 @once_per_run

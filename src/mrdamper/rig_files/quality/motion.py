@@ -29,11 +29,8 @@ def moves(view: View) -> None:
     # Von Neumann's ratio: one for white noise, near zero for any motion sampled finely enough.
     noise = span < NOISE_MOTION and np.mean(np.diff(x) ** 2) > np.var(x)
     if span < LEAST_MOTION or noise:
-        raise view.refused(
-            "E_NO_EXCITATION",
-            f"the displacement moves {1e3 * span:.3g} mm" + (", which is noise" if noise else ""),
-            "check the channel, its unit and the drive",
-        )
+        problem = f"the displacement moves {1e3 * span:.3g} mm" + (", which is noise" if noise else "")
+        raise view.refused("E_NO_EXCITATION", problem, "check the channel, its unit and the drive")
 
 
 def cycles_of(view: View) -> float:

@@ -59,11 +59,9 @@ def missing(view: View) -> Iterator[Finding]:
         yield Finding("W_MISSING", f"{text}; they are left out, not filled")
     longest, start = longest_run(~view.record.present)
     if longest > MOST_IN_A_ROW:
-        raise view.refused(
-            "E_MISSING",
-            f"{longest} samples in a row of which one channel or another is missing, {view.place(start)}",
-            f"record again, or cut the record; up to {MOST_IN_A_ROW} in a row are taken",
-        )
+        problem = f"{longest} samples in a row of which one channel or another is missing, {view.place(start)}"
+        remedy = f"record again, or cut the record; up to {MOST_IN_A_ROW} in a row are taken"
+        raise view.refused("E_MISSING", problem, remedy)
 
 
 def longest_run(mask: np.ndarray) -> tuple[int, int]:
