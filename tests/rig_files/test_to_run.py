@@ -136,8 +136,8 @@ def test_the_table_measures_and_does_not_stop_at_a_refusal(record):
     good, shifted, bad = quality_table([record, moved, replace(record, force=-record.force)])
     assert good.verdict == "good"
     # Reported, not taken off; to rounding.
-    assert shifted.offset_force - good.offset_force == pytest.approx(37.0, abs=1e-6)
-    assert shifted.centre - good.centre == pytest.approx(0.011, abs=1e-9)
+    assert shifted.figures["offset_force_N"] - good.figures["offset_force_N"] == pytest.approx(37.0, abs=1e-6)
+    assert shifted.figures["centre_mm"] - good.figures["centre_mm"] == pytest.approx(11.0, abs=1e-6)
     assert bad.verdict == "refused"
     assert bad.codes == ("E_DISSIPATION_SIGN",)
     assert row(bad)["frequency_Hz"] is None

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from mrdamper.data import Condition, Run, once_per_run
+from mrdamper.data import Run, once_per_run
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality import check_record, checked
 from mrdamper.rig_files.quality.current import held_in
@@ -22,20 +23,28 @@ from mrdamper.rig_files.record import FURTHER, Finding, Record
 NOT_IDENTIFIED = ("W_CLIPPED", "W_SHORT", "W_CURRENT_VARIES")  # what identification refuses by default
 
 
+FIGURES = MappingProxyType(
+    {  # of a record, by columns of the table, and the digits they are shown with
+        "current_A": ".4f",  # magnitude of its mean over the steady window; none where it changes there
+        "frequency_Hz": ".4f",  # none, as of the amplitude and the distortion, for a motion without a period
+        "amplitude_mm": ".4g",
+        "cycles": ".2f",
+        "sample_rate_Hz": ".1f",
+        "repeatability_percent": ".2f",  # scatter of the cycles over the peak-to-peak force; none under two cycles
+        "offset_force_N": ".1f",  # mean over whole cycles; reported, never taken off
+        "centre_mm": ".3f",  # mean displacement over whole cycles; reported, never taken off
+        "drift_mm": ".3f",  # change of the mean displacement over the record
+        "distortion_percent": ".2f",  # THD of the motion
+    }
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Quality:
-    """One record's verdict; its figures are NaN for a refused record."""
+    """One record's verdict and figures; a refused record has none."""
 
     record: Record  # as judged
-    condition: Condition | None = None  # measured; None for a motion without a period and for a refused record
-    current: float = np.nan  # magnitude of its mean over the steady window [A]; NaN where it changes there
-    cycles: float = np.nan
-    sample_rate_Hz: float = np.nan
-    repeatability: float = np.nan  # scatter of the cycles over the peak-to-peak force; NaN under two cycles
-    offset_force: float = np.nan  # mean over whole cycles [N]; reported, never taken off
-    centre: float = np.nan  # mean displacement over whole cycles [m]; reported, never taken off
-    drift: float = np.nan  # change of the mean displacement over the record [m]
-    distortion: float = np.nan  # THD of the motion; NaN for a motion without a period
+    figures: Mapping[str, float] = field(default_factory=dict)  # by the columns of `FIGURES`, NaN where there is none
     refusal: QualityError | None = None
 
     @property
@@ -95,23 +104,12 @@ def with_findings(run: Run) -> Run:
 
 def row(quality: Quality) -> dict[str, Any]:
     """Return a verdict as a row of numbers and words, in engineers' units; None where there is no figure."""
-    condition = quality.condition
-    return {
-        "run_id": quality.record.id,
-        "rig": quality.record.rig,
-        "current_A": _rounded(quality.current, 4),
-        "frequency_Hz": None if condition is None else _rounded(condition.frequency_Hz, 4),
-        "amplitude_mm": None if condition is None else float(f"{1e3 * condition.amplitude_m:.4g}"),
-        "cycles": _rounded(quality.cycles, 2),
-        "sample_rate_Hz": _rounded(quality.sample_rate_Hz, 1),
-        "repeatability_percent": _rounded(100 * quality.repeatability, 2),
-        "offset_force_N": _rounded(quality.offset_force, 1),
-        "centre_mm": _rounded(1e3 * quality.centre, 3),
-        "drift_mm": _rounded(1e3 * quality.drift, 3),
-        "distortion_percent": _rounded(100 * quality.distortion, 2),
-        "verdict": quality.verdict,
-        "findings": " ".join(quality.codes),
+    figures = {name: value for name, value in quality.figures.items() if np.isfinite(value)}
+    shown = {
+        name: float(f"{figures[name]:{form}}") + 0.0 if name in figures else None for name, form in FIGURES.items()
     }
+    names = {"run_id": quality.record.id, "rig": quality.record.rig}
+    return {**names, **shown, "verdict": quality.verdict, "findings": " ".join(quality.codes)}
 
 
 def _quality(record: Record) -> Quality:
@@ -127,19 +125,16 @@ def _quality(record: Record) -> Quality:
     if motion is not None:
         count = max(1, int(motion.cycles + 0.02))
         whole = steady.time >= steady.time[-1] - count / motion.condition.frequency_Hz
-    return Quality(
-        judged,
-        condition=None if motion is None else motion.condition,
-        current=np.nan if change else abs(current),
-        cycles=cycles_of(view),
-        sample_rate_Hz=1 / view.step,
-        repeatability=np.nan if scatter is None else scatter[0],
-        offset_force=float(np.mean(steady.force[whole])),
-        centre=float(np.mean(steady.displacement[whole])),
-        drift=drift_of(view)[0],
-        distortion=np.nan if motion is None else motion.distortion,
-    )
-
-
-def _rounded(value: float, digits: int) -> float | None:
-    return round(float(value), digits) + 0.0 if np.isfinite(value) else None
+    figures = {
+        "current_A": np.nan if change else abs(current),
+        "frequency_Hz": np.nan if motion is None else motion.condition.frequency_Hz,
+        "amplitude_mm": np.nan if motion is None else 1e3 * motion.condition.amplitude_m,
+        "cycles": cycles_of(view),
+        "sample_rate_Hz": 1 / view.step,
+        "repeatability_percent": np.nan if scatter is None else 100 * scatter[0],
+        "offset_force_N": float(np.mean(steady.force[whole])),
+        "centre_mm": 1e3 * float(np.mean(steady.displacement[whole])),
+        "drift_mm": 1e3 * drift_of(view)[0],
+        "distortion_percent": np.nan if motion is None else 100 * motion.distortion,
+    }
+    return Quality(judged, figures)
