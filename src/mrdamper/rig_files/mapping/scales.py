@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import Header, role_of, split_name, unknown_unit, words_of
+from mrdamper.rig_files.column_names import Header, holds, role_of, split_name, unknown_unit, words_of
 from mrdamper.rig_files.conditions import FULL_SCALES, stated_by_lines, stated_in_titles
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
@@ -27,6 +27,7 @@ _PER_COUNT = re.compile(
     r"(?:counts?|cnts?|cts?|digits?|bits?|lsb|incs?|increments?|inkr?|steps?|pulses?|imp|ticks?))?",
     re.IGNORECASE,
 )
+_CHANNELS = {dimension: role for role, dimension in DIMENSION.items()}
 _SIGNALS = ("voltage", "count")  # what a scale leads from
 _UNKNOWN = (None, "voltage")  # channels of columns that may be the monitor of a current
 _AT = r"(?P<{}>[+-]?[0-9]{{1,10}}(?:\.[0-9]{{1,6}})?)(?![.,]?[0-9])\s*(?P<{}>[a-zµ]{{0,6}}|%)"
@@ -85,11 +86,10 @@ def with_scales(table: RawTable) -> RawTable:
         other = _stated_scale(table, i, volts)
         if other is None:
             continue
-        unit, factor, line = other
+        role, unit, factor, line = other
         header = table.headers[i]
         text = f"column {table.names[i]!r} is scaled as the file states: {line.strip()[:60]!r}"
         zero = _zero_of(line, header)
-        role = next((role for role, dimension in DIMENSION.items() if dimension == parse_unit(unit).dimension), "")  # type: ignore[union-attr]
         if zero is None or _shifted_elsewhere(table, i, line, role):
             continue
         name = header.name if header.role == role else f"{role} {header.name}"
@@ -159,32 +159,27 @@ def _parts(table: RawTable) -> list[str]:
     return [part for t in beside for part in (re.split(r"[,;|\t]\s*", t) if len(scales_in(t)) > 1 else [t])]
 
 
-def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[str, float, str] | None:
-    """Return unit, its number per volt and the line of a scale that can only be meant for a column; else None."""
+def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[str, str, float, str] | None:
+    """Return channel, unit, number per volt and line of the scale that can only be meant for a column; else None."""
     name = table.headers[column].name
     own = [table.names[column], *table.over[column : column + 1]]
     for lines in (own, _parts(table)):
         scales = []
         for line in lines:
-            for unit, factor in scales_in(line):
-                unit_of = parse_unit(unit)
-                role = next((r for r, d in DIMENSION.items() if unit_of is not None and d == unit_of.dimension), None)
-                if role is None or role in ("voltage", "time"):
-                    continue
-                words = {word.casefold() for word in words_of(name)}
+            for role, unit, factor in scales_in(line):
                 meant = role_of(name) == role or lines is own or name.casefold() in line.casefold()
-                meant = meant or (role == "current" and role_of(name) in _UNKNOWN and bool(words & _MONITOR))
-                alone = len(volts) == 1 and role_of(name) in _UNKNOWN and role == "current"
-                has = any(header.dimension == unit_of.dimension for header in table.headers) if unit_of else True
-                if (meant or alone) and not has:
-                    scales.append((unit, factor, line))
+                alone = len(volts) == 1 or holds(name, _MONITOR)
+                meant = meant or (role == "current" and role_of(name) in _UNKNOWN and alone)
+                has = any(header.dimension == DIMENSION.get(role) for header in table.headers)
+                if role not in ("", "voltage", "time") and meant and not has:
+                    scales.append((role, unit, factor, line))
         if scales:
-            return scales[0] if len({entry[:2] for entry in scales}) == 1 else None
+            return scales[0] if len({entry[:3] for entry in scales}) == 1 else None
     return None
 
 
-def scales_in(line: str) -> list[tuple[str, float]]:
-    """Return unit and number per volt of every scale that a line states: 0.5 A/V, 100 mV/A, 1 V = 2 A."""
+def scales_in(line: str) -> list[tuple[str, str, float]]:
+    """Return channel, unit and number per volt of every scale that a line states: 0.5 A/V, 100 mV/A, 1 V = 2 A."""
     scales = []
     for match in SCALE.finditer(line):
         one, other = parse_unit(match["unit"]), parse_unit(match["volt"])
@@ -194,9 +189,9 @@ def scales_in(line: str) -> list[tuple[str, float]]:
         if not left or not right:
             continue
         if other.dimension in _SIGNALS:
-            scales.append((match["unit"], left / (right * other.factor)))
+            scales.append((_CHANNELS.get(one.dimension, ""), match["unit"], left / (right * other.factor)))
         else:
-            scales.append((match["volt"], right / (left * one.factor)))
+            scales.append((_CHANNELS.get(other.dimension, ""), match["volt"], right / (left * one.factor)))
     return scales
 
 
