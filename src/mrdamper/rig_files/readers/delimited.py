@@ -180,18 +180,14 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
     block, findings = _without_footer(form, block)
     block, cut = _without_cut_row(form, block)
     findings += cut
-    spool, odd, line = Spool((*columns, _LINES)), False, block.line
+    spool, odd = Spool((*columns, _LINES)), False
     fast = block.stop - block.start > BULK_FROM
-    at = block.start
-    for chunk in stream.chunks(block.start, block.stop):
-        at += len(chunk)
+    for chunk, at, line in stream.numbered(block.start, block.stop, block.line):
         stream.check(chunk, line)
         rows = read_bulk(chunk, line, form) if fast else None
-        if rows is None:
-            rows = read_cells(chunk, line, form, final=at >= stream.stop)
+        rows = rows or read_cells(chunk, line, form, final=at + len(chunk) >= stream.stop)
         spool.add({**rows.values, _LINES: rows.lines})
         odd |= rows.odd
-        line += line_feeds(chunk)
     form.refuse_wrong()
     values = spool.arrays()
     lines = values.pop(_LINES)
@@ -209,13 +205,9 @@ def _words(stream: TextStream, layout: Layout, block: Block, column: int) -> Wor
     block, _ = _without_cut_row(form, _without_footer(form, block)[0])
     indices: dict[str, int] = {}
     codes: list[np.ndarray] = []
-    line, at = block.line, block.start
-    for chunk in stream.chunks(block.start, block.stop):
-        at += len(chunk)
-        texts = stream.decode(chunk).split("\n")
-        rows, _ = split_rows(texts, line, form, at >= stream.stop)
+    for chunk, at, line in stream.numbered(block.start, block.stop, block.line):
+        rows, _ = split_rows(stream.decode(chunk).split("\n"), line, form, at + len(chunk) >= stream.stop)
         codes.append(np.array([indices.setdefault(row[column], len(indices)) for row in rows], dtype=np.int32))
-        line += line_feeds(chunk)
     form.refuse_wrong()
     return Words(np.concatenate(codes) if codes else np.empty(0, dtype=np.int32), tuple(indices))
 

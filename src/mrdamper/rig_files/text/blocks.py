@@ -38,10 +38,10 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
         return _cut_at_currents(stream, layout, Block(start, stop, layout.data_line))
     header = layout.header.strip(" \t\r").encode(stream.encoding, "ignore")
     blocks: list[Block] = []
-    at, line, begin, begin_line = start, layout.data_line, start, layout.data_line
+    begin, begin_line = start, layout.data_line
     tail, worded = b"", False
     remarks: tuple[str, ...] = ()
-    for chunk in stream.chunks(start, stop):
+    for chunk, at, line in stream.numbered(start, stop, layout.data_line):
         stream.check(chunk, line)
         worded |= b"A" in chunk or b"amp" in chunk
         position = chunk.find(header)
@@ -59,8 +59,6 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
                 size, skipped = _units_below(stream, layout, at + line_end, header_line)
                 begin, begin_line = at + line_end + size, header_line + 1 + skipped
             position = chunk.find(header, line_end)
-        line += line_feeds(chunk)
-        at += len(chunk)
         tail = chunk[-_LOOK_BACK:]
     blocks.append(Block(begin, stop, begin_line, remarks))
     blocks = [_with_head(block, layout) for block in blocks if block.stop > block.start]
@@ -86,8 +84,7 @@ def _cut_at_currents(stream: TextStream, layout: Layout, block: Block) -> list[B
     Raises `RigFileError`, E_BLOCKS, if none stands above the first of them: the lines may close their tests.
     """
     cuts: list[tuple[int, int, int, str]] = []  # start and end of a line, its number and text
-    at, line = block.start, block.line
-    for chunk in stream.chunks(block.start, block.stop):
+    for chunk, at, line in stream.numbered(block.start, block.stop, block.line):
         for match in _STATED.finditer(chunk):
             text = stream.decode(match[0]).strip()
             if not _is_data(text, layout) and _currents([text]):
@@ -95,8 +92,6 @@ def _cut_at_currents(stream: TextStream, layout: Layout, block: Block) -> list[B
                 if any(_is_data(raw.rstrip("\r\n"), layout) for raw in below):
                     number = line + line_feeds(chunk[: match.start()])
                     cuts.append((at + match.start(), at + match.end() + 1, number, text))
-        line += line_feeds(chunk)
-        at += len(chunk)
     above = block.remarks or layout.remarks
     first = _currents(above)
     if len({*first, *(current for *_, text in cuts for current in _currents([text]))}) < 2 or not cuts:

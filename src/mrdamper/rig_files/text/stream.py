@@ -91,6 +91,12 @@ class TextStream:
         if rest:
             yield rest
 
+    def numbered(self, start: int, stop: int, line: int) -> Iterator[tuple[bytes, int, int]]:
+        """Yield the chunks between two places, each with its place and the line it starts at."""
+        for chunk in self.chunks(start, stop):
+            yield chunk, start, line
+            start, line = start + len(chunk), line + line_feeds(chunk)
+
     def lines_at(self, start: int, count: int) -> list[bytes]:
         """So many lines from a place on, with their ends; reading goes on afterwards where it stood."""
         before = self.file.tell()
