@@ -168,8 +168,8 @@ def results_of(path: Path) -> Results | None:
     """Return the table of results that a file holds; None if it holds none."""
     if path.suffix.lower() in TEXTS:
         return results_in(short_lines(path))
-    found = ask_tables(path, lambda tables: [r for t in tables[:20] if (r := results_in(lines_of(t)))], [])
-    return found[0] if len(found) == 1 else None
+    tables_of_results = ask_tables(path, lambda tables: [r for t in tables[:20] if (r := results_in(lines_of(t)))], [])
+    return tables_of_results[0] if len(tables_of_results) == 1 else None
 
 
 def currents_beside(
