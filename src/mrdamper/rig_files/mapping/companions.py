@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
 from mrdamper.rig_files.profile import Channel, Profile
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.arrays import array_table
-from mrdamper.rig_files.readers.base import RawTable
+from mrdamper.rig_files.readers.base import RawTable, Source
 from mrdamper.rig_files.record import Finding, Record, part_of_record
 from mrdamper.rig_files.rig_record import records_of
 from mrdamper.rig_files.text.short import short_lines
@@ -95,11 +95,17 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
         path.parent / "_".join(words) if alone and words else path.parent if alone else path.with_name(run or path.name)
     )
     remarks = [] if current is None else [f"current: {current!r} A"]
-    units = [SI[role] for role in channels]
     columns = ", ".join(f"{role} = {e.name} in {e.unit}" for role, e in assigned.items())
-    values = array_table(table.source, list(channels), units, list(channels.values()).__getitem__, remarks=remarks)
+    values = _table_of(table.source, channels, remarks)
     key = ("column", str(test)) if alone else (run,) if run else number_of(path)
     return Part(path, values.noted(*table.findings, *raw.findings), key, test, columns)
+
+
+def _table_of(source: Source, channels: Mapping[str, Floats], remarks: Sequence[str]) -> RawTable:
+    """Return channels in SI as a table."""
+    units = [SI[role] for role in channels]
+    table = array_table(source, list(channels), units, list(channels.values()).__getitem__)
+    return replace(table, remarks=tuple(remarks))
 
 
 def number_of(path: Path) -> tuple[str, ...]:
@@ -140,12 +146,10 @@ def _together(parts: Sequence[Part]) -> RawTable | None:
         whole = {"displacement", "force"} <= set(columns) and len(columns) == len(tables)
         if not whole or len({values.size for values in columns.values()}) > 1:
             return None
-        units, folder = [SI[role] for role in columns], parts[0].test
+        folder = parts[0].test
         texts = sorted({*folder.iterdir()} - {part.path for part in parts}) if folder.is_dir() else []
         lines = [line for path in texts if path.suffix.lower() in TEXTS for line in short_lines(path)]
-        return array_table(
-            tables[0].source, list(columns), units, list(columns.values()).__getitem__, remarks=lines[:_FEWEST_ROWS]
-        )
+        return _table_of(tables[0].source, columns, lines[:_FEWEST_ROWS])
     clocks = [_arrays(table)[table.names.index("time")] for table in tables]
     moving = [time for time, table in zip(clocks, tables, strict=True) if {"displacement", "force"} & {*table.names}]
     span = clocks[0][-1] - clocks[0][0]

@@ -70,16 +70,7 @@ Array = np.ndarray | Stored
 
 
 def array_table(
-    source: Source,
-    names: Sequence[str],
-    units: Sequence[str],
-    load: Callable[[int], np.ndarray],
-    *,
-    label: str = "",
-    title: str = "",
-    constants: Mapping[str, float] | None = None,
-    remarks: Sequence[str] = (),
-    over: Sequence[str] = (),
+    source: Source, names: Sequence[str], units: Sequence[str], load: Callable[[int], np.ndarray], title: str = ""
 ) -> RawTable:
     """Return a table whose columns are loaded as arrays, one by one; E_TOO_MANY_COLUMNS beyond a thousand."""
     if len(names) > MOST_COLUMNS:
@@ -104,10 +95,7 @@ def array_table(
             array = np.asarray(load(column))
         return words_of([text_of(item) for item in array.reshape(-1).tolist()])
 
-    return RawTable(
-        source, tuple(names), tuple(units), read, label=label, constants=constants or {},
-        remarks=tuple(remarks), words=words, over=tuple(over),
-    )  # fmt: skip
+    return RawTable(source, tuple(names), tuple(units), read, words=words)
 
 
 def words_of(cells: Sequence[str]) -> Words:

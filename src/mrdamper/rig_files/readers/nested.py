@@ -330,13 +330,13 @@ def _table(source: Source, node: _Node, title: str) -> RawTable:
             columns.append(replace(column, name=name, unit=unit))
     columns = _one_time(columns)
     names, units = [column.name for column in columns], [column.unit for column in columns]
-    over = [column.over or column.name for column in columns] if any(c.over for c in columns) else []
+    over = tuple(column.over or column.name for column in columns) if any(c.over for c in columns) else ()
 
     def load(column: int) -> np.ndarray:
         return pick(columns[column].array, columns[column].part)
 
-    table = array_table(source, names, units, load, title=title, over=over)
-    return replace(table, label=node.label, constants=node.constants, remarks=tuple(node.remarks))
+    table = array_table(source, names, units, load, title)
+    return replace(table, label=node.label, constants=node.constants, remarks=tuple(node.remarks), over=over)
 
 
 def _one_time(columns: list[_Column]) -> list[_Column]:

@@ -55,7 +55,7 @@ class Npy(Reader):
             return array[part] if isinstance(part, str) else pick(array, part)
 
         units = ["s" if dtype.names and dtype[name].kind in "Mm" else "" for name in names]
-        return [array_table(source, names, units, load, title=self.title)]
+        return [array_table(source, names, units, load, self.title)]
 
 
 class Npz(Reader):

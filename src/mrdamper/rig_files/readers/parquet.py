@@ -115,7 +115,7 @@ def _table(
             return words_in(loaded(names[column]))
 
     units = ["s" if isinstance(kind, (pl.Datetime, pl.Duration)) else "" for kind in schema.values()]
-    return replace(array_table(source, names, units, column_of, title=title), words=words)
+    return replace(array_table(source, names, units, column_of, title), words=words)
 
 
 def words_in(values: pl.Series) -> Words:

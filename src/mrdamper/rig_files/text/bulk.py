@@ -21,7 +21,7 @@ _COMMA_MARK = _ALLOWED.replace(b",", b"\0").replace(b".", b"\x01").replace(b"\0"
 def read_bulk(block: bytes, line: int, form: RowFormat) -> Rows | None:
     """Read a block of whole lines; None if it is not plain enough."""
     layout = form.layout
-    slow = any(layout.kinds[c] == "stamp" or (layout.behind and layout.behind[c]) for c in form.wanted)
+    slow = any(layout.kinds[c] == "stamp" or layout.behind[c] for c in form.wanted)
     if slow or layout.separator == SPACES or b'"' in block:
         return None
     ends = _even_lines(block, ord(layout.separator), layout.width - 1 + layout.trailing)

@@ -129,7 +129,7 @@ def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: RowF
     for sign, meant in form.layout.writes:
         cells = [cell.replace(sign, meant) for cell in cells]
     factors: dict[int, float] = {}
-    if form.layout.behind and form.layout.behind[column]:
+    if form.layout.behind[column]:
         cells, factors = _without_unit(cells, form.layout.behind[column])
     values = np.empty(len(cells))
     for i, cell in enumerate(cells):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -47,5 +48,5 @@ def turned_table(source: Source, lines: Sequence[str]) -> RawTable | None:
             return np.array(values, dtype=float)
 
         names, units = [header.name for header in headers], [header.unit for header in headers]
-        return array_table(source, names, units, load, remarks=remarks)
+        return replace(array_table(source, names, units, load), remarks=tuple(remarks))
     return None
