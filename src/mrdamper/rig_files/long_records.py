@@ -12,7 +12,7 @@ import numpy as np
 from mrdamper.data.arrays import drop_pages
 from mrdamper.errors import InputError
 from mrdamper.rig_files.quality.current import change_of
-from mrdamper.rig_files.record import Finding, Record
+from mrdamper.rig_files.record import Finding, Record, part_of_record
 
 PART = 2**19  # samples: a minute of a test at 10 kHz, some megabytes a channel
 _AT_ONCE = 2  # parts: their checks are sums and sorts of long arrays, which need no turn of the interpreter
@@ -73,14 +73,12 @@ def _checked_parts(record: Record, check: Callable[[Record], Record]) -> Iterato
 
 def _parts(record: Record) -> Iterator[tuple[int, Record]]:
     """Parts that share one sample, so that steps of time between them are seen."""
-    named, size = record.channels, record.time.size
-    for at in range(0, size - 1, PART):
-        inside = slice(at, min(at + PART, size - 1) + 1)
-        channels = {name: np.array(values[inside]) for name, values in named.items()}
-        for values in named.values():
+    for at in range(0, record.time.size - 1, PART):
+        part = part_of_record(record, slice(at, min(at + PART, record.time.size - 1) + 1))
+        channels = {name: np.array(values) for name, values in part.channels.items()}
+        for values in record.channels.values():
             drop_pages(values)
-        lines = None if record.lines is None else record.lines[inside]
-        yield at, replace(record, lines=lines, findings=(), segments=(), **channels)
+        yield at, replace(part, findings=(), segments=(), **channels)
 
 
 def _extend(segments: list[tuple[int, int]], new: tuple[tuple[int, int], ...], start: int) -> None:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -21,16 +20,6 @@ from mrdamper.rig_files.record import SIGNED
 
 _ROWS_SHOWN, _MOST_SHOWN = 6, 30  # rows and columns of a preview
 _MOST_COLUMNS, _MOST_REMARKS, _MOST_NAMES = 40, 6, 3  # of a tree that is shown
-
-
-@dataclass(frozen=True, eq=False)
-class Preview:
-    """Beginning of a file, and the channels its columns are assigned to."""
-
-    names: tuple[str, ...]  # one a column
-    units: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]  # the first, cell by cell
-    channels: Mapping[str, tuple[int | None, str, int]]  # by channel its column, unit and sign, as far as known
 
 
 def guess_profile(path: str | Path, profile: Profile | str | Path | None = None) -> Profile:
@@ -61,8 +50,8 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
     return profile.model_copy(update=update)
 
 
-def preview(path: str | Path, profile: Profile | str | Path | None = None) -> Preview:
-    """Return the beginning of a file, to choose its columns from.
+def preview(path: str | Path, profile: Profile | str | Path | None = None) -> dict[str, Any]:
+    """Return the names and units of a file's columns, its first rows, and the column, unit and sign of each channel.
 
     Raises `InputError` if the form of the file cannot be found.
     """
@@ -71,11 +60,12 @@ def preview(path: str | Path, profile: Profile | str | Path | None = None) -> Pr
         table, channels = _guess_channels(test_tables(tables, profile), profile)
         cells = [_first_cells(table, column) for column in range(min(len(table.names), _MOST_SHOWN))]
         places = {
-            name: (_place(table, channel.column), channel.unit or "", channel.sign)
+            name: {"column": _place(table, channel.column), "unit": channel.unit or "", "sign": channel.sign}
             for name, channel in channels.items()
         }
-    rows = tuple(tuple(column[i] if i < len(column) else "" for column in cells) for i in range(_ROWS_SHOWN))
-    return Preview(table.names[:_MOST_SHOWN], table.units[:_MOST_SHOWN], rows, places)
+    rows = [[column[i] if i < len(column) else "" for column in cells] for i in range(_ROWS_SHOWN)]
+    names, units = table.names[:_MOST_SHOWN], table.units[:_MOST_SHOWN]
+    return {"names": names, "units": units, "rows": rows, "channels": places}
 
 
 def _first_cells(table: RawTable, column: int) -> list[str]:

@@ -107,15 +107,11 @@ class Results:
 
 def results_in(lines: Sequence[str]) -> Results | None:
     """Return the table of results among lines of text; None if there is none or several."""
-    columns = {}
     for separator in _SEPARATORS:
-        for results in _tables(lines[:_MOST_LINES], separator):
-            columns[results.current, results.cells] = results
-        if columns:
-            break
-    return (
-        next(iter(columns.values())) if len(columns) == 1 else None if columns else numbered_tests(lines[:_MOST_LINES])
-    )
+        tables = {(table.current, table.cells): table for table in _tables(lines[:_MOST_LINES], separator)}
+        if tables:
+            return next(iter(tables.values())) if len(tables) == 1 else None
+    return numbered_tests(lines[:_MOST_LINES])
 
 
 def numbered_tests(lines: Iterable[str]) -> Results | None:

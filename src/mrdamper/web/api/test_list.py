@@ -179,8 +179,6 @@ def _preview(upload: Upload) -> dict[str, Any] | None:
             shown = preview(path, profile)
         except InputError:
             continue
-        channels = {name: dict(zip(("column", "unit", "sign"), c, strict=True)) for name, c in shown.channels.items()}
-        names = [name or f"column {i}" for i, name in enumerate(shown.names, 1)]
-        head = {"name": upload.names[path], "names": names, "units": shown.units}
-        return {**head, "rows": shown.rows, "channels": channels}
+        names = [name or f"column {i}" for i, name in enumerate(shown["names"], 1)]
+        return {**shown, "name": upload.names[path], "names": names}
     return None
