@@ -24,7 +24,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mrdamper.errors import InputError, MissingExtraError
 from mrdamper.web.api import routers
-from mrdamper.web.page import PageFiles
+from mrdamper.web.page import STATIC, PageFiles, page
 from mrdamper.web.security import Guard
 from mrdamper.web.sessions import BrowserSessions
 from mrdamper.web.uploads import NothingTakenError
@@ -71,18 +71,17 @@ def create_app(
     for router in routers():
         app.include_router(router, prefix="/api")
 
-    files = PageFiles()
-    front = HTMLResponse(files.page(), headers={"Cache-Control": "no-cache"})
+    front = HTMLResponse(page(), headers={"Cache-Control": "no-cache"})
 
     @app.get("/")
-    async def page() -> HTMLResponse:
+    async def first() -> HTMLResponse:
         return front
 
     @app.get("/static/plotly.js")
     async def charts() -> Response:
         return Response(chart_library, media_type="text/javascript", headers={"Cache-Control": "max-age=3600"})
 
-    app.mount("/static", files)
+    app.mount("/static", PageFiles(directory=STATIC))
     app.add_middleware(_Faults)
     app.add_middleware(Guard, hosts=tuple(hosts))
     return app
