@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from threading import Lock, Timer
@@ -11,33 +10,27 @@ from typing import TypeVar
 Item = TypeVar("Item")
 Progress = Callable[[str, float], None]
 _QUICK = 1.0  # seconds in which nothing needs to be said
-_SOON = 2.0  # seconds before which the time left is a guess nobody needs
 
 
 @contextmanager
-def progress_on_stderr(quiet: bool = False, began: float | None = None) -> Iterator[Progress]:
+def progress_on_stderr(quiet: bool = False) -> Iterator[Progress]:
     """Give a function (what is being done, share done 0...1) that shows progress and the time left on stderr."""
     if quiet:
         yield lambda what, share: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[left]}"))
-    began = time.monotonic() if began is None else began
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=False) as bar:
-        task = bar.add_task("", total=1.0, left="")
-
-        def tell(what: str, share: float) -> None:
-            bar.update(task, description=what, completed=share, left=time_left(time.monotonic() - began, share))
-
-        yield tell
+        task = bar.add_task("", total=1.0)
+        yield lambda what, share: bar.update(task, description=what, completed=share)
 
 
 @contextmanager
 def progress_soon(what: str) -> Iterator[Progress]:
     """Show progress from the second second on: work, and the time it has taken."""
-    began, lock, latest = time.monotonic(), Lock(), (what, 0.0)
+    lock, latest = Lock(), (what, 0.0)
     bar: Progress | None = None
     with ExitStack() as stack:
 
@@ -45,7 +38,7 @@ def progress_soon(what: str) -> Iterator[Progress]:
             nonlocal bar
             with lock:
                 if not over:
-                    bar = stack.enter_context(progress_on_stderr(began=began))
+                    bar = stack.enter_context(progress_on_stderr())
                     bar(*latest)
 
         def tell(what: str, share: float) -> None:
@@ -81,17 +74,3 @@ def watched(items: Sequence[Item], what: str) -> Iterator[Item]:
             tell(f"{what} {number + 1} of {len(items)}", number / len(items))
             yield item
         tell(f"{len(items)} {what}s", 1.0)
-
-
-def time_left(seconds: float, share: float) -> str:
-    """Estimate the time left at the pace so far; empty while it cannot be estimated.
-
-    Examples
-    --------
-    >>> time_left(30.0, 0.25)
-    'about 90 s left'
-    """
-    if seconds < _SOON or not 0.02 < share < 1:
-        return ""
-    left = seconds * (1 - share) / share
-    return f"about {left / 60:.0f} min left" if left >= 100 else f"about {left:.0f} s left"

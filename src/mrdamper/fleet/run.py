@@ -224,7 +224,9 @@ class _Line:
             finished = wait(running, return_when=FIRST_COMPLETED).done
             self._keep([(running.pop(future), outcome(future)) for future in finished], plan)
             done += len(finished)
-            self._progress(*_pace(done, len(waiting), time.monotonic() - begin, plan is None))
+            what = "reference dampers" if plan is None else "dampers"
+            rate = done / max(time.monotonic() - begin, 1e-9)
+            self._progress(f"{done} of {len(waiting)} {what}, {rate:.3g} a second", done / len(waiting))
 
     def _is_kept(self, number: int, plan: Plan | None) -> bool:
         if self._journal.status(self._key(number, plan)) is not None:
@@ -251,14 +253,6 @@ class _Line:
     def _key(self, number: int, plan: Plan | None) -> str:
         about = None if plan is None else plan.digest
         return hash_of(self._digests[number], vars(self._for(plan)), VERSION, FORMAT, about)
-
-
-def _pace(done: int, total: int, seconds: float, reference: bool) -> tuple[str, float]:
-    rate = done / max(seconds, 1e-9)
-    left = (total - done) / rate
-    time_left = f"{left / 3600:.1f} h" if left >= 3600 else f"{left / 60:.0f} min" if left >= 60 else f"{left:.0f} s"
-    what = "reference dampers" if reference else "dampers"
-    return f"{done} of {total} {what}, {rate:.3g} a second, {time_left} left", done / total
 
 
 def _rig_profile(profile: FleetProfile) -> str:
