@@ -22,6 +22,7 @@ from mrdamper.dampers.envelope import SAME_CURRENT, Envelope
 from mrdamper.dampers.prediction import NOT_A_SINE, Prediction
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty, table
 from mrdamper.data import Condition, Displayable, Floats, Run
+from mrdamper.data.strict_text import STRICT
 from mrdamper.errors import InputError, validate_arguments
 from mrdamper.models.base import Model
 from mrdamper.physics.motion.excitation import Excitation
@@ -48,7 +49,7 @@ class Saved:
     Only numbers, texts, lists and mappings of them: the types are checked when a file is read.
     """
 
-    __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}
+    __pydantic_config__: ClassVar = STRICT
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

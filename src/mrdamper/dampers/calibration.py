@@ -22,6 +22,7 @@ from mrdamper.dampers.distance import AT_TESTS, Distance
 from mrdamper.data.arrays import Floats, index_at
 from mrdamper.data.runs import Run, once_per_run
 from mrdamper.data.sessions import session_of
+from mrdamper.data.strict_text import STRICT
 from mrdamper.identification.intervals import student
 from mrdamper.physics.motion.sines import equivalent_sine
 from mrdamper.statistics.linear import nonnegative_least_squares
@@ -236,7 +237,7 @@ class Growth:
         Degrees of freedom behind their squares, by distance.
     """
 
-    __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}
+    __pydantic_config__: ClassVar = STRICT
 
     force: tuple[float, float, float] = (0.0, 0.0, 0.0)
     peak: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -320,7 +321,7 @@ class Calibration:
         reached, each unit held out of the calibration in turn.
     """
 
-    __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}
+    __pydantic_config__: ClassVar = STRICT
 
     unit: Literal["run", "session"]
     units: int

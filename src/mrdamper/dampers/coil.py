@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from mrdamper.data.arrays import Floats
+from mrdamper.data.strict_text import STRICT
 from mrdamper.errors import ParameterError
 from mrdamper.tracing import Tape, choose
 
@@ -31,8 +32,8 @@ class Driver:
     resistance_ohm, inductance_H : float
         Of the coil behind an amplifier without current control [ohm], [H]: the current then lags
         by L/R. Zero inductance: a current controller, no lag of its own.
-    limit_A : float
-        Largest magnitude of current it delivers [A].
+    limit_A : float, optional
+        Largest magnitude of current it delivers [A], if there is a limit.
 
     Raises
     ------
@@ -40,17 +41,19 @@ class Driver:
         If a number is no driver's.
     """
 
+    __pydantic_config__: ClassVar = STRICT
+
     amperes_per_volt: float
     resistance_ohm: float = 0.0
     inductance_H: float = 0.0
-    limit_A: float = math.inf
+    limit_A: float | None = None
 
     def __post_init__(self) -> None:
         for name, value, good in (
             ("amperes_per_volt", self.amperes_per_volt, 0 < abs(self.amperes_per_volt) < math.inf),
             ("resistance_ohm", self.resistance_ohm, 0 <= self.resistance_ohm < math.inf),
             ("inductance_H", self.inductance_H, 0 <= self.inductance_H < math.inf),
-            ("limit_A", self.limit_A, self.limit_A > 0),
+            ("limit_A", self.limit_A, self.limit_A is None or 0 < self.limit_A < math.inf),
             ("resistance_ohm", self.resistance_ohm, self.resistance_ohm > 0 or self.inductance_H == 0),
         ):
             if not good:
@@ -67,7 +70,8 @@ class Driver:
 
     def current(self, time: Floats, volts: Floats) -> Floats:
         """(N,) current [A] of (N,) command voltages [V] at (N,) times [s]."""
-        amperes = np.clip(self.amperes_per_volt * np.asarray(volts, dtype=float), -self.limit_A, self.limit_A)
+        limit = self.limit_A or math.inf
+        amperes = np.clip(self.amperes_per_volt * np.asarray(volts, dtype=float), -limit, limit)
         return field_current(time, amperes, self.lag_s, self.lag_s, signed=True)
 
 
@@ -87,6 +91,8 @@ class Coil:
     ParameterError
         If a time constant is negative, not finite, or over 10 s.
     """
+
+    __pydantic_config__: ClassVar = STRICT
 
     rise_s: float
     fall_s: float

@@ -6,7 +6,6 @@ Numbers round-trip bit by bit. The document states units and where the model cam
 from __future__ import annotations
 
 import json
-import math
 import re
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, 
 from mrdamper.dampers import all_kinds, kind_named
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import Calibration, Growth
-from mrdamper.dampers.coil import Coil, Driver
+from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.sessions import Sessions
 from mrdamper.dampers.uncertainty import Uncertainty
@@ -74,19 +73,6 @@ class _Envelope(_SavedPart):
     conditions: tuple[tuple[float, float, float], ...] | None = None  # tested: [A], [Hz], [m]
 
 
-class _Driver(_SavedPart):
-    amperes_per_volt: float
-    resistance_ohm: float = 0.0
-    inductance_H: float = 0.0
-    limit_A: float | None = None
-
-
-class _Coil(_SavedPart):
-    rise_s: float
-    fall_s: float
-    driver: _Driver | None = None
-
-
 # Standard deviations whose squares, and whose sums with a force, are numbers.
 Deviation = Annotated[float, Field(ge=0, le=1e12)]
 
@@ -130,7 +116,7 @@ class _Document(_SavedPart):
     units: dict[str, str]
     envelope: _Envelope
     provenance: dict[str, str]
-    coil: _Coil | None = None  # since 1.2
+    coil: Coil | None = None  # since 1.2
     covariance: _Covariance | None = None  # since 1.3
     damper: dict[str, Any]  # its kind, and what that kind says
 
@@ -188,7 +174,7 @@ def dump_model(damper: Damper) -> str:
         units=UNITS,
         envelope=_Envelope(**{name: getattr(damper.envelope, name) or None for name in _Envelope.model_fields}),  # type: ignore[arg-type]
         provenance={**damper.provenance, **_outside_package(damper)},
-        coil=_describe_coil(damper.coil),
+        coil=damper.coil,
         covariance=_describe_uncertainty(damper.uncertainty),
         damper={"kind": damper.kind, **asdict(damper.to_saved())},
     )
@@ -257,10 +243,9 @@ def parse_model(text: str, where: str = "model") -> Damper:
     saved = _checked(kind.saved, own, "damper.", where)
     try:
         require_name("rig", document.rig)
-        coil = _restore_coil(document.coil) if document.coil else None
         envelope = Envelope(**document.envelope.model_dump(exclude_none=True))
-        about = document.provenance
-        damper = kind.from_saved(saved, rig=document.rig, envelope=envelope, provenance=about, coil=coil)
+        shared = {"rig": document.rig, "provenance": document.provenance, "coil": document.coil}
+        damper = kind.from_saved(saved, envelope=envelope, **shared)
         return _with_uncertainty(damper, document.covariance, where) if document.covariance else damper
     except InputError as error:
         package = document.provenance.get(_PACKAGE)
@@ -364,17 +349,3 @@ def _with_uncertainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
         saved.effective, factors, saved.sessions, saved.calibration, saved.growth,
     )  # fmt: skip
     return replace(damper, uncertainty=uncertainty)
-
-
-def _describe_coil(coil: Coil | None) -> _Coil | None:
-    if coil is None:
-        return None
-    driver = coil.driver and _Driver.model_validate(
-        {**asdict(coil.driver), "limit_A": None if coil.driver.limit_A == math.inf else coil.driver.limit_A}
-    )
-    return _Coil(rise_s=coil.rise_s, fall_s=coil.fall_s, driver=driver)
-
-
-def _restore_coil(saved: _Coil) -> Coil:
-    driver = saved.driver.model_dump(exclude_none=True) if saved.driver else None
-    return Coil(saved.rise_s, saved.fall_s, Driver(**driver) if driver else None)

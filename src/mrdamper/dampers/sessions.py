@@ -19,12 +19,12 @@ import numpy as np
 from mrdamper.data.arrays import Floats
 from mrdamper.data.runs import Run
 from mrdamper.data.sessions import SESSIONS_NEEDED, hour_of, session_of
+from mrdamper.data.strict_text import STRICT
 from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
     from mrdamper.dampers.protocols import DamperLike as Damper
 
-STRICT = {"extra": "forbid", "allow_inf_nan": False}  # of what is read from a saved model
 UNKNOWN, KNOWN = "unknown", "known"  # session of a score: predicted as it is, or corrected by other runs of the day
 _CORRELATION_HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # over which what an hour shares is forgotten
 _MIN_RUN_SHARE = (

@@ -18,6 +18,7 @@ from typing import Any, BinaryIO, NoReturn, TypeGuard
 
 from mrdamper.errors import InputError
 
+STRICT = {"extra": "forbid", "allow_inf_nan": False}  # of dataclasses that pydantic reads from a file
 _MAX_DEPTH = 64  # objects and arrays inside each other
 _MAX_DIGITS = 40  # characters of a whole number
 _LONGEST = 200_000  # characters; the profiles of the documentation have under 3,000

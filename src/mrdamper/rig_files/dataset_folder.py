@@ -253,11 +253,8 @@ def _driven(channels: Channels, number: Callable[[str], float | None], where: st
     if gain is None:
         remedy = "add amperes_per_volt to runs.csv: the amplifier's, or one over the coil's resistance"
         raise ColumnError("voltage_V without a gain", where=where, remedy=remedy, code="E_DRIVER")
-    time, limit = channels["time_s"], number("limit_A")
-    driver = Driver(
-        gain, number("resistance_ohm") or 0.0, number("inductance_H") or 0.0, math.inf if limit is None else limit
-    )
-    return driver.current(time, np.broadcast_to(volts, time.shape))
+    driver = Driver(gain, number("resistance_ohm") or 0.0, number("inductance_H") or 0.0, number("limit_A"))
+    return driver.current(channels["time_s"], np.broadcast_to(volts, channels["time_s"].shape))
 
 
 def _row(run: Run) -> dict[str, Any]:

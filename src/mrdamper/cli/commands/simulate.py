@@ -157,7 +157,7 @@ def _amperes(current: float | None, volts: float | None, dampers: dict[str, Damp
         raise InputError(
             "volts for a damper whose driver is not known", remedy="give --current, or a model with a coil driver"
         )
-    return min(driver.amperes_per_volt * volts, driver.limit_A)
+    return min(driver.amperes_per_volt * volts, driver.limit_A or math.inf)
 
 
 def _figures(done: Simulation, dampers: Mapping[str, Damper]) -> dict[str, Any]:
