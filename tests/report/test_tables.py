@@ -12,10 +12,12 @@ from support.dampers import joint_damper
 from support.synthetic import synthetic_run
 
 from mrdamper.dampers.model_file import save_model
+from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Condition
 from mrdamper.data.encoding import csv_text
 from mrdamper.identification.problem import RunUncertainty
 from mrdamper.models.bingham import Bingham
+from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.report.study import _validation_table
 from mrdamper.report.tables import identification_rows, prediction_rows, score_row
 from mrdamper.rig_files.dataset_folder import save_dataset
@@ -89,9 +91,8 @@ def test_an_identification_stands_in_the_columns_that_name_it():
 
 
 def test_a_prediction_stands_in_the_columns_of_the_contract():
-    motion = SimpleNamespace(time=np.array([0.0, 0.5]), displacement=np.array([1.0, 2.0]),
-                             velocity=np.array([3.0, 4.0]), current=np.array([5.0, 6.0]))  # fmt: skip
-    prediction = SimpleNamespace(motion=motion, force=np.array([7.0, 8.0]), extrapolation=("current", "amplitude"))
+    motion = Excitation(*np.array([[0.0, 0.5], [1.0, 2.0], [3.0, 4.0], [0.0, 0.0], [5.0, 6.0]]))
+    prediction = Prediction(motion, np.array([7.0, 8.0]), Condition(6.0, 1.0, 1.0), ("current", "amplitude"))
     plain = {"time_s": 0.5, "displacement_m": 2.0, "velocity_m_s": 4.0, "current_A": 6.0, "force_N": 8.0}
     flags = {"extrapolation": "current amplitude"}
     assert prediction_rows(prediction)[1] == {**plain, **flags}

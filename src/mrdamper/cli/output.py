@@ -20,12 +20,10 @@ Rows = Sequence[Mapping[str, Any]]
 
 def put(rows: Rows, out: Path | None, as_json: bool, as_csv: Callable[[Rows], str]) -> None:
     """Write rows where they were asked for; a file appears whole or not at all."""
-    text = (
-        json.dumps([{k: _plain(v) for k, v in row.items()} for row in rows], indent=1) + "\n"
-        if as_json
-        else as_csv(rows)
-    )
-    put_text(text, out)
+    from mrdamper.data.encoding import finite
+
+    plain = [{k: finite(v) if isinstance(v, float) else v for k, v in row.items()} for row in rows]
+    put_text(json.dumps(plain, indent=1) + "\n" if as_json else as_csv(rows), out)
 
 
 def put_text(text: str, out: Path | None) -> None:
@@ -138,9 +136,3 @@ def parse_gas(text: str | None) -> GasSpring | None:
             f"--gas {text}", remedy="write --gas P,V,A in MPa, cm³ and mm², for example 1.5,150,314"
         ) from error
     return GasSpring(1e6 * pressure, 1e-6 * volume, 1e-6 * area)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -7,6 +7,7 @@ may have written them. HTML is escaped by the page templates themselves; the ter
 
 from __future__ import annotations
 
+import math
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
@@ -49,6 +50,11 @@ def latex(text: str) -> str:
 def markdown(text: str) -> str:
     """Text of Markdown, also in a table and between dollar signs: every mark is escaped."""
     return _one_line(text).translate(_MARKDOWN)
+
+
+def finite(value: float | None) -> float | None:
+    """Return a number that JSON can hold: what is not finite becomes nothing."""
+    return float(value) if value is not None and math.isfinite(value) else None
 
 
 def csv_cell(text: str) -> str:

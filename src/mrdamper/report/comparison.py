@@ -13,7 +13,7 @@ import numpy as np
 from mrdamper.dampers.model_file import save_model
 from mrdamper.data import Run
 from mrdamper.data.atomic import ResultRecord, publish
-from mrdamper.data.encoding import csv_text, file_names
+from mrdamper.data.encoding import csv_text, file_names, finite
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.comparison import overlaid_loops, ranking
 from mrdamper.report.plots.style import save_figure
@@ -88,13 +88,13 @@ def _rows(rig: RigComparison) -> list[dict[str, Any]]:
                 "rank": rank,
                 "model": entry.recipe.name,
                 "title": entry.title,
-                "per_run_nrmse_pp": _plain(entry.per_run),
-                "train_nrmse_pp": _plain(entry.train.median()),
-                "cv_nrmse_pp": _plain(entry.cross_validated.median()),
-                "cv_worst_nrmse_pp": _plain(entry.cross_validated.worst_error()),
-                "validation_nrmse_pp": _plain(entry.validation.median()),
-                "validation_worst_nrmse_pp": _plain(entry.validation.worst_error()),
-                "validation_energy_error": _plain(entry.validation.median("energy_error")),
+                "per_run_nrmse_pp": finite(entry.per_run),
+                "train_nrmse_pp": finite(entry.train.median()),
+                "cv_nrmse_pp": finite(entry.cross_validated.median()),
+                "cv_worst_nrmse_pp": finite(entry.cross_validated.worst_error()),
+                "validation_nrmse_pp": finite(entry.validation.median()),
+                "validation_worst_nrmse_pp": finite(entry.validation.worst_error()),
+                "validation_energy_error": finite(entry.validation.median("energy_error")),
                 "parameters_per_run": entry.parameters_per_run,
                 "parameters": entry.damper.parameter_count,
                 "conditions_needed": entry.conditions_needed,
@@ -170,7 +170,3 @@ def _shown(rig: RigComparison) -> list[Run]:
     ordered = sorted(scored, key=lambda run: (run.condition.current_A, run.condition.peak_velocity))
     picks = np.unique(np.linspace(0, len(ordered) - 1, min(_LOOPS, len(ordered))).round().astype(int))
     return [rig.dataset[ordered[i].run_id] for i in picks]
-
-
-def _plain(value: float) -> float | None:
-    return value if math.isfinite(value) else None

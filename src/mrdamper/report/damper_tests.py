@@ -231,16 +231,7 @@ def _verdict(name: str, specimen: Characteristics, limit: Limit) -> dict[str, An
     side = SIDES.index(limit.side)
     force = specimen.at_velocity(near[0], limit.velocity_m_s, side) if near else float("nan")
     verdict = "not tested" if np.isnan(force) else "pass" if limit.lower_N <= force <= limit.upper_N else "fail"
-    return {
-        "specimen": name,
-        "current_A": limit.current_A,
-        "velocity_m_s": limit.velocity_m_s,
-        "side": limit.side,
-        "lower_N": limit.lower_N,
-        "upper_N": limit.upper_N,
-        "measured_N": force,
-        "verdict": verdict,
-    }
+    return {"specimen": name, **limit.model_dump(), "measured_N": force, "verdict": verdict}
 
 
 def _test_rows(specimens: Mapping[str, Characteristics]) -> list[dict[str, Any]]:

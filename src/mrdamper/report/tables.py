@@ -11,7 +11,7 @@ from typing import Any
 from mrdamper.dampers.bands import Band
 from mrdamper.dampers.prediction import Prediction
 from mrdamper.identification import Identification
-from mrdamper.study.validation import RunScore
+from mrdamper.study.validation import SCORES, RunScore
 
 
 def identification_rows(identifications: Sequence[Identification], dataset: str = "") -> list[dict[str, Any]]:
@@ -45,14 +45,7 @@ def identification_rows(identifications: Sequence[Identification], dataset: str 
 
 def prediction_rows(prediction: Prediction, band: Band | None = None) -> list[dict[str, Any]]:
     """One row a sample, in the columns of the command-line contract; the band where there is one; the flags."""
-    motion = prediction.motion
-    columns = {
-        "time_s": motion.time,
-        "displacement_m": motion.displacement,
-        "velocity_m_s": motion.velocity,
-        "current_A": motion.current,
-        "force_N": prediction.force,
-    }
+    columns = dict(prediction.table)
     if band is not None:
         columns |= {"force_low_N": band.low, "force_high_N": band.high}
     flag = " ".join(prediction.extrapolation)
@@ -65,14 +58,9 @@ def prediction_rows(prediction: Prediction, band: Band | None = None) -> list[di
 
 def score_row(run: RunScore) -> dict[str, Any]:
     """Return the columns of the command-line contract for one scored run."""
-    s = run.scores
     return {
         "run_id": run.run_id,
-        "nrmse_pp": s.nrmse_pp,
-        "nrmse_std": s.nrmse_std,
-        "wape": s.wape,
-        "energy_error": s.energy_error,
-        "peak_error": s.peak_error,
+        **{name: getattr(run.scores, name) for name in SCORES},
         "rest_nrmse_pp": run.rest,
         "session": run.session,
         "extrapolation": " ".join(run.extrapolation),

@@ -17,6 +17,7 @@ from mrdamper.data import Condition, Displayable, Floats, Run
 from mrdamper.errors import InputError, RunError, UnknownNameError, require, validate_arguments
 from mrdamper.statistics.metrics import Scores, dissipated_power, score
 
+SCORES = ("nrmse_pp", "nrmse_std", "wape", "energy_error", "peak_error")  # that tables show of a run
 _MIN_SWING_N = 1e-100  # of a force, and its inverse the most [N]: their squares are numbers
 
 
@@ -84,10 +85,9 @@ class Validation(Displayable):
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
         """A row a run."""
-        names = ("nrmse_pp", "nrmse_std", "wape", "energy_error", "peak_error")
         return {
             "run_id": [run.run_id for run in self.runs],
-            **{name: [float(getattr(run.scores, name)) for run in self.runs] for name in names},
+            **{name: [float(getattr(run.scores, name)) for run in self.runs] for name in SCORES},
             "session": [run.session for run in self.runs],
             "extrapolation": [" ".join(run.extrapolation) for run in self.runs],
         }

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 import struct
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -52,11 +51,6 @@ def in_units(rows: Sequence[Mapping[str, Any]], force: str, length: str) -> list
         {columns[k][0] if k in columns else k: columns[k][1] * v if k in columns else v for k, v in row.items()}
         for row in rows
     ]
-
-
-def number(value: float | None) -> float | None:
-    """Return a number JSON can hold: what is not finite becomes nothing."""
-    return float(value) if value is not None and math.isfinite(value) else None
 
 
 def download(content: bytes, name: str, kind: str) -> Response:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Condition
+from mrdamper.data.encoding import finite
 from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import ParameterError
 from mrdamper.physics.simulation import ForceLaw, Response, steady_loop
@@ -68,7 +68,7 @@ def sliders(damper: Damper) -> list[dict[str, Any]]:
             "scale": "log" if info.scale == "log" and value > 0 else "linear",
             "low": low,
             "high": high,
-            "bounds": [b if math.isfinite(b) else None for b in info.bounds],
+            "bounds": [finite(bound) for bound in info.bounds],
         }
         for info in model.parameters()
         for value in (float(model.values()[info.name]),)

@@ -11,12 +11,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from mrdamper.data import Condition, Dataset, Run, current_levels, same_motion
+from mrdamper.data.encoding import finite
 from mrdamper.errors import InputError
 from mrdamper.identification.loop_analysis import LoopAnalysis, analyse_loop
 from mrdamper.physics.motion import equivalent_sine
 from mrdamper.rig_files.quality.table import Quality, quality_table, record_of
 from mrdamper.study.workflow import usable_sines
-from mrdamper.web.answers import number
 
 MM = 1e3
 _NEAREST = 3  # measured loops laid under a prediction
@@ -131,13 +131,13 @@ def describe(row: TableRow) -> dict[str, Any]:
         "excitation": run.excitation,
         "condition": condition_on_screen(row.condition),
         "samples": int(run.time.size),
-        "duration_s": number(float(run.time[-1] - run.time[0])),
-        "cycles": number(loop.motion.cycles) if loop else None,
-        "peak_N": number(loop.peak_force) if loop else None,
-        "energy_J": number(loop.dissipated_energy) if loop else None,
-        "mean_N": number(loop.mean_force) if loop else None,
-        "damping_Ns_m": number(loop.equivalent_damping) if loop else None,
-        "repeatability": number(run.repeatability),
+        "duration_s": finite(float(run.time[-1] - run.time[0])),
+        "cycles": finite(loop.motion.cycles) if loop else None,
+        "peak_N": finite(loop.peak_force) if loop else None,
+        "energy_J": finite(loop.dissipated_energy) if loop else None,
+        "mean_N": finite(loop.mean_force) if loop else None,
+        "damping_Ns_m": finite(loop.equivalent_damping) if loop else None,
+        "repeatability": finite(run.repeatability),
         "refused": row.refused,
         "notes": {name: str(value) for name, value in run.notes.items()},
     }

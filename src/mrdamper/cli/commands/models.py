@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 
 import typer
 
@@ -69,8 +68,7 @@ def _page(model) -> str:
 
 
 def _entry(model) -> dict:
-    def plain(value):
-        return value if value is not None and math.isfinite(value) else None
+    from mrdamper.data.encoding import finite
 
     if not hasattr(model, "parameters"):
         head = {"name": model.name, "title": model.heading, "equation": model.__dict__.get("equation", "")}
@@ -80,7 +78,7 @@ def _entry(model) -> dict:
     facts = ("name", "unit", "meaning", "bounds", "linear", "preset", "default")
     parameters = [
         {fact: getattr(info, fact) for fact in facts}
-        | {"bounds": [plain(bound) for bound in info.bounds], "default": plain(info.default)}
+        | {"bounds": [finite(bound) for bound in info.bounds], "default": finite(info.default)}
         for info in model.parameters()
     ]
     head = {fact: getattr(model, fact) for fact in ("name", "title", "equation", "source")}

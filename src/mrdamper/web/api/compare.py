@@ -11,13 +11,13 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
 from mrdamper.data import Dataset
-from mrdamper.data.encoding import csv_text
+from mrdamper.data.encoding import csv_text, finite
 from mrdamper.report.comparison import summary_rows
 from mrdamper.study.comparison import Comparison, RigComparison
 from mrdamper.study.recipe import WHOLE_DAMPER, RecipeResult, recipes
 from mrdamper.study.validation import RunScore, Validation
 from mrdamper.study.workflow import STUDIED
-from mrdamper.web.answers import archive, download, frame, number
+from mrdamper.web.answers import archive, download, frame
 from mrdamper.web.curves import measured_cycle, measured_window, predicted_on_run
 from mrdamper.web.rig_table import condition_on_screen
 from mrdamper.web.sessions import Current, Session
@@ -146,15 +146,15 @@ def _entry(rig: RigComparison, entry: RecipeResult, key: str, keys: dict[str, st
 
 
 def _median(validation: Validation) -> float | None:
-    return number(validation.median()) if validation.runs else None
+    return finite(validation.median()) if validation.runs else None
 
 
 def _score(run: RunScore, keys: dict[str, str]) -> dict[str, Any]:
     return {
         "key": keys[run.run_id],
-        "nrmse_pp": number(run.scores.nrmse_pp),
-        "energy_error": number(run.scores.energy_error),
-        "peak_error": number(run.scores.peak_error),
-        "floor": number(run.floor),
+        "nrmse_pp": finite(run.scores.nrmse_pp),
+        "energy_error": finite(run.scores.energy_error),
+        "peak_error": finite(run.scores.peak_error),
+        "floor": finite(run.floor),
         "extrapolation": run.extrapolation,
     }

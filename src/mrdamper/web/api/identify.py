@@ -14,6 +14,7 @@ from pydantic import BaseModel, Field
 
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.uncertainty import table as intervals
+from mrdamper.data.encoding import finite
 from mrdamper.errors import InputError
 from mrdamper.identification import Identification, all_methods, identify
 from mrdamper.models import all_models
@@ -21,7 +22,7 @@ from mrdamper.report.about import About, about_of, logo_of
 from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import Validation
 from mrdamper.study.workflow import Study
-from mrdamper.web.answers import frame, number
+from mrdamper.web.answers import frame
 from mrdamper.web.bundled_studies import BundledStudies
 from mrdamper.web.curves import measured_cycle, modelled_cycle, predicted_on_run
 from mrdamper.web.rig_table import condition_on_screen
@@ -154,9 +155,9 @@ def _candidate(candidate: RecipeResult, key: str) -> dict[str, Any]:
         "damper": key,
         "title": candidate.title,
         "numbers": candidate.damper.parameter_count,
-        "per_run": number(candidate.per_run),
-        "left_out": number(candidate.cross_validated.median()),
-        "held_out": number(candidate.validation.median()) if candidate.validation.runs else None,
+        "per_run": finite(candidate.per_run),
+        "left_out": finite(candidate.cross_validated.median()),
+        "held_out": finite(candidate.validation.median()) if candidate.validation.runs else None,
         "seconds": round(candidate.seconds, 2),
     }
 
@@ -181,8 +182,8 @@ def _conclude_identification(
         "title": damper.title if damper else None,
         "numbers": damper.parameter_count if damper else None,
         "no_damper": scored if isinstance(scored, str) else "",
-        "held_out": number(held_out.median()) if held_out else None,
-        "median": number(float(np.median(errors))),
+        "held_out": finite(held_out.median()) if held_out else None,
+        "median": finite(float(np.median(errors))),
         "runs": [_identified(i) for i in identifications],
         "joint": None if identifications else _joint(scored),
         "units": _units(identifications, scored),
@@ -194,9 +195,9 @@ def _identified(one: Identification) -> dict[str, Any]:
     return {
         "id": one.run_id,
         "condition": condition_on_screen(one.condition),
-        "nrmse_pp": number(one.scores.nrmse_pp),
-        "floor": number(one.floor),
-        "values": {n: number(v) for n, v in one.model.values().items()},
+        "nrmse_pp": finite(one.scores.nrmse_pp),
+        "floor": finite(one.floor),
+        "values": {n: finite(v) for n, v in one.model.values().items()},
         "intervals": {name: ends for name in one.free if (ends := one.interval(name))},
         "states": dict(zip(one.table["parameter"], one.table["state"], strict=True)),
         "at_bounds": one.at_bounds,
@@ -217,14 +218,14 @@ def _joint(scored: RecipeResult | str) -> dict[str, Any]:
     fit = _joint_fit(scored)
     assert isinstance(scored, RecipeResult)
     return {
-        "values": {n: number(v) for n, v in fit.damper.model.values().items()},
+        "values": {n: finite(v) for n, v in fit.damper.model.values().items()},
         "intervals": {
-            row["name"]: {"low": number(row["low"]), "high": number(row["high"]), "state": row["state"]}
+            row["name"]: {"low": finite(row["low"]), "high": finite(row["high"]), "state": row["state"]}
             for row in intervals(scored.damper)
         },
         "at_bounds": fit.at_bounds,
         "runs": [
-            {"id": run.run_id, "nrmse_pp": number(error)}
+            {"id": run.run_id, "nrmse_pp": finite(error)}
             for run, error in zip(scored.train.runs, fit.nrmse_pp.tolist(), strict=True)
         ],
         "message": str(fit.ending),

@@ -15,9 +15,10 @@ from pydantic import BaseModel, Field
 from mrdamper.dampers.bands import band, no_band, scope
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition, Floats
+from mrdamper.data.encoding import finite
 from mrdamper.physics.motion import Excitation
 from mrdamper.statistics.metrics import dissipated_power, peak_force
-from mrdamper.web.answers import frame, number
+from mrdamper.web.answers import frame
 from mrdamper.web.bench_model import held_model, loop_held, predict_held, sliders
 from mrdamper.web.curves import on_screen, predicted_cycle
 from mrdamper.web.rig_table import RigTable, condition_on_screen
@@ -122,7 +123,7 @@ def _predicted(damper: Damper, ask: PredictionRequest, session: Session) -> Resp
         "peak_velocity_m_s": ask.condition.peak_velocity,
         "extrapolation": damper.envelope.flags(ask.condition),
         "tested_A": damper.envelope.current_A,
-        "parameters": {n: number(v) for n, v in model.values().items()} if model else {},
+        "parameters": {n: finite(v) for n, v in model.values().items()} if model else {},
         "nearest": [_measured(row) for row in table.nearest(ask.condition)] if table else [],
         "measured": [_measured(row) for row in table.at_motion(ask.condition)] if table else [],
     }
@@ -170,8 +171,8 @@ def _measured(row: Any) -> dict[str, Any]:
         "id": row.run.id,
         "split": row.run.split,
         "condition": condition_on_screen(row.condition),
-        "peak_N": number(row.loop.peak_force),
-        "energy_J": number(row.loop.dissipated_energy),
+        "peak_N": finite(row.loop.peak_force),
+        "energy_J": finite(row.loop.dissipated_energy),
     }
 
 
@@ -183,6 +184,6 @@ def _head(bench: Bench) -> dict[str, Any]:
         "numbers": bench.damper.parameter_count,
         "origin": bench.origin,
         "note": bench.note,
-        "error": number(bench.error),
+        "error": finite(bench.error),
         "selected": bench.selected,
     }

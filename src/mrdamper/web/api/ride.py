@@ -14,6 +14,7 @@ from pydantic import BaseModel, Field
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
+from mrdamper.data.encoding import finite
 from mrdamper.data.parameters import with_values
 from mrdamper.errors import UnknownNameError
 from mrdamper.statistics.metrics import peak_force
@@ -25,7 +26,7 @@ from mrdamper.systems.result import Simulation
 from mrdamper.systems.simulate import SystemLoop, simulate_system
 from mrdamper.systems.structure import System
 from mrdamper.systems.system_file import bundled_systems, load_system
-from mrdamper.web.answers import frame, number
+from mrdamper.web.answers import frame
 from mrdamper.web.sessions import Current, shared
 
 router = APIRouter(prefix="/sessions/{session}/ride")
@@ -96,12 +97,12 @@ def _ridden(
         "dampers": [link.name for link in done.dampers],
         "calm": system.coordinates[-1 if system.ground is not None else 0],
         "peaks": {name: values.tolist() for name, values in done.peaks.items()},
-        "gain": number(1 - (cost(done) / idle_cost) ** 0.5 if idle_cost > 0 else None),
+        "gain": finite(1 - (cost(done) / idle_cost) ** 0.5 if idle_cost > 0 else None),
         "outside": done.outside,
         "settled": done.settled,
         "step_s": done.step,
-        "halving": number(done.halving),
-        "energy_gap": number(done.energy_gap),
+        "halving": finite(done.halving),
+        "energy_gap": finite(done.energy_gap),
     }
     return head, _thinned(_histories(done, source)) | idle
 
