@@ -95,16 +95,14 @@ def bundled_study(bundled):
 @pytest.fixture
 def studied_once(bundled_study, monkeypatch):
     """A study that an example or a page asks for is that of the bundled data; test_how_to.py makes its own."""
-    from mrdamper.report import study
     from mrdamper.study import workflow
 
-    def run_study(dataset):
+    def run_study(dataset, *others, **options):
         ours = {rig.rig: rig for rig in bundled_study.rigs}
         rigs = tuple(ours[name] for name in dataset.rigs if name in ours)
         return workflow.Study(dataset, rigs or (ours["utfsm"],), 0.0)
 
     monkeypatch.setattr(workflow, "run_study", run_study)
-    monkeypatch.setattr(study, "study_and_draw", lambda dataset, *others, **options: (run_study(dataset), []))
 
 
 @pytest.fixture(scope="session")

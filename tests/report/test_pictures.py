@@ -168,7 +168,7 @@ def test_one_number_stands_everywhere(bundled, bundled_study, written, tmp_path,
     from mrdamper.report.study import _validation_table
     from mrdamper.web.api.identify import _candidate
 
-    monkeypatch.setattr("mrdamper.report.study.study_and_draw", lambda *args, **options: (bundled_study, []))
+    monkeypatch.setattr("mrdamper.study.workflow.run_study", lambda *args, **options: bundled_study)
     monkeypatch.setattr("mrdamper.report.study.write_study", lambda *args, **options: [written / "report.html"])
     terminal = CliRunner().invoke(application(), ["study", "--verbose", "--out", str(tmp_path / "out")]).stdout
     page = (written / "report.html").read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ from mrdamper.dampers.model_file import dump_model, load_model
 from mrdamper.data import Dataset
 from mrdamper.errors import IdentificationError, OutputError
 from mrdamper.identification.loop_analysis import analyse_loop, dynamic_ranges
-from mrdamper.report.study import study_and_draw, write_study
+from mrdamper.report.study import write_study
 from mrdamper.study import workflow
 from mrdamper.study.parallel import several
 from mrdamper.study.validation import validate
@@ -169,8 +169,8 @@ def test_a_study_is_the_same_in_another_process(small, few):
 def test_rigs_are_studied_and_drawn_in_several_processes(small, few, tmp_path):
     beside = tuple(replace(run, id=f"other {run.id}", rig="other") for run in few)
     with several(2) as processes:
-        again, drawn = study_and_draw(Dataset((*beside, *few.runs), "both"), processes=processes)
-    write_study(again, tmp_path / "out", drawn=drawn)
+        again = run_study(Dataset((*beside, *few.runs), "both"), processes=processes)
+        write_study(again, tmp_path / "out", processes=processes)
     for name in ("rig", "other"):  # one was studied in this process
         assert numbers(again.rig(name)) == numbers(small.rigs[0])
     assert dump_model(again.rig("rig").damper) == dump_model(small.model)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -15,7 +14,6 @@ from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.model_file import save_model
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.uncertainty import table
-from mrdamper.data import Dataset
 from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names
 from mrdamper.data.runs import once_per_run
@@ -36,9 +34,9 @@ from mrdamper.report.plots.style import Picture
 from mrdamper.report.summary import error_sentence, omission_lines
 from mrdamper.report.tables import identification_rows, score_row
 from mrdamper.study.parallel import IN_PROCESS, Processes
-from mrdamper.study.recipe import Progress, RecipeResult, StudyMethod
+from mrdamper.study.recipe import Progress, RecipeResult
 from mrdamper.study.validation import session_drift
-from mrdamper.study.workflow import RigStudy, Study, require_runs, study_rig
+from mrdamper.study.workflow import RigStudy, Study
 
 _LOOPS_SHOWN = 6
 _CV_RANGE = ("low_cv", "high_cv")  # columns with the range of a parameter in cross-validation
@@ -52,8 +50,8 @@ def write_study(
     about: About | Mapping[str, Any] | str | Path | None = None,
     limits: Sequence[Limit] | str | Path = (),
     also: Sequence[str] = (),
-    drawn: Sequence[Mapping[str, Picture]] = (),
     paper: str = "a4",
+    processes: Processes = IN_PROCESS,
 ) -> list[Path]:
     """Write report.html, model files, tables (identifications, parameters, validation, coverage, forces) and figures/.
 
@@ -71,10 +69,10 @@ def write_study(
         against these.
     also : sequence of str
         "png" and "pdf": every figure in that format too; with "pdf" comes report.pdf.
-    drawn : sequence of mapping, optional
-        The figures of each rig from `study_and_draw`.
     paper : str
         Size of the pages of report.pdf: "a4" or "letter".
+    processes : Processes
+        Where the figures are drawn.
 
     Returns
     -------
@@ -90,7 +88,7 @@ def write_study(
     """
     head = _head(about)
     limits = load_limits(limits) if isinstance(limits, (str, Path)) else tuple(limits)
-    drawn = drawn or IN_PROCESS.map(partial(_draw, also=tuple(also), limits=limits), study.rigs, progress)
+    drawn = processes.map(partial(_draw, also=tuple(also), limits=limits), study.rigs, progress)
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
@@ -136,41 +134,6 @@ def _head(about: About | Mapping[str, Any] | str | Path | None) -> About:
     if isinstance(about, (str, Path)):
         return load_about(about)
     return about if isinstance(about, About) else about_of(about or {}, "about")
-
-
-def study_and_draw(
-    dataset: Dataset,
-    progress: Progress = lambda what, share: None,
-    *,
-    model: str | StudyMethod | None = None,
-    keep: Sequence[str] = (),
-    also: Sequence[str] = (),
-    limits: Sequence[Limit] = (),
-    processes: Processes = IN_PROCESS,
-) -> tuple[Study, list[dict[str, Picture]]]:
-    """Run a study as `run_study` and draw the figures of each rig in the process that studied it."""
-    begin = time.perf_counter()
-    require_runs(dataset, keep)
-    done = processes.map(
-        partial(_studied_and_drawn, model=model, keep=tuple(keep), also=tuple(also), limits=tuple(limits)),
-        [dataset.rig(n) for n in dataset.rigs],
-        progress,
-    )
-    study = Study(dataset, tuple(rig for rig, _ in done), time.perf_counter() - begin)
-    return study, [pictures for _, pictures in done]
-
-
-def _studied_and_drawn(
-    dataset: Dataset,
-    progress: Progress,
-    *,
-    model: str | StudyMethod | None,
-    keep: tuple[str, ...],
-    also: tuple[str, ...],
-    limits: tuple[Limit, ...],
-) -> tuple[RigStudy, dict[str, Picture]]:
-    rig = study_rig(dataset, lambda what, share: progress(what, 0.85 * share), model=model, keep=keep)
-    return rig, _draw(rig, lambda what, share: progress(what, 0.85 + 0.15 * share), also=also, limits=limits)
 
 
 def _draw(rig: RigStudy, progress: Progress, *, also: tuple[str, ...], limits: tuple[Limit, ...]) -> dict[str, Picture]:

@@ -271,7 +271,7 @@ def run_study(
     Raises
     ------
     UnknownNameError
-        If there is no such model, recipe or method.
+        If there is no such model, recipe, method or run.
     IdentificationError
         If a rig has too few runs to identify anything from.
     ContradictionError
@@ -289,22 +289,12 @@ def run_study(
     True
     """
     begin = time.perf_counter()
-    require_runs(dataset, keep)
+    for name in keep:
+        dataset[name]  # refuses a name that no run has
     study = partial(study_rig, model=model, keep=tuple(keep))
     rigs = processes.map(study, [dataset.rig(name) for name in dataset.rigs], progress)
     progress("studied", 1.0)
     return Study(dataset, tuple(rigs), time.perf_counter() - begin)
-
-
-def require_runs(dataset: Dataset, names: Iterable[str]) -> None:
-    """Refuse names of runs that a dataset does not hold.
-
-    Raises
-    ------
-    UnknownNameError
-    """
-    for name in names:
-        dataset[name]
 
 
 @on_one_blas_thread

@@ -51,10 +51,11 @@ def study(
     """
     from mrdamper.data.atomic import require_writable
     from mrdamper.report.about import load_about, load_limits
-    from mrdamper.report.study import study_and_draw, write_study
+    from mrdamper.report.study import write_study
     from mrdamper.report.summary import omission_lines, study_lines
     from mrdamper.rig_files.dataset_folder import load_dataset
     from mrdamper.study.parallel import several
+    from mrdamper.study.workflow import run_study
 
     chosen = _model(model, gas, setting)
     head, bands = load_about(about) if about else None, load_limits(limits) if limits else ()
@@ -66,11 +67,10 @@ def study(
         _require_switched_current(dataset)
     workers = min(os.cpu_count() or 1, len(dataset.rigs))
     with progress_on_stderr() as progress, several(workers) as processes:
-        studying, writing = in_two(progress, 0.97)
-        result, drawn = study_and_draw(
-            dataset, studying, model=chosen, keep=keep, also=also, limits=bands, processes=processes
-        )
-        written = write_study(result, out, writing, about=head, limits=bands, also=also, drawn=drawn, paper=page_size)
+        studying, writing = in_two(progress, 0.85)
+        result = run_study(dataset, studying, model=chosen, keep=keep, processes=processes)
+        options = {"also": also, "paper": page_size, "processes": processes}
+        written = write_study(result, out, writing, about=head, limits=bands, **options)
     for rig in result.rigs:
         lines = [f"excluded: {one.run_id}: {one}" for one in rig.contradictions]
         lines += omission_lines(rig.candidates, rig.omitted, len(dataset) if verbose else 3)
