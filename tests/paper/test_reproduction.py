@@ -88,6 +88,12 @@ def test_every_claim_is_judged_with_numbers_and_its_threshold_printed(study):
     assert "Ali's model could not be followed" in claims["few parameters"].evidence
 
 
+def test_what_was_identified_is_marked_and_its_function_a_line(study):
+    for curve in FIGURES["fig12"].make(study, FIGURES["fig12"].axes).axes[0].series:
+        marked = curve.x.size in (0, len(CURRENTS))  # of the list, or of the tests at one motion
+        assert bool(curve.look.mark) is marked
+
+
 MOTIONS = [f"{f:g} Hz, {A:g} mm" for A, f in ((20, 1.0), (20, 1.5), (20, 2.0), (50, 0.5), (50, 1.0), (50, 1.5))]
 AMPERES = [f"{current:g} A" for current in CURRENTS]
 # Series and number of panels of every figure of the paper, as its text describes them.

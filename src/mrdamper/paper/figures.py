@@ -10,20 +10,20 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.loop_analysis import dynamic_ranges
-from mrdamper.paper.charts import FigureLayout, Panel, Series, draw
 from mrdamper.paper.claims_on_tests import friction_along
 from mrdamper.paper.options import CONSISTENT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import SAME, Reproduction, function_of, motions, rate_rows, values
 from mrdamper.physics.motion import equivalent_sine, measured_motion
 from mrdamper.physics.simulation import simulate
 from mrdamper.report.plots.comparison import overlaid_loops
-from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.figure import Axes, Figure
 from mrdamper.report.plots.rig_tests import test_analysis, test_matrix
 from mrdamper.report.plots.style import MEASURED, MM, PALETTE, Picture, current_colours, motion_name, powered, thin
 from mrdamper.statistics.functions.fitting import fit_function
@@ -31,11 +31,11 @@ from mrdamper.statistics.functions.forms import ParameterFunction, features
 from mrdamper.study.recipe import Progress
 
 _MOST_LOOPS, _LOOP_POINTS = 9, 400  # loops in one panel, points of a loop
-_LIST = {"right": 2.3}  # margin for a list of motions [inches]
-_POINTS = {"mark": "o", "ms": 3.5, "ls": "-"}
+_LINE, _SMALL = 0.9, 7  # width of a line, size of the letters of a legend [pt]
+_POINTS = {"mark": "o", "ms": 3.5, "lw": _LINE}
 
 Texts = Sequence[tuple[str, str]]  # of the axes of each panel
-Drawing = FigureLayout | Figure | str  # or why there is none
+Drawing = Figure | str  # or why there is none
 
 
 @dataclass(frozen=True)
@@ -63,12 +63,26 @@ def pictures(
     for number, name in enumerate(names):
         progress(f"figure {name}", number / len(names))
         figure = FIGURES[name].make(study, FIGURES[name].axes)
-        drawn[name] = (
-            figure
-            if isinstance(figure, str)
-            else Picture.of(draw(figure) if isinstance(figure, FigureLayout) else figure, also)
-        )
+        drawn[name] = figure if isinstance(figure, str) else Picture.of(figure, also)
     return drawn
+
+
+def _figure(axes: Texts, height: float, **margins: Any) -> Figure:
+    """Make a row of panels with these texts of the axes."""
+    figure = Figure(1, len(axes), height, **margins)
+    for panel, texts in zip(figure.axes, axes, strict=True):
+        panel.label(*texts)
+    return figure
+
+
+def _listed_above(panel: Axes) -> None:
+    """Name the curves of a panel above the figure."""
+    panel.legend("above", size=_SMALL, columns=min(sum(bool(one.label) for one in panel.series), 4))
+
+
+def _name_rows(panel: Axes, names: Sequence[str]) -> None:
+    """Write names on the vertical axis, from the top; row k lies at −k."""
+    panel.y.places, panel.y.texts = [-row for row in range(len(names))], names
 
 
 # Loops as tested, as identified and as predicted.
@@ -85,9 +99,12 @@ def _friction(study: Reproduction, axes: Texts) -> Drawing:
         return "the data hold no friction test"
     x, force = (thin(channel, 1500) for channel in (study.friction.displacement, study.friction.force))
     at, friction = friction_along(study.friction)
-    slow = Series(MM * x, force, style={"color": MEASURED, "lw": 0.6})
-    along = Series(MM * at, friction, style={"color": PALETTE[1]})
-    return FigureLayout([Panel(axes[0], [slow]), Panel(axes[1], [along], low=0.0)], 2.9, "")
+    figure = _figure(axes, 2.9)
+    slow, along = figure.axes
+    slow.plot(MM * x, force, color=MEASURED, lw=0.6)
+    along.plot(MM * at, friction, color=PALETTE[1], lw=_LINE)
+    along.y.low = 0.0
+    return figure
 
 
 def _loops_by(vary: str, place: int, study: Reproduction, axes: Texts) -> Drawing:
@@ -110,14 +127,14 @@ def _loops_by(vary: str, place: int, study: Reproduction, axes: Texts) -> Drawin
     identified = [group for group in largest if any(run.split == "train" for run, _ in group.values())]
     chosen = sorted(identified or largest, key=order)[place]
     group = [chosen[key] for key in sorted(chosen)][:_MOST_LOOPS]
-    same = ", ".join(text(group[0][1]) for name, (_, text) in _QUANTITIES.items() if name != vary)
     shades = current_colours([float(k) for k in range(len(group))])
-    lines = [
-        _loop(run, run.force, {"color": shades[float(k)]}, _QUANTITIES[vary][1](condition))
-        for k, (run, condition) in enumerate(group)
-    ]
-    over_x, over_v = zip(*lines, strict=True)
-    return FigureLayout([Panel(axes[0], over_x, same), Panel(axes[1], over_v)], margins={"right": 1.5})
+    figure = _figure(axes, 3.2, right=1.5)
+    for k, (run, condition) in enumerate(group):
+        _plot_loop(figure.axes, run, run.force, label=_QUANTITIES[vary][1](condition), color=shades[float(k)])
+    over_x, over_v = figure.axes
+    over_x.title = ", ".join(text(group[0][1]) for name, (_, text) in _QUANTITIES.items() if name != vary)
+    over_v.legend("right", size=_SMALL)
+    return figure
 
 
 def _identified(place: int, study: Reproduction, axes: Texts) -> Drawing:
@@ -140,7 +157,7 @@ def _predicted(title: str, study: Reproduction, axes: Texts) -> Drawing:
     return _tested_and_model(axes, runs, [method.damper.predict(run).force for run in runs])
 
 
-def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]) -> FigureLayout:
+def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]) -> Figure:
     """Draw force over displacement and over velocity, a column a frequency, a colour a current; the model dashed."""
     conditions = [equivalent_sine(run).condition for run in runs]
     columns: dict[float, list[int]] = {}
@@ -148,27 +165,29 @@ def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]
         near = [f for f in columns if abs(np.log(conditions[i].frequency_Hz / f)) < SAME]
         columns.setdefault(near[0] if near else conditions[i].frequency_Hz, []).append(i)
     shades = current_colours([round(c.current_A, 2) for c in conditions])
-    above, below = [], []
-    for members in list(columns.values())[:3]:
-        lines: list[tuple[Series, Series]] = []
+    shown = list(columns.values())[:3]
+    figure = Figure(2, len(shown), 5.2, right=0.9)
+    for column, members in enumerate(shown):
+        panels = figure.axes[column :: len(shown)]
         for i in sorted(members, key=lambda i: conditions[i].current_A):
-            style = {"color": shades[round(conditions[i].current_A, 2)]}
-            lines.append(_loop(runs[i], runs[i].force, style, f"{conditions[i].current_A:.3g} A"))
-            lines.append(_loop(runs[i], forces[i], {**style, "ls": "--"}))
-        first, name = conditions[members[0]], "" if above else "Force (N)"
-        over_x, over_v = zip(*lines, strict=True)
-        above.append(Panel((axes[0][0], name and axes[0][1]), over_x, motion_name(first)))
-        below.append(Panel((axes[1][0], name and axes[1][1]), over_v))
-    return FigureLayout([*above, *below], 5.2, rows=2, margins={"right": 0.9})
+            colour = shades[round(conditions[i].current_A, 2)]
+            _plot_loop(panels, runs[i], runs[i].force, label=f"{conditions[i].current_A:.3g} A", color=colour)
+            _plot_loop(panels, runs[i], forces[i], color=colour, ls="--")
+        for panel, (x, y) in zip(panels, axes, strict=True):
+            panel.label(x, "" if column else y)
+        panels[0].title = motion_name(conditions[members[0]])
+    figure.axes[len(shown) - 1].legend("right", size=_SMALL)
+    return figure
 
 
-def _loop(run: Run, force: Floats, style: Mapping[str, object], text: str = "") -> tuple[Series, Series]:
-    """Return the last cycle of a force inside a run's steady window, over displacement and over velocity."""
+def _plot_loop(panels: Sequence[Axes], run: Run, force: Floats, **look: Any) -> None:
+    """Draw the last cycle of a force inside a run's steady window, over displacement and over velocity."""
     end = run.window[1] if run.window else float(run.time[-1])
     last = (run.time <= end) & (run.time >= end - 1.02 / equivalent_sine(run).condition.frequency_Hz)
     motion = measured_motion(run)
     x, v, force = (thin(channel[last], _LOOP_POINTS) for channel in (motion.displacement, motion.velocity, force))
-    return Series(MM * x, force, text, style), Series(v, force, text, style)
+    for panel, across in zip(panels, (MM * x, v), strict=True):
+        panel.plot(across, force, lw=_LINE, **look)
 
 
 def _methods_at_currents(study: Reproduction, axes: Texts) -> Drawing:
@@ -200,23 +219,25 @@ def _over_current(name: str, form: str, study: Reproduction, axes: Texts) -> Dra
     (x, y), power = axes[0], 1.0
     if not log:
         y, power = powered(y, float(np.max(np.abs(values))))
-    shades, lines = current_colours([study.conditions[g[0]].peak_velocity for g in motions(study)]), []
+    figure = _figure([(x, y)], 3.4, right=2.3)
+    (panel,) = figure.axes
+    shades = current_colours([study.conditions[g[0]].peak_velocity for g in motions(study)])
     for group in motions(study):
         conditions = [study.conditions[i] for i in group]
         first, currents = conditions[0], np.array([c.current_A for c in conditions])
-        style = {"color": shades[first.peak_velocity]}
+        colour = shades[first.peak_velocity]
         function, text = _function_at(study, name, form, conditions, values[group])
-        lines.append(Series(currents, power * values[group], style={**style, **_POINTS, "ls": "" if form else "-"}))
+        panel.plot(currents, power * values[group], color=colour, ls="" if form else "-", **_POINTS)
         if function is not None:
             dense = np.linspace(currents.min(), currents.max(), 60)
             scale = power * (study.options.scaled(name, 1.0) if form == "whole" else 1.0)
-            lines.append(
-                Series(dense, scale * function(dense, first.frequency_Hz, first.amplitude_m) * np.ones(60), style=style)
-            )
-        style |= {**_POINTS, "ls": "" if function is None else "-"}
-        lines.append(Series([], [], f"{motion_name(first)}: {text}" if text else motion_name(first), style))
-    title = f"R² {whole.r2:.3f} over all runs" if whole and form == "whole" else ""
-    return FigureLayout([Panel((x, y), lines, title, "y" if log else "")], 3.4, margins=_LIST)
+            curve = scale * function(dense, first.frequency_Hz, first.amplitude_m) * np.ones(60)
+            panel.plot(dense, curve, color=colour, lw=_LINE)
+        name_and_fit = f"{motion_name(first)}: {text}" if text else motion_name(first)
+        panel.plot([], [], label=name_and_fit, color=colour, ls="" if function is None else "-", **_POINTS)
+    panel.title, panel.y.log = f"R² {whole.r2:.3f} over all runs" if whole and form == "whole" else "", log
+    panel.legend("right", size=_SMALL)
+    return figure
 
 
 def _function_at(
@@ -253,8 +274,11 @@ def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> 
             shares[motion_name(conditions[0]).replace(", ", "\n")] = fit.r2
     if not shares:
         return "too few currents at every motion"
-    marks = Series(range(len(shares)), list(shares.values()), "R²", {**_POINTS, "ls": ":", "color": MEASURED})
-    return FigureLayout([Panel(axes[0], [marks], columns=list(shares), low=min(0.0, *shares.values()))], 2.6, "")
+    figure = _figure(axes, 2.6)
+    (panel,) = figure.axes
+    panel.plot(range(len(shares)), list(shares.values()), label="R²", color=MEASURED, ls=":", **_POINTS)
+    panel.x.places, panel.x.texts, panel.y.low = range(len(shares)), list(shares), min(0.0, *shares.values())
+    return figure
 
 
 def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
@@ -274,20 +298,22 @@ def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Dr
     (x, y), by_speed = axes[0], name == "F0"
     y, power = powered(y, float(np.max(np.abs(level))))
     u = [MM * c.frequency_Hz * c.amplitude_m if by_speed else c.frequency_Hz for c in firsts]
-    shades, dash = current_colours([c.peak_velocity for c in firsts]), {"mark": "_", "ms": 11, "mew": 1.4, "ls": ""}
-    lines = []
+    shades, dash = current_colours([c.peak_velocity for c in firsts]), {"mark": "_", "ms": 11, "mew": 1.4}
+    figure = _figure([(x, y)], 3.0, right=2.0)
+    (panel,) = figure.axes
     for c, at, value, curve in zip(firsts, u, power * level, power * fitted, strict=True):
-        lines.append(Series([at], [value], motion_name(c), {**_POINTS, "ls": "", "color": shades[c.peak_velocity]}))
-        lines.append(Series([at], [curve], style={**dash, "color": shades[c.peak_velocity]}))
+        panel.plot([at], [value], label=motion_name(c), color=shades[c.peak_velocity], **_POINTS)
+        panel.plot([at], [curve], color=shades[c.peak_velocity], **dash)
     dense = np.linspace(min(u), max(u), 40)
     amplitudes = {round(np.log(c.amplitude_m) / SAME): c.amplitude_m for c in firsts}
     pairs = [(np.ones(40), dense / MM)] if by_speed else [(dense, A) for A in amplitudes.values()]
-    thin_line = {"lw": 0.7, "color": MEASURED, "alpha": 0.6}
-    lines += [Series(dense, power * function(0.0, f, A) * np.ones(40), style=thin_line) for f, A in pairs]
-    lines.append(Series([], [], "by the function", {**dash, "color": MEASURED}))
+    for f, A in pairs:
+        panel.plot(dense, power * function(0.0, f, A) * np.ones(40), lw=0.7, color=MEASURED, alpha=0.6)
+    panel.plot([], [], label="by the function", color=MEASURED, **dash)
     r2 = _r2(level, fitted)
-    title = f"R² {r2:.3f} over the motions" if np.isfinite(r2) else "one motion: no R²"
-    return FigureLayout([Panel((x, y), lines, title)], 3.0, margins={"right": 2.0})
+    panel.title = f"R² {r2:.3f} over the motions" if np.isfinite(r2) else "one motion: no R²"
+    panel.legend("right", size=_SMALL)
+    return figure
 
 
 def beside_current_law(function: ParameterFunction, conditions: Sequence[Condition], values: Floats) -> Floats:
@@ -308,67 +334,80 @@ def _accuracy_rate(study: Reproduction, axes: Texts) -> Drawing:
     rows = [row for row in rate_rows(study) if np.isfinite(row["nrmse_pp"])]
     if not rows:
         return "nothing predicts a validation run"
-    panels = []
-    for text, (name, scale) in zip(
-        axes, (("nrmse_pp", 100), ("mean_relative_error", 100), ("forces_until_settled", 1)), strict=True
-    ):
-        lines = []
+    figure = _figure(axes, 2.9, top=0.5)
+    scales = {"nrmse_pp": 100, "mean_relative_error": 100, "forces_until_settled": 1}
+    for panel, (name, scale) in zip(figure.axes, scales.items(), strict=True):
+        panel.y.log = name == "forces_until_settled"
         for method, colour in zip(dict.fromkeys(row["method"] for row in rows), PALETTE[1:], strict=False):
             own = [(r["current_A"], scale * r[name]) for r in rows if r["method"] == method and r[name] is not None]
             x, y = np.reshape(own, (-1, 2)).T
-            lines.append(Series(x, y, method, {**_POINTS, "color": colour}))
-        panels.append(Panel(text, lines, log="y" if name == "forces_until_settled" else ""))
-    return FigureLayout(panels, 2.9, "above", margins={"top": 0.5})
+            panel.plot(x, y, label=method, color=colour, ls="-", **_POINTS)
+    _listed_above(figure.axes[0])
+    return figure
 
 
 def _errors(study: Reproduction, axes: Texts) -> Drawing:
-    lines = []
+    if not study.held_out:
+        return "nothing predicts a validation run"
+    figure = _figure(axes, 3.4, right=2.6)
+    (panel,) = figure.axes
     for number, method in enumerate(study.contenders):
         again, place = divmod(number, 7)  # yellow is lost on white
         runs = sorted(method.validation.runs, key=lambda r: r.condition.current_A)
         errors = [100 * r.scores.nrmse_pp for r in runs]
-        style = {**_POINTS, "color": PALETTE[place], "ls": ("-", "--", ":")[min(again, 2)]}
-        lines.append(Series([r.condition.current_A for r in runs], errors, method.recipe.title, style))
-    if not study.held_out:
-        return "nothing predicts a validation run"
-    return FigureLayout([Panel(axes[0], lines, log="y")], 3.4, margins={"right": 2.6})
+        look = {"color": PALETTE[place], "ls": ("-", "--", ":")[min(again, 2)], **_POINTS}
+        panel.plot([r.condition.current_A for r in runs], errors, label=method.recipe.title, **look)
+    panel.y.log = True
+    panel.legend("right", size=_SMALL)
+    return figure
 
 
 def _genetic(study: Reproduction, axes: Texts) -> Drawing:
     if not study.genetic:
         return "no genetic search was made"
-    lines = []
+    figure = _figure(axes, 2.8, top=0.5)
+    (panel,) = figure.axes
     for check, colour in zip(study.genetic, PALETTE[1:], strict=False):
         # The search sees a part of the samples; its error is carried over to all of them.
         carried = check.minimum.history * check.reached / check.minimum.cost
         excess = np.maximum(carried / check.optimum - 1, 1e-6)
-        lines.append(Series(np.arange(1, excess.size + 1), excess, str(check.condition), {"color": colour}))
-    return FigureLayout([Panel(axes[0], lines, log="y")], 2.8, "above", margins={"top": 0.5})
+        panel.plot(np.arange(1, excess.size + 1), excess, label=str(check.condition), color=colour, lw=_LINE)
+    panel.y.log = True
+    _listed_above(panel)
+    return figure
 
 
 def _seeds(study: Reproduction, axes: Texts) -> Drawing:
     if not study.seed_errors:
         return "noise seeds need a virtual rig"
-    style = {"mark": "|", "ms": 9, "ls": "", "color": PALETTE[1]}
-    lines = [Series(100 * e, np.full(e.size, -row), style=style) for row, e in enumerate(study.seed_errors.values())]
-    return FigureLayout([Panel(axes[0], lines, rows=list(study.seed_errors), low=0.0)], 2.4, "", margins={"left": 2.2})
+    figure = _figure(axes, 2.4, left=2.2)
+    (panel,) = figure.axes
+    for row, errors in enumerate(study.seed_errors.values()):
+        panel.plot(100 * errors, np.full(errors.size, -row), "|", ms=9, color=PALETTE[1])
+    _name_rows(panel, list(study.seed_errors))
+    panel.x.low = 0.0
+    return figure
 
 
 def _sensitivity(study: Reproduction, axes: Texts) -> Drawing:
     effects, indices = study.sensitivity, study.sobol
     if not effects or indices is None:
         return "no run was identified by the consistent method"
-    rows, left = [e.name.replace("_", " ") for e in effects], [max(e.left, 1e-8) for e in effects]
-    series = ([e.effect for e in effects], "others held", PALETTE[6]), (left, "others identified anew", PALETTE[2])
-    marks = [
-        Series(x, -np.arange(len(rows)), text, {**_POINTS, "ls": "", "color": colour}) for x, text, colour in series
-    ]
+    figure = _figure(axes, 3.2, left=1.3, gap=1.3, top=0.45)
+    single, total = figure.axes
+    left = [max(e.left, 1e-8) for e in effects]
+    rows = -np.arange(len(effects))
+    single.plot([e.effect for e in effects], rows, label="others held", color=PALETTE[6], **_POINTS)
+    single.plot(left, rows, label="others identified anew", color=PALETTE[2], **_POINTS)
+    single.x.log = True
+    total.plot(indices.total, -np.arange(indices.total.size), color=PALETTE[6], **_POINTS)
     ends = zip(indices.total - indices.total_confidence, indices.total + indices.total_confidence, strict=True)
-    spans = [Series(pair, [-row, -row], style={"color": PALETTE[6]}) for row, pair in enumerate(ends)]
-    total = Series(indices.total, -np.arange(len(spans)), "", {**_POINTS, "ls": "", "color": PALETTE[6]})
-    names = [name.replace("_", " ") for name in indices.names]
-    panels = [Panel(axes[0], marks, log="x", rows=rows), Panel(axes[1], [total, *spans], rows=names)]
-    return FigureLayout(panels, 3.2, "above", margins={"left": 1.3, "gap": 1.3, "top": 0.45})
+    for row, pair in enumerate(ends):
+        total.plot(pair, [-row, -row], color=PALETTE[6], lw=_LINE)
+    for panel, names in ((single, [e.name for e in effects]), (total, indices.names)):
+        _name_rows(panel, [name.replace("_", " ") for name in names])
+    _listed_above(single)
+    return figure
 
 
 _X, _V, _F = "Displacement (mm)", "Velocity (m/s)", "Force (N)"
