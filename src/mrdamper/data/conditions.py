@@ -87,6 +87,15 @@ class Condition:
         if isinstance(self.frequency_Hz, Real) and self.frequency_Hz and not _SLOWEST <= self.frequency_Hz <= _FASTEST:
             raise ConditionError(f"frequency is {shown(self.frequency_Hz)} Hz", remedy="give hertz; zero for none")
 
+    @classmethod
+    def of_text(cls, text: str) -> Condition:
+        """Read "A,Hz,mm", as "0.5,1,20"; raises `ConditionError` if it is not three numbers of a condition."""
+        try:
+            current, frequency, amplitude = (float(part) for part in text.split(","))
+        except ValueError as error:
+            raise ConditionError(f"{text!r} is no condition", remedy="write A,Hz,mm: 0.5,1,20") from error
+        return cls(current, frequency, 1e-3 * amplitude)
+
     @property
     def peak_velocity(self) -> float:
         """Largest velocity of a sine at this condition [m/s]."""

@@ -86,13 +86,11 @@ def identify(
     if not is_a(run, Run):
         remedy = 'identify one run, identify(dataset["ID"]); run_study(dataset) identifies them all'
         raise IdentificationError(f"a {type(run).__name__} in place of a run", remedy=remedy)
-    refuse_clipped(run, clipped)
+    refuse_unusable(run, clipped)
     chosen_model = model_type(model) if isinstance(model, str) else model
     chosen_method = method_named(method) if isinstance(method, str) else method
     problem = Problem.of(run, chosen_model, free=free, fixed=fixed, gas=gas, with_delay=with_delay)
     run.current_A  # noqa: B018  refuses a varying current before anything is computed
-    if np.ptp(problem.force) == 0:
-        raise IdentificationError("the force does not change", where=f"run {run.id}", remedy="check the channel")
     where = f"run {run.id}"
     try:
         result = conclude(problem, chosen_method, chosen_method.solve(problem))
@@ -109,11 +107,13 @@ def identify(
     return result
 
 
-def refuse_clipped(run: Run, clipped: bool = False) -> None:
-    """Refuse a run with a channel cut off at its extreme: its peaks are not the damper's.
+def refuse_unusable(run: Run, clipped: bool = False) -> None:
+    """Refuse a run whose force does not change, or with a channel cut off at its extreme: not the damper's peaks.
 
-    Raises `IdentificationError` unless `clipped` runs are wanted.
+    Raises `IdentificationError`; of a channel that is cut off unless `clipped` runs are wanted.
     """
+    if np.ptp(run.force[run.in_window]) == 0:
+        raise IdentificationError("the force does not change", where=f"run {run.id}", remedy="check the channel")
     if "W_CLIPPED" in run.findings and not clipped:
         raise IdentificationError(
             "a channel is cut off at its extreme (W_CLIPPED)",

@@ -49,6 +49,8 @@ def hold_out(
         dataset has a split already that is not to be given up.
     UnknownNameError
         If a run is not there.
+    ConditionError
+        If a condition is none.
     """
     where = f"dataset {dataset.name}"
     before = [run.id for run in dataset if run.split == "validate"]
@@ -79,7 +81,7 @@ def hold_out(
         held.update(ids)
         reasons.append(f"all at {amperes:g} A")
     for text in conditions:
-        wanted = _stated(text)
+        wanted = Condition.of_text(text)
         ids = [name for name, c in condition_of.items() if c is not None and len(same_condition([wanted, c])) == 1]
         if not ids:
             raise SplitError(f"no run at {wanted}", where=where, remedy="mrdamper check shows the conditions")
@@ -105,14 +107,6 @@ def _condition(run: Run) -> Condition | None:
         return None if run.current_changes else equivalent_sine(run).condition
     except InputError:
         return None
-
-
-def _stated(text: str) -> Condition:
-    try:
-        current, frequency, amplitude = (float(part) for part in text.split(","))
-    except ValueError as error:
-        raise SplitError(f"{text!r} is no condition", remedy="write A,Hz,mm: 0.5,1,20") from error
-    return Condition(current, frequency, amplitude / 1e3)
 
 
 def _stratified(condition_of: dict[str, Condition | None], where: str) -> tuple[set[str], str]:

@@ -25,7 +25,7 @@ from mrdamper.dampers.sessions import Sessions, known_errors
 from mrdamper.data import Dataset, Displayable, Floats, Run
 from mrdamper.data.displayable import joined
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError, validate_arguments
-from mrdamper.identification import refuse_clipped
+from mrdamper.identification import refuse_unusable
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.physics.motion import analyse_motion, equivalent_sine
 from mrdamper.rig_files.quality.table import check_run, with_findings
@@ -457,11 +457,7 @@ def runs_for_global_fit(runs: Iterable[Run]) -> tuple[list[Run], dict[str, str]]
     runs_used, refused = list[Run](), dict[str, str]()
     for run in runs:
         try:
-            refuse_clipped(with_findings(run))
-            if np.ptp(run.force[run.in_window]) == 0:
-                raise IdentificationError(
-                    "the force does not change", where=f"run {run.id}", remedy="check the channel"
-                )
+            refuse_unusable(with_findings(run))
             equivalent_sine(run)  # refuses a run that does not move
             runs_used.append(run)
         except InputError as error:
@@ -543,7 +539,7 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
     kept, refused = accepted_runs(dataset)
     for run in kept:
         try:
-            refuse_clipped(with_findings(run), clipped)
+            refuse_unusable(with_findings(run), clipped)
             run.current_A  # noqa: B018
             sine = equivalent_sine(run)
             rate = (run.time.size - 1) / float(run.time[-1] - run.time[0])

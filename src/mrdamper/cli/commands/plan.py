@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 from mrdamper.cli.progress import progress_soon
-from mrdamper.errors import ConditionError, InputError
+from mrdamper.errors import InputError
 
 app = typer.Typer()
 
@@ -32,6 +32,7 @@ def plan(
     import numpy as np
 
     from mrdamper.dampers.model_file import load_model
+    from mrdamper.data import Condition
     from mrdamper.data.atomic import require_writable, write_result
     from mrdamper.data.encoding import csv_text
     from mrdamper.study.first_matrix import first_matrix
@@ -49,7 +50,8 @@ def plan(
     rows = []
     with progress_soon("planning") as tell, write_result(out) as folder:
         if damper:
-            chosen, reckoning = plan_tests(damper, allowed, hours, _doubt(about), tell)
+            doubt = Condition.of_text(about) if about and "," in about else about
+            chosen, reckoning = plan_tests(damper, allowed, hours, doubt, tell)
         else:
             chosen, reckoning = first_matrix(allowed, hours), None
         for number, item in enumerate(chosen, start=1):
@@ -74,16 +76,3 @@ def plan(
     if least := least_informative_runs(damper):
         runs = ", ".join(f"{name} ({100 * share:.1f} %)" for name, share in least)
         typer.echo(f"least informative runs: {runs} of the information")
-
-
-def _doubt(about: str | None):
-    """Return a condition where three numbers stand, else the name of a number."""
-    from mrdamper.data import Condition
-
-    if about is None or "," not in about:
-        return about
-    try:
-        current, frequency, amplitude = (float(part) for part in about.split(","))
-        return Condition(current, frequency, 1e-3 * amplitude)
-    except ValueError:
-        raise ConditionError(f"--about {about}", remedy="give A,Hz,mm, as 0.5,2,10") from None

@@ -330,10 +330,9 @@ class Search:
         sets: list[list[int]] = []
         low: list[int] = []
         high: list[int] = []
-        constant = [k for k in order if not self.tracks[k].current_changes]
-        levels = dict(zip(constant, current_levels([float(self.tracks[k].current[0]) for k in constant]), strict=True))
+        levels = self._levels(order)
         for level in sorted(set(levels.values())):
-            at = sorted((k for k in constant if levels[k] == level), key=gains.__getitem__)
+            at = sorted((k for k in levels if levels[k] == level), key=gains.__getitem__)
             for size in range(2, len(at)):
                 sets += [at[:size], at[-size:]]
             jumps = np.diff([np.log(max(gains[k], 1e-3)) for k in at])
@@ -433,18 +432,21 @@ class Search:
 
     def _may_share(self, group: tuple[int, ...], current: float) -> bool:
         """Tell whether runs may have one current: those of a level, but not all of them, or of open coils."""
-        constant = [k for k, track in enumerate(self.tracks) if not track.current_changes]
-        levels = current_levels([float(self.tracks[k].current[0]) for k in constant])
-        inside = {level for k, level in zip(constant, levels, strict=True) if k in group}
-        outside = {level for k, level in zip(constant, levels, strict=True) if k not in group}
+        levels = self._levels(range(len(self.tracks)))
+        inside = {level for k, level in levels.items() if k in group}
+        outside = {level for k, level in levels.items() if k not in group}
         return inside <= outside and (len(inside) == 1 or current <= SAME_CURRENT)
 
     def _outnumbers(self, group: tuple[int, ...]) -> bool:
         """Tell whether a group is most of the runs at one of its currents: the few others may be the wrong ones."""
-        constant = [k for k, track in enumerate(self.tracks) if not track.current_changes]
-        levels = current_levels([float(self.tracks[k].current[0]) for k in constant])
-        inside = [level for k, level in zip(constant, levels, strict=True) if k in group]
-        return any(2 * inside.count(level) > levels.count(level) for level in inside)
+        levels = self._levels(range(len(self.tracks)))
+        inside, every = [levels[k] for k in group if k in levels], list(levels.values())
+        return any(2 * inside.count(level) > every.count(level) for level in inside)
+
+    def _levels(self, runs: Iterable[int]) -> dict[int, float]:
+        """Levels of the runs of one current [A]."""
+        constant = [k for k in runs if not self.tracks[k].current_changes]
+        return dict(zip(constant, current_levels([float(self.tracks[k].current[0]) for k in constant]), strict=True))
 
     def _smaller(self, proposal: JointExplanation) -> JointExplanation:
         """Return a proposal for a group without the runs that need no explanation once the others are explained."""
