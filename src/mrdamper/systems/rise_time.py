@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from mrdamper.dampers.base import Damper
@@ -14,19 +12,10 @@ _STEP_SAMPLES = 4000
 _SETTLE = 12.0  # lags of the coil after which nothing changes any more
 
 
-@dataclass(frozen=True)
-class RiseTimes:
-    """Times from the step of current to shares of the change of force [s]."""
+def rise_times(damper: Damper) -> dict[str, float]:
+    """Measure the times of the force at constant velocity after steps of current, up and down [s].
 
-    rise_63: float  # these two with the current switched on
-    rise_90: float
-    fall_63: float  # and these switched off
-    fall_90: float
-
-
-def rise_times(damper: Damper) -> RiseTimes:
-    """Measure the times of the force at constant velocity after steps of current, up and down.
-
+    To 63 % and 90 % of the change of force: rise_63 and rise_90 with the current switched on, fall_63 and fall_90 off.
     The highest tested current is switched on and off at half the highest tested velocity. Without a coil the answer is
     the model's own. Raises `ParameterError` if the force does not change with the current.
     """
@@ -49,8 +38,9 @@ def rise_times(damper: Damper) -> RiseTimes:
     if not abs(top) > 0:
         raise ParameterError("the force does not change with the current", where=damper.title, remedy="another damper")
 
-    def when(part: np.ndarray, share: float) -> float:
-        return float((np.argmax(part >= share) + 0.5) * dt)  # the step itself takes a sample
-
-    up, down = forces[:half] / top, 1 - forces[half:] / top
-    return RiseTimes(when(up, 1 - np.exp(-1)), when(up, 0.9), when(down, 1 - np.exp(-1)), when(down, 0.9))
+    parts, shares = {"rise": forces[:half] / top, "fall": 1 - forces[half:] / top}, {63: 1 - np.exp(-1), 90: 0.9}
+    return {  # the step itself takes a sample
+        f"{way}_{percent}": float((np.argmax(part >= share) + 0.5) * dt)
+        for way, part in parts.items()
+        for percent, share in shares.items()
+    }

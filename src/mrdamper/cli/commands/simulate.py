@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -181,7 +180,7 @@ def _figures(done: Simulation, dampers: Mapping[str, Damper]) -> dict[str, Any]:
         "outside_tests": done.outside,
         "out_of_reach": done.unreachable,
         "timing": done.timing,
-        "rise_times_s": {name: asdict(rise_times(d)) for name, d in dampers.items() if d.coil},
+        "rise_times_s": {name: rise_times(d) for name, d in dampers.items() if d.coil},
         "measures": measures(done),
     }
 

@@ -74,20 +74,26 @@ def describe_copy(copy: Copy, validation: bool) -> Contradiction:
 
 
 def _force(run: Run, e: Trial) -> tuple[str, str]:
-    if e.unit.startswith("not "):
-        return (
-            f"its force is {1 / e.value:.3g} times as large, as if newtons had been read as {e.unit[4:]}",
-            _corrected(run, "force", e.value, "N", read=e.unit[4:]),
-        )
     if e.unit:
-        return (
-            f"its force is {1 / e.value:.3g} of what the others show, as if it were in {e.unit}",
-            _corrected(run, "force", e.value, e.unit, read="N"),
-        )
+        return _misread(run, "force", "N", e)
     return (
         f"its force is {1 / e.value:.3g} times what the others show: another range of the load cell, or another damper",
         _corrected(run, "force", e.value) + f", or {_specimen(run)}",
     )
+
+
+def _displacement(run: Run, e: Trial) -> tuple[str, str]:
+    if e.unit:
+        return _misread(run, "displacement", "mm", e)
+    text = f"its displacement is about {1 / e.value:.2g} times what its force shows"
+    return text, _corrected(run, "displacement", e.value)
+
+
+def _misread(run: Run, channel: str, usual: str, e: Trial) -> tuple[str, str]:
+    """Say that a channel was in the usual unit and read in another, or the other way round."""
+    true, read = (usual, e.unit[4:]) if e.unit.startswith("not ") else (e.unit, usual)
+    text = f"its {channel} is {1 / e.value:.3g} times what the others show, as if {true} had been read as {read}"
+    return text, _corrected(run, channel, e.value, true, read=read)
 
 
 def _offset(run: Run, e: Trial) -> tuple[str, str]:
@@ -110,23 +116,6 @@ def _current(run: Run, e: Trial) -> tuple[str, str]:
     return (
         f"its force is that of {_amperes(e.value)}, not of {_amperes(tested)}: {why}",
         _repeated(run, e.value),
-    )
-
-
-def _displacement(run: Run, e: Trial) -> tuple[str, str]:
-    if e.unit.startswith("not "):
-        return (
-            f"its displacement is {1 / e.value:.3g} times too large, as if millimetres had been read as {e.unit[4:]}",
-            _corrected(run, "displacement", e.value, "mm", read=e.unit[4:]),
-        )
-    if e.unit:
-        return (
-            f"its displacement is {1 / e.value:.3g} of what its force shows, as if it were in {e.unit}, not mm",
-            _corrected(run, "displacement", e.value, e.unit, read="mm"),
-        )
-    return (
-        f"its displacement is about {1 / e.value:.2g} times what its force shows",
-        _corrected(run, "displacement", e.value),
     )
 
 
