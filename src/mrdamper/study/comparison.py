@@ -23,15 +23,7 @@ from mrdamper.identification.basis import Basis
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.study.parallel import follow_each, identify_each, several
 from mrdamper.study.recipe import IdentificationCache, Progress, Recipe, RecipeResult, StudyMethod, recipes
-from mrdamper.study.workflow import (
-    accepted_runs,
-    headline_of,
-    runs_for_global_fit,
-    table_of,
-    usable_sines,
-    with_unused_runs,
-    without_contradictions,
-)
+from mrdamper.study.workflow import UsableRuns, headline_of, table_of, with_unused_runs
 
 RANKING = (
     "ranked by cross-validation over conditions; mrdamper study chooses the smallest model within one standard error "
@@ -135,7 +127,7 @@ def compare(
     begin = time.perf_counter()
     chosen = recipes(names, genetic, method)
     workers = jobs or os.cpu_count() or 1
-    rigs = [_seen(dataset.rig(name)) for name in dataset.rigs]
+    rigs = [_usable(dataset.rig(name)) for name in dataset.rigs]
     completed = [_completed(chosen, rig) for rig in rigs]
     tasks, steps = list[tuple[Basis, Run]](), list[tuple[Recipe, Sequence[Run], Sequence[Run]]]()
     for rig, (recipes_of_rig, _) in zip(rigs, completed, strict=True):
@@ -153,37 +145,18 @@ def compare(
     return Comparison(dataset, compared, time.perf_counter() - begin, workers)
 
 
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """The runs of one rig as a comparison sees them."""
-
-    dataset: Dataset
-    sines: Sequence[Run]
-    train: Sequence[Run]
-    everything: Sequence[Run]
-    held_out: Sequence[Run]
-    not_identified: Mapping[str, str]
-
-
-def _seen(rig: Dataset) -> _Seen:
-    rig, contradictions = without_contradictions(rig)
-    sines, not_identified = usable_sines(rig)
-    not_identified |= {one.run_id: str(one) for one in contradictions}
-    trusted = accepted_runs(rig)[0]
-    train, all_ids = [run for run in sines if run.split == "train"], {run.id for run in sines}
-    # Any other motion, or a current that changes: the joint model takes them too.
-    others = runs_for_global_fit(run for run in trusted if run.split == "train" and run.id not in all_ids)[0]
-    if len(train) < 3 and not others:
+def _usable(rig: Dataset) -> UsableRuns:
+    runs = UsableRuns.of(rig)
+    if len(runs.train) < 3 and len(runs.everything) == len(runs.train):
         raise IdentificationError(
             "fewer than three identification runs with a steady sine",
             where=rig.name,
             remedy="check the split column",
         )
-    held_out = [run for run in trusted if run.split == "validate"]
-    return _Seen(rig, sines, train, [*train, *others], held_out, not_identified)
+    return runs
 
 
-def _completed(chosen: Sequence[Recipe], rig: _Seen) -> tuple[list[Recipe], dict[str, str]]:
+def _completed(chosen: Sequence[Recipe], rig: UsableRuns) -> tuple[list[Recipe], dict[str, str]]:
     """Complete the recipes for a rig; and why some cannot be followed on its runs."""
     pure = [run for run in rig.train if analyse_motion(run).is_sine]
     recipes_of_rig, refused = list[Recipe](), dict[str, str]()
@@ -196,7 +169,7 @@ def _completed(chosen: Sequence[Recipe], rig: _Seen) -> tuple[list[Recipe], dict
 
 
 def _ranked(
-    rig: _Seen,
+    rig: UsableRuns,
     chosen: Sequence[Recipe],
     impossible: Mapping[str, str],
     followed: Mapping[tuple[str, str], RecipeResult | str],

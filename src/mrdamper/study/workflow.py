@@ -314,19 +314,13 @@ def study_rig(
     method, model = (model, model.name) if isinstance(model, StudyMethod) else (None, model)
     rig = dataset.rigs[0]
     progress(f"{rig or 'rig'}: loops", 0.0)
-    dataset, contradictions = without_contradictions(dataset, keep)
-    sines, refused = usable_sines(dataset)
-    loops = at_levels([analyse_loop(run) for run in sines])
-    train = [run for run in sines if run.split == "train"]
-    trusted, distrusted = accepted_runs(dataset)
-    everything, unusable = runs_for_global_fit(run for run in trusted if run.split == "train")
-    unusable |= distrusted
-    refused = {name: unusable.get(name, why) for name, why in refused.items()}
-    refused = {one.run_id: str(one) for one in contradictions} | refused
-    _require_runs(train, everything, unusable, f"rig {rig}" if rig else dataset.name)
+    runs = UsableRuns.of(dataset, keep)
+    dataset, train, everything = runs.dataset, runs.train, runs.everything
+    loops = at_levels([analyse_loop(run) for run in runs.sines])
+    _require_runs(train, everything, runs.unusable, f"rig {rig}" if rig else dataset.name)
     candidates, impossible = fit_and_score_all(
         _steps(train, everything, method, model if method is None else None),
-        [run for run in trusted if run.split == "validate"],
+        runs.held_out,
         lambda what, share: progress(f"{rig or 'rig'}: {what}", share),
         kinds=True,
     )
@@ -348,9 +342,43 @@ def study_rig(
     candidates[0], sessions_note = _with_sessions(chosen, dataset)
     impossible |= unphysical
     return RigStudy(
-        rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), refused, impossible, model is not None,
-        sessions_note, contradictions,
+        rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), runs.not_identified, impossible,
+        model is not None, sessions_note, runs.contradictions,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class UsableRuns:
+    """The runs of one rig that models are identified from and tested on."""
+
+    dataset: Dataset  # without those that contradict the others
+    contradictions: tuple[Contradiction, ...]
+    sines: Sequence[Run]  # steady, at one current
+    train: Sequence[Run]  # of the sines, those to identify from
+    everything: Sequence[Run]  # to identify a whole damper from: any motion and current
+    held_out: Sequence[Run]
+    unusable: Mapping[str, str]  # by run, why nothing is identified from it
+    not_identified: Mapping[str, str]  # by run, why it is not identified by itself
+
+    @classmethod
+    def of(cls, dataset: Dataset, keep: Collection[str] = ()) -> UsableRuns:
+        """Sort the runs of a rig; `keep` names some that may contradict the others."""
+        dataset, contradictions = without_contradictions(dataset, keep)
+        sines, refused = usable_sines(dataset)
+        trusted, distrusted = accepted_runs(dataset)
+        everything, unusable = runs_for_global_fit(run for run in trusted if run.split == "train")
+        unusable |= distrusted
+        refused = {name: unusable.get(name, why) for name, why in refused.items()}
+        return cls(
+            dataset,
+            contradictions,
+            sines,
+            [run for run in sines if run.split == "train"],
+            everything,
+            [run for run in trusted if run.split == "validate"],
+            unusable,
+            {one.run_id: str(one) for one in contradictions} | refused,
+        )
 
 
 def _require_runs(sines: Sequence[Run], usable: Sequence[Run], unusable: Mapping[str, str], where: str) -> None:
