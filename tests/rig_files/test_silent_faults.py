@@ -290,14 +290,23 @@ def test_a_filtered_sheet_beside_the_measured_one_is_left_out_and_said(tmp_path)
     assert "W_TABLE" in {finding.code for finding in record.findings}
 
 
-@pytest.mark.parametrize("copy", ["filtered/run_0.5A.csv", "run_filtered_0.5A.csv"])
-def test_a_filtered_copy_of_a_file_is_no_second_test(copy, tmp_path):
-    write(tmp_path, "run_0.5A.csv", table(NAMES))
+@pytest.mark.parametrize("name", ["run_0.5A", "run_raw_0.5A"])
+@pytest.mark.parametrize("copy", ["filtered/run_0.5A.csv", "run_filtered_0.5A.csv", "run_0.5A (Peak-Valley).csv"])
+def test_a_filtered_copy_of_a_file_is_no_second_test(name, copy, tmp_path):
+    write(tmp_path, f"{name}.csv", table(NAMES))
     (tmp_path / copy).parent.mkdir(exist_ok=True)
-    write(tmp_path, copy, table(NAMES))
+    write(tmp_path, copy, table({**NAMES, "force [N]": 0.9 * F}))
     found = import_files([tmp_path])
-    assert [record.id for record in found.records] == ["run_0.5A"]
+    assert [record.id for record in found.records] == [name]
     assert found.left_out == (copy.rpartition("/")[2],)
+
+
+def test_two_exports_of_a_test_with_other_decimals_are_one(tmp_path):
+    rows = np.column_stack([T, X, F])
+    write(tmp_path, "run_0.5A.xlsx", xlsx_bytes([["time [s]", "disp [mm]", "force [N]"], *rows.tolist()]))
+    np.savetxt(tmp_path / "a_0.5A.csv", rows, "%.4f", ",", header="time [s],disp [mm],force [N]", comments="")
+    found = import_files([tmp_path])
+    assert ([record.id for record in found.records], found.left_out) == (["a_0.5A"], ("run_0.5A.xlsx",))
 
 
 def test_a_copy_of_a_file_in_another_folder_is_no_second_test(tmp_path):

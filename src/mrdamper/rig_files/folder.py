@@ -27,7 +27,9 @@ from mrdamper.rig_files.readers.archive import (
 )
 from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RawTable, RigFileError, Source
 from mrdamper.rig_files.tests_table import NAME as TESTS
+from mrdamper.rig_files.vocabulary import words
 
+_RAW = words("raw")
 _MOST_MEMBERS = 10_000
 _PIECE = 2**20
 _NESTED = (".zip", ".gz", ".tgz", ".tar", ".bz2", ".xz", ".7z", ".rar")
@@ -82,9 +84,9 @@ def _by_number(path: Path) -> list[list[int | str]]:
 
 
 def _measured(files: list[Path], top: Path) -> list[Path]:
-    """Return the files without those called filtered, or in such a folder, beside one that is called alike."""
+    """Return the files without those called filtered, or in such a folder, beside one that is called alike, or raw."""
     computed = {file for file in files if holds(str(file.relative_to(top)), COMPUTED)}
-    names = {file: tuple(w for w in words_of(file.name) if w.casefold() not in COMPUTED) for file in files}
+    names = {file: tuple(w for w in words_of(file.name) if w.casefold() not in COMPUTED | _RAW) for file in files}
     measured = {name for file, name in names.items() if file not in computed}
     return [file for file in files if file not in computed or names[file] not in measured]
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mrdamper.data import held_current
+from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import take
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality.strokes import find_strokes
@@ -16,6 +16,7 @@ from mrdamper.rig_files.record import Record
 _ALIKE = 0.1  # relative difference of frequency and amplitude within which two motions are one
 _ALIKE_A = 0.03  # difference of the current within which two tests have the same [A]
 _SEVERAL = 2.0  # ratio of peak-to-peak forces at equal conditions that no repetition explains
+_ROUNDING = 1e-3  # of the largest value: two exports of one test differ by less, two tests by more
 _MOST_SAMPLES = 20_000
 
 _Point = tuple[float, float, float, float]
@@ -66,14 +67,34 @@ def repeated(records: Sequence[Record]) -> set[int]:
 
 
 def _of_same_samples(records: Sequence[Record], *, with_current: bool = False) -> list[list[int]]:
-    """Group the tests of equal force and displacement, by their places."""
-    groups: dict[tuple[int | bytes, ...], list[int]] = defaultdict(list)
+    """Group the tests of equal force and displacement but for the rounding of numbers, by their places."""
+    groups: list[list[int]] = []
+    peaks = [float(np.nanmax(np.abs(_sampled(record.force, record.time.size)))) for record in records]
     for i, record in enumerate(records):
-        samples = np.arange(0, record.time.size, max(1, record.time.size // _MOST_SAMPLES))
-        channels = [record.force, record.displacement, record.current if with_current else None]
-        same = (take(channel, samples).tobytes() for channel in channels if channel is not None)
-        groups[record.time.size, *same].append(i)
-    return list(groups.values())
+        near = (group for group in groups if abs(peaks[group[0]] - peaks[i]) <= _ROUNDING * peaks[i])
+        own = next((group for group in near if _same(records[group[0]], record, with_current)), None)
+        if own is None:
+            groups.append([i])
+        else:
+            own.append(i)
+    return groups
+
+
+def _same(one: Record, other: Record, with_current: bool) -> bool:
+    size = min(one.time.size, other.time.size)  # the last row may be cut off
+
+    def alike(a: Floats, b: Floats, limit: float | None = None) -> bool:
+        a, b = _sampled(a, size), _sampled(b, size)
+        return np.allclose(a, b, rtol=0, atol=limit or _ROUNDING * np.nanmax(np.abs(a)), equal_nan=True)
+
+    same = max(one.time.size, other.time.size) <= size + 1
+    same = same and alike(one.force, other.force) and alike(one.displacement, other.displacement)
+    currents = (one.current, other.current) if with_current else ()
+    return same and (not currents or alike(*currents, limit=_ALIKE_A))  # type: ignore[arg-type]
+
+
+def _sampled(channel: Floats, size: int) -> Floats:
+    return take(channel, np.arange(0, size, max(1, size // _MOST_SAMPLES)))
 
 
 def _contradict(one: _Point, other: _Point) -> bool:
@@ -99,8 +120,8 @@ def _point(record: Record) -> _Point | None:
     """Frequency [Hz], amplitude [m], current [A] and peak-to-peak force [N] of a record; None without a period."""
     if record.current is None:
         return None
-    samples = np.arange(0, record.time.size, max(1, record.time.size // _MOST_SAMPLES))
-    channels = [take(c, samples) for c in (record.time, record.displacement, record.force, record.current)]
+    channels = (record.time, record.displacement, record.force, record.current)
+    channels = [_sampled(channel, record.time.size) for channel in channels]
     there = np.all([np.isfinite(c) for c in channels], axis=0)
     time, x, force, current = (c[there] for c in channels)
     if time.size < 20:
