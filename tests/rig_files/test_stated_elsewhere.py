@@ -228,6 +228,20 @@ def test_rows_of_tables_beside_a_vector_of_currents_are_tests(tmp_path):
     expect(tmp_path, *currents)
 
 
+@pytest.mark.parametrize("text", ["columns: time [s], displacement [mm], force [N]", ""])
+def test_matrices_whose_names_tell_no_channel_are_tests(tmp_path, text):
+    tests = {
+        f"I{i}A".replace(".", "p"): np.column_stack([T, X, force(i)])[: 1400 + 50 * n] for n, i in enumerate((0.0, 0.5))
+    }
+    savemat(tmp_path / "all.mat", {**tests, "info": text})
+    stated = "".join(
+        f'[channels.{role}]\ncolumn = {i}\nunit = "{unit}"\n'
+        for i, (role, unit) in enumerate({"time": "s", "displacement": "mm", "force": "N"}.items(), 1)
+    )
+    found = import_files([tmp_path], None if text else parse_profile(stated))
+    assert [(record.current[0], record.time.size) for record in found.records] == [(0.0, 1400), (0.5, 1450)]
+
+
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_arrays_over_two_conditions_have_their_samples_along_any_dimension(tmp_path, axis):
     forces = np.array([[force(current) * share for share in (1.0, 0.9)] for current in (0.0, 0.5, 1.0)])
@@ -501,7 +515,7 @@ def test_cycles_that_a_column_counts_are_one_test(tmp_path):
 def test_currents_of_a_list_beside_the_files(name, text, encoding, tmp_path):
     for n, current in enumerate((0.0, 0.0, 0.5), 1):
         stem = f"L{1 if n < 3 else 2}_{'abc'[n - 1]}" if name == "levels.csv" else f"t{n:02d}"
-        table(tmp_path / f"{stem}.csv", ["Time [s],Displacement [mm],Force [N]"], T, X, force(current) + 0.001 * n)
+        table(tmp_path / f"{stem}.csv", ["Time [s],Displacement [mm],Force [N]"], T, X, force(current) + 2.0 * n)
     (tmp_path / name).write_text(text, encoding)
     assert [record.current[0] for record in import_files([tmp_path]).records] == [0.0, 0.0, 0.5]
 

@@ -29,6 +29,7 @@ DEEPEST = 8  # levels
 _MOST_TEXT = 200  # characters
 _HEAD = re.compile(r"_?(?:header|info|properties|attributes|meta(?:data)?)$", re.IGNORECASE)
 _BODY = re.compile(r"_?(?:data|values)$", re.IGNORECASE)
+_LISTING = re.compile(r"(?i)^\s*(?:columns?|channels?|spalten|kanäle|colonnes|names)\s*[:=]\s*")
 _CLOCK = re.compile(r"(^|[_. ])time[_. ]", re.IGNORECASE)
 
 
@@ -92,6 +93,10 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     own |= {key: channel["unit"] for key, channel in channels.items()}
     node.units = {**node.units, **{key: u for key, u in own.items() if isinstance(u, str) and is_unit(u)}}
     sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= FEWEST_SAMPLES}
+    texts = [_LISTING.sub("", value) for value in tree.values() if isinstance(value, str)]
+    node.lists += [re.split(r"\s*[,;]\s*", text.strip()) for text in texts if len(text) < _MOST_TEXT]
+    inner += [(key, {"column": tree[key]}) for key in _matrices_of_tests(tree)]
+    tree = {key: value for key, value in tree.items() if key not in {key for key, _ in inner}}
     for key, value in _paired(tree, node.units).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
             if split_name(key).role is not None or len(value) in sizes:
@@ -120,6 +125,16 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
         yield from _walk(
             value, _Node(label, [], list(node.lists), dict(node.constants), list(node.remarks), node.units), depth + 1
         )
+
+
+def _matrices_of_tests(tree: Mapping[str, Any]) -> list[str]:
+    """Return the keys of matrices that hold a test each: several, each a column a channel, whose names tell none."""
+    shapes = {k: sorted(v.shape) for k, v in tree.items() if isinstance(v, Array) and v.ndim == 2}
+    of_tests = {
+        key: shape[0] for key, shape in shapes.items() if shape[0] in range(3, 21) and shape[1] >= FEWEST_SAMPLES
+    }
+    alone = len(of_tests) > 1 and len({*of_tests.values()}) == 1 and not any(split_name(key).role for key in of_tests)
+    return list(of_tests) if alone else []
 
 
 class _JsonText(dict[str, Any]):
