@@ -141,6 +141,13 @@ def test_the_scale_of_an_amplifier_of_the_load_cell_is_not_that_of_the_current(t
     require_the_tests(tmp_path)
 
 
+def test_cells_of_a_list_may_hold_the_unit_that_its_heading_lacks(tmp_path):
+    write(tmp_path, "time [s],stroke [mm],load [N]\n")
+    rows = [f"{i};{name};2 Hz / 12 mm;{amperes:g} A\n" for i, (name, amperes) in enumerate(CURRENTS.items(), 1)]
+    (tmp_path / "programme.csv").write_text("No.;Record;Excitation;Coil\n" + "".join(rows))
+    require_the_tests(tmp_path)
+
+
 def test_a_list_of_tests_without_anything_that_names_them_is_not_applied(tmp_path):
     write(tmp_path, "time [s],stroke [mm],load [N]\n")
     (tmp_path / "tests.csv").write_text("Remark;Current / A\nfirst;0.2\nsecond;0.9\nthird;0.0\n")

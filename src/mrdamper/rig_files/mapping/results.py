@@ -208,6 +208,7 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
         if sum(map(bool, row)) < 2:  # most lines are one cell where another character separates them
             continue
         columns = [i for i, cell in enumerate(row) if cell and not _NUMBER.fullmatch(cell) and _is_current(cell)]
+        columns = columns or [i for i, cell in enumerate(row) if holds(cell, COIL) and cell.isalpha()]  # above 0.5 A
         if not columns:
             continue
         below = at + 1
