@@ -242,6 +242,17 @@ def test_matrices_whose_names_tell_no_channel_are_tests(tmp_path, text):
     assert [(record.current[0], record.time.size) for record in found.records] == [(0.0, 1400), (0.5, 1450)]
 
 
+def test_a_current_in_the_first_row_of_each_test_is_that_of_its_other_rows(tmp_path):
+    lines = ["Test,Current [A],Time [s],Displacement [mm],Force [N]"]
+    for n, i in enumerate((0.0, 0.5), 1):
+        rows = zip(T, X, force(i), strict=True)
+        lines += [
+            f"{n if k == 0 else ''},{i if k == 0 else ''},{t:.3f},{x:.5f},{f:.4f}" for k, (t, x, f) in enumerate(rows)
+        ]
+    (tmp_path / "all.csv").write_text("\n".join([*lines, ""]))
+    expect(tmp_path, 0.0, 0.5)
+
+
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_arrays_over_two_conditions_have_their_samples_along_any_dimension(tmp_path, axis):
     forces = np.array([[force(current) * share for share in (1.0, 0.9)] for current in (0.0, 0.5, 1.0)])
