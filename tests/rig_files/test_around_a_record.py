@@ -118,6 +118,8 @@ RATINGS = [
     "pwm 255 = 1.5 A", "PWM 20 = 0 A", "U = 5 V -> 2 A", "2 A corresponds to 10 V", "20 mA = 5 kN", "load cell 4-20 mA",
     "coil 300 turns, 1 A nominal", "Damper type MR-2A", "Operating voltage 12 V (1 A)", "0 A at 0.4 V",
     "coil monitor = (U - 2.5) / 0.625 A", "Relay 5 A", "Coil heated with 1 A for 10 min",
+    "Motor current: 3 A", "Pump motor: 12 A", "Preconditioning: 1 A, 20 cycles", "Inrush current: 2.3 A",
+    "Current increment: 0.25 A", "Residual current: 0.0 A",
 ]  # fmt: skip
 
 
