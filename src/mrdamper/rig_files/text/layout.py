@@ -36,7 +36,7 @@ _MARKS, _DIGITS = frozenset("#%/"), frozenset("0123456789+-.")
 _FEWEST_LINES = 20  # of a text: fewer, with words among the numbers, are notes
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
-_UNIT_KEYS, _NOTES, _SCALES = words("unit"), words("notes"), words("scale") | {"offset"}
+_UNIT_KEYS, _NOTES = words("unit"), words("notes")
 _MOST_LEVELS = 4  # lines of headings
 _TELLING = 2  # columns whose names tell what they are
 _LONGEST_HEADING = 6  # words
@@ -64,6 +64,7 @@ class Layout:
     units: tuple[str, ...]
     kinds: tuple[Kind, ...]  # what the sampled cells look like
     header_line: int | None
+    units_line: int | None
     data_line: int
     trailing: bool  # every row ends with a separator
     header: str = ""  # the line of names as it stands, to find it again where it is repeated
@@ -133,6 +134,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         tuple(_unbracket(unit) for unit in units),
         kinds,
         None if header is None else header + 1,
+        None if unit_row is None else unit_row + 1,
         first + 1,
         trailing,
         "" if header is None else lines[header],
@@ -140,7 +142,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         (*(line for line in (*above, *below) if line.strip()), *notes),
         titles or _titles(above, separator, width),
         _writes(rows),
-        behind,
+        behind if any(behind) else (),
     )
 
 
@@ -360,14 +362,17 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
     prose = all(sum(_WORD.match(cell) is not None for cell in cells) >= 2 for cells in rows)
     if separator == SPACES and len(content) < _FEWEST_LINES and prose:
         raise NoTableError("E_NO_DATA", "text with numbers in it, but no rows of numbers", file=source.name)
-    few = not rows or (len(rows) == 1 and len(content) > 1 and not _is_row(sample[-1]))
-    named = few and any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
+    if not rows or (len(rows) == 1 and len(content) > 1 and not _is_row(sample[-1])):
+        named = any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
+    else:
+        named = False
     if not rows or named:
         what = "names of columns, but no row of numbers below them" if named else "no row of numbers"
         kind = RigFileError if named else NoTableError
         raise kind("E_NO_DATA", what, file=source.name, remedy="export the file again, with its data")
     width = Counter(len(cells) for cells in rows).most_common(1)[0][0]
-    first, cells = _first_of(content, width, separator)
+    labelled = 2 * sum(not cells[0] or _is_key(cells[0].strip('"')) for cells in rows) > len(rows)  # or notes beside
+    first, cells = _first_of(content, width, separator, labelled=labelled)
     trailing = width > 1 and separator != SPACES and not cells[-1] and not any(r[-1] for r in rows if len(r) == width)
     if trailing:
         over = (cells_of(line, separator) for i, line in (*before, *content) if i < first)
@@ -376,33 +381,23 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
     return first, width - trailing, trailing
 
 
-def _first_of(content: Sequence[tuple[int, str]], width: int, separator: str) -> tuple[int, list[str]]:
-    """Index and cells of the first row; a key with numbers behind it is none if lines of another kind follow.
-
-    Nor is it below units behind a key, if a line below has another: Units, mm, kN; Full scale, 50, 25.
-    """
+def _first_of(
+    content: Sequence[tuple[int, str]], width: int, separator: str, *, labelled: bool
+) -> tuple[int, list[str]]:
+    """Index and cells of the first row; a key with numbers behind it is none, unless the rows are labelled."""
     worded: tuple[int, list[str]] | None = None
-    keyed: tuple[int, list[str]] | None = None
-    keys = False
-    for (i, line), (_, below) in zip(content, [*content[1:], (0, "")], strict=True):
+    first: tuple[int, list[str]] | None = None
+    for i, line in content:
         cells = cells_of(line, separator)
-        ranges = keys and cells_of(below, separator)[:1] not in ([], [""], cells[:1])
         if not _is_row(cells):
-            keyed, worded = None, worded or (i, cells)
-            keys |= cells[0].strip('"').casefold() in _UNIT_KEYS and is_units(cells[1:])
+            first, worded = None, worded or (i, cells)
         elif len(cells) == width and not _is_key(cells[0].strip('"')):
-            return keyed or (i, cells)
-        elif (
-            ranges or cells[0].strip('"').casefold() in _SCALES or (width > 2 and len({*filter(None, cells[1:])}) == 1)
-        ):
-            keyed = None  # a key with the scales of the columns, or one value for all of them
-        elif len([cell for cell in cells if is_unit(cell)]) > 1:
-            keyed = None  # units beside a start and a step: Sequence, Volt, Volt, 0, 0.002
-        elif len(cells) == width:
-            keyed = keyed or (i, cells)
-    first = keyed or worded
-    assert first is not None
-    return first
+            return first or (i, cells)
+        elif len(cells) == width and labelled:
+            first = first or (i, cells)
+    found = first or worded
+    assert found is not None
+    return found
 
 
 def _is_key(cell: str) -> bool:
