@@ -16,7 +16,7 @@ because y^n is not smooth there.
 
 This is a file of its own because it is the numerics of a function; `hysteresis` is the
 mechanics and knows only the methods of `MasterCurve`. Each takes floats with `xp=math`, or
-arrays with `xp=numpy`, and a single rho.
+arrays and symbols with `xp=numpy`, and a single rho.
 """
 
 from __future__ import annotations
@@ -33,7 +33,6 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data.arrays import Floats
-from mrdamper.tracing import functions
 from mrdamper.tracing.expression import Expression, choose, settled
 
 CEILING = 11.0  # largest |w| a motion may start from
@@ -166,7 +165,7 @@ class _Tabulated(MasterCurve):
     def climb(self, w: Value, phi: Value, xp: ModuleType) -> Value:
         if xp is math:
             return self._fall_from(w, phi, xp) if w > 1 else self._climb_from(w, phi, xp)
-        if xp is functions:  # a stream starts at rest and never gets above 1
+        if isinstance(phi, Expression):  # a stream starts at rest and never gets above 1
             return self._climb_from(w, phi, xp)
         above = w > 1
         reached = np.empty_like(phi)

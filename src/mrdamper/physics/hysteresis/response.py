@@ -14,7 +14,7 @@ from mrdamper.errors import ParameterError
 from mrdamper.physics.hysteresis.master_curve import CEILING, STEEPEST, MasterCurve, master_curve
 from mrdamper.physics.hysteresis.shape import Shape
 from mrdamper.physics.motion.path import Path
-from mrdamper.tracing import Tape, choose, functions, streamed
+from mrdamper.tracing import Tape, choose, streamed
 
 
 def follow_step(tape: Tape, shape: Shape, path: Any, zeta0: ArrayLike = 0.0) -> Any:
@@ -46,7 +46,7 @@ def step(shape: Shape, zeta: Any, dx: Any) -> Any:
     Plain or traced. The caller vouches for the start: nothing is checked here.
     """
     curve, back = master_curve(shape.n), dx < 0
-    xp = math if isinstance(back, bool) else functions
+    xp = math if isinstance(back, bool) else np
     w = choose(back, lambda: -zeta, lambda: zeta)
     reached = advance(curve, shape.rho, w, shape.kappa * abs(dx), xp)
     return choose(back, lambda: -reached, lambda: reached)
