@@ -1,6 +1,6 @@
 """Selection of the terms of a global model by cross-validation.
 
-Terms are tried on the linearisation of one fit: leaving out a condition, a current or a session,
+Terms are tried on the linearisation of one fit: omitting a condition, a current or a session,
 with a term or without it, is then linear algebra on a few thousand rows, and only the selected
 terms are fitted.
 """
@@ -284,7 +284,7 @@ class CrossValidation:
 
     @classmethod
     def of(cls, problem: JointProblem, fit: JointFit, by: Grouping | None = None) -> CrossValidation:
-        """Linearise a problem where a fit of it ended; by default conditions are left out."""
+        """Linearise a problem where a fit of it ended; by default conditions are omitted."""
         linearised = problem.linearised(fit)
         table, owner = linearised.table, linearised.table.owner
         names = [*(a.name for a in problem.axes), *(i.name for i in problem.linear)]
@@ -368,7 +368,7 @@ def _means(errors: Errors) -> dict[str, float]:
 
 
 def _by_condition(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndarray]]:
-    """Rows left out together: of a condition, or a stretch of another record."""
+    """Rows omitted together: of a condition, or a stretch of another record."""
     rows_by_key: dict[str, list[np.ndarray]] = {}
     sines = [i for i, part in enumerate(problem.parts) if part.is_sine and not part.changes]
     conditions = [problem.parts[i].condition for i in sines]

@@ -28,7 +28,7 @@ class FoldFits:
     problem : JointProblem
         Of all runs.
     folds : iterable of sequence of int
-        Indices of runs that will be left out together.
+        Indices of runs that will be omitted together.
     searched : sequence of str
         Presets that are free in the search as well, as in that over all runs: without them others make up for what
         they do, and the search ends in another local minimum.

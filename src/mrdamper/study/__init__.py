@@ -1,1 +1,1 @@
-"""Ways from runs to a damper, tried in order and judged by conditions left out."""
+"""Ways from runs to a damper, tried in order and judged by omitted conditions."""

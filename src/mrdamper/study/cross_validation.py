@@ -1,6 +1,6 @@
 """Cross-validation of a damper by kind of fold.
 
-A fold is a set of runs that are left out together: those of a condition, a current, a motion or a session, or a
+A fold is a set of runs that are omitted together: those of a condition, a current, a motion or a session, or a
 stretch of a long record. Every run is predicted by a damper identified without its fold and scored as a whole.
 """
 
@@ -22,7 +22,7 @@ from mrdamper.study.validation import RunScore, Validation, leave_out, score_run
 
 _MOTION_TOLERANCE = 0.05  # frequencies and amplitudes this close are one motion
 _FAST_VELOCITY_RATIO = 0.8  # of the largest peak velocity, from which a motion is among the fastest
-_MIN_STRETCH_CYCLES = 12  # cycles of a long record that are left out together, at least
+_MIN_STRETCH_CYCLES = 12  # cycles of a long record that are omitted together, at least
 _MAX_STRETCHES = 8  # stretches of a record
 NO_CURRENT = "no current"  # kind of fold that is shown and that no model is ranked by: no current lies below 0 A
 _STRETCH_NOTE = "stretch of"  # note of a stretch: the record it was cut from
@@ -43,7 +43,7 @@ def cross_validate(pieces: Sequence[Run], refit: Callable[[Sequence[int]], Dampe
 
 
 def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
-    """Return indices of runs that are left out together, by kind of fold beyond a single condition.
+    """Return indices of runs that are omitted together, by kind of fold beyond a single condition.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
 
 
 def all_folds(pieces: Sequence[Run]) -> list[list[int]]:
-    """Return indices left out together in any kind of fold."""
+    """Return indices omitted together in any kind of fold."""
     return [*condition_folds(pieces), *(group for groups in folds_by_kind(pieces).values() for group in groups)]
 
 

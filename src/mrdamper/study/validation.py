@@ -242,7 +242,7 @@ def leave_out(
     ----------
     runs : sequence of Run, length N
     folds : iterable of sequence of int
-        Indices of the runs left out together.
+        Indices of the runs omitted together.
     fit : callable
         Makes a damper from the runs at the given indices.
     title : str

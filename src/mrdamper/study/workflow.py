@@ -102,7 +102,7 @@ class RigStudy(Displayable):
     asked_for : bool
         The user named the model; the evidence did not choose it.
     session_known : float or str
-        Median nrmse_pp of left-out conditions corrected by the other runs of their session, beside
+        Median nrmse_pp of omitted conditions corrected by the other runs of their session, beside
         the scores, which are of sessions nobody has seen; or why there is none.
     contradictions : tuple of Contradiction
         Runs that were set aside because they contradict the others; `dataset` is without them.
@@ -411,7 +411,7 @@ def _chosen_first(candidates: Sequence[RecipeResult], eligible: Sequence[RecipeR
 
 
 def _with_uncertainty(chosen: RecipeResult, taken: Sequence[Run]) -> RecipeResult:
-    """Return the candidate with the uncertainty that the runs it is fitted to and its left-out runs show."""
+    """Return the candidate with the uncertainty that the runs it is fitted to and its omitted runs show."""
     held = chosen.fit.at_bounds if isinstance(chosen.fit, JointFit | ModifiedFit) else ()
     beside = [score.predicted for score in chosen.cross_validated.runs if score.predicted is not None]
     away, other_sessions = (
@@ -454,7 +454,7 @@ def with_unused_runs(candidate: RecipeResult, everything: Sequence[Run]) -> Reci
 def errors_by_kind(candidates: Sequence[RecipeResult]) -> list[dict[str, Floats]]:
     """Cross-validated errors of the runs that all candidates have, by kind of fold, in the order of their names.
 
-    A run that a candidate cannot take was left out of it in every way; one that no damper could be made without
+    A run that a candidate cannot take was omitted from it in every way; one that no damper could be made without
     counts as infinitely wrong.
     """
     by_candidate: list[dict[str, Floats]] = [{} for _ in candidates]
@@ -474,7 +474,7 @@ def errors_by_kind(candidates: Sequence[RecipeResult]) -> list[dict[str, Floats]
 
 
 def _runs(candidate: RecipeResult, kind: str) -> Sequence[RunScore]:
-    """Scores of runs whose fold of a kind was left out."""
+    """Scores of runs whose fold of a kind was omitted."""
     if kind == CONDITION:
         return candidate.cross_validated.runs
     return candidate.by_kind[kind].runs if kind in candidate.by_kind else ()

@@ -36,7 +36,7 @@ class FunctionFit:
 
 @dataclass(frozen=True, eq=False)
 class _Fitted:
-    """A fitted function with what its errors at values left out follow from."""
+    """A fitted function with what its errors at omitted values follow from."""
 
     fit: FunctionFit
     basis: Floats  # (N, terms), orthonormal, of the weighted columns

@@ -21,7 +21,7 @@ from mrdamper.data import Condition, Floats, current_levels, same_condition, sam
 from mrdamper.statistics.functions.forms import Form, ParameterFunction
 from mrdamper.statistics.functions.motion_hull import MotionHull
 
-Errors = Mapping[str, Floats]  # by kind of fold: the error of every unit left out, in one order for all models
+Errors = Mapping[str, Floats]  # by kind of fold: the error of every omitted unit, in one order for all models
 BEYOND = 1.2  # largest current [of the largest tested] up to which a function obeys physics
 _CLEAR = 2.0  # standard errors of a difference that no other kind of fold outweighs
 _ROUNDING = 1e-12  # relative difference of errors below which they are equal
@@ -42,7 +42,7 @@ def smaller_wins(smaller: Errors, larger: Errors) -> bool:
     Parameters
     ----------
     smaller, larger : mapping of str to (N,) array
-        Errors of the same units left out, by kind of fold. Kinds that only one of them has do not count.
+        Errors of the same omitted units, by kind of fold. Kinds that only one of them has do not count.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def _mean_and_variance(values: Floats) -> tuple[float, float]:
 
 
 def fold_groups(conditions: Sequence[Condition]) -> dict[str, list[list[int]]]:
-    """Group the indices of conditions left out together, by kind of fold: a condition, an inner current, a motion.
+    """Group the indices of conditions omitted together, by kind of fold: a condition, an inner current, a motion.
 
     A form is chosen for what lies between the tested currents: a fold without the lowest or the
     highest one would ask for an extrapolation that no law over two remaining levels supports.
