@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from mrdamper import import_files
 from mrdamper.rig_files.profile import Profile
+from mrdamper.rig_files.text.short import short_lines
 
 T = np.arange(1001) / 200.0
 X = 12.0 * np.sin(2 * np.pi * T)
@@ -66,6 +68,20 @@ def test_units_and_currents_of_a_yaml_file_for_all_files(tmp_path):
     require_the_tests(tmp_path)
     (tmp_path / "campaign.yaml").write_text(text.replace(", current: A", ""))  # 0.2 of what?
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
+
+
+def test_a_yaml_file_with_nodes_within_nodes_and_one_that_repeats_itself_without_end(tmp_path):
+    write(tmp_path, "time [s],stroke [mm],load [N]\n")
+    coil = "rig:\n  coil:\n    current: {value: 0.4, unit: A}\n"
+    for name in CURRENTS:
+        (tmp_path / f"{name}.yaml").write_text(coil)
+    assert {record.current[0] for record in import_files([tmp_path]).records} == {0.4}
+    repeated = "a: &a []\n" + "".join(
+        f"{key}: &{key} [{', '.join([f'*{before}'] * 10)}]\n" for before, key in pairwise("abcdefghi")
+    )
+    assert short_lines(tmp_path / "m07.yaml") == ["current: 0.4 A"]
+    (tmp_path / "m07.yaml").write_text(coil + repeated)
+    assert short_lines(tmp_path / "m07.yaml") == []
 
 
 def test_currents_of_a_table_in_a_readme_are_taken_and_those_of_names_compared_with_it(tmp_path):

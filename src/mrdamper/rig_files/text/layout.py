@@ -395,9 +395,9 @@ def _first_of(
             return first or (i, cells)
         elif len(cells) == width and labelled:
             first = first or (i, cells)
-    found = first or worded
-    assert found is not None
-    return found
+    row = first or worded
+    assert row is not None
+    return row
 
 
 def _is_key(cell: str) -> bool:

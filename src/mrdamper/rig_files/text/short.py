@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,8 +21,6 @@ from mrdamper.rig_files.vocabulary import words
 
 _LARGEST = 2**18  # bytes
 _RULE = re.compile(r"[\s|:+=-]*")  # below the names of columns of a table in Markdown
-_PAIR = re.compile(r"""\s*["']?(?P<key>[^:"'{}\[\]#,]{1,60}?)["']?\s*:\s+["']?(?P<value>[^"'{},#]*?)["']?\s*""")
-_ITEM = re.compile(r"\s*-\s+(?=\S)")
 _DEEPEST, _FEWEST_TESTS = 6, 2
 _MOST_LISTED = 200  # quantities or channels
 _VALUE, _SCALE, _UNIT = words("value"), words("scale"), words("unit")
@@ -43,13 +43,11 @@ def short_lines(path: Path) -> list[str]:
         return []
     text = decoded(content) if len(content) <= _LARGEST else ""
     suffix = path.suffix.lower()
-    if suffix in (".json", ".xml"):
+    if suffix in _STRUCTURED:
         try:
-            return list(_stated(json.loads(text) if suffix == ".json" else _elements(text), ""))
+            return list(_stated(_STRUCTURED[suffix](text), ""))
         except (ValueError, RecursionError, SyntaxError, InputError):
             return []
-    if suffix in (".yaml", ".yml"):
-        return list(_stated(_mapping(text.splitlines()), ""))
     text = text.replace("`", "") if suffix == ".md" else text
     lines = [line for line in text.splitlines() if "|" not in line or not _RULE.fullmatch(line)]
     return _by_headings(lines) if len(lines) <= _MOST_LISTED else lines
@@ -88,6 +86,23 @@ def _elements(text: str) -> dict[str, Any]:
     return elements.root
 
 
+@lru_cache(maxsize=16)  # every file of a folder asks
+def _tree_of_yaml(text: str) -> Any:
+    """Return what a YAML text holds; nothing of one with aliases, which can repeat a node without end."""
+    import yaml
+
+    try:
+        aliases = any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text, yaml.SafeLoader))
+        return {} if aliases else yaml.safe_load(text)
+    except yaml.YAMLError:
+        return {}
+
+
+_STRUCTURED: Mapping[str, Callable[[str], Any]] = MappingProxyType(
+    {".json": json.loads, ".xml": _elements, ".yaml": _tree_of_yaml, ".yml": _tree_of_yaml}
+)
+
+
 def packaged_lines(path: Path) -> list[str]:
     """Return what the data package (datapackage.json) of a file's folder, or of the one above, states of the file."""
     for folder in path.parents[:2]:
@@ -100,32 +115,6 @@ def packaged_lines(path: Path) -> list[str]:
         except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
             continue  # none, or no data package
     return []
-
-
-def _mapping(lines: list[str]) -> dict[str, Any]:
-    """Return pairs, pairs in braces, and lists of objects of a YAML text; all other structure is omitted."""
-    tree: dict[str, Any] = {}
-    items: list[dict[str, Any]] = []
-    for line in (text.split(" #")[0].rstrip() for text in lines):
-        head, brace, inner = line.partition("{")
-        if brace:
-            pairs = [match for part in inner.rstrip("}").split(",") if (match := _PAIR.fullmatch(part))]
-            tree[head.strip(" :-")] = {match["key"]: _scalar(match["value"]) for match in pairs}
-            continue
-        item, match = _ITEM.match(line), _PAIR.fullmatch(_ITEM.sub("", line) + " ")
-        if item and match:
-            items.append({})
-        if match and match["value"]:
-            own = items[-1] if items and line[:1] in (" ", "-") else tree
-            own[match["key"].strip()] = _scalar(match["value"])
-    return {**tree, "tests": items}
-
-
-def _scalar(text: str) -> Any:
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: int = 0) -> Iterator[str]:
