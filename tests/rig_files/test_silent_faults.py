@@ -91,6 +91,12 @@ def test_what_is_named_beside_the_force_does_not_disturb(tmp_path):
     np.testing.assert_allclose(record.force, F, atol=1e-5)
 
 
+@pytest.mark.parametrize("measured", ["disp feedback [mm]", "disp_ist [mm]", "disp (actual) [mm]"])
+def test_a_channel_called_measured_is_taken_before_one_that_may_be_its_command(measured, tmp_path):
+    write(tmp_path, "a_0.5A.csv", table({"time [s]": T, "disp [mm]": np.roll(X, 6), measured: X, "force [N]": F}))
+    np.testing.assert_allclose(1e3 * read_run(tmp_path / "a_0.5A.csv").displacement, X, atol=1e-5)
+
+
 def test_a_sign_that_is_stated_settles_compression(tmp_path):
     path = write(tmp_path, "a_0.5A.csv", table({"time [s]": T, "compression [mm]": -X, "force [N]": F}))
     profile = guess_profile(path)

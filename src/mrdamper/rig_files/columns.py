@@ -38,7 +38,7 @@ ROLES = (*REQUIRED, *OPTIONAL)
 _DERIVED = ("velocity", "acceleration")  # of the displacement
 _MOST_RESTARTS = 0.05  # of the samples of a clock that counts within steps
 _TOTAL = re.compile(r"total|absolut|gesamt|cumulat|kumul", re.IGNORECASE)
-_INDEX = words("sample")
+_INDEX, _MEASURED = words("sample"), words("measured")
 _TIMES = re.compile(r"(?i)(?<!\w)multipl(?:y|ie[ds]?|ier|iz|ic|ik)\w*")  # no multiple, no multiplexer
 _FACTOR = re.compile(r"(?<![\w.,])[0-9]+(?:[.,][0-9]+)?(?!\w)")
 
@@ -204,6 +204,9 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
     candidates = fitting or named
     names = [headers[i].name.casefold() for i in candidates]
     if len(set(names)) > 1:
+        measured = [i for i in candidates if holds(headers[i].name, _MEASURED)]
+        if len(measured) == 1:
+            return measured[0]
         exact = [i for i, name in zip(candidates, names, strict=True) if name in WORDS[role]]
         if len({headers[i].name.casefold() for i in exact}) == 1 or (exact and role == "time"):
             return exact[0]
