@@ -234,3 +234,20 @@ def test_a_long_table_is_known_by_what_stands_in_its_columns(tmp_path):
             body += f"{name};{t:.4f};{value:.4f};{unit}\n"
     (tmp_path / "archiv.csv").write_text(f"Veličina;Čas [s];Naměřeno;Jedn.\n{body}")
     expect(tmp_path, 0.6)
+
+
+def test_tables_of_a_database_are_joined_by_their_numbers(tmp_path):
+    rows = [
+        f"{run},{channel},{t:.4f},{value:.4f}"
+        for run, amperes in enumerate(CURRENTS, 1)
+        for t, x, f in zip(T, X, force(amperes), strict=True)
+        for channel, value in ((1, x), (2, f), (3, 24.0))
+    ]
+    (tmp_path / "samples.csv").write_text("\n".join(["run_id,channel_id,t_s,value", *rows, ""]))
+    (tmp_path / "channels.csv").write_text("id,name,unit\n1,displacement,mm\n2,force,N\n3,temperature,degC\n")
+    runs = "".join(f"{run},MR-4,{amperes}\n" for run, amperes in enumerate(CURRENTS, 1))
+    (tmp_path / "runs.csv").write_text("id,damper,current_A\n" + runs)
+    expect(tmp_path, *CURRENTS)
+    (tmp_path / "samples.csv").write_text("\n".join(["run_id,channel_id,t_s,value", *rows[:-1], ""]))
+    sizes = [record.time.size for record in import_files([tmp_path]).records]
+    assert sizes == [*[T.size] * (len(CURRENTS) - 1), T.size - 1]  # the last sample is cut

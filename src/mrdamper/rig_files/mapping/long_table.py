@@ -8,13 +8,13 @@ from functools import cache
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.column_names import split_name, words_of
 from mrdamper.rig_files.readers.base import Content, RawTable, Words
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 from mrdamper.rig_files.units import is_unit
 from mrdamper.rig_files.vocabulary import words
 
-_VALUE, _CHANNEL, _UNIT = words("value"), words("channel"), words("unit")
+_VALUE, _CHANNEL, _UNIT, _NUMBER = words("value"), words("channel"), words("unit"), words("run_number")
 _MOST_CHANNELS = 60
 _FEWEST_SAMPLES = 50  # of channels whose names say nothing
 
@@ -24,7 +24,8 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
 
     Raises `RigFileError`: E_RASTER if channels of several tests have other times than the force.
     """
-    names = [name.strip(" _").casefold() for name in table.names]
+    words_in = [[word.casefold() for word in words_of(name)] for name in table.names]
+    names = ["_".join(w for w in own if w not in _NUMBER) or "_".join(own) for own in words_in]  # channel of channel_id
     value = [i for i, name in enumerate(names) if name in _VALUE]
     channel = [i for i, name in enumerate(names) if name in _CHANNEL]
     unit = [i for i, name in enumerate(names) if name in _UNIT][:1]
@@ -44,6 +45,7 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
     others = [i for i in range(len(names)) if i not in (value[0], channel[0], *unit)]
     others.sort(key=lambda i: table.headers[i].role != "time")
     rows = [np.flatnonzero(words.codes == code) for code in range(len(words.labels))]
+    rows = [own[: sizes.min()] for own in rows] if np.ptp(sizes) == 1 else rows  # the last sample is cut
     return _pivoted(table, value[0], others, words.labels, units, rows, rows[roles.get("force", int(sizes.argmax()))])
 
 
