@@ -234,6 +234,21 @@ def test_a_guessed_profile_reads_the_same_record(tmp_path, name, header, separat
     assert guess_profile(path, saved) == guess
 
 
+def test_all_units_that_lack_are_asked_for_at_once_and_those_of_a_column_that_is_asked_for(tmp_path):
+    table = np.column_stack([rows(), np.full(600, 0.5)])
+    path = write(tmp_path, "a.csv", text(table, ("time [s],disp,force,current",)))
+    with pytest.raises(InputError) as caught:
+        read_run(path)
+    remedies = [error.remedy for error in caught.value.errors]
+    channels_asked = [remedy.partition("[channels.")[2].partition("]")[0] for remedy in remedies]
+    assert channels_asked == ["displacement", "force", "current"]
+    path = write(tmp_path, "a.csv", text(table, ("clk,disp [mm],force [N],current [A]",)))
+    with pytest.raises(InputError, match=r'set \[channels.time\] column = "..." and unit = "..."'):
+        read_run(path)
+    record = read_run(path, parse_profile('[channels.time]\ncolumn = "clk"\nunit = "s"'))
+    np.testing.assert_allclose(record.time, rows()[:, 0])
+
+
 def test_the_profile_of_columns_that_the_samples_decide_on_names_those_of_the_file(tmp_path):
     samples = np.random.default_rng(1).normal(0, 0.02, 600)  # of an actuator at rest
     header = ("time [s],Axial displacement [mm],force [N],Vertical displacement [mm]",)

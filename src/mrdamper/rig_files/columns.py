@@ -25,7 +25,7 @@ from mrdamper.rig_files.column_names import (
     unknown_unit,
     words_of,
 )
-from mrdamper.rig_files.conditions import rate_in_name, stated_rate
+from mrdamper.rig_files.conditions import currents_in, rate_in_name, stated_rate
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, SIGNED
 from mrdamper.rig_files.units import DIMENSION, Unit, parse_unit
@@ -84,13 +84,10 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
             columns[role] = choice
     if not problems:
         problems += _missing(table, columns, profile)
-    assigned = {}
+    assigned: dict[str, Assigned] = {}
     for role, column in columns.items():
-        channel = profile.channel(role)
         try:
-            if role in REQUIRED and role not in table.chosen and not isinstance(channel.column, int):
-                _refuse_two_values(table, column)
-            entry = _convert(table, role, column, profile)
+            entry = _checked(table, role, column, profile, first=not problems)
         except InputError as error:
             problems.append(error)
             continue
@@ -100,6 +97,19 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
         problems += _second_clock(table, assigned["time"])
     CombinedError.raise_from(problems)
     return assigned
+
+
+def _checked(table: RawTable, role: str, column: int, profile: Profile, *, first: bool) -> Assigned | None:
+    """Return the conversion of a channel; of a current without a unit its refusal, where it is not the first."""
+    channel = profile.channel(role)
+    if role in REQUIRED and role not in table.chosen and not isinstance(channel.column, int):
+        _refuse_two_values(table, column)
+    entry = _convert(table, role, column, profile)
+    asked = role == "current" and not first and not (profile.current or currents_in(table.source.name))
+    problem = _unit_problem(table, role, column, channel.unit or table.headers[column].unit) if asked else None
+    if entry is None and problem is not None:
+        raise problem
+    return entry
 
 
 def partly_assigned(table: RawTable, profile: Profile, needed: Collection[str] = ()) -> dict[str, Assigned]:
@@ -265,8 +275,14 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
         each = ', and file = "...{run}..." where each file has one channel,'
         fixed |= {role: fixed.get(role, "") + each for role in missing if role != "time"}
     beside = f"(found {shown})"
+    bare = {r: ' and unit = "..."' for r in missing if not volts and not table.columns(dimension=DIMENSION[r])}
     return [
-        _refusal(ColumnError, table, f"no column is known to be {r} {beside}", remedy.format(r, fixed.get(r, "")))
+        _refusal(
+            ColumnError,
+            table,
+            f"no column is known to be {r} {beside}",
+            remedy.format(r, bare.get(r, "") + fixed.get(r, "")),
+        )
         for r in missing
     ]
 
