@@ -206,7 +206,7 @@ def _level_law(current: Floats, fy0: float, fy1: float, Ic: float, si: float) ->
 def _loaded(path: Path, d: float, seat: float) -> Floats:
     """φ, how far the seat is loaded."""
     play = play_position(path, d)
-    return np.sign(play) * np.maximum(0.0, np.abs(play) - (d - seat)) / seat
+    return np.sign(play) * np.maximum(0.0, np.abs(play) - (d - seat)) * (1 / seat)
 
 
 @memoize_per_path
@@ -218,7 +218,7 @@ def _along(velocity: Floats, loaded: Floats) -> Floats:
 @memoize_per_path
 def _bypass(velocity: Floats, cb: float, qb: float, yield_force: Floats) -> Floats:
     """b, what the bypass carries of the yield force."""
-    ratio = (cb * (1 + qb * _sign(velocity))) * _speed(velocity) / yield_force
+    ratio = (cb / yield_force) * (1 + qb * _sign(velocity)) * _speed(velocity)
     return ratio / np.sqrt(1 + ratio**2)
 
 

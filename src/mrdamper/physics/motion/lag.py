@@ -95,10 +95,9 @@ def load_step(tape: Tape, time: Any, path: Any, length: Any, leak: Any) -> Any:
     travelled = abs(path.step)
     for turn in path.turns:
         travelled = travelled + abs(turn)
-    built, leaked = travelled / length, time.step * leak
-    both = built + leaked
-    settled = choose(both > 0, lambda: built / both, lambda: 1.0)
-    moved = tape.select(tape.first, 1.0, settled + (held - settled) * np.exp(-both))
+    both = travelled + time.step * (leak * length)
+    settled = choose(both > 0, lambda: travelled / both, lambda: 1.0)
+    moved = tape.select(tape.first, 1.0, settled + (held - settled) * np.exp(-(1 / length) * both))
     load = choose(leak > 0, lambda: moved, lambda: 1.0)
     tape.update(held, load)
     return load
