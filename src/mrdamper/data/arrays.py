@@ -23,6 +23,8 @@ def chunks(values: NDArray[T], overlap: int = 0) -> Iterator[tuple[int, NDArray[
 
 def take(values: NDArray[T], index: NDArray[np.intp]) -> NDArray[T]:
     """Return the samples of an increasing index, without holding all of a memory-mapped array at once."""
+    if index.size == values.size <= CHUNK:
+        return values  # the same array: what is remembered of it holds
     if values.size <= CHUNK:
         return values[index]
     bounds = np.searchsorted(index, np.arange(CHUNK, values.size, CHUNK))

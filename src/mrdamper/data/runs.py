@@ -272,8 +272,9 @@ class Run(Displayable):
                 where=self._where,
                 remedy="remove these samples",
             )
-        array = array.view()
-        array.flags.writeable = False
+        if array.flags.writeable:  # else the same array: what is remembered of it holds
+            array = array.view()
+            array.flags.writeable = False
         return array
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from mrdamper.data.arrays import Floats
 from mrdamper.data.runs import Run, once_per_run
 from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.motion.path import memoize_per_path
 
 _UNIFORM = 1e-8  # spread of the sampling interval, relative, up to which it counts as one
 _ROUNDING = 4 * float(np.finfo(float).eps)  # of the largest value: a slope per sample below is made of rounding
@@ -29,13 +30,16 @@ def measured_motion(run: Run) -> Excitation:
     acceleration. The fit is centred, so no phase is lost; it never reaches across a gap in
     time. A constant current comes without the noise of its channel.
     """
-    parts = [smooth(run.time[a:b], run.displacement[a:b]) for a, b in run.segments]
-    x, v, a = (np.concatenate(p) for p in zip(*parts, strict=True))
+    if len(run.segments) == 1:
+        x, v, a = smooth(run.time, run.displacement)
+    else:
+        x, v, a = np.concatenate([smooth(run.time[a:b], run.displacement[a:b]) for a, b in run.segments], axis=1)
     return Excitation(run.time, x, v, a, run.coil_current)
 
 
-def smooth(time: Floats, signal: Floats, span: float | None = None) -> tuple[Floats, Floats, Floats]:
-    """Value, slope and curvature (N,) of local quadratics through a sampled signal (N,); sampling need not be uniform.
+@memoize_per_path
+def smooth(time: Floats, signal: Floats, span: float | None = None) -> Floats:
+    """(3, N) value, slope and curvature of local quadratics through a signal (N,); sampling need not be uniform.
 
     `span` is the width of the fit [s]; default a fortieth of the signal's characteristic period 2π
     rms(signal)/rms(slope). Never under five samples.
@@ -50,7 +54,7 @@ def smooth(time: Floats, signal: Floats, span: float | None = None) -> tuple[Flo
     c = _fits_uniform(signal, half) if uniform else _fits(time, signal, half, width, spacing)
     slope = c[:, 1]
     slope[np.abs(slope) <= _ROUNDING * np.max(np.abs(signal), initial=0.0)] = 0.0  # else its sign is the machine's
-    return signal + c[:, 0], slope / spacing, 2 * c[:, 2] / spacing**2
+    return np.stack([signal + c[:, 0], slope / spacing, 2 * c[:, 2] / spacing**2])
 
 
 def _fits(time: Floats, signal: Floats, half: int, width: int, spacing: float) -> Floats:

@@ -95,9 +95,9 @@ def memoize_per_path(function: Callable[..., Floats]) -> Callable[..., Floats]:
     memory: dict[int, tuple[ref[Any], list[tuple[tuple[Any, ...], Floats]]]] = {}
 
     @wraps(function)
-    def remembered(first: Any, *given: Any) -> Floats:
-        if not is_a(first, (np.ndarray, Path)) or len(first) > LONG:
-            return function(first, *given)
+    def remembered(first: Any, *given: Any, **options: Any) -> Floats:
+        if options or not is_a(first, (np.ndarray, Path)) or len(first) > LONG:
+            return function(first, *given, **options)
         if id(first) not in memory:
             memory[id(first)] = ref(first, lambda _, key=id(first): memory.pop(key, None)), []
         _, last = memory[id(first)]
