@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.metadata import Distribution, EntryPoint, entry_points, version
+from importlib.metadata import Distribution, EntryPoint, EntryPoints, entry_points, version
 from types import MappingProxyType, ModuleType
 from typing import Any, Generic, TypeVar
 
@@ -82,7 +82,7 @@ def provided_modules(group: str) -> tuple[tuple[EntryPoint, tuple[ModuleType, ..
         For a package other than mrdamper that cannot be loaded; it is skipped.
     """
     loaded: list[tuple[EntryPoint, tuple[ModuleType, ...] | type]] = []
-    for point in sorted(entry_points(group=group), key=_order):
+    for point in sorted(_entry_points().select(group=group), key=_order):
         try:
             _require_this_version(point.dist)
             loaded.append((point, _load(point)))
@@ -91,6 +91,12 @@ def provided_modules(group: str) -> tuple[tuple[EntryPoint, tuple[ModuleType, ..
                 raise
             skip(ExtensionPart(group, point.name, package_of(point.dist), point.value), error)
     return tuple(loaded)
+
+
+@cache
+def _entry_points() -> EntryPoints:
+    """Read the entry points of all packages, once for all groups: a file of every installed package is opened."""
+    return entry_points()
 
 
 def _order(point: EntryPoint) -> tuple[bool, str, str]:
