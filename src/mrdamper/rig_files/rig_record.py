@@ -186,13 +186,11 @@ def corrected_force(channels: dict[str, Floats], correction: Correction) -> tupl
     """Force without the inertia of what moves with the load cell and without gas force [N], and how it was made."""
     measured = channels.get("acceleration")
     acceleration = measured if measured is not None else _curvature(channels["time"], channels["displacement"])
-    force = channels["force"] - correction.moving_mass_kg * acceleration + correction.gas_force_N
     whence = "the accelerometer" if measured is not None else "the displacement"
-    notes = [f"{correction.moving_mass_kg:g} kg times acceleration by {whence} subtracted"] * bool(
-        correction.moving_mass_kg
-    )
-    notes += [f"{correction.gas_force_N:g} N of gas force added"] * bool(correction.gas_force_N)
-    return force, ", ".join(notes) or "none"
+    mass, gas = correction.moving_mass_kg, correction.gas_force_N
+    notes = [f"{mass:g} kg times acceleration by {whence} subtracted"] * bool(mass)
+    notes += [f"{gas:g} N of gas force added"] * bool(gas)
+    return channels["force"] - mass * acceleration + gas, ", ".join(notes) or "none"
 
 
 def _curvature(time: Floats, displacement: Floats) -> Floats:

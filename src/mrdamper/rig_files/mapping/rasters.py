@@ -57,9 +57,8 @@ def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
         whole = [i for i, roles_of in enumerate(roles) if {"displacement", "force"} <= roles_of]
         every = [role for roles_of in roles for role in roles_of if role not in ("time", None)]
         needed = {"displacement", "force"} <= set(every) and len(set(every)) == len(every)
-        if len(timed) < 2 or len(whole) > 1 or not needed or (whole and "current" in roles[whole[0]]):
-            continue
-        if whole and "current" not in every:
+        lacks = not whole or ("current" in every and "current" not in roles[whole[0]])
+        if len(timed) < 2 or len(whole) > 1 or not needed or not lacks:
             continue
         joined[id(timed[0])] = _joined(label, timed)
         dropped |= {id(table) for table in timed[1:]}

@@ -127,7 +127,7 @@ class _Walk:
             }
             fields |= {"units": dict(zip(item.dtype.names, units, strict=True))} if units else {}
             return {**_attributes(item), **fields} if alone else {name: {**_attributes(item), **fields}}
-        numbers = _numbers(item.attrs)
+        numbers = {key: number for key, number in _attributes(item).items() if isinstance(number, float)}
         packed = item.dtype.kind in "iu" and counts_of(item.attrs) is None
         says = {f"{name}_{key}": number for key, number in numbers.items()} if packed else {}
         unit = unit.partition(" since ")[0]  # netCDF counts time from a date
@@ -207,12 +207,6 @@ def _attributes(item: Any) -> dict[str, Any]:
         elif words := _words(value):
             says[name] = words
     return says
-
-
-def _numbers(says: Any) -> dict[str, float]:
-    """Return the attributes that are one number each."""
-    values = {key: np.asarray(says[key]) for key in list(says)[:MOST_COLUMNS]}
-    return {k: float(v.reshape(-1)[0]) for k, v in values.items() if v.dtype.kind in "iuf" and v.size == 1}
 
 
 def _words(values: Any) -> list[str]:
