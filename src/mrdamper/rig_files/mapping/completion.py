@@ -124,12 +124,9 @@ def _with_values_for_all(table: RawTable) -> RawTable:
     sections = _FULL_SCALE.finditer("\n".join(table.remarks))
     lines += [f"{m['name']}: 100 % = {m['full']} {m['unit']}" for m in sections]
     plain = {match[1]: match[2] for line in table.remarks if (match := _KEY.fullmatch(line[:_LONGEST_LINE]))}
-    lines += [
-        f"{key}: {cell} {plain[unit]}"
-        for key, cell in plain.items()
-        for unit in (f"{key}Unit", f"{key}_unit", f"{key} unit")
-        if unit in plain and looks_numeric(cell)
-    ]
+    numbers = {key: cell for key, cell in plain.items() if looks_numeric(cell)}
+    for end in ("Unit", "_unit", " unit"):
+        lines += [f"{key}: {cell} {plain[key + end]}" for key, cell in numbers.items() if key + end in plain]
     lines += [f"DELTA_T: {line[8:].strip()} s" for line in table.remarks if line.startswith("DELTA_T=")]
     return replace(table, remarks=(*table.remarks, *lines)) if lines else table
 

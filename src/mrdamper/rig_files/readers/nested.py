@@ -176,17 +176,14 @@ def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
 def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, Any]:
     """Join arrays to what describes them: Channel_1_Data to Channel_1_Header, F to time_F, units by name."""
     heads = {_HEAD.sub("", key): key for key, value in tree.items() if _HEAD.search(key) and isinstance(value, Mapping)}
-    pairs = {
-        key: heads[stem]
-        for key in tree
-        if (stem := _BODY.sub("", key)) in heads and _BODY.search(key) and isinstance(tree[key], Array)
-    }
+    bodies = {key: stem for key in tree if (stem := _BODY.sub("", key)) != key and isinstance(tree[key], Array)}
+    pairs = {key: heads[stem] for key, stem in bodies.items() if stem in heads}
     clocks = {bare: key for key in tree if (bare := _CLOCK.sub(r"\1", key, count=1)) != key and bare in tree}
     seconds = {"sample_rate", "start_time"} <= {key.casefold() for key in tree}  # exported by Dewesoft, in seconds
     used = {*pairs.values(), *clocks.values()}
     partners = {}
     for key, value in tree.items():
-        if key in pairs and isinstance(value, Array):
+        if key in pairs:
             partners[key] = {**tree[pairs[key]], "data": value}
         elif isinstance(value, Array) and isinstance(tree.get(clocks.get(key, "")), Array):
             own = {"name": key, "unit": units.get(key, ""), "data": value, "time": tree[clocks[key]]}
@@ -215,11 +212,8 @@ def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[s
     nodes = [(f"{key}_{i}" if number else key, item) for i, item in enumerate(items, 1) if isinstance(item, Mapping)]
     nodes = [(name, item) for name, item in nodes if not _is_plain(item)]
     arrays = [item for item in items if isinstance(item, Array)]
-    node.columns += [
-        column
-        for i, array in enumerate(arrays, 1)
-        for column in _across(f"{key}_{i}" if len(arrays) > 1 else key, array)
-    ]
+    for i, array in enumerate(arrays, 1):
+        node.columns += _across(f"{key}_{i}" if len(arrays) > 1 else key, array)
     return nodes
 
 
