@@ -105,13 +105,10 @@ def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displaceme
     if any(near) or (profile.channel("time").column is not None and not near):
         return
     beside = f", and the motion {measured:.3g} Hz where {min(frequencies):g} Hz are stated" if measured and near else ""
-    raise table.source.refuse(
-        "E_AMBIGUOUS",
-        f"the file states {stated:g} samples per second, its time column has {1 / step:.4g}{beside}: which is right?",
-        'set [file] sample_rate_Hz = ... in a profile, or [channels.time] column = "..." if the time column is right'
-        if not near
-        else "set [file] sample_rate_Hz = ... in a profile, or correct the line that is wrong",
-    )
+    problem = f"the file states {stated:g} samples per second, its time column has {1 / step:.4g}{beside}"
+    other = "correct the line that is wrong" if near else '[channels.time] column = "..." if the time column is right'
+    remedy = f"set [file] sample_rate_Hz = ... in a profile, or {other}"
+    raise table.source.refuse("E_AMBIGUOUS", f"{problem}: which is right?", remedy)
 
 
 def _rate_beside(table: RawTable) -> float | None:

@@ -26,13 +26,11 @@ def order_of_time(view: View) -> None:
     where = view.place(sample)
     more = f" ({len(wrong)} such places)" if len(wrong) > 1 else ""
     if before == after:
-        raise view.refused(
-            "E_TIME_DUPLICATE",
-            f"time stamp {before:.9g} s is repeated {where}{more}",
-            "write time with more decimals, or set [file] sample_rate_Hz = ... in a profile if the clock is too coarse"
-            if len(wrong) > COARSE_CLOCK * view.record.time.size
-            else "write time with more decimals, or drop the repeated rows",
-        )
+        remedy = "drop the repeated rows"
+        if len(wrong) > COARSE_CLOCK * view.record.time.size:
+            remedy = "set [file] sample_rate_Hz = ... in a profile if the clock is too coarse"
+        problem = f"time stamp {before:.9g} s is repeated {where}{more}"
+        raise view.refused("E_TIME_DUPLICATE", problem, f"write time with more decimals, or {remedy}")
     problem = f"time runs backwards {where}, from {before:.9g} s to {after:.9g} s{more}"
     raise view.refused("E_TIME_ORDER", problem, _turning_back(before - after))
 

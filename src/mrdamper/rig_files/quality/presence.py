@@ -49,13 +49,10 @@ def missing(view: View) -> Iterator[Finding]:
         share = count / absent.size
         text = f"{name}: {count} of {absent.size} samples missing ({100 * share:.3g} %), {longest} in a row at most"
         if name in USED and (share > MOST_MISSING or longest > MOST_IN_A_ROW):
-            raise view.refused(
-                "E_MISSING",
-                f"{text}, {view.place(start)}",
-                "export the channels with one clock: each has rows of its own"
-                if share > _IN_TURN and longest < absent.size / 10
-                else f"record again, or cut the record; up to 2 % and {MOST_IN_A_ROW} in a row are taken",
-            )
+            remedy = f"record again, or cut the record; up to 2 % and {MOST_IN_A_ROW} in a row are taken"
+            if share > _IN_TURN and longest < absent.size / 10:
+                remedy = "export the channels with one clock: each has rows of its own"
+            raise view.refused("E_MISSING", f"{text}, {view.place(start)}", remedy)
         yield Finding("W_MISSING", f"{text}; they are left out, not filled")
     longest, start = longest_run(~view.record.present)
     if longest > MOST_IN_A_ROW:

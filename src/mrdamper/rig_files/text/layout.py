@@ -573,12 +573,10 @@ def _mismatch(
     if fields < names and not any(line.strip() for line in lines[first + 1 :]):
         problem = f"the file ends inside its first row: {fields} of {names} fields"
         return source.refuse("E_TRUNCATED", problem, "copy or export the file again", line=first + 1)
-    comma = separator == "," and fields > names
-    return source.refuse(
-        "E_AMBIGUOUS" if comma and fields % names == 0 else "E_FIELD_COUNT",
-        f"{fields} fields under {names} names",
-        "decimal commas cannot be distinguished from separating commas: export with semicolons or decimal points"
-        if comma
-        else "export the file again with one name a column",
-        line=first + 1,
-    )
+    code, remedy = "E_FIELD_COUNT", "export the file again with one name a column"
+    if separator == "," and fields > names:
+        code = "E_FIELD_COUNT" if fields % names else "E_AMBIGUOUS"
+        remedy = (
+            "decimal commas cannot be distinguished from separating commas: export with semicolons or decimal points"
+        )
+    return source.refuse(code, f"{fields} fields under {names} names", remedy, line=first + 1)
