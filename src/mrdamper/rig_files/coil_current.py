@@ -9,7 +9,7 @@ import numpy as np
 
 from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import chunks
-from mrdamper.errors import ColumnError, InputError, printable
+from mrdamper.errors import ColumnError, printable
 from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.conditions import (
     LARGEST_STATED,
@@ -157,12 +157,8 @@ def _set_points(table: RawTable, rows: slice) -> list[Statement]:
         unit = header.known
         if unit is None or unit.dimension != "current" or not names_condition(header.name, "current"):
             continue
-        try:
-            values = table.read([column]).values[column][rows]
-        except InputError:
-            continue
-        low, high = np.nanmin(values), np.nanmax(values)
-        if low == high:
+        values = table.try_read(column)
+        if values is not None and (low := np.nanmin(values[column][rows])) == np.nanmax(values[column][rows]):
             statements.append(Statement(unit.factor * float(low), f"the column {table.names[column]!r}"))
     return statements if len({statement.amperes for statement in statements}) == 1 else []
 

@@ -69,10 +69,10 @@ def preview(path: str | Path, profile: Profile | str | Path | None = None) -> di
 
 
 def _first_cells(table: RawTable, column: int) -> list[str]:
-    try:
-        return [f"{value:g}" for value in table.read([column]).values[column][:_ROWS_SHOWN]]
-    except InputError:
+    values = table.try_read(column)
+    if values is None:
         return [table.odd[column]] if table.odd else []
+    return [f"{value:g}" for value in values[column][:_ROWS_SHOWN]]
 
 
 def _place(table: RawTable, column: str | int | None) -> int | None:

@@ -211,23 +211,15 @@ def _further(table: RawTable, assigned: dict[str, Assigned], size: int) -> dict[
             continue
         bare = re.sub(r"[^A-Za-z0-9]+", "_", header.name).strip("_")[:40].lower() or "column"
         wanted.setdefault(f"{bare}_{_KEPT[unit_of.dimension]}", (column, unit_of))
-    values = _at_once(table, [column for column, _ in wanted.values()])
+    columns = [column for column, _ in wanted.values()]
+    values = table.try_read(*columns) if columns else {}
+    if values is None:  # one of them cannot be read
+        values = {column: own[column] for column in columns if (own := table.try_read(column)) is not None}
     return {
         key: rescale(values[column], unit.factor, unit.offset)
         for key, (column, unit) in wanted.items()
         if column in values and values[column].size == size
     }
-
-
-def _at_once(table: RawTable, columns: list[int]) -> dict[int, Floats]:
-    """Columns read in one pass; one by one, where one of them cannot be read."""
-    try:
-        return dict(table.read(columns).values) if columns else {}
-    except InputError:
-        values: dict[int, Floats] = {}
-        for column in columns if len(columns) > 1 else ():
-            values |= _at_once(table, [column])
-        return values
 
 
 def thousands_in(values: Floats) -> bool:

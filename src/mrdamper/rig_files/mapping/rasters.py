@@ -9,7 +9,6 @@ from functools import cache, lru_cache
 import numpy as np
 
 from mrdamper.data import Floats, held_current
-from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding
@@ -157,10 +156,10 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
 
 def _apart(table: RawTable, clock: int, others: Iterable[int]) -> float | None:
     """Largest difference of the stamps of a row between a clock and others [s]; None where they have no common rows."""
-    try:
-        first, *rest = (_filled(table.read([i]).values[i]) * table.headers[i].factor for i in (clock, *others))
-    except InputError:
+    values = table.try_read(clock, *others)
+    if values is None:
         return None
+    first, *rest = (_filled(values[i]) * table.headers[i].factor for i in (clock, *others))
     if any(other.size != first.size for other in rest):
         return None
     return max((float(np.nanmax(np.abs(other - first))) for other in rest), default=0.0)

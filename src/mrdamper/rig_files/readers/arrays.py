@@ -251,9 +251,7 @@ def refusing_damage(source: Source, title: str) -> Iterator[None]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
-    except InputError:
-        raise
-    except (KeyboardInterrupt, SystemExit, GeneratorExit, MemoryError):
+    except (InputError, KeyboardInterrupt, SystemExit, GeneratorExit, MemoryError):
         raise
     except BaseException as error:  # a library's panic is no Exception
         raise damaged(source, title, str(error)) from error
