@@ -84,13 +84,17 @@ def test_every_operation_has_the_slope_of_its_values():
     assert along(0.4)[1] == pytest.approx(difference, rel=1e-7)
 
 
-def test_parameters_that_move_through_one_expression_share_its_factor():
+@pytest.mark.parametrize("integrated", [False, True])
+def test_parameters_that_move_through_one_expression_share_its_factor_but_beside_an_integrator(integrated):
     tape = Tape()
     p, q, x = cast(Any, tape.parameter("p", 0.4)), cast(Any, tape.parameter("q", 0.1)), cast(Any, tape.input("x"))
     ratio = p * x + q
-    outputs = with_tangents(tape, np.tanh(ratio / np.sqrt(1 + ratio * ratio)) - ratio, ["q", "p"])
-    by_q = postorder([outputs["q"]])
-    assert len(postorder([outputs["q"], outputs["p"]])) == len(by_q) + 1  # times x
+    value = np.tanh(ratio / np.sqrt(1 + ratio * ratio)) - ratio
+    if integrated:
+        value = value + tape.loop([x], lambda rest: (rest > 1.0, [0.5 * rest]), 3)[0]
+    outputs = with_tangents(tape, value, ["q", "p"])
+    more = len(postorder([outputs["q"], outputs["p"]])) - len(postorder([outputs["q"]]))
+    assert (more == 1) is not integrated  # times x
 
 
 def test_a_branch_that_is_not_taken_has_no_part_in_a_slope():

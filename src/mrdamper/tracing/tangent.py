@@ -44,7 +44,7 @@ def with_tangents(tape: Tape, output: Any, along: Sequence[str]) -> dict[str, An
     updates = dict(tape.updates)
     loops = {id(node): (node.start, node.updates) for node in nodes if isinstance(node, TracedLoop)}
     outputs = {"value": output}
-    chains = _Chains(tape)
+    chains = _Chains(tape, joined=not loops)
     for name in along:
         moving = _moving(nodes, updates, loops, name)
         slopes: dict[int, Any] = {id(tape.parameters[name]): 1.0}
@@ -72,10 +72,13 @@ def with_tangents(tape: Tape, output: Any, along: Sequence[str]) -> dict[str, An
 
 
 class _Chains:
-    """Derivatives by one parameter after the other: some written out, the others as factors of these."""
+    """Derivatives by one parameter after the other: some written out, the others as factors of these.
 
-    def __init__(self, tape: Tape):
-        self.tape = tape
+    All are written out where they are not `joined`: with an integrator's steps, whose searches end where rounding says.
+    """
+
+    def __init__(self, tape: Tape, *, joined: bool):
+        self.tape, self.joined = tape, joined
         self.factors: dict[tuple[int, int], Any] = {}  # derivatives by an expression through which all of it moves
 
     def begin(self, moving: set[int], slopes: dict[int, Any]) -> None:
@@ -87,7 +90,7 @@ class _Chains:
     def add(self, node: Expression) -> None:
         """Note what an expression moves through; where that is more than one, write its derivative out."""
         first, *others = parts = [part for part in node.args if id(part) in self.moving]
-        above: Expression | None = None if node.op in _BRANCHING else first
+        above: Expression | None = first if self.joined and node.op not in _BRANCHING else None
         for part in others:
             above = self._meet(above, part)
         if above is None:
