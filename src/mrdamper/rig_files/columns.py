@@ -85,9 +85,11 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
     if not problems:
         problems += _missing(table, columns, profile)
     assigned: dict[str, Assigned] = {}
+    stated = profile.current or currents_in(table.source.name)
     for role, column in columns.items():
         try:
-            entry = _checked(table, role, column, profile, first=not problems)
+            _refuse_two_values(table, role, column, profile)
+            entry = _convert(table, role, column, profile, asks_current=bool(problems) and not stated)
         except InputError as error:
             problems.append(error)
             continue
@@ -97,19 +99,6 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
         problems += _second_clock(table, assigned["time"])
     CombinedError.raise_from(problems)
     return assigned
-
-
-def _checked(table: RawTable, role: str, column: int, profile: Profile, *, first: bool) -> Assigned | None:
-    """Return the conversion of a channel; of a current without a unit its refusal, where it is not the first."""
-    channel = profile.channel(role)
-    if role in REQUIRED and role not in table.chosen and not isinstance(channel.column, int):
-        _refuse_two_values(table, column)
-    entry = _convert(table, role, column, profile)
-    asked = role == "current" and not first and not (profile.current or currents_in(table.source.name))
-    problem = _unit_problem(table, role, column, channel.unit or table.headers[column].unit) if asked else None
-    if entry is None and problem is not None:
-        raise problem
-    return entry
 
 
 def partly_assigned(table: RawTable, profile: Profile, needed: Collection[str] = ()) -> dict[str, Assigned]:
@@ -304,7 +293,9 @@ def sign_of(table: RawTable, profile: Profile, role: str) -> int | None:
     return table.senses.get(role) if role not in _DERIVED else sign_of(table, profile, "displacement")
 
 
-def _convert(table: RawTable, role: str, column: int, profile: Profile) -> Assigned | None:
+def _convert(
+    table: RawTable, role: str, column: int, profile: Profile, *, asks_current: bool = False
+) -> Assigned | None:
     header, channel, sign = table.headers[column], profile.channel(role), sign_of(table, profile, role)
     unit = channel.unit or header.unit
     unit = "degF" if unit == "F" and role == "temperature" else unit
@@ -312,7 +303,7 @@ def _convert(table: RawTable, role: str, column: int, profile: Profile) -> Assig
     for text in (unit, header.unit) if uncalibrated else (unit,):
         problem = _unit_problem(table, "velocity" if channel.integrate else role, column, text)
         if problem is not None:
-            if role in REQUIRED:
+            if role in REQUIRED or (role == "current" and asks_current):
                 raise problem
             return None
     if not channel.unit:
@@ -382,8 +373,10 @@ def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> Non
     raise table.source.refuse("E_AMBIGUOUS", problem, remedy, line=table.line, column=column + 1)
 
 
-def _refuse_two_values(table: RawTable, column: int) -> None:
+def _refuse_two_values(table: RawTable, role: str, column: int, profile: Profile) -> None:
     """Columns of one name must hold one thing, in whatever units."""
+    if role not in REQUIRED or role in table.chosen or isinstance(profile.channel(role).column, int):
+        return
     own = table.headers[column]
     keys = [(header.name.casefold(), header.role, header.dimension) for header in table.headers]  # t is no T
     same = [i for i, key in enumerate(keys) if own.name and key == keys[column]]
