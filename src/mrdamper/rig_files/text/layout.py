@@ -64,7 +64,6 @@ class Layout:
     units: tuple[str, ...]
     kinds: tuple[Kind, ...]  # what the sampled cells look like
     header_line: int | None
-    units_line: int | None
     data_line: int
     trailing: bool  # every row ends with a separator
     header: str = ""  # the line of names as it stands, to find it again where it is repeated
@@ -134,7 +133,6 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         tuple(_unbracket(unit) for unit in units),
         kinds,
         None if header is None else header + 1,
-        None if unit_row is None else unit_row + 1,
         first + 1,
         trailing,
         "" if header is None else lines[header],
@@ -142,7 +140,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         (*(line for line in (*above, *below) if line.strip()), *notes),
         titles or _titles(above, separator, width),
         _writes(rows),
-        behind if any(behind) else (),
+        behind,
     )
 
 
