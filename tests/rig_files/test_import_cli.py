@@ -24,7 +24,7 @@ def folder(tmp_path):
     write(raw, "one_0.5A.csv", text())
     german = text(rows(seed=2), header=("Zeit [s];Weg [mm];Kraft [N]",), separator=";", decimal=",")
     write(raw, "two_-0.3A-.csv", german, "utf-16")
-    write(raw / "b", "one_0.5A.npz", npz_bytes(**columns()))
+    write(raw / "b", "one_0.5A.npz", npz_bytes(**columns(seed=3)))
     write(raw, "notes.md", "not a rig's file")
     return raw
 
@@ -37,7 +37,7 @@ def test_a_folder_becomes_a_dataset_with_its_provenance(folder, tmp_path):
     assert [item.current_A for item in dataset] == [0.5, 0.5, 0.3]
     for item in dataset:
         # Six decimals in the text files.
-        measured = channels(seed=2 if item.id.startswith("two") else 1)["force"]
+        measured = channels(seed={"one_0.5A": 3, "one_0.5A_2": 1}.get(item.id, 2))["force"]
         np.testing.assert_allclose(item.force, measured, rtol=0, atol=1e-6)
         assert len(item.notes["sha256"]) == 64
         assert item.notes["current_from"] == "file name"

@@ -56,9 +56,9 @@ def write(folder: Path, name: str, content: str | bytes, encoding: str = "utf-8"
     return path
 
 
-def columns() -> dict[str, np.ndarray]:
+def columns(seed: int = 1) -> dict[str, np.ndarray]:
     """The columns of `NAMES`."""
-    return dict(zip(NAMES, rows().T, strict=True))
+    return dict(zip(NAMES, rows(seed=seed).T, strict=True))
 
 
 def npz_bytes(**arrays) -> bytes:
