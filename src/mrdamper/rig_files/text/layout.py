@@ -360,10 +360,8 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
     prose = all(sum(_WORD.match(cell) is not None for cell in cells) >= 2 for cells in rows)
     if separator == SPACES and len(content) < _FEWEST_LINES and prose:
         raise NoTableError("E_NO_DATA", "text with numbers in it, but no rows of numbers", file=source.name)
-    if not rows or (len(rows) == 1 and len(content) > 1 and not _is_row(sample[-1])):
-        named = any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
-    else:
-        named = False
+    few = not rows or (len(rows) == 1 and len(content) > 1 and not _is_row(sample[-1]))
+    named = few and any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
     if not rows or named:
         what = "names of columns, but no row of numbers below them" if named else "no row of numbers"
         kind = RigFileError if named else NoTableError
