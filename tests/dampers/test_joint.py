@@ -13,7 +13,7 @@ from support.dampers import joint_damper
 
 from mrdamper.dampers import joint
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.concatenated_runs import RunRows, concatenate
+from mrdamper.dampers.concatenated_runs import RunRows, concatenate, envelope_of
 from mrdamper.dampers.envelope import UNTESTED, Envelope
 from mrdamper.dampers.joint import FALL, RISE, JointDamper, JointFit, JointProblem, damper_of
 from mrdamper.dampers.model_file import dump_model, parse_model
@@ -262,12 +262,12 @@ def test_scales_and_ranges_are_those_of_the_runs(runs, problem):
     plain = Envelope.of([sine_.condition, other.condition])
     extent = np.array([[other.lowest, other.highest]])
     wider = plain.with_motion(other.motion.current, extent, other.motion.velocity)
-    assert joint._envelope([sine_, other]) == wider != plain
-    assert joint._envelope([sine_]) == Envelope.of([sine_.condition])
+    assert envelope_of([sine_, other]) == wider != plain
+    assert envelope_of([sine_]) == Envelope.of([sine_.condition])
     extent = np.array([[sine_.lowest, sine_.highest]])
     conditions = [sine_.condition, *extreme_strokes(sine_.motion)]
     rough = Envelope.of(conditions).with_motion(sine_.motion.current, extent, sine_.motion.velocity)
-    assert joint._envelope([replace(sine_, is_sine=False)]) == rough
+    assert envelope_of([replace(sine_, is_sine=False)]) == rough
 
 
 def test_starts_are_tried_on_six_runs_and_a_single_start_is_taken_as_it_is(runs, problem, monkeypatch):

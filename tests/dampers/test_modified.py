@@ -164,7 +164,7 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
 
         def only(self, rows):
             asked.update(rows=rows)
-            return SimpleNamespace(conditions=tuple(CONDITIONS[i] for i in rows))
+            return "part"
 
     def chosen(data, candidates, shapes, dissipating):
         asked.update(candidates=candidates, shapes=shapes, dissipating=dissipating)
@@ -178,9 +178,11 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
     monkeypatch.setattr(modified, "condense", condensed)
     monkeypatch.setattr(modified, "choose_forms", chosen)
     monkeypatch.setattr(modified, "fit_jointly", lambda part, forms, start: SimpleNamespace(parameters=parameters))
-    fit, refit = modified.fit_modified_jointly(("runs",), identified(by_the_papers_laws), {"a": "b"})
+    rows = SimpleNamespace(of=lambda c: SimpleNamespace(condition=c, changes=False, is_sine=True))
+    monkeypatch.setattr(modified, "RunRows", rows)
+    fit, refit = modified.fit_modified_jointly(tuple(CONDITIONS), identified(by_the_papers_laws), {"a": "b"})
     lengths = [by_the_papers_laws(c).yield_displacement for c in CONDITIONS]
-    assert (asked["runs"], asked["cls"], asked["more"]) == (("runs",), BoucWen, ("m",))
+    assert (asked["runs"], asked["cls"], asked["more"]) == (tuple(CONDITIONS), BoucWen, ("m",))
     assert asked["dissipating"]["yield_force"] == "N"
     assert fit.refused == {"c: plane": "negative at 0 A"}
     assert asked["shapes"] == pytest.approx(np.array(lengths))

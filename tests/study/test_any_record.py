@@ -53,6 +53,8 @@ def test_random_records_alone_are_fitted_by_laws_of_the_current_and_by_no_model_
     assert {"bingham:current", "bouc-wen:current", "play-bypass"} <= {c.recipe.name for c in study.rigs[0].candidates}
     assert study.table["rig"][0] == "roads"
     assert _parameters_table(study).splitlines()[1].startswith("roads,c.0,")
+    for damper in (candidate.damper for candidate in study.rigs[0].candidates):
+        assert {flag for run in runs[:4] for flag in damper.predict(run).extrapolation} <= {"sampling"}, damper.title
     page = study.write_report(tmp_path / "report")[0].read_text(encoding="utf-8")
     assert "No run is a steady sine" in page
     assert "Validation runs, last cycle of the steady window" in page

@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.coil import Coil
+from mrdamper.dampers.envelope import Envelope
 from mrdamper.data import Condition, Floats, Run, index_at
 from mrdamper.errors import RunError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.models.base import Model
 from mrdamper.models.recorded import force_tangents
 from mrdamper.physics.motion.excitation import Excitation
-from mrdamper.physics.motion.sines import centred_motion, equivalent_sine
+from mrdamper.physics.motion.sines import centred_motion, equivalent_sine, extreme_strokes
 from mrdamper.statistics.levenberg_marquardt import forward_differences, least_squares
 from mrdamper.statistics.linear import robust_weights, solve_bounded
 
@@ -128,6 +129,17 @@ class RunRows:
             share=self.share[kept] / self.share[kept].sum(),
             steady=(int(self.picked[kept[0]]) - begin, end - 1 - begin),
         )
+
+
+def envelope_of(parts: Sequence[RunRows]) -> Envelope:
+    """Return the ranges of the sines at one current, and every sample and the extreme strokes of the others."""
+    others = [part for part in parts if part.changes or not part.is_sine]
+    strokes = [stroke for part in others if not part.is_sine for stroke in extreme_strokes(part.motion)]
+    envelope = Envelope.of([*(part.condition for part in parts), *strokes])
+    extent = np.array([[part.lowest, part.highest] for part in others])
+    for part in others:
+        envelope = envelope.with_motion(part.motion.current, extent, part.motion.velocity)
+    return envelope
 
 
 def _carrying(motion: Excitation, condition: Condition) -> NDArray[np.bool_]:

@@ -21,16 +21,15 @@ from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper, Saved, not_held
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.concatenated_runs import JointResiduals, Linearisation, RunRows
+from mrdamper.dampers.concatenated_runs import JointResiduals, Linearisation, RunRows, envelope_of
 from mrdamper.dampers.current_levels import undetermined
-from mrdamper.dampers.envelope import UNTESTED, Envelope
+from mrdamper.dampers.envelope import UNTESTED
 from mrdamper.dampers.uncertainty import FittedParameter
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
 from mrdamper.models.recorded import force_tangents
 from mrdamper.physics.motion.excitation import Excitation
-from mrdamper.physics.motion.sines import extreme_strokes
 from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares, newton_refine
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.statistics.stop_reason import StopReason
@@ -429,7 +428,7 @@ class JointProblem:
 
     def _damper(self, model: Model, point: Floats, parts: Sequence[RunRows]) -> JointDamper:
         about = {"runs": str(len(parts)), "fit": "global fit, all runs"}
-        coil, envelope = self.coil_at(point), _envelope(parts)
+        coil, envelope = self.coil_at(point), envelope_of(parts)
         return JointDamper(model, self.free, rig=self.rig, envelope=envelope, provenance=about, coil=coil)
 
     def coil_at(self, point: Floats) -> Coil | None:
@@ -508,17 +507,6 @@ class JointProblem:
         values = {axis.name: axis.value(float(u)) for axis, u in zip(self.axes, point, strict=True)}
         values = {name: value for name, value in values.items() if name not in (RISE, FALL)}
         return self.model_type.build({**self.fixed, **values, **{info.name: 0.0 for info in self.linear}})
-
-
-def _envelope(parts: Sequence[RunRows]) -> Envelope:
-    """Ranges of the sines at one current, and every sample and the extreme strokes of the others."""
-    others = [part for part in parts if part.changes or not part.is_sine]
-    strokes = [stroke for part in others if not part.is_sine for stroke in extreme_strokes(part.motion)]
-    envelope = Envelope.of([*(part.condition for part in parts), *strokes])
-    extent = np.array([[part.lowest, part.highest] for part in others])
-    for part in others:
-        envelope = envelope.with_motion(part.motion.current, extent, part.motion.velocity)
-    return envelope
 
 
 def _scale(parts: Sequence[RunRows]) -> Scale:

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Saved, not_held
+from mrdamper.dampers.concatenated_runs import RunRows, envelope_of
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.normal_equations import ABSENT, Condensed, Law, choose_forms, condense, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
@@ -273,20 +274,22 @@ def fit_modified_jointly(
     start = joint.parameters.functions.get(data.shape)
     about = {**(provenance or {}), **_about_forms(joint.parameters.functions)}
 
-    def model(part: Condensed, parameters: ParameterMap) -> ModifiedModel:
-        held = replace(parameters, motions=MotionHull.of(part.conditions))
-        rig, envelope = identifications[0].rig, Envelope.of(part.conditions)
+    parts = [RunRows.of(run) for run in runs]
+
+    def model(rows: Sequence[int], parameters: ParameterMap) -> ModifiedModel:
+        held = replace(parameters, motions=MotionHull.of([data.conditions[i] for i in rows]))
+        rig, envelope = identifications[0].rig, envelope_of([parts[i] for i in rows])
         return ModifiedModel(held, rig=rig, envelope=envelope, provenance=dict(about))
 
     def refit(rows: Sequence[int]) -> ModifiedModel:
-        part = data.only(rows)
-        return model(part, fit_jointly(part, forms, start).parameters)
+        return model(rows, fit_jointly(data.only(rows), forms, start).parameters)
 
     functions = joint.parameters.functions
     values = {name: np.array([_coordinate(i, name) for i in identifications]) for name in functions}
     fits = {name: assess(function, data.conditions, values[name]) for name, function in functions.items()}
     at_bounds = tuple(dict.fromkeys((*joint.at_bounds, *functions_at_bounds(joint.parameters, data.conditions))))
-    fit = ModifiedFit(model(data, joint.parameters), fits, values, data.conditions, at_bounds, chosen.refused)
+    damper = model(range(len(runs)), joint.parameters)
+    fit = ModifiedFit(damper, fits, values, data.conditions, at_bounds, chosen.refused)
     return fit, refit
 
 
