@@ -356,3 +356,24 @@ def test_runs_of_which_none_agrees_with_another_are_refused(sound):
     factors = np.exp(np.random.default_rng(4).uniform(-2, 2, len(sound)))
     with pytest.raises(ContradictionError):
         find_contradictions([replace(run, force=g * run.force) for run, g in zip(sound, factors, strict=True)])
+
+
+def test_a_bypass_that_carries_the_slow_motions_accuses_no_run():
+    """A dashpot over a spring below the yield force: slow loops have no yield displacement, which a leak describes."""
+    points = [(i, f, a) for i in (0.0, 0.4, 0.8, 1.2, 1.5) for a in (0.008, 0.02) for f in (0.5, 1.5, 4.0)]
+    current, frequency, amplitude = np.array(points).T
+    yield_force = 60 + 1150 * (current / 1.5) ** 1.4
+    steps, cycles = 4000, 4
+    dt, force = 1 / frequency / steps, np.zeros((cycles * steps, len(points)))
+    for k in range(1, len(force)):
+        v = 2 * np.pi * frequency * amplitude * np.cos(2 * np.pi * k / steps)
+        before = force[k - 1]
+        flow = before / 3e4 + np.sign(before) * np.maximum(np.abs(before) - yield_force, 0) / 1700
+        force[k] = before + 2e6 * (v - flow) * dt
+    rng, runs = np.random.default_rng(1), []
+    for n, (i, f, a) in enumerate(points):
+        time = np.arange(len(force))[::20] * dt[n]
+        gain, noise = 1 + 0.01 * rng.normal(), 4 * rng.normal(size=time.size)
+        x, own = a * np.sin(2 * np.pi * f * time), force[::20, n]
+        runs.append(Run(f"t{n:02d}", time, x, gain * own + 900 * x + 25 + noise, np.full(time.size, i)))
+    assert find_contradictions(runs) == []

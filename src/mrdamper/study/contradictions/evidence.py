@@ -2,7 +2,7 @@
 
 The force of a run is linear in elements of a damper: offset, spring, mass, viscous damping, friction
 over velocity, friction whose sign depends on the displacement, too, and stop operators, which are
-elastic-plastic elements [Prandtl and Ishlinskii]; every coefficient is a smooth function of the
+elastic-plastic elements [Prandtl and Ishlinskii] and may leak; every coefficient is a smooth function of the
 current, a Gaussian process. Gain and offset of a run vary as they do between sessions. The logarithm
 of the evidence (marginal likelihood) of a set of runs follows from sums over its runs, so that
 leaving out a run or changing it costs one factorisation.
@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import product
 from typing import TypeVar
 
 import numpy as np
@@ -23,11 +24,13 @@ from mrdamper.statistics.linear import inverse_of_triangle
 from mrdamper.study.contradictions.tracks import Track
 
 _YIELDS = (0.015, 0.06, 0.2, 0.6)  # yield displacements of the stop operators, relative to the median amplitude
+# Yield displacements of stop operators that leak, and velocities from which they yield: a bypass over a compliance.
+_LEAKY = tuple(product((0.06, 0.2), (0.3, 1.0)))
 _VELOCITIES = (0.03, 0.1, 0.3)  # velocities at which friction saturates, relative to the median peak velocity
 _LEADS = (0.1, 0.4)  # displacements that count as velocity in friction, relative to the median amplitude
 R = TypeVar("R", "Moments", "RowProducts")
 T = TypeVar("T")
-_ELEMENTS = 7 + len(_VELOCITIES) + len(_LEADS) + len(_YIELDS)
+_ELEMENTS = 7 + len(_VELOCITIES) + len(_LEADS) + len(_YIELDS) + len(_LEAKY)
 _MAX_ELEMENT = 20.0  # size of an element relative to its usual one
 _MAX_NODES = 7  # currents at which coefficients are estimated
 _COMMON_DEVIATION, _SLOPE_DEVIATION = 1.5, 1.5  # standard deviations of a coefficient, relative to the median force
@@ -48,6 +51,8 @@ class AssumedScatter:
     saturation: float = 4.0
     # standard deviation of a coefficient about the course that all have over the current, relative to the median force
     bend: float = 0.8
+    # weight of the stop operators that leak: none, or that of the other elements
+    leak: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,28 +205,34 @@ class Evidence:
         self._acceleration = float(np.median([np.max(np.abs(t.acceleration)) for t in tracks])) or 1.0
         self.nodes = _nodes(tracks)
         self._shares: dict[float, Floats] = {}
-        self._priors: dict[tuple[float, float], tuple[Floats, Posterior]] = {}
+        self._priors: dict[tuple[float, float, float], tuple[Floats, Floats, Posterior]] = {}
 
     @property
     def prior(self) -> Posterior:
         """Coefficients before any run."""
-        return self._course[1]
+        return self._course[2]
 
     @property
-    def _course(self) -> tuple[Floats, Posterior]:
-        """(K, K) root of the covariance of a coefficient at the nodes, and the coefficients before any run."""
-        course = self.spread.saturation, self.spread.bend
+    def _course(self) -> tuple[Floats, Floats, Posterior]:
+        """Root of the covariance of a coefficient at the nodes, weights of the elements there, and the prior.
+
+        (K, K), (P,), and the coefficients before any run.
+        """
+        course = self.spread.saturation, self.spread.bend, self.spread.leak
         if course not in self._priors:
-            nodes = _root_covariance(self.nodes, *course)
-            root = _outer(nodes, np.eye(_ELEMENTS))
-            self._priors[course] = nodes, Posterior(np.zeros(len(root)), root, self)
+            nodes = _root_covariance(self.nodes, self.spread.saturation, self.spread.bend)
+            weights = np.repeat([1.0, self.spread.leak], [_ELEMENTS - len(_LEAKY), len(_LEAKY)])
+            root = _outer(nodes, np.diag(weights))
+            prior = Posterior(np.zeros(len(root)), root, self)
+            self._priors[course] = nodes, np.tile(weights, self.nodes.size), prior
         return self._priors[course]
 
     def posterior(self, members: Sequence[Moments]) -> Posterior:
         """Coefficients determined by runs."""
         gram, moment = self._scaled(members)
         inverse = inverse_of_triangle(np.linalg.cholesky(gram))
-        spread = _along_nodes(self._course[0], inverse.T)
+        nodes, weights, _ = self._course
+        spread = weights[:, None] * _along_nodes(nodes, inverse.T)
         return Posterior(spread @ (inverse @ moment), spread, self)
 
     def log_evidence(self, members: Sequence[Moments]) -> float:
@@ -267,8 +278,9 @@ class Evidence:
 
     def products(self, tracks: Sequence[Track]) -> list[RowProducts]:
         """Products of the rows of runs."""
-        yields = np.array(_YIELDS) * self.amplitude
-        stops = stop_operators([t.displacement for t in tracks], yields)
+        yields = np.array([*_YIELDS, *(length for length, _ in _LEAKY)]) * self.amplitude
+        velocities = np.array([*(0.0 for _ in _YIELDS), *(velocity for _, velocity in _LEAKY)]) * self._velocity
+        stops = stop_operators(tracks, yields, velocities / yields)
         return [self._of_rows(track, stop[track.rows] / yields) for track, stop in zip(tracks, stops, strict=True)]
 
     def _of_rows(self, track: Track, stops: Floats) -> RowProducts:
@@ -300,7 +312,8 @@ class Evidence:
 
     def _scaled(self, members: Sequence[Moments]) -> tuple[Floats, Floats]:
         """Return sums of the moments of runs over all nodes in units of the prior, which adds one to the products."""
-        root, count = self._course[0], self.nodes.size
+        root, weights, _ = self._course
+        count = self.nodes.size
         gram, moment = np.zeros((count * _ELEMENTS, count * _ELEMENTS)), np.zeros(count * _ELEMENTS)
         if changing := [member for member in members if member.over is None]:
             gram = _along_nodes(root.T, sum((member.gram for member in changing), gram))
@@ -314,8 +327,9 @@ class Evidence:
             summed = (pairs.T @ grams.reshape(len(grams), -1)).reshape(count, count, _ELEMENTS, _ELEMENTS)
             gram += summed.transpose(0, 2, 1, 3).reshape(gram.shape)
             moment += (over.T @ moments).ravel()
+        gram *= weights[:, None] * weights
         gram.flat[:: len(gram) + 1] += 1
-        return gram, moment
+        return gram, weights * moment
 
 
 def model_error(run: RowProducts) -> float:
@@ -333,19 +347,23 @@ def _outer(a: Floats, b: Floats) -> Floats:
     return np.einsum("ij,kl->ikjl", a, b).reshape(len(a) * len(b), -1)
 
 
-def stop_operators(displacements: Sequence[Floats], yields: Floats) -> list[Floats]:
-    """(L, Y) outputs [m] of elastic-plastic elements of several yield displacements [m], run by run."""
-    longest = max(x.size for x in displacements)
-    steps = np.zeros((longest, len(displacements), 1))
-    for i, x in enumerate(displacements):
-        steps[: x.size, i, 0] = np.diff(x, prepend=x[:1])
-    state, least = np.zeros((len(displacements), yields.size)), -yields
-    outputs = np.empty((longest, *state.shape))
-    for step, row in zip(steps, outputs, strict=True):
-        np.add(state, step, out=row)
+def stop_operators(tracks: Sequence[Track], yields: Floats, rates: Floats) -> list[Floats]:
+    """(L, Y) outputs [m] of elastic-plastic elements of some yield displacements [m] that leak at some rates [1/s]."""
+    longest = max(track.displacement.size for track in tracks)
+    steps, kept = np.zeros((2, longest, len(tracks), yields.size))
+    for i, track in enumerate(tracks):
+        leak = np.diff(track.time, prepend=track.time[:1])[:, None] * rates
+        kept[: leak.shape[0], i] = np.exp(-leak)
+        share = np.divide(-np.expm1(-leak), leak, out=np.ones_like(leak), where=leak > 0)
+        steps[: leak.shape[0], i] = np.diff(track.displacement, prepend=track.displacement[:1])[:, None] * share
+    state, least = np.zeros((len(tracks), yields.size)), -yields
+    outputs = np.empty_like(steps)
+    for step, held, row in zip(steps, kept, outputs, strict=True):
+        np.multiply(state, held, out=row)
+        np.add(row, step, out=row)
         np.minimum(row, yields, out=row)
         state = np.maximum(row, least, out=row)
-    return [outputs[: x.size, i] for i, x in enumerate(displacements)]
+    return [outputs[: track.displacement.size, i] for i, track in enumerate(tracks)]
 
 
 def _nodes(tracks: Sequence[Track]) -> Floats:

@@ -37,6 +37,7 @@ _ALONE_ODDS = 10.0  # more of them for a run that nothing explains
 _MISFITS = (4.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35)  # factors of the usual model error that are tried
 _SATURATIONS = (4.0, 1.0, 0.5, 0.25)  # saturation of the course over the current that is tried
 _BENDS = (0.8, 0.3, 0.1)  # deviations from the common course over the current that are tried
+_LEAK_ODDS = 2.0  # logarithm of the odds of the median run from which a damper has stop operators that leak
 # Deviations of gains and offsets between runs that are tried.
 _GAINS = ((0.06, 0.04), (0.04, 0.04), (0.06, 0.01), (0.04, 0.01), (0.025, 0.01), (0.015, 0.01))
 _SHARED_EXPLANATIONS = 3  # explanations of a run that others may have in common with it
@@ -172,7 +173,7 @@ class Search:
             self.evidence.spread = spread
             members = expected.weigh([self._products[k] for k in agreeing])
             posterior = self.evidence.posterior(members)
-            return float(np.median(posterior.log_probabilities_by_others(members)))
+            return float(np.median(posterior.log_probabilities_by_others(members))) - _LEAK_ODDS * spread.leak
 
         def choose(variants: Iterable[dict[str, float]]) -> None:
             best = max(scores, key=scores.__getitem__, default=AssumedScatter())
@@ -184,6 +185,7 @@ class Search:
         for _ in range(2):
             choose({"saturation": saturation, "bend": bend} for saturation, bend in product(_SATURATIONS, _BENDS))
             choose({"misfit": misfit} for misfit in _MISFITS)
+            choose({"leak": leak} for leak in (0.0, 1.0))
         choose({"gain": gain, "offset": offset} for gain, offset in _GAINS)
         self.evidence.spread = max(scores, key=scores.__getitem__)
         expected = self.evidence.posterior(expected.weigh([self._products[k] for k in agreeing]))

@@ -30,7 +30,8 @@ class Track:
     """The short version of a run."""
 
     run: Run
-    # displacement, velocity and acceleration: (L,) [m] about its mean, [m/s], [m/s²]
+    # time, displacement, velocity and acceleration: (L,) [s], [m] about its mean, [m/s], [m/s²]
+    time: Floats
     displacement: Floats
     velocity: Floats
     acceleration: Floats
@@ -48,6 +49,7 @@ class Track:
         """Return the same test with displacement and time multiplied by factors; a negative one inverts the motion."""
         return replace(
             self,
+            time=self.time * time,
             displacement=self.displacement * motion,
             velocity=self.velocity * (motion / time),
             acceleration=self.acceleration * (motion / time**2),
@@ -123,6 +125,7 @@ def _track(run: Run) -> Track:
     low, high = np.percentile(force, (1, 99))
     return Track(
         run,
+        run.time[index],
         x - float(np.mean(x)),
         motion.velocity[index],
         motion.acceleration[index],
