@@ -79,6 +79,15 @@ def test_a_loop_that_gives_energy_is_refused_from_a_twentieth_on(monkeypatch, sh
         dissipates(made)
 
 
+def test_a_spring_force_that_comes_late_is_no_inverted_sign():
+    late = view(lambda p, n, t: np.sin(p - 0.1) + 0.01 * np.cos(3 * p))
+    with pytest.raises(QualityError, match=rf"{1e3 * 0.1 / OMEGA:.2g} ms or more behind the displacement") as told:
+        dissipates(late)
+    assert "sign" not in str(told.value.remedy)
+    with pytest.raises(QualityError, match="count in opposite directions"):
+        dissipates(view(lambda p, n, t: -np.sin(p) - 0.1 * np.cos(p) + 0.01 * np.cos(3 * p)))
+
+
 def test_exchanged_channels_are_told_by_which_moves_like_a_sine():
     def square(p, n, t):
         return 50 * np.sign(np.cos(p)) + 3 * t

@@ -19,6 +19,7 @@ _BELOW = 0.15  # of the range: so far below both strokes is a rectified force at
 _LOW, _ALIKE = 0.2, 0.25  # of a folded force's largest: near zero, and strokes that do not differ
 GIVING = -0.05  # share of the force in phase with the velocity, below which the loop gives energy
 _CLEARLY = 0.3  # share of the force that opposes, or pushes, in a cycle that surely does
+_ELASTIC = 0.9  # correlation with the displacement from which a force is nearly that of a spring
 _GAIN, _EVEN = 0.3, 0.08  # natural logarithms: a leap of the force's size, and what it varies by before and after
 _SAME_CURRENT = 0.1  # [A]
 _FEWEST = 20  # samples of a cycle
@@ -39,9 +40,15 @@ def dissipates(view: View) -> None:
         problem = "the force has the size of a damper's but one sign in both directions: an absolute value"
         raise view.refused("E_RECTIFIED", problem, "export the channel with its sign")
     if share < GIVING:
+        displacement, force = view.run.displacement, view.run.force
+        elastic = float(np.corrcoef(displacement, force)[0, 1])
         if _exchanged(view):
             what = "displacement and force look exchanged"
             remedy = "name the columns the other way round: [channels.force] column = ... in a profile"
+        elif share > -_CLEARLY and elastic > _ELASTIC:
+            delay = -share / elastic * np.std(displacement) / np.std(view.moving.velocity)
+            what = f"the force is nearly that of a spring, {1e3 * delay:.2g} ms or more behind the displacement"
+            remedy = "record it again with both channels filtered alike, or set the force's known delay_ms in a profile"
         else:
             what = "force and displacement count in opposite directions"
             changed = [role for role in SIGNED if view.has_changed_sign(role)]
