@@ -10,7 +10,7 @@ from mrdamper.cli.progress import progress_on_stderr, progress_soon, watched
 
 
 def test_what_is_being_done_and_the_time_left_are_shown(capsys, monkeypatch):
-    clock = count(0.0, 20.0)
+    clock = count(0.0, 40.0)
     monkeypatch.setattr("rich.console.monotonic", lambda: next(clock))
     with progress_on_stderr() as tell:
         for share in (0.1, 0.2, 0.3):

@@ -52,6 +52,7 @@ def change(document, path, value):
     ("path", "value", "text"),
     [
         ("version", "2.0", "newer mrdamper"),
+        ("coil", {"rise_s": -1.0, "fall_s": 0.01}, "coil: rise_s = -1 s; write"),
         ("surprise", 1, "surprise: Extra inputs are not permitted"),
         ("damper.model", "binghum", "no model is called 'binghum'; did you mean bingham"),
         ("damper.functions.c.form", "linear", "no parameter function is called 'linear'"),

@@ -173,3 +173,9 @@ def test_a_long_record_of_a_stepped_model_is_searched_on_its_end_first(monkeypat
     for name in ("c1", "c0_ratio", "creep"):
         assert getattr(rehearsed.model, name) == pytest.approx(getattr(whole.model, name), rel=1e-4)
     assert rehearsed.scores.nrmse_pp == pytest.approx(whole.scores.nrmse_pp, rel=1e-6)
+
+
+def test_a_window_without_samples_is_named():
+    run = replace(synthetic_run(Condition(0.5, 1.0, 0.01)), window=(500.0, 600.0))
+    with pytest.raises(RunError, match="holds 0 samples"):
+        identify(run)

@@ -71,10 +71,10 @@ class Damper(Displayable):
     envelope : Envelope
         Ranges of the tests it was identified from.
     provenance : mapping of str to str
-        What it was made from.
+        Dataset, numbers and ways of the identification, versions; texts for the report.
     coil : Coil or None
     uncertainty : Uncertainty or None
-        How sure its numbers and predictions are, where that is known.
+        Covariance of its parameters and errors of its predictions; None where they are not known.
 
     Examples
     --------

@@ -5,7 +5,7 @@ dissipated energy. How many of these standard deviations hold a stated share is 
 by samples pooled over independent units, each unit counting alike [Dunn, Wasserman and Ramdas 2023, J. Am. Stat.
 Assoc. 118, 2491], and by runs for the peak force and the energy [Vovk, Gammerman and Shafer 2005, between two order
 statistics: Beran and Hall 1993, J. R. Stat. Soc. B 55, 643; with several runs a unit: Lee, Barber and Willett 2023,
-arXiv:2306.06342]. Residuals of omitted folds stand in for those of a calibration
+arXiv:2306.06342]. Residuals of cross-validation stand in for those of a calibration
 set [Barber, Candès, Ramdas and Tibshirani 2021, Ann. Stat. 49, 486: the jackknife, whose level holds for stable fits].
 """
 

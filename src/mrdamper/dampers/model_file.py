@@ -267,7 +267,9 @@ def _checked(schema: Any, raw: dict[str, Any], prefix: str, where: str) -> Any:
     except ValidationError as error:
         first = error.errors()[0]
         field = prefix + ".".join(str(part) for part in first["loc"])
-        raise ModelFileError(f"{field}: {first['msg']}", where=where, remedy="write the model again") from error
+        inner = first.get("ctx", {}).get("error")
+        problem = inner.found if isinstance(inner, InputError) else first["msg"]
+        raise ModelFileError(f"{field}: {problem}", where=where, remedy="write the model again") from error
 
 
 def _kind(described: dict[str, Any], where: str) -> tuple[type[Damper], dict[str, Any]]:

@@ -1,7 +1,7 @@
 """Modified model: a model whose parameters are functions of I, f and A.
 
 [Qian et al. 2024, Eq. 23–43], with the functions fitted to identifications that do not count
-the hysteretic force twice, and each form chosen by how it predicts omitted conditions.
+the hysteretic force twice, and each form chosen by cross-validation over conditions.
 """
 
 from __future__ import annotations

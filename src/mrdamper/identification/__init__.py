@@ -112,7 +112,8 @@ def refuse_unusable(run: Run, clipped: bool = False) -> None:
 
     Raises `IdentificationError`; of a channel that is cut off unless `clipped` runs are wanted.
     """
-    if np.ptp(run.force[run.in_window]) == 0:
+    force = run.force[run.in_window]  # an empty window is refused where its samples are asked for
+    if force.size and np.ptp(force) == 0:
         raise IdentificationError("the force does not change", where=f"run {run.id}", remedy="check the channel")
     if "W_CLIPPED" in run.findings and not clipped:
         raise IdentificationError(

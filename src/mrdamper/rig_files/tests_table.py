@@ -47,8 +47,8 @@ class StatedTest:
     notes: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def what(self) -> str:
-        """The file and the run as they are named."""
+    def label(self) -> str:
+        """The names of its file and run."""
         return " ".join(filter(None, (self.file, self.run)))
 
     def names(self, path: Path, run: str) -> bool:
@@ -83,7 +83,7 @@ class TestsTable:
             fitting = {path for path, run in tests if run and row.names(path, run)}
             if len(fitting) > 1:
                 shown = ", ".join(sorted("/".join(path.parts[-2:]) for path in fitting)[:4])
-                problem = f"{row.what!r} names tests of {len(fitting)} files: {shown}"
+                problem = f"{row.label!r} names tests of {len(fitting)} files: {shown}"
                 remedy = "write the file with its folder, and one row for each"
                 raise TestsTableError(problem, where=f"{self.path.name}, line {row.line}", remedy=remedy)
         absent = [
@@ -93,7 +93,7 @@ class TestsTable:
             and not (row.file and (self.path.parent / row.file).is_file() and not row.run)
         ]
         if absent:
-            shown = listed([f"{row.what!r} (line {row.line})" for row in absent], 10)
+            shown = listed([f"{row.label!r} (line {row.line})" for row in absent], 10)
             remedy = "correct the names, or remove the rows"
             raise TestsTableError(f"no such test: {shown}", where=self.path.name, remedy=remedy)
 
@@ -137,10 +137,10 @@ def load_tests(path: str | Path) -> TestsTable:
     stated = [_row(line, cells, names, keys, wrong) for line, cells in rows[1:]]
     lines_of: dict[tuple[str, str], int] = {}
     for row in stated:
-        if not row.what:
+        if not row.label:
             wrong(row.line, "names neither file nor run", "fill the cell or remove the row")
         elif (row.file, row.run) in lines_of:
-            wrong(row.line, f"{row.what!r} stands in line {lines_of[row.file, row.run]} already", "remove one row")
+            wrong(row.line, f"{row.label!r} stands in line {lines_of[row.file, row.run]} already", "remove one row")
         lines_of.setdefault((row.file, row.run), row.line)
     CombinedError.raise_from(problems)
     return TestsTable(path, tuple(stated))

@@ -1,1 +1,1 @@
-"""Ways from runs to a damper, tried in order and judged by omitted conditions."""
+"""Ways from runs to a damper, tried in order and judged by cross-validation over conditions."""

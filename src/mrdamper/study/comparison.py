@@ -1,4 +1,4 @@
-"""Every model on the same data: accuracy, numbers, data, time; ranked by omitted conditions.
+"""Every model on the same data: accuracy, numbers, data, time; ranked by cross-validation over conditions.
 
 A model is identified run by run, then made a damper over all conditions in its own way:
 parameter functions, the published laws over current, frequency and amplitude, or one joint
@@ -33,7 +33,7 @@ RANKING = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigComparison(Displayable):
-    """All recipes on one rig, the best on omitted conditions first.
+    """All recipes on one rig, the best in cross-validation over conditions first.
 
     Attributes
     ----------

@@ -22,7 +22,7 @@ from mrdamper.rig_files.record import REQUIRED, Finding
 from mrdamper.rig_files.text.short import packaged_lines, short_lines
 from mrdamper.rig_files.units import is_unit, parse_unit
 
-_MOST = 200  # elements
+_MOST = 200  # lines
 _FEWEST_ROWS = 50  # of a record
 _FEW_FILES = 10  # that describe a folder, not a test each
 _STRUCTURES = (".json", ".yaml", ".yml")

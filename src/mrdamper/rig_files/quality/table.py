@@ -43,7 +43,7 @@ FIGURES = MappingProxyType(
 class Quality:
     """One record's verdict and figures; a refused record has none."""
 
-    record: Record  # as judged
+    record: Record  # with its findings
     figures: Mapping[str, float] = field(default_factory=dict)  # by the columns of `FIGURES`, NaN where there is none
     refusal: QualityError | None = None
 
