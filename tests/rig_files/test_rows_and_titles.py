@@ -100,6 +100,16 @@ def test_ranges_below_the_units_are_no_row(tmp_path):
     np.testing.assert_allclose(record.force, force(0.5), atol=1e-3)
 
 
+def test_one_value_for_all_columns_above_rows_that_begin_empty_is_no_row(tmp_path):
+    head = '"TraceName";"LOAD";"LVDT"\n"VUnit";"N";"mm"\n"HResolution";0.002;0.002\n"HUnit";"s";"s"\n'
+    head += '"Time";"10:31:22.123456";"10:31:22.123456"\n\n'
+    (tmp_path / "a_0.5A.csv").write_text(
+        head + "\n".join(";" + line for line in rows(force(0.5), X).splitlines()) + "\n"
+    )
+    (record,) = import_files([tmp_path]).records
+    np.testing.assert_allclose(record.force, force(0.5), atol=1e-3)
+
+
 def test_signs_apart_and_days_are_numbers(tmp_path):
     signed = [f"{t / 86400 + 45363:.11f};{x:+9.4f};{f:+9.2f}" for t, x, f in zip(T, X, force(0.5), strict=True)]
     signed = [line.replace("+", "+ ").replace("-", "- ") for line in signed]

@@ -390,7 +390,8 @@ def _first_of(
         elif len(cells) == width and not _is_key(cells[0].strip('"')):
             return first or (i, cells)
         elif len(cells) == width and labelled:
-            first = first or (i, cells)
+            alike = width > _TELLING and len({*filter(None, cells[1:])}) == 1  # Time, 10:31:22, 10:31:22
+            first = None if alike else first or (i, cells)
     row = first or worded
     assert row is not None
     return row
