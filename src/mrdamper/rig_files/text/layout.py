@@ -459,7 +459,7 @@ def _header_lines(
         naming = [i for i in fitting if i != units and (units is None or i < units)]
         if units is not None and units != last:  # keys with one cell a column: TraceName, VUnit, HUnit
             named = [i for i in telling if i < units]
-            if named and all(_is_keyed(cells[i]) for i in fitting if i > named[-1]):
+            if named and _WORD.match(cells[units][0]) and not is_unit(_unbracket(cells[units][0])):
                 return named[-1], units
             if units == fitting[-2] and not naming:  # above the names
                 return last, units
@@ -538,14 +538,6 @@ def _is_times(cells: Sequence[str]) -> bool:
     """Tell if a line of units gives the same unit of time to several columns."""
     units = [cell for cell in map(_unbracket, cells) if is_unit(cell)]
     return len(units) > 1 and {split_name("", unit).dimension for unit in units} == {"time"}
-
-
-def _is_keyed(cells: Sequence[str]) -> bool:
-    """Tell if a line is a key followed by units, by numbers, or by one text for all columns."""
-    rest = cells[1:]
-    return _WORD.match(cells[0]) is not None and (
-        is_units(rest) or len(set(rest)) == 1 or all(looks_numeric(cell) for cell in rest)
-    )
 
 
 def _unbracket(unit: str) -> str:
