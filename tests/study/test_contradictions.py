@@ -17,7 +17,8 @@ from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 from mrdamper.rig_files.rig_import import import_files, to_dataset
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
 from mrdamper.study.contradictions.evidence import AssumedScatter, Evidence
-from mrdamper.study.contradictions.explanations import completed_matrix_odds
+from mrdamper.study.contradictions.explanations import Explanation, Trial, completed_matrix_odds
+from mrdamper.study.contradictions.findings import describe
 from mrdamper.study.contradictions.gains import gain_differences
 from mrdamper.study.contradictions.tracks import tracks_of
 
@@ -377,3 +378,11 @@ def test_a_bypass_that_carries_the_slow_motions_accuses_no_run():
         x, own = a * np.sin(2 * np.pi * f * time), force[::20, n]
         runs.append(Run(f"t{n:02d}", time, x, gain * own + 900 * x + 25 + noise, np.full(time.size, i)))
     assert find_contradictions(runs) == []
+
+
+@pytest.mark.parametrize("current", [0.0, 0.5])
+def test_a_factor_of_the_force_without_current_may_be_a_magnetisation(sound, current):
+    run = next(run for run in sound if run.mean_current == current)
+    found = describe(run, Explanation(Trial("force", 1.8, "", 0.0), 20.0, None), 11)
+    assert ("magnetisation that other tests left" in found.explanation) == (current == 0)
+    assert ("demagnetise the damper" in found.remedy) == (current == 0)

@@ -11,6 +11,7 @@ from mrdamper.data import Run
 from mrdamper.rig_files.units import DIMENSION, SI, Unit, parse_unit
 from mrdamper.study.contradictions.copies import Copy
 from mrdamper.study.contradictions.explanations import Explanation, Trial
+from mrdamper.study.contradictions.tracks import SAME_CURRENT
 
 CODES = {
     "force": "E_FORCE_SCALE",
@@ -76,10 +77,12 @@ def describe_copy(copy: Copy, validation: bool) -> Contradiction:
 def _force(run: Run, e: Trial) -> tuple[str, str]:
     if e.unit:
         return _misread(run, "force", "N", e)
-    return (
-        f"its force is {1 / e.value:.3g} times what the others show: another range of the load cell, or another damper",
-        _corrected(run, "force", e.value) + f", or {_specimen(run)}",
-    )
+    what = f"its force is {1 / e.value:.3g} times what the others show: another range of the load cell"
+    remedy = f"{_corrected(run, 'force', e.value)}, or {_specimen(run)}"
+    if abs(run.mean_current) <= SAME_CURRENT:
+        what += ", a magnetisation that other tests left"
+        remedy += ", or demagnetise the damper before every test without current"
+    return f"{what}, or another damper", remedy
 
 
 def _displacement(run: Run, e: Trial) -> tuple[str, str]:
