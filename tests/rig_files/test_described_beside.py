@@ -84,6 +84,24 @@ def test_a_yaml_file_with_nodes_within_nodes_and_one_that_repeats_itself_without
     assert short_lines(tmp_path / "m07.yaml") == []
 
 
+@pytest.mark.parametrize(
+    ("text", "amperes"),
+    [
+        ("Quantity;Description;Value;Unit\nCurrent;maximum of the supply;5;A", None),
+        ("Name;Value;Unit;Remark\nCoil current;5;A;limit of the supply", None),
+        ("Group;Name;Value;Unit\nCoil;rated current;2;A\nCoil;inductance current;0.1;A", None),
+        ("Quantity,Max value,Unit\nCurrent,2,A", None),
+        ("Value,Unit,Name\n0.5,A,Coil current", 0.5),
+    ],
+)
+def test_all_cells_of_a_list_of_values_tell_whose_they_are(tmp_path, text, amperes):
+    write(tmp_path, "time [s],stroke [mm],load [N]\n")
+    (tmp_path / "m07.txt").write_text(text)
+    found = import_files([tmp_path / "m07.csv"])
+    assert [record.current[0] for record in found.records] == ([] if amperes is None else [amperes])
+    assert {refusal.error.code for refusal in found.refusals} == ({"E_CURRENT_MISSING"} if amperes is None else set())
+
+
 def test_currents_of_a_table_in_a_readme_are_taken_and_those_of_names_compared_with_it(tmp_path):
     write(tmp_path, "time [s],stroke [mm],load [N]\n")
     table = "".join(f"| {name}.csv | {1000 * amperes:g} |\n" for name, amperes in CURRENTS.items())

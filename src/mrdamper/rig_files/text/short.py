@@ -62,9 +62,9 @@ def _by_headings(lines: list[str]) -> list[str]:
     for line in lines:
         cells = [cell.strip(' "') for cell in re.split(r"[,;\t|]", line.strip(" |"))]
         keys = [{word.casefold() for word in words_of(cell)} for cell in cells]
-        places = [next((i for i, key in enumerate(keys) if key & of), 0) for of in (_VALUE | _SCALE, _UNIT)]
-        if all(places):
-            heads, (number, unit) = cells, places
+        of, its = [next((i for i, key in enumerate(keys) if key & of), None) for of in (_VALUE | _SCALE, _UNIT)]
+        if of is not None and its is not None:
+            heads, number, unit = cells, of, its
         elif len(cells) == len(heads) and split_name("", cells[unit]).dimension in _MEASURED:
             head, per = heads[number], _PER.search(heads[number])
             rest = [
@@ -72,8 +72,10 @@ def _by_headings(lines: list[str]) -> list[str]:
                 for i, (key, cell) in enumerate(zip(heads, cells, strict=True))
                 if i not in (number, unit)
             ]
-            if {word.casefold() for word in words_of(head)} & _VALUE:
-                line = f"{next((cell for cell in rest if not cell.isdigit()), '')}: {cells[number]} {cells[unit]}"
+            more = [word for word in words_of(head) if word.casefold() not in _VALUE]
+            if len(more) < len(words_of(head)):  # a value; what else is said may tell that it is that of no test
+                texts = [cell for cell in rest if cell and not cell.isdigit()]
+                line = f"{' '.join([*texts, *more])}: {cells[number]} {cells[unit]}"
             else:
                 line = "; ".join([*rest, f"{cells[number]} {_EU.sub(cells[unit], per[0])}" if per else ""])
         written.append(line)
