@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from itertools import pairwise
+from time import process_time
 
 import numpy as np
 import pytest
@@ -81,7 +82,32 @@ def test_a_yaml_file_with_nodes_within_nodes_and_one_that_repeats_itself_without
     )
     assert short_lines(tmp_path / "m07.yaml") == ["current: 0.4 A"]
     (tmp_path / "m07.yaml").write_text(coil + repeated)
-    assert short_lines(tmp_path / "m07.yaml") == []
+    assert short_lines(tmp_path / "m07.yaml") == (coil + repeated).splitlines()
+
+
+@pytest.mark.parametrize(
+    ("text", "amperes"),
+    [
+        ("a: !!int ''\nb: !!bool abc\nc: !!timestamp abc\ncoil_current: 0.5 A\n", 0.5),
+        ("[" * 2**17 + "\ncoil_current: 0.5 A\n", 0.5),
+        ("coil_current: {value: 010, unit: mA}\n", 0.01),
+        ("coil_current_A: on\n", None),
+        ("coil_current_A: 0_5\n", None),
+        ("note: test: first\ncoil_current: 0.5 A\n", 0.5),
+        ("operator: A\n---\ncoil_current: 0.5 A\n", 0.5),
+        ("rig: &rig {name: B}\nother: *rig\ncoil_current: 0.5 A\n", 0.5),
+        ("date: 2024-13-45\ncoil_current: 0.5 A\n", 0.5),
+    ],
+)
+def test_yaml_of_any_form_states_what_its_lines_do_at_once(tmp_path, text, amperes):
+    write(tmp_path, "time [s],stroke [mm],load [N]\n")
+    (tmp_path / "m07.yaml").write_text(text)
+    began = process_time()
+    short_lines(tmp_path / "m07.yaml")
+    assert process_time() - began < 0.5
+    found = import_files([tmp_path / "m07.csv"])
+    assert [record.current[0] for record in found.records] == ([] if amperes is None else [amperes])
+    assert {refusal.error.code for refusal in found.refusals} == ({"E_CURRENT_MISSING"} if amperes is None else set())
 
 
 @pytest.mark.parametrize(

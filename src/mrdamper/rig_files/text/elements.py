@@ -88,7 +88,7 @@ def _local(name: str) -> str:
 
 def _number(text: str) -> float | None:
     try:
-        return float(text)
+        return None if "_" in text else float(text)  # 0_5 is a code
     except ValueError:
         return None
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import split_name, words_of
-from mrdamper.rig_files.text.elements import Elements
+from mrdamper.rig_files.text.elements import Elements, value_of
 from mrdamper.rig_files.text.stream import decoded
 from mrdamper.rig_files.units import DIMENSION, is_unit
 from mrdamper.rig_files.vocabulary import words
@@ -22,6 +22,7 @@ from mrdamper.rig_files.vocabulary import words
 _LARGEST = 2**18  # bytes
 _RULE = re.compile(r"[\s|:+=-]*")  # below the names of columns of a table in Markdown
 _DEEPEST, _FEWEST_TESTS = 6, 2
+_MOST_LEVELS = 50  # of a text in YAML
 _MOST_LISTED = 200  # quantities or channels
 _VALUE, _SCALE, _UNIT = words("value"), words("scale"), words("unit")
 _EU = re.compile(r"(?i)\b(?:EU|units?)\b")  # engineering units, those of the row
@@ -34,7 +35,8 @@ _PLACES = ("column", "number", "index", "no", "position", "channel")  # of a col
 def short_lines(path: Path) -> list[str]:
     """Return the lines of a short text; none of a file that is long, or cannot be read.
 
-    Of a structure, every quantity and every channel is a line, and a list of objects of one form a table.
+    Of a structure, every quantity and every channel is a line, and a list of objects of one form a table. YAML that
+    cannot be parsed has the lines of its text.
     """
     try:
         with path.open("rb") as file:
@@ -47,7 +49,8 @@ def short_lines(path: Path) -> list[str]:
         try:
             return list(_stated(_STRUCTURED[suffix](text), ""))
         except (ValueError, RecursionError, SyntaxError, InputError):
-            return []
+            if suffix in (".json", ".xml"):
+                return []
     text = text.replace("`", "") if suffix == ".md" else text
     lines = [line for line in text.splitlines() if "|" not in line or not _RULE.fullmatch(line)]
     return _by_headings(lines) if len(lines) <= _MOST_LISTED else lines
@@ -90,14 +93,28 @@ def _elements(text: str) -> dict[str, Any]:
 
 @lru_cache(maxsize=16)  # every file of a folder asks
 def _tree_of_yaml(text: str) -> Any:
-    """Return what a YAML text holds; nothing of one with aliases, which can repeat a node without end."""
+    """Return what the documents of a YAML text hold, its numbers as those of other texts: 010 is ten, on is a word.
+
+    Raises `ValueError` for one with aliases, which can repeat a node without end, or nested too deeply.
+    """
     import yaml
 
+    loader, depth = getattr(yaml, "CBaseLoader", yaml.BaseLoader), 0
     try:
-        aliases = any(isinstance(token, yaml.AliasToken) for token in yaml.scan(text, yaml.SafeLoader))
-        return {} if aliases else yaml.safe_load(text)
-    except yaml.YAMLError:
-        return {}
+        for event in yaml.parse(text, loader):
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            if depth > _MOST_LEVELS or isinstance(event, yaml.AliasEvent):
+                raise ValueError("aliases, or nodes nested too deeply")
+        documents = [_with_numbers(document) for document in yaml.load_all(text, loader)]
+    except yaml.YAMLError as error:
+        raise ValueError("no YAML") from error
+    return documents[0] if len(documents) == 1 else dict(enumerate(documents))
+
+
+def _with_numbers(node: Any) -> Any:
+    if isinstance(node, dict):
+        return {key: _with_numbers(value) for key, value in node.items()}
+    return [_with_numbers(item) for item in node] if isinstance(node, list) else value_of(node)
 
 
 _STRUCTURED: Mapping[str, Callable[[str], Any]] = MappingProxyType(
