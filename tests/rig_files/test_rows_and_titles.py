@@ -46,6 +46,11 @@ def test_json_lines_of_events_are_notes_about_the_records(tmp_path):
     (tmp_path / "a.jsonl").write_text("\n".join(map(json.dumps, [*events, *lines, {"current_A": 1.5}])))
     (refusal,) = import_files([tmp_path / "a.jsonl"]).refusals
     assert refusal.error.code == "E_CURRENT_MISSING"
+    for at, amperes in ((500, 1.0), (len(lines), 0.0), (500, "1 A"), (500, "off")):
+        event = {"event": "coil off after test", "coil": {"current_A": amperes}, "current_A": amperes}
+        (tmp_path / "a.jsonl").write_text("\n".join(map(json.dumps, [*lines[:at], event, *lines[at:]])))
+        (refusal,) = import_files([tmp_path / "a.jsonl"]).refusals
+        assert refusal.error.code == "E_CURRENT_MISSING"
 
 
 @pytest.mark.parametrize(

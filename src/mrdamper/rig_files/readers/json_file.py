@@ -99,15 +99,21 @@ def _of_figure(tree: Any) -> Any:
 
 
 def _with_notes(lines: list[Any]) -> Any:
-    """Return the records of a text with one a line, under what its other lines state: of start and end, of an event."""
+    """Return the records of a text with one a line, under what its other lines state: of start and end, of an event.
+
+    Between or below the records words count only: a current that stands there is not that of all records.
+    """
     forms = Counter(frozenset(line) for line in lines if isinstance(line, dict))
     keys, count = forms.most_common(1)[0] if forms else (frozenset(), 0)
     others = [line for line in lines if not isinstance(line, dict) or line.keys() != keys]
     if not 0 < len(others) < count >= _FEWEST or any(not isinstance(o, dict) or o.keys() & keys for o in others):
         return lines
     stated = {key: [other[key] for other in others if key in other] for other in others for key in other}
-    notes = {key: values[0] for key, values in stated.items() if values.count(values[0]) == len(values)}
     records = [line for line in lines if line.keys() == keys]
+    above = {key for other in lines[: lines.index(records[0])] for key in other}
+    same = {key: values[0] for key, values in stated.items() if values.count(values[0]) == len(values)}
+    words = {key for key, value in same.items() if isinstance(value, str) and not any(map(str.isdigit, value))}
+    notes = {key: same[key] for key in same if key in above | words}
     return {**notes, **{key: [record[key] for record in records] for key in records[0]}}
 
 
