@@ -190,6 +190,19 @@ def test_a_list_of_variables_beside_the_only_record_of_a_folder_states_its_curre
     require_the_tests(tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("name", "described"),
+    [("meta.json", 1), ("m07_info.yaml", 1), ("m08.json", 0), ("m08.yaml", 0), ("m08.xml", 0), ("m08.txt", 0)],
+)
+def test_the_description_of_another_record_states_no_current_of_the_only_record_of_a_folder(tmp_path, name, described):
+    write(tmp_path, "time [s],stroke [mm],load [N]\n")
+    for other in ("m08.csv", "m09.csv"):
+        (tmp_path / other).unlink()
+    texts = {".json": '{"coil_current": "1.5 A"}', ".xml": '<test><coilCurrent unit="A">1.5</coilCurrent></test>'}
+    (tmp_path / name).write_text(texts.get((tmp_path / name).suffix, "coil_current: 1.5 A\n"))
+    assert [record.current[0] for record in import_files([tmp_path]).records] == [1.5] * described
+
+
 def test_the_scale_of_an_amplifier_of_the_load_cell_is_not_that_of_the_current(tmp_path):
     for name, amperes in CURRENTS.items():
         rows = zip(T, X / 10, force(amperes) / 400, np.full(T.size, 100 * amperes), strict=True)

@@ -44,6 +44,10 @@ _OTHER_RATES = re.compile(  # than that of the rows
 _README = re.compile(
     r"(?i)(?:read[_ ]?me|lies_?mich|lisez[-_ ]?moi|l[eé]eme|leggimi|leia[-_ ]?me|notes?|info|说明|説明|설명)\b.*"
 )
+_GENERAL = re.compile(  # structures that describe the only record of a folder, behind its name or without it
+    r"(?i)(?:meta(?:[ _-]?data)?|info(?:rmation)?|set-?up|settings?|config(?:uration)?|tests?|conditions?|parameters?"
+    r"|params?|description|experiment|campaign|acquisition|header|sidecar|read[_ -]?me|notes?)?"
+)
 
 
 def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
@@ -115,12 +119,19 @@ def _of_channels(line: str) -> str:
 def with_description(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Return the table with what the text or structure of its name, or the only other file of its folder, states."""
     other = _only_other(path)
-    other = None if other is None or profile.leaves_out(other.name) else other
+    other = other if other and _may_describe(other, path) and not profile.leaves_out(other.name) else None
     beside = [path.with_suffix(suffix) for suffix in (*_NAMED, *_TEXTS)]
     named = [p for p in beside if p != path and p.is_file() and not profile.leaves_out(p.name)]
     named = [p for p in (*named, *([other] if other else ())) if p.suffix.lower() in _NAMED or is_description(p)]
     lines = short_lines(named[0]) if named else packaged_lines(path)
     return replace(table, remarks=(*table.remarks, *lines))
+
+
+def _may_describe(other: Path, path: Path) -> bool:
+    """Tell if a name may be that of the description of a record: meta.xml, run1_info.json; no run2.json of run1.csv."""
+    if other.suffix.lower() in _NAMED:
+        return _GENERAL.fullmatch(other.stem.removeprefix(path.stem).strip(" ._-")) is not None
+    return other.stem == path.stem or len({re.sub("[0-9]+", "0", p.stem) for p in (other, path)}) > 1
 
 
 def is_description(path: Path) -> bool:
