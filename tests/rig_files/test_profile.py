@@ -112,6 +112,7 @@ def test_profiles_that_are_no_files_of_text(tmp_path):
         ("1A_to_2A.csv", None),
         ("run_0_5A.csv", None),
         ("run_0_5_A_2Hz.csv", None),
+        ("rec_1_500_mA.csv", 0.5),
         ("run3A.csv", None),
         ("A1.csv", None),
         ("2AB.csv", None),

@@ -95,7 +95,7 @@ def currents_in(text: str) -> tuple[float, ...]:
     none, nor does what stands beside a fuse, a supply or a limit.
     """
     text = unicodedata.normalize("NFKC", text[:255]).replace("−", "-")
-    if re.search(r"(?<![0-9])[0-9]_[0-9]+[ _]?m?A(?![A-Za-z0-9])", text) or _LABELLED_RATING.search(text):
+    if re.search(r"(?<![0-9])[0-9]_[0-9]+[ _]?A(?![A-Za-z0-9])", text) or _LABELLED_RATING.search(text):
         return ()
     # 04A may be four or 0.4 amperes; 0400mA is padded.
     stated = [match for match in _IN_NAME.finditer(text) if match[2] or not re.fullmatch("0[1-9]+", match[1])]
