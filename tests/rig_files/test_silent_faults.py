@@ -324,6 +324,12 @@ def test_a_copy_of_a_file_in_another_folder_is_no_second_test(tmp_path):
     assert found.left_out == ("run_0.5A.csv",)
 
 
+def test_the_same_motion_and_nearly_the_same_force_at_another_current_is_a_test_of_its_own(tmp_path):
+    write(tmp_path, "a.csv", table({**NAMES, "current [A]": 0 * T + 0.5}))
+    write(tmp_path, "b.csv", table({**NAMES, "force [N]": 1.0005 * F, "current [A]": 0 * T + 0.52}))
+    assert [record.id for record in import_files([tmp_path]).records] == ["a", "b"]
+
+
 @pytest.mark.parametrize("title", ["# {} A", "Test at {} A", "Coil current: {} A"])
 def test_lines_among_the_rows_that_state_other_currents_begin_other_tests(title, tmp_path):
     head = table(NAMES).partition("\n")[0] + "\n"

@@ -17,6 +17,7 @@ _ALIKE = 0.1  # relative difference of frequency and amplitude within which two 
 _ALIKE_A = 0.03  # difference of the current within which two tests have the same [A]
 _SEVERAL = 2.0  # ratio of peak-to-peak forces at equal conditions that no repetition explains
 _ROUNDING = 1e-3  # of the largest value: two exports of one test differ by less, two tests by more
+_ROUNDING_A = 5.5e-3  # [A] so much a current of two decimals differs from one of more
 _MOST_SAMPLES = 20_000
 
 _Point = tuple[float, float, float, float]
@@ -67,7 +68,7 @@ def repeated(records: Sequence[Record]) -> set[int]:
 
 
 def _of_same_samples(records: Sequence[Record], *, with_current: bool = False) -> list[list[int]]:
-    """Group the tests of equal force and displacement but for the rounding of numbers, by their places."""
+    """Group the tests whose force and displacement, or current too, differ by rounding at most, by their places."""
     groups: list[list[int]] = []
     peaks = [float(np.nanmax(np.abs(_sampled(record.force, record.time.size)))) for record in records]
     for i, record in enumerate(records):
@@ -90,7 +91,7 @@ def _same(one: Record, other: Record, with_current: bool) -> bool:
     same = max(one.time.size, other.time.size) <= size + 1
     same = same and alike(one.force, other.force) and alike(one.displacement, other.displacement)
     currents = (one.current, other.current) if with_current else ()
-    return same and (not currents or alike(*currents, limit=_ALIKE_A))  # type: ignore[arg-type]
+    return same and (not currents or alike(*currents, limit=_ROUNDING_A))  # type: ignore[arg-type]
 
 
 def _sampled(channel: Floats, size: int) -> Floats:
