@@ -5,6 +5,7 @@ import pytest
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.rig_import import import_files, read_run
+from mrdamper.rig_files.text.elements import value_of
 
 T = np.arange(0, 6, 0.005)
 X = 0.01 * np.sin(2 * np.pi * T)
@@ -36,6 +37,20 @@ def _elements():
     return f"<!-- a comment --><Data><Current_A>0.5</Current_A>{samples}</Data>"
 
 
+def _with_attributes():
+    lists = (("Time", "s", T), ("Pos", "mm", 1e3 * X), ("Load", "kN", F / 1e3))
+    channels = "".join(f"<{n} unit='{u}'>{';'.join(f'{v:.7f}' for v in values)}</{n}>" for n, u, values in lists)
+    return f"<Test><CoilCurrent unit='A'>0.5</CoilCurrent>{channels}</Test>"
+
+
+def _elements_with_units():
+    samples = "".join(
+        f'<R><Time unit="s">{t:.3f}</Time><Pos unit="mm">{x:.5f}</Pos><Load unit="kN">{f:.6f}</Load></R>'
+        for t, x, f in ROWS
+    )
+    return f'<Data><Current unit="A">0.5</Current>{samples}</Data>'
+
+
 def _workbook():
     def row(cells, kind):
         return "".join(f'<Cell ss:Index="{i}"><Data ss:Type="{kind}">{c}</Data></Cell>' for i, c in enumerate(cells, 2))
@@ -60,6 +75,8 @@ def _page():
     [
         ("records.xml", _records(), "utf-8"), ("channels.xml", _channels(), "utf-8"),
         ("channels16.xml", '<?xml version="1.0" encoding="UTF-16"?>' + _channels(), "utf-16"),
+        ("attributes.xml", _with_attributes(), "utf-8"), ("units.xml", _elements_with_units(), "utf-8"),
+        ("decimal_commas.xml", _with_attributes().replace(".", ",").replace("0,5<", "0.5<"), "utf-8"),
         ("elements.xml", _elements(), "utf-8"), ("workbook.xls", _workbook(), "utf-8"), ("page.xls", _page(), "utf-8"),
     ],
 )  # fmt: skip
@@ -90,6 +107,14 @@ def test_hostile_documents_are_refused_by_name(tmp_path, text, code):
     with pytest.raises(InputError, match=r"a\.xml") as refused:
         read_run(tmp_path / "a.xml")
     assert refused.value.code == code
+
+
+def test_commas_that_may_be_of_decimals_or_between_numbers_and_underscores_are_in_no_number():
+    pairs = " ".join(["1,5", "2,5"] * 50)
+    assert value_of(pairs) == pairs
+    assert value_of("0_5") == "0_5"
+    np.testing.assert_array_equal(value_of(", ".join(map(str, range(60)))), np.arange(60))
+    np.testing.assert_array_equal(value_of("0.5,1.5;" * 29 + "0.5,1.5"), [0.5, 1.5] * 30)
 
 
 def test_a_document_without_samples_beside_tests_is_no_test(tmp_path):

@@ -11,9 +11,14 @@ import numpy as np
 
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RigFileError
 from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES
+from mrdamper.rig_files.units import is_unit
+from mrdamper.rig_files.vocabulary import KEYS
 
 _SHEETS = "{urn:schemas-microsoft-com:office:spreadsheet}"
 _BETWEEN = re.compile(r"[\s;,]+")
+_APART = re.compile(r"[\s;]+(?:,[\s;]*)?|,[\s;]+")  # between numbers with decimal commas
+_DECIMAL = re.compile(r"[+-]?(?:0|[1-9][0-9]*)(?:,[0-9]+)?(?:[eE][+-]?[0-9]+)?")
+_PADDED = re.compile(r"0[0-9]+(?:[eE].*)?")  # digits behind a decimal comma, no number of their own
 _MOST_LEVELS = 100
 Sheets = list[tuple[str, list[list[str]]]]  # rows of cells by the name of the sheet
 
@@ -65,10 +70,14 @@ class Elements:
             return
         value = value_of("".join(texts).strip())
         inner = {name: _together(values) for name, values in within.items()}
-        if own or inner:
-            text = {} if value == "" else {"data" if isinstance(value, np.ndarray) else "value": value}
-            value = {**own, **inner, **text}
-        self._levels[-1][1].setdefault(_local(tag), []).append(value)
+        name = _local(tag)
+        units = [u for key, u in own.items() if key.casefold() in KEYS["unit"] and isinstance(u, str) and is_unit(u)]
+        if isinstance(value, float) and len(units) == len(own) == 1 and not inner:
+            name = f"{name} [{units[0]}]"
+        elif own or inner:
+            text = {"data" if isinstance(value, np.ndarray) else "value": value}
+            value = {**own, **inner, **({} if isinstance(value, str) and not value else text)}
+        self._levels[-1][1].setdefault(name, []).append(value)
 
     def close(self) -> None:
         """Take what the outermost element holds."""
@@ -94,13 +103,16 @@ def _number(text: str) -> float | None:
 
 
 def value_of(text: str) -> Any:
-    """Return a text as the number or numbers that it lists, or as it is."""
+    """Return a text as the number or numbers that it lists, or as it is; 1,5 2,5 may be two numbers or four."""
     number = _number(text)
     if number is not None:
         return number
     if not text[:1].isdigit() and text[:1] not in ("+", "-", "."):
         return text
-    listed = [_number(part) for part in _BETWEEN.split(text)]
+    parts, apart = _BETWEEN.split(text), _APART.split(text)
+    if 1 < len(apart) < len(parts) and all(map(_DECIMAL.fullmatch, apart)):
+        parts = [part.replace(",", ".") for part in apart] if any(map(_PADDED.fullmatch, parts)) else [text]
+    listed = [_number(part) for part in parts]
     return np.array(listed) if len(listed) >= FEWEST_SAMPLES and None not in listed else text
 
 
