@@ -110,6 +110,13 @@ def test_a_current_in_per_cent_is_no_current(tmp_path):
     assert [finding.code for finding in record.findings] == ["W_COLUMN"]
 
 
+def test_a_current_in_the_first_row_only_is_compared_with_the_name_and_may_not_be_zero(tmp_path):
+    half, zero = (table({**NAMES, "current [A]": [first, *[""] * (T.size - 1)]}) for first in ("0.5", "0.0"))
+    assert codes_of(read_run(write(tmp_path, "t_0.5A.csv", half))) == ["W_DECIMATED"]
+    assert code(write(tmp_path, "t_1.0A.csv", half)) == "E_CURRENT_CONTRADICTS"
+    assert code(write(tmp_path, "t.csv", zero)) == "E_MISSING"
+
+
 def test_a_line_break_in_a_quoted_name_is_read(tmp_path):
     names = {'"time\n[s]"': T, '"disp\n[mm]"': X, '"force\n[N]"': F}
     record = read_run(write(tmp_path, "a_0.5A.csv", table(names)))

@@ -196,9 +196,12 @@ def as_data(text: str) -> str:
 
 
 def without_gaps(current: Floats) -> tuple[Floats, tuple[Finding, ...]]:
-    """Return a current that is recorded at every n-th sample only, by its mean, or in the first row of the test."""
+    """Return a current that is recorded at every n-th sample only, by its mean, or in the first row of the test.
+
+    A zero in the first row only may be that of a logger that stopped.
+    """
     count = sum(int(np.count_nonzero(np.isfinite(piece))) for _, piece in chunks(current))
-    if count == 1 and np.isfinite(current[0]):  # a cell merged over the rows, or not filled down
+    if count == 1 and abs(current[0]) > 0:  # a cell merged over the rows, or not filled down
         text = f"the current stands in the first row only: {float(current[0]):g} A is taken for the whole test"
         return constant(float(current[0]), current), (Finding("W_DECIMATED", text),)
     if count < _FEWEST_SLOW or count > 0.6 * current.size:

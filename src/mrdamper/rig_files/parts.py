@@ -75,7 +75,8 @@ def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
     assert table.words is not None
     words = table.words(column)
     codes, labels = words.codes, list(words.labels)
-    if "" in labels and labels[0] != "":  # named in its first row only
+    merged = "" in labels and labels[0] != ""  # named in its first row only
+    if merged:
         blank = labels.index("")
         at = np.maximum.accumulate(np.where(codes == blank, 0, np.arange(codes.size)))
         codes = codes[at]
@@ -89,7 +90,7 @@ def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
     read = _remembered(table)
     others = [i for i in range(len(table.names)) if i != column]
     tidy = [re.sub(r"^([0-9]+)[.,]0+$", r"\1", label.strip()) or "unnamed" for label in labels]
-    return [_part(table, read, others, partial(_rows_of, codes, code), tidy[code]) for code in runs]
+    return [_part(table, read, others, partial(_rows_of, codes, code), tidy[code], merged=merged) for code in runs]
 
 
 def _rows_of(codes: np.ndarray, code: int) -> slice | np.ndarray:
@@ -125,12 +126,19 @@ def _part(
     columns: Sequence[int],
     rows: Callable[[], slice | np.ndarray],
     label: str,
+    *,
+    merged: bool = False,
 ) -> RawTable:
-    """Return some of a table's columns in the rows of one test, which are asked for when they are needed."""
+    """Return some of a table's columns in the rows of one test, which are asked for when they are needed.
+
+    Where the test is named in a cell merged over its rows, other cells may be merged, too.
+    """
 
     def part(wanted: Sequence[int]) -> Content:
         content, inside = read(tuple(columns[i] for i in wanted)), rows()
         values = {i: np.array(content.values[columns[i]][inside]) for i in wanted}
+        for own in values.values() if merged else ():
+            own[:] = own if np.isfinite(own[1:]).any() else own[0]
         return Content(values, None if content.lines is None else content.lines[inside], content.findings)
 
     several = tuple(line for line in table.remarks if len(set(currents_in_cells(line))) > 1)

@@ -87,11 +87,11 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         if profile.correction is not None:
             others["force_raw_N"] = part["force"]
             part["force"], remarks["force_correction"] = corrected_force(part, profile.correction)
-        current, whence = current_of(table, profile, path, part.get("current"), stretch)
         noticed = findings
         if "current" in part:
             part["current"], slow = without_gaps(part["current"])
             noticed = [*findings, *slow]
+        current, whence = current_of(table, profile, path, part.get("current"), stretch)
         if current is not None:
             part["current"] = constant(current, part["time"])
             noticed = [f for f in findings if not f.text.startswith(NO_CHANNEL)]
