@@ -94,7 +94,14 @@ def test_what_is_named_beside_the_force_does_not_disturb(tmp_path):
 @pytest.mark.parametrize("measured", ["disp feedback [mm]", "disp_ist [mm]", "disp (actual) [mm]"])
 def test_a_channel_called_measured_is_taken_before_one_that_may_be_its_command(measured, tmp_path):
     write(tmp_path, "a_0.5A.csv", table({"time [s]": T, "disp [mm]": np.roll(X, 6), measured: X, "force [N]": F}))
-    np.testing.assert_allclose(1e3 * read_run(tmp_path / "a_0.5A.csv").displacement, X, atol=1e-5)
+    record = read_run(tmp_path / "a_0.5A.csv")
+    np.testing.assert_allclose(1e3 * record.displacement, X, atol=1e-5)
+    assert [finding.code for finding in record.findings] == ["W_CHOSEN"]
+
+
+def test_what_is_abbreviated_act_may_be_of_the_actuator(tmp_path):
+    columns = {"Time (s)": T, "Damper disp (mm)": X, "Force (N)": F, "Act disp (mm)": 1.01 * X}
+    assert code(write(tmp_path, "a_0.5A.csv", table(columns))) == "E_AMBIGUOUS"
 
 
 def test_a_sign_that_is_stated_settles_compression(tmp_path):

@@ -166,6 +166,18 @@ def left_out(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]
     return reasons
 
 
+def measured_beside_others(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]) -> list[str]:
+    """Return which columns were taken because they are called measured, beside others of the same channel."""
+    taken = []
+    for role in [role for role in assigned if profile.channel(role).column is None and role not in table.chosen]:
+        own = assigned[role].column
+        alike = table.columns(role, table.headers[own].dimension)
+        if len(alike) > 1 and [own] == [i for i in alike if holds(table.headers[i].name, _MEASURED)]:
+            other = next(table.names[i] for i in alike if i != own)
+            taken.append(f"{table.names[own]!r} is taken as the {role}, not {other!r}: its name says it was measured")
+    return taken
+
+
 def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
     """Column and unit of every channel as far as the file says them, for a profile to be completed."""
     proposed: dict[str, tuple[int | None, str]] = {role: (None, "") for role in REQUIRED}

@@ -14,7 +14,14 @@ from mrdamper.errors import ColumnError, InputError, listed, printable
 from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, constant, current_of, without_gaps
 from mrdamper.rig_files.column_names import role_of
-from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, left_out, rate_of
+from mrdamper.rig_files.columns import (
+    Assigned,
+    assign,
+    index_of_samples,
+    left_out,
+    measured_beside_others,
+    rate_of,
+)
 from mrdamper.rig_files.conditions import stated_motion, stated_quantities
 from mrdamper.rig_files.mapping.clocks import past_midnight, refuse_two_rates
 from mrdamper.rig_files.mapping.integration import integral
@@ -75,6 +82,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         "motion_stated": motion if len(stretches) == 1 else "",
     }
     remarks = {key: text for key, text in remarks.items() if text}
+    findings += [Finding("W_CHOSEN", text) for text in measured_beside_others(table, profile, assigned)]
     for name, why in left_out(table, profile, assigned).items():
         findings.append(Finding("W_COLUMN", f"the {name} channel is left out: {why}"))
     records = []
