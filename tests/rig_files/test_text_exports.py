@@ -91,6 +91,10 @@ EXPORTS = {
     "a step for all channels, and a separator behind every line": '"Name","stroke","load",\n"VUnit","mm","N",\n'
     + '"HResolution",0.005,0.005,\n"HUnit","s","s",\n\n'
     + lines(lambda i, t, x, f: f",{x:.6f},{f:.4f},"),
+    "scales above rows with a key": "Name,Time,Stroke,Load\nUnit,s,mm,N\nFull range,9,40,900\nScale,1,1,1\n"
+    + lines(lambda i, t, x, f: f"Data,{t:.3f},{x:.6f},{f:.4f}"),
+    "offsets above rows without a key": "Name,Time,Stroke,Load\nUnit,s,mm,N\nOffset,0,0.3,12\n"
+    + lines(lambda i, t, x, f: f",{t:.3f},{x:.6f},{f:.4f}"),
     "paths of a model": "time,Rig model/plant/Ref/x_ref,Rig model/plant/Sensor/stroke,Rig model/plant/Sensor/load\n"
     + "s,mm,mm,N\n"
     + lines(lambda i, t, x, f: f"{t:.3f},{x:.4f},{x:.6f},{f:.4f}"),

@@ -16,7 +16,7 @@ from itertools import islice
 from string import ascii_uppercase
 from typing import Literal
 
-from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.column_names import holds, split_name
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RigFileError, Source
 from mrdamper.rig_files.text.notes import with_notes_beside
@@ -36,7 +36,7 @@ _MARKS, _DIGITS = frozenset("#%/"), frozenset("0123456789+-.")
 _FEWEST_LINES = 20  # of a text: fewer, with words among the numbers, are notes
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
-_UNIT_KEYS, _NOTES = words("unit"), words("notes")
+_UNIT_KEYS, _NOTES, _SCALES = words("unit"), words("notes"), words("scale") | {"offset"}
 _MOST_LEVELS = 4  # lines of headings
 _TELLING = 2  # columns whose names tell what they are
 _LONGEST_HEADING = 6  # words
@@ -380,18 +380,25 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
 def _first_of(
     content: Sequence[tuple[int, str]], width: int, separator: str, *, labelled: bool
 ) -> tuple[int, list[str]]:
-    """Index and cells of the first row; a key with numbers behind it is none, unless the rows are labelled."""
+    """Index and cells of the first row; a key with numbers behind it is none, unless the rows are labelled.
+
+    A key of its own is none above rows of one label, nor is one of scales: Scale,1,1,1; Data,0.0,1.2,3.4.
+    """
     worded: tuple[int, list[str]] | None = None
     first: tuple[int, list[str]] | None = None
-    for i, line in content:
-        cells = cells_of(line, separator)
+    rows = [(i, cells_of(line, separator)) for i, line in content]
+    keys = Counter(cells[0].strip('"').casefold() for _, cells in rows if len(cells) == width and _is_row(cells))
+    shared = any(count > 1 and _is_key(key) for key, count in keys.most_common(1))
+    for i, cells in rows:
         if not _is_row(cells):
             first, worded = None, worded or (i, cells)
         elif len(cells) == width and not _is_key(cells[0].strip('"')):
             return first or (i, cells)
         elif len(cells) == width and labelled:
+            key = cells[0].strip('"').casefold()
+            alone = keys[key] == 1 and (shared or holds(key, _SCALES))
             alike = width > _TELLING and len({*filter(None, cells[1:])}) == 1  # Time, 10:31:22, 10:31:22
-            first = None if alike else first or (i, cells)
+            first = None if alike else first or (None if alone else (i, cells))
     row = first or worded
     assert row is not None
     return row
