@@ -57,7 +57,9 @@ def main(folder: Path) -> None:
     for refusal in imported.refusals:
         print(f"refused: {refusal.error}")
     for quality in quality_table(imported.records):
-        print(f"{quality.record.id}: {quality.condition}, {quality.cycles:.1f} cycles, {quality.verdict}")
+        of = quality.figures
+        motion = f"{of['current_A']:.3g} A, {of['frequency_Hz']:.3g} Hz, {of['amplitude_mm']:.3g} mm"
+        print(f"{quality.record.id}: {motion}, {of['cycles']:.1f} cycles, {quality.verdict}")
     rig = run_study(to_dataset(imported.records, "my rig")).rigs[0]
     error = rig.chosen.cross_validated.median()
     print(f"{rig.chosen.title}: {100 * error:.1f} % of peak-to-peak at cross-validated conditions")

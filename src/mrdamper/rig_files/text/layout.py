@@ -388,16 +388,15 @@ def _first_of(
     first: tuple[int, list[str]] | None = None
     rows = [(i, cells_of(line, separator)) for i, line in content]
     keys = Counter(cells[0].strip('"').casefold() for _, cells in rows if len(cells) == width and _is_row(cells))
-    shared = any(count > 1 and _is_key(key) for key, count in keys.most_common(1))
+    label = next((key for key, count in keys.most_common(1) if count > 1), "-")  # of most rows; - if each has its own
     for i, cells in rows:
         if not _is_row(cells):
             first, worded = None, worded or (i, cells)
         elif len(cells) == width and not _is_key(cells[0].strip('"')):
             return first or (i, cells)
         elif len(cells) == width and labelled:
-            key = cells[0].strip('"').casefold()
-            alone = keys[key] == 1 and (shared or holds(key, _SCALES))
-            alike = width > _TELLING and len({*filter(None, cells[1:])}) == 1  # Time, 10:31:22, 10:31:22
+            alike = not label and width > _TELLING and len({*filter(None, cells[1:])}) == 1  # Time, 10:31:22, 10:31:22
+            alone = keys[key := cells[0].strip('"').casefold()] == 1 and (_is_key(label) or holds(key, _SCALES))
             first = None if alike else first or (None if alone else (i, cells))
     row = first or worded
     assert row is not None
