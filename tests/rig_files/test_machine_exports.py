@@ -106,9 +106,9 @@ def test_days_since_1900_need_no_unit_and_their_millionths_the_dates_beside_them
         days = (moment - datetime(1899, 12, 30)) / timedelta(days=1)
         for name, value in (("Weg_mm", x), ("Kraft_N", f), ("Spulenstrom_A", 0.6)):
             clock = f"{1e6 * days:.4f}" if times == "Time_ms" else f"{days:.11f}"
-            body += f'"{name}";"{moment:%d.%m.%Y %H:%M:%S}";{value:.4f};{clock}\n'
+            body += f'"{name}";"{moment:%d.%m.%Y %H:%M:%S}";{value:.4f};1;{clock}\n'
     stamps = "TimeString" if times == "Time_ms" else "Remark"
-    (tmp_path / "trend.csv").write_text(f'"VarName";"{stamps}";"VarValue";"{times}"\n{body}')
+    (tmp_path / "trend.csv").write_text(f'"VarName";"{stamps}";"VarValue";"Validity";"{times}"\n{body}')
     expect(tmp_path, 0.6)
 
 

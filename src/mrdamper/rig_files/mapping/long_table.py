@@ -24,11 +24,14 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
 
     Raises `RigFileError`: E_RASTER if channels of several tests have other times than the force.
     """
-    words_in = [[word.casefold() for word in words_of(name)] for name in table.names]
-    names = ["_".join(w for w in own if w not in _NUMBER) or "_".join(own) for own in words_in]  # channel of channel_id
-    value = [i for i, name in enumerate(names) if name in _VALUE]
-    channel = [i for i, name in enumerate(names) if name in _CHANNEL]
-    unit = [i for i, name in enumerate(names) if name in _UNIT][:1]
+    parts = [[word.casefold() for word in words_of(name)] for name in table.names]
+    names = [  # channel of channel_id, too
+        {name.strip(" _").casefold(), "_".join(part for part in own if part not in _NUMBER)}
+        for name, own in zip(table.names, parts, strict=True)
+    ]
+    value = [i for i, either in enumerate(names) if either & _VALUE]
+    channel = [i for i, either in enumerate(names) if either & _CHANNEL]
+    unit = [i for i, either in enumerate(names) if either & _UNIT][:1]
     if len(value) != 1 or len(channel) != 1:
         value, channel, unit = _by_content(table)
     if table.words is None or len(value) != 1 or len(channel) != 1:
