@@ -1,8 +1,38 @@
-"""Formats of machines as lists of columns, where headings alone do not state the channels: a real-time system."""
+"""Formats of testing machines as lists of columns: a servohydraulic one, a shock dynamometer, a real-time system."""
 
 from __future__ import annotations
 
 from mrdamper.rig_files.readers.column_list import ColumnList
+
+
+class MtsText(ColumnList):
+    """Text of an MTS station: a block an acquisition, with its name above it."""
+
+    name = "mts-text"
+    title = "MTS station text"
+    mark = r"^(?:MTS793\||Data Acquisition:)"
+    columns = (
+        ("time", "Running Time (*)"),
+        ("time", "Time (*)"),
+        ("displacement", "Axial Displacement (*)"),
+        ("displacement", "Axial Stroke (*)"),
+        ("force", "Axial Force (*)"),
+        ("force", "Axial Load (*)"),
+    )
+
+
+class ShockDyno(ColumnList):
+    """Tests of a shock dynamometer beside each other, each under a title."""
+
+    name = "shock-dyno"
+    title = "shock dynamometer text"
+    mark = r"(?i)shock dyno"
+    columns = (
+        ("displacement", "Disp (*)"),
+        ("displacement", "Position (*)"),
+        ("force", "Force (*)"),
+        ("velocity", "Velocity (*)"),
+    )
 
 
 class RealTimeRecorder(ColumnList):
@@ -11,4 +41,12 @@ class RealTimeRecorder(ColumnList):
     name = "real-time-recorder"
     title = "real-time recorder text"
     mark = r'"xaxis"\s*[;,]\s*"trace_values"'
-    columns = (("displacement", "xPiston (*)"), ("force", "FRod (*)"), ("current", "iMeas (*)"))
+    columns = (
+        ("displacement", "xPiston (*)"),
+        ("displacement", "Stroke (*)"),
+        ("displacement", "LVDT (*)"),
+        ("force", "FRod (*)"),
+        ("force", "Load cell (*)"),
+        ("current", "iMeas (*)"),
+        ("current", "iCoil (*)"),
+    )
