@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.metadata import Distribution, EntryPoint, EntryPoints, entry_points, version
+from importlib.metadata import Distribution, EntryPoint, entry_points, version
 from types import MappingProxyType, ModuleType
 from typing import Any, Generic, TypeVar
 
@@ -94,7 +94,7 @@ def provided_modules(group: str) -> tuple[tuple[EntryPoint, tuple[ModuleType, ..
 
 
 @cache
-def _entry_points() -> EntryPoints:
+def _entry_points():
     """Read the entry points of all packages, once for all groups: a file of every installed package is opened."""
     return entry_points()
 
