@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
@@ -140,7 +142,8 @@ def _statements(table: RawTable, path: Path, profile: Profile) -> list[Statement
     named = {} if number is None else {f"current [{channel.unit or 'A'}]": (channel.scale or 1.0) * number}
     held = held_current_of(replace(table, constants=named) if named else table, channel.unit or "")
     statements = [] if held is None else [Statement(held, table.stated_in or "a number in the file")]
-    lines = [line for line in table.remarks if line not in table.titles]
+    columns = {*table.names, *(header.name for header in table.headers)}
+    lines = [line for line in table.remarks if line not in table.titles and not _lists_channel(line, columns)]
     statements += stated_by_lines(lines, table.decimal)
     member = table.source.name.removeprefix(f"{path.name}:").removeprefix(f"{path.name}, sheet ")
     for text, whence in ((table.label, "the title"), (path.name, "file name"), (member, "file name")):
@@ -148,6 +151,12 @@ def _statements(table: RawTable, path: Path, profile: Profile) -> list[Statement
         if len(stated) == 1:
             statements.append(Statement(stated[0], whence if whence == "file name" else f"{whence} {text!r}"))
     return statements
+
+
+def _lists_channel(line: str, columns: Collection[str]) -> bool:
+    """Tell if a line lists a column behind its number, with its gain and unit: CH2-1, Coil current, 1.0, A."""
+    cells = [cell.strip(' "') for cell in re.split("[,;\t]", line)]
+    return len(cells) > 3 and cells[1] in columns
 
 
 def _set_points(table: RawTable, rows: slice) -> list[Statement]:
