@@ -6,6 +6,7 @@ from datetime import datetime, timedelta
 import numpy as np
 import pytest
 from openpyxl import Workbook
+from scipy.io import savemat
 
 from mrdamper import import_files
 from mrdamper.rig_files.profile import parse_profile
@@ -201,6 +202,36 @@ def test_the_interval_above_the_samples_gives_a_clock_its_unit(tmp_path):
     body = rows(lambda t, x, f: f"{t:.4E},{x:.5f},{f:.3f}")
     (tmp_path / "AUTO_0.6A.csv").write_text(f'"Interval","4ms"\n"Time","CH1-1[mm]","CH1-2[N]"\n{body}')
     expect(tmp_path, 0.6)
+
+
+def test_a_line_that_lists_a_channel_with_its_gain_states_no_current(tmp_path):
+    listed = '"CH1-1","Stroke","1.0E+00","mm"\n"CH1-2","Force","1.0E+00","N"\n"CH2-1","Coil current","1.0E+00","A"\n'
+    body = rows(lambda t, x, f: f"{t:.4E},{x:.5f},{f:.3f},0.6")
+    (tmp_path / "wave.csv").write_text(f'{listed}"Time[s]","CH1-1[mm]","CH1-2[N]","CH2-1[A]"\n{body}')
+    expect(tmp_path, 0.6)
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_functions_of_a_vibration_analyser_are_channels_whose_unit_is_asked_for_unless_it_is_of_si(tmp_path, together):
+    channels = (("Stroke:S", "mm", X), ("Force:+Z", "N", force(0.6)), ("Coil current", "A", np.full(T.size, 0.6)))
+    names, units, samples = zip(*channels, strict=True)
+    clock = {"start_value": 0.0, "increment": 1 / 250, "number_of_values": T.size, "quantity": {"label": "s"}}
+
+    def function(names, units, values):
+        quantity = [{"label": unit} for unit in units]
+        return {
+            "x_values": clock,
+            "y_values": {"values": values, "quantity": quantity},
+            "function_record": {"name": np.array(names, dtype=object)},
+        }
+
+    apart = {f"Signal_{i}": function([n], [u], y[:, None]) for i, (n, u, y) in enumerate(channels)}
+    whole = {"Signal": function(names, units, np.column_stack(samples))}
+    savemat(tmp_path / "run.mat", whole if together else apart)
+    (refusal,) = import_files([tmp_path]).refusals
+    assert str(refusal.error).count("has no unit") == 1
+    assert "[channels.displacement] unit" in refusal.error.remedy
+    expect(tmp_path, 0.6, profile='[channels.displacement]\nunit = "mm"\n')
 
 
 def test_a_row_of_units_may_end_with_the_start_and_the_step_of_the_samples(tmp_path):

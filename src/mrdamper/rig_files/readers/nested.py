@@ -30,6 +30,7 @@ _MOST_TEXT = 200  # characters
 _HEAD = re.compile(r"_?(?:header|info|properties|attributes|meta(?:data)?)$", re.IGNORECASE)
 _BODY = re.compile(r"_?(?:data|values)$", re.IGNORECASE)
 _LISTING = re.compile(r"(?i)^\s*(?:columns?|channels?|spalten|kanäle|colonnes|names)\s*[:=]\s*")
+_DIRECTION = re.compile(r":[+-]?[SXYZ]$")  # of a point of measurement
 _CLOCK = re.compile(r"(^|[_. ])time[_. ]", re.IGNORECASE)
 
 
@@ -77,7 +78,7 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, togeth
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
-    tree = {key: _object_in(value) for key, value in tree.items()}
+    tree = _with_functions({key: _object_in(value) for key, value in tree.items()})
     texts = [value for value in tree.values() if isinstance(value, _JsonText)]
     lists = {f"{key} ": own.pop(key) for own in texts for key in list(own) if isinstance(own[key], list)}
     tree |= {key: own for key, own in lists.items() if all(isinstance(item, str) for item in own)}
@@ -149,6 +150,37 @@ def _object_in(value: Any) -> Any:
         return _JsonText(json.loads(value, parse_int=float))
     except (ValueError, RecursionError, OverflowError):
         return value
+
+
+def _with_functions(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """Give functions that a vibration analyser exports, each x_values and y_values, the form of channels."""
+    plain = {}
+    for key, says in tree.items():
+        inner = says if isinstance(says, Mapping) else {}
+        parts = (inner.get(name) for name in ("x_values", "y_values", "function_record"))
+        x, y, record = (part if isinstance(part, Mapping) else {} for part in parts)
+        data, step = y.get("values"), x.get("increment")
+        names = record["name"] if isinstance(record.get("name"), list) else [record.get("name")]
+        fits = isinstance(data, Array) and (len(names) == 1 or data.shape[1:] == (len(names),))
+        if not fits or not isinstance(step, float):
+            plain[key] = says
+            continue
+        stated = y.get("quantity")  # one for all of them, or one each
+        quantities = stated if isinstance(stated, list) and len(stated) == len(names) else [stated] * len(names)
+        clock = _si_unit(x.get("quantity"))
+        times = {f"x_start [{clock}]": x.get("start_value"), f"x_increment [{clock}]": step}
+        across = [data] if len(names) == 1 else np.asarray(data).T
+        for name, quantity, values in zip(names, quantities, across, strict=True):
+            name = _DIRECTION.sub("", name) if isinstance(name, str) else key
+            plain[f"{key} {name}"] = {"name": name, "unit": _si_unit(quantity), "data": values, **times}
+    return plain
+
+
+def _si_unit(quantity: Any) -> str:
+    """Return the unit of a function if it is one of SI; of mm it is not known if the samples are in mm or in m."""
+    unit = quantity.get("label") if isinstance(quantity, Mapping) else None
+    known = parse_unit(unit) if isinstance(unit, str) else None
+    return unit if known is not None and known.factor == 1.0 and not known.offset else ""
 
 
 def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
