@@ -111,6 +111,13 @@ def test_the_guess_is_a_profile_for_the_folder(folder, tmp_path):
     assert done.exit_code == 0, done.output
 
 
+def test_the_guess_for_a_folder_is_that_of_its_first_test_not_of_its_readme(folder, tmp_path):
+    (folder / "README.txt").write_text("MR damper tests. One file per test.\n")
+    done = run(folder, "--write-profile", tmp_path / "rig.toml")
+    assert done.exit_code == 0, done.output
+    assert "[channels.force]" in (tmp_path / "rig.toml").read_text()
+
+
 def test_a_wrong_sign_is_mended_by_the_profile(tmp_path):
     table = rows() * [1, 1, -1]
     path = write(tmp_path, "a_1A.csv", text(table))

@@ -104,9 +104,10 @@ def read_runs(path: str | Path, profile: Profile | str | Path | None = None) -> 
 
 @contextlib.contextmanager
 def first_file(paths: Sequence[str | Path]) -> Iterator[Path]:
-    """Yield the first file among files, folders and archives, for as long as the block goes."""
+    """Yield the first file among files, folders and archives that is no README, for as long as the block goes."""
     with unpacked(paths) as given:
-        yield files_in(given)[0][0]
+        files = files_in(given)[0]
+        yield next((file for file in files if not is_readme(file)), files[0])
 
 
 @validate_arguments("paths")
