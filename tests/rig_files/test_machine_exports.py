@@ -209,6 +209,10 @@ def test_a_line_that_lists_a_channel_with_its_gain_states_no_current(tmp_path):
     body = rows(lambda t, x, f: f"{t:.4E},{x:.5f},{f:.3f},0.6")
     (tmp_path / "wave.csv").write_text(f'{listed}"Time[s]","CH1-1[mm]","CH1-2[N]","CH2-1[A]"\n{body}')
     expect(tmp_path, 0.6)
+    body = rows(lambda t, x, f: f"{t:.4E},{x:.5f},{f:.3f}")  # the current is listed, and not exported
+    (tmp_path / "wave.csv").write_text(f'{listed}"Time[s]","CH1-1[mm]","CH1-2[N]"\n{body}')
+    (refusal,) = import_files([tmp_path]).refusals
+    assert refusal.error.code == "E_CURRENT_MISSING"
 
 
 @pytest.mark.parametrize("together", [True, False])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
@@ -142,8 +141,7 @@ def _statements(table: RawTable, path: Path, profile: Profile) -> list[Statement
     named = {} if number is None else {f"current [{channel.unit or 'A'}]": (channel.scale or 1.0) * number}
     held = held_current_of(replace(table, constants=named) if named else table, channel.unit or "")
     statements = [] if held is None else [Statement(held, table.stated_in or "a number in the file")]
-    columns = {*table.names, *(header.name for header in table.headers)}
-    lines = [line for line in table.remarks if line not in table.titles and not _lists_channel(line, columns)]
+    lines = [line for line in _without_channels(table) if line not in table.titles]
     statements += stated_by_lines(lines, table.decimal)
     member = table.source.name.removeprefix(f"{path.name}:").removeprefix(f"{path.name}, sheet ")
     for text, whence in ((table.label, "the title"), (path.name, "file name"), (member, "file name")):
@@ -153,10 +151,13 @@ def _statements(table: RawTable, path: Path, profile: Profile) -> list[Statement
     return statements
 
 
-def _lists_channel(line: str, columns: Collection[str]) -> bool:
-    """Tell if a line lists a column behind its number, with its gain and unit: CH2-1, Coil current, 1.0, A."""
-    cells = [cell.strip(' "') for cell in re.split("[,;\t]", line)]
-    return len(cells) > 3 and cells[1] in columns
+def _without_channels(table: RawTable) -> list[str]:
+    """Return the lines that do not list channels, exported or not, with gain and unit: CH2-1, Coil current, 1.0, A."""
+    columns = {*table.names, *(header.name for header in table.headers)}
+    cells = {line: [cell.strip(' "') for cell in re.split("[,;\t]", line)] for line in table.remarks}
+    forms = {line: (len(own), re.sub("[0-9]+", "0", own[0])) for line, own in cells.items()}
+    listing = {forms[line] for line, own in cells.items() if len(own) > 3 and own[1] in columns}
+    return [line for line in table.remarks if forms[line] not in listing]
 
 
 def _set_points(table: RawTable, rows: slice) -> list[Statement]:

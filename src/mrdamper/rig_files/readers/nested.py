@@ -178,8 +178,8 @@ def _with_functions(tree: Mapping[str, Any]) -> dict[str, Any]:
 
 def _si_unit(quantity: Any) -> str:
     """Return the unit of a function if it is one of SI; of mm it is not known if the samples are in mm or in m."""
-    unit = quantity.get("label") if isinstance(quantity, Mapping) else None
-    known = parse_unit(unit) if isinstance(unit, str) else None
+    unit = str(quantity.get("label", "")) if isinstance(quantity, Mapping) else ""
+    known = parse_unit(unit)
     return unit if known is not None and known.factor == 1.0 and not known.offset else ""
 
 
