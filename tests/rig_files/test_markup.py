@@ -12,6 +12,8 @@ X = 0.01 * np.sin(2 * np.pi * T)
 V = np.gradient(X, T)
 F = 650 * np.tanh(V / 0.01) + 900 * V
 ROWS = list(zip(T, 1e3 * X, F / 1e3, strict=True))
+COIL = '<CoilCurrent unit="A">0.5</CoilCurrent>'
+PARAMETERS = '<Parameter name="Strom" unit="A">0.5</Parameter><Parameter name="Temperatur" unit="°C">24</Parameter>'
 EXCEL = "urn:schemas-microsoft-com:office:spreadsheet"
 
 
@@ -27,7 +29,7 @@ def _channels():
         "</Channel>"
         for name, unit, values in lists
     )
-    return f'<Test><CoilCurrent unit="A">0.5</CoilCurrent>{channels}</Test>'
+    return f"<Test>{COIL}{channels}</Test>"
 
 
 def _elements():
@@ -77,6 +79,7 @@ def _page():
         ("channels16.xml", '<?xml version="1.0" encoding="UTF-16"?>' + _channels(), "utf-16"),
         ("attributes.xml", _with_attributes(), "utf-8"), ("units.xml", _elements_with_units(), "utf-8"),
         ("decimal_commas.xml", _with_attributes().replace(".", ",").replace("0,5<", "0.5<"), "utf-8"),
+        ("parameters.xml", _channels().replace(COIL, PARAMETERS), "utf-8"),
         ("elements.xml", _elements(), "utf-8"), ("workbook.xls", _workbook(), "utf-8"), ("page.xls", _page(), "utf-8"),
     ],
 )  # fmt: skip

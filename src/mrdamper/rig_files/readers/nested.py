@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -179,8 +179,8 @@ def _with_functions(tree: Mapping[str, Any]) -> dict[str, Any]:
 def _si_unit(quantity: Any) -> str:
     """Return the unit of a function if it is one of SI; of mm it is not known if the samples are in mm or in m."""
     unit = str(quantity.get("label", "")) if isinstance(quantity, Mapping) else ""
-    known = parse_unit(unit)
-    return unit if known is not None and known.factor == 1.0 and not known.offset else ""
+    si = parse_unit(unit)
+    return unit if si is not None and si.factor == 1.0 and not si.offset else ""
 
 
 def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -230,6 +230,11 @@ def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, A
 def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[str, Any]]]:
     """Nodes of their own among the items of a list; items that are channels become columns, records a table."""
     mappings = [item for item in items if isinstance(item, Mapping)]
+    own = {_stated(item, KEYS["name"], str): item for item in mappings if _stated(item, _VALUE, float) is not None}
+    if len(own) == len(items) and None not in own:  # parameters, each with its name, value and unit
+        for name, item in own.items():
+            _tell(node, {key: value for key, value in item.items() if value is not name}, str(name))
+        return []
     records = _records(mappings) if len(mappings) == len(items) else {}
     if records:
         return [(key, records)]
@@ -247,6 +252,10 @@ def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[s
     for i, array in enumerate(arrays, 1):
         node.columns += _across(f"{key}_{i}" if len(arrays) > 1 else key, array)
     return nodes
+
+
+def _stated(says: Mapping[str, Any], names: Collection[str], kind: type[str] | type[float]) -> str | float | None:
+    return next((v for key, v in says.items() if key.casefold() in names and isinstance(v, kind)), None)
 
 
 def _records(items: list[Mapping[str, Any]]) -> dict[str, Any]:
