@@ -106,4 +106,4 @@ def bench_damper() -> Any:
 
     values = {"c": 1440.0, "alpha": 9e5, "beta": 2e5, "gamma": 2e5, "f0": 60.0, "k1": 800.0}
     envelope = Envelope((0.0, 1.0), (0.5, 4.0), (0.004, 0.02), (0.02, 0.3))
-    return JointDamper("bench", model_type("bouc-wen").build(values), tuple(values), envelope, {})
+    return JointDamper(model_type("bouc-wen").build(values), tuple(values), rig="bench", envelope=envelope)
