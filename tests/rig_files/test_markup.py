@@ -5,7 +5,7 @@ import pytest
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.rig_import import import_files, read_run
-from mrdamper.rig_files.text.elements import value_of
+from mrdamper.rig_files.text.elements import numbers_in
 
 T = np.arange(0, 6, 0.005)
 X = 0.01 * np.sin(2 * np.pi * T)
@@ -114,10 +114,10 @@ def test_hostile_documents_are_refused_by_name(tmp_path, text, code):
 
 def test_commas_that_may_be_of_decimals_or_between_numbers_and_underscores_are_in_no_number():
     pairs = " ".join(["1,5", "2,5"] * 50)
-    assert value_of(pairs) == pairs
-    assert value_of("0_5") == "0_5"
-    np.testing.assert_array_equal(value_of(", ".join(map(str, range(60)))), np.arange(60))
-    np.testing.assert_array_equal(value_of("0.5,1.5;" * 29 + "0.5,1.5"), [0.5, 1.5] * 30)
+    assert numbers_in(pairs) == pairs
+    assert numbers_in("0_5") == "0_5"
+    np.testing.assert_array_equal(numbers_in(", ".join(map(str, range(60)))), np.arange(60))
+    np.testing.assert_array_equal(numbers_in("0.5,1.5;" * 29 + "0.5,1.5"), [0.5, 1.5] * 30)
 
 
 def test_a_document_without_samples_beside_tests_is_no_test(tmp_path):

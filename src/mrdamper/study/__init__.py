@@ -1,1 +1,1 @@
-"""Ways from runs to a damper, tried in order and judged by cross-validation over conditions."""
+"""Procedures that identify a damper from runs, compared by cross-validation over conditions."""

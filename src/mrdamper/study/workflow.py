@@ -365,9 +365,9 @@ class UsableRuns:
         """Sort the runs of a rig; `keep` names some that may contradict the others."""
         dataset, contradictions = without_contradictions(dataset, keep)
         sines, refused = usable_sines(dataset)
-        trusted, distrusted = accepted_runs(dataset)
-        everything, unusable = runs_for_global_fit(run for run in trusted if run.split == "train")
-        unusable |= distrusted
+        accepted, reasons = accepted_runs(dataset)
+        everything, unusable = runs_for_global_fit(run for run in accepted if run.split == "train")
+        unusable |= reasons
         refused = {name: unusable.get(name, why) for name, why in refused.items()}
         return cls(
             dataset,
@@ -375,7 +375,7 @@ class UsableRuns:
             sines,
             [run for run in sines if run.split == "train"],
             everything,
-            [run for run in trusted if run.split == "validate"],
+            [run for run in accepted if run.split == "validate"],
             unusable,
             {one.run_id: str(one) for one in contradictions} | refused,
         )

@@ -1,4 +1,4 @@
-"""The verdict on every record of a set, with the figures behind it: one row a record."""
+"""The result of the checks of every record of a set, with the figures behind it: one row a record."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Quality:
 
 
 def quality_table(records: Iterable[Record]) -> tuple[Quality, ...]:
-    """Judge records, judged or not, and measure them; a refused one does not stop the others."""
+    """Check records, checked or not, and measure them; a refused one does not stop the others."""
     return tuple(_quality(record) for record in records)
 
 
@@ -115,11 +115,11 @@ def row(quality: Quality) -> dict[str, Any]:
 def _quality(record: Record) -> Quality:
     view = View(replace(record, findings=()) if record.segments else record)
     try:
-        judged = record if record.segments else checked(view)
+        result = record if record.segments else checked(view)
     except QualityError as refusal:
         return Quality(record, refusal=refusal)
     motion, scatter = view.motion, repeatability(view)
-    current, change = held_in(judged, steady_window(view))
+    current, change = held_in(result, steady_window(view))
     steady = view.steady
     whole = slice(None)
     if motion is not None:
@@ -137,4 +137,4 @@ def _quality(record: Record) -> Quality:
         "drift_mm": 1e3 * drift_of(view)[0],
         "distortion_percent": np.nan if motion is None else 100 * motion.distortion,
     }
-    return Quality(judged, figures)
+    return Quality(result, figures)

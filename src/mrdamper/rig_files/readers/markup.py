@@ -12,7 +12,7 @@ from mrdamper.rig_files.readers.arrays import refusing_damage, whole
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, Reader, RigFileError, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 from mrdamper.rig_files.readers.workbook import as_text, tables_of_sheets
-from mrdamper.rig_files.text.elements import Elements, Sheets, value_of
+from mrdamper.rig_files.text.elements import Elements, Sheets, numbers_in
 
 _BEGINS = re.compile(rb"\s*<[?!A-Za-z]")
 _PAGE = re.compile(rb"\s*(?:<!--.*?-->\s*)?<(?:!doctype\s+html|html|head|body|table|meta)\b", re.IGNORECASE | re.DOTALL)
@@ -80,7 +80,7 @@ class _Page(HTMLParser):
         elif tag == "tr" and self.sheets:
             self.sheets[-1][1].append([])
         elif tag in ("td", "th") and self.sheets:
-            row, across = self.sheets[-1][1][-1], value_of(dict(attrs).get("colspan") or "")
+            row, across = self.sheets[-1][1][-1], numbers_in(dict(attrs).get("colspan") or "")
             self._at = len(row)
             row += [""] * (int(np.clip(across, 1, MOST_COLUMNS)) if isinstance(across, float) else 1)
         self._open = tag in ("td", "th") or (self._open and tag not in ("table", "tr"))

@@ -45,7 +45,7 @@ class Elements:
         """Begin an element, or a sheet or row of a workbook."""
         if len(self._levels) > _MOST_LEVELS:
             raise RigFileError("E_FORMAT", "XML nested too deeply", remedy="export it as CSV")
-        own = {_local(key): value_of(text) for key, text in attributes.items()}
+        own = {_local(key): numbers_in(text) for key, text in attributes.items()}
         self._levels.append((own, {}, []))
         if tag == f"{_SHEETS}Worksheet":
             self.sheets.append((str(own.get("Name", "")), []))
@@ -68,7 +68,7 @@ class Elements:
             elif tag == f"{_SHEETS}Data":
                 self._levels[-1][1]["Data"] = ["".join(texts).strip()]
             return
-        value = value_of("".join(texts).strip())
+        value = numbers_in("".join(texts).strip())
         inner = {name: _together(values) for name, values in within.items()}
         name = _local(tag)
         units = [u for key, u in own.items() if key.casefold() in KEYS["unit"] and isinstance(u, str) and is_unit(u)]
@@ -102,7 +102,7 @@ def _number(text: str) -> float | None:
         return None
 
 
-def value_of(text: str) -> Any:
+def numbers_in(text: str) -> Any:
     """Return a text as the number or numbers that it lists, or as it is; 1,5 2,5 may be two numbers or four."""
     number = _number(text)
     if number is not None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import split_name, words_of
-from mrdamper.rig_files.text.elements import Elements, value_of
+from mrdamper.rig_files.text.elements import Elements, numbers_in
 from mrdamper.rig_files.text.stream import decoded
 from mrdamper.rig_files.units import DIMENSION, is_unit
 from mrdamper.rig_files.vocabulary import words
@@ -114,7 +114,7 @@ def _tree_of_yaml(text: str) -> Any:
 def _with_numbers(node: Any) -> Any:
     if isinstance(node, dict):
         return {key: _with_numbers(value) for key, value in node.items()}
-    return [_with_numbers(item) for item in node] if isinstance(node, list) else value_of(node)
+    return [_with_numbers(item) for item in node] if isinstance(node, list) else numbers_in(node)
 
 
 _STRUCTURED: Mapping[str, Callable[[str], Any]] = MappingProxyType(
