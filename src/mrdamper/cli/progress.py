@@ -14,7 +14,7 @@ _QUICK = 1.0  # seconds in which nothing needs to be said
 
 @contextmanager
 def progress_on_stderr(quiet: bool = False) -> Iterator[Progress]:
-    """Give a function (what is being done, share done 0...1) that shows progress and the time left on stderr."""
+    """Give a function (what is being done, share done 0...1) that shows progress and the time left on a terminal."""
     if quiet:
         yield lambda what, share: None
         return
@@ -23,7 +23,8 @@ def progress_on_stderr(quiet: bool = False) -> Iterator[Progress]:
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
-    with Progress(*columns, console=console, speed_estimate_period=1e9) as bar:  # steps may last for minutes
+    # Steps may last for minutes; a file or a pipe in place of a terminal would get the last bar only.
+    with Progress(*columns, console=console, disable=not console.is_terminal, speed_estimate_period=1e9) as bar:
         task = bar.add_task("", total=1.0)
         yield lambda what, share: bar.update(task, description=what, completed=share)
 
