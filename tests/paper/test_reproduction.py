@@ -383,7 +383,6 @@ def test_the_command_writes_the_full_study_in_75_seconds_of_processor_time(tmp_p
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     # Processor time: the machine may have other work.
     assert os.times().children_user - before < 75
-    assert "noise seed" in done.stderr or "written" in done.stderr
     found = json.loads(done.stdout)
     assert found["synthetic"]
     assert differences(of_reproduction(tmp_path / "out")) == [], "python -m benchmarks.numbers --reproduce DIR --write"
