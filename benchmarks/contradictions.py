@@ -22,7 +22,7 @@ from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError
 from mrdamper.statistics.metrics import peak_force
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
-from mrdamper.study.workflow import accepted_runs
+from mrdamper.study.usable_runs import accepted_runs
 
 WORSE = 0.05  # difference of the peak forces of two models from which one is worse
 _MODEL = "play-bypass"

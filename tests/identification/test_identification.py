@@ -17,7 +17,7 @@ from mrdamper.physics.motion import sine
 from mrdamper.physics.simulation import simulate
 from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.statistics.linear import solve_bounded
-from mrdamper.study.workflow import usable_sines
+from mrdamper.study.usable_runs import usable_sines
 
 
 @pytest.mark.parametrize("current_frequency", [(0.0, 0.5), (1.0, 1.0), (2.0, 2.0)])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mrdamper.study.workflow import accepted_runs, usable_sines
+from mrdamper.study.usable_runs import accepted_runs, usable_sines
 
 
 @pytest.fixture(scope="module")

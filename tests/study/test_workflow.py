@@ -13,7 +13,7 @@ from mrdamper.data import Dataset
 from mrdamper.errors import IdentificationError, OutputError
 from mrdamper.identification.loop_analysis import analyse_loop, dynamic_ranges
 from mrdamper.report.study import write_study
-from mrdamper.study import workflow
+from mrdamper.study import usable_runs
 from mrdamper.study.parallel import several
 from mrdamper.study.validation import validate
 from mrdamper.study.workflow import run_study
@@ -207,9 +207,9 @@ def test_our_own_faults_are_not_a_reason_to_leave_a_run_out(bundled, monkeypatch
     def broken(run):
         raise ValueError("a fault of the program")
 
-    monkeypatch.setattr(workflow, "equivalent_sine", broken)
+    monkeypatch.setattr(usable_runs, "equivalent_sine", broken)
     with pytest.raises(ValueError, match="a fault of the program"):
-        workflow.usable_sines(bundled)
+        usable_runs.usable_sines(bundled)
 
 
 def test_terms_the_runs_do_not_show_are_not_in_the_model(bundled_study):

@@ -30,7 +30,8 @@ from mrdamper.fleet.plan import Plan
 from mrdamper.identification.covariance import spread
 from mrdamper.models import Model
 from mrdamper.physics.motion import equivalent_sine
-from mrdamper.study.workflow import accepted_runs, runs_for_global_fit, study_rig, without_contradictions
+from mrdamper.study.usable_runs import accepted_runs, runs_for_global_fit, without_contradictions
+from mrdamper.study.workflow import study_rig
 
 VERSION = version("mrdamper")  # asked once: the answer takes a millisecond
 OTHER_RIG = "W_OTHER_RIG"  # tested on another rig than most of the line: compared with them all the same

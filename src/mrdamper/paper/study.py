@@ -37,7 +37,7 @@ from mrdamper.paper.virtual_rig import CURRENTS, VirtualRig, friction_test, virt
 from mrdamper.physics.gas_spring import GasSpring
 from mrdamper.study.parallel import IN_PROCESS, Processes, follow_each, identify_quickly, shortened_method
 from mrdamper.study.recipe import IdentificationCache, Progress, RecipeResult, fit_and_score_all
-from mrdamper.study.workflow import usable_sines
+from mrdamper.study.usable_runs import usable_sines
 
 SOBOL_SAMPLES = 512
 SEED_CURRENTS, _SEED_CYCLES = (0.0, 0.5, 1.0, 1.5, 2.0), 2  # [A], cycles a run: tests of each noise seed

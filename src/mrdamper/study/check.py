@@ -12,7 +12,7 @@ from mrdamper.data import Dataset, Displayable, Run
 from mrdamper.errors import InputError, is_a, validate_arguments
 from mrdamper.rig_files.quality.table import check_run, with_findings
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
-from mrdamper.study.workflow import accepted_runs
+from mrdamper.study.usable_runs import accepted_runs
 
 Severity = Literal["refused", "set aside", "noted"]
 P = ParamSpec("P")

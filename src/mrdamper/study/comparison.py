@@ -23,7 +23,8 @@ from mrdamper.identification.basis import Basis
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.study.parallel import follow_each, identify_each, several
 from mrdamper.study.recipe import IdentificationCache, Progress, Recipe, RecipeResult, StudyMethod, recipes
-from mrdamper.study.workflow import UsableRuns, headline_of, table_of, with_unused_runs
+from mrdamper.study.usable_runs import UsableRuns
+from mrdamper.study.workflow import headline_of, table_of, with_unused_runs
 
 RANKING = (
     "ranked by cross-validation over conditions; mrdamper study chooses the smallest model within one standard error "

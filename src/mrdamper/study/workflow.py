@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -25,13 +25,11 @@ from mrdamper.dampers.sessions import Sessions, known_errors
 from mrdamper.data import Dataset, Displayable, Floats, Run
 from mrdamper.data.displayable import joined
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError, validate_arguments
-from mrdamper.identification import refuse_unusable
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
-from mrdamper.physics.motion import analyse_motion, equivalent_sine
-from mrdamper.rig_files.quality.table import check_run, with_findings
+from mrdamper.physics.motion import analyse_motion
 from mrdamper.statistics.functions.selection import mean_error, smaller_wins
 from mrdamper.statistics.linear import on_one_blas_thread
-from mrdamper.study.contradictions import Contradiction, find_contradictions
+from mrdamper.study.contradictions import Contradiction
 from mrdamper.study.cross_validation import NO_CURRENT
 from mrdamper.study.dissipation import gains_energy
 from mrdamper.study.parallel import IN_PROCESS, Processes
@@ -49,17 +47,9 @@ from mrdamper.study.recipe import (
     study_methods,
     whole_damper,
 )
+from mrdamper.study.usable_runs import UsableRuns
 from mrdamper.study.validation import RunScore, Validation, validate
 
-_MIN_SAMPLES_PER_CYCLE = 8  # below, neither the velocity nor a loop can be told
-_MAX_DISTORTION = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
-_DUPLICATE_TOLERANCE = 1e-4  # of the range: two tests never agree so well, a file written twice does
-_MIN_RUNS = 4  # runs that say what is usual
-_SIZES: tuple[tuple[str, str, int, Callable[[Run], float]], ...] = (
-    ("peak-to-peak force", "N", 100, lambda run: float(np.ptp(run.force))),
-    ("stroke", "m", 300, lambda run: float(np.ptp(run.displacement))),
-    ("current", "A", 12, lambda run: float(np.median(np.abs(run.current)))),
-)
 CONDITION = "condition"  # kind of fold: the runs of one condition, a stretch of another record
 AWAY = ("current", "fastest motions")  # kinds that tell how errors grow away from the tests
 STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the one everybody compares with
@@ -347,40 +337,6 @@ def study_rig(
     )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class UsableRuns:
-    """The runs of one rig that models are identified from and tested on."""
-
-    dataset: Dataset  # without those that contradict the others
-    contradictions: tuple[Contradiction, ...]
-    sines: Sequence[Run]  # steady, at one current
-    train: Sequence[Run]  # of the sines, those to identify from
-    everything: Sequence[Run]  # to identify a whole damper from: any motion and current
-    held_out: Sequence[Run]
-    unusable: Mapping[str, str]  # by run, why nothing is identified from it
-    not_identified: Mapping[str, str]  # by run, why it is not identified by itself
-
-    @classmethod
-    def of(cls, dataset: Dataset, keep: Collection[str] = ()) -> UsableRuns:
-        """Sort the runs of a rig; `keep` names some that may contradict the others."""
-        dataset, contradictions = without_contradictions(dataset, keep)
-        sines, refused = usable_sines(dataset)
-        accepted, reasons = accepted_runs(dataset)
-        everything, unusable = runs_for_global_fit(run for run in accepted if run.split == "train")
-        unusable |= reasons
-        refused = {name: unusable.get(name, why) for name, why in refused.items()}
-        return cls(
-            dataset,
-            contradictions,
-            sines,
-            [run for run in sines if run.split == "train"],
-            everything,
-            [run for run in accepted if run.split == "validate"],
-            unusable,
-            {one.run_id: str(one) for one in contradictions} | refused,
-        )
-
-
 def _require_runs(sines: Sequence[Run], usable: Sequence[Run], unusable: Mapping[str, str], where: str) -> None:
     """Raise `IdentificationError` where no identification run is usable, or one sine is all there is."""
     if not usable:
@@ -478,113 +434,6 @@ def _runs(candidate: RecipeResult, kind: str) -> Sequence[RunScore]:
     if kind == CONDITION:
         return candidate.cross_validated.runs
     return candidate.by_kind[kind].runs if kind in candidate.by_kind else ()
-
-
-def runs_for_global_fit(runs: Iterable[Run]) -> tuple[list[Run], dict[str, str]]:
-    """Return the runs that a global model accepts, any motion and current, and the reasons for excluding the others."""
-    runs_used, refused = list[Run](), dict[str, str]()
-    for run in runs:
-        try:
-            refuse_unusable(with_findings(run))
-            equivalent_sine(run)  # refuses a run that does not move
-            runs_used.append(run)
-        except InputError as error:
-            refused[run.id] = _reason(error, run)
-    return runs_used, refused
-
-
-def _reason(error: InputError, run: Run) -> str:
-    """State an error of a run whose name stands beside it: runs of one reason are listed together."""
-    return str(error).removeprefix(f"run {run.id}: ")
-
-
-def without_contradictions(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, tuple[Contradiction, ...]]:
-    """Set aside the runs of a rig that contradict the others.
-
-    Raises
-    ------
-    ContradictionError
-        If more than a third of the identification runs contradict the others, or their forces differ as those of
-        two dampers do.
-    """
-    contradictions = tuple(find_contradictions(accepted_runs(dataset)[0], keep))
-    aside = {one.run_id for one in contradictions}
-    return dataset.only([run for run in dataset if run.id not in aside]), contradictions
-
-
-def accepted_runs(dataset: Iterable[Run]) -> tuple[list[Run], dict[str, str]]:
-    """Return the runs accepted by the physical checks, each once, and the reasons for rejecting the others."""
-    kept: list[Run] = []
-    refused: dict[str, str] = {}
-    for run in dataset:
-        twin = next((other.id for other in kept if _are_one_test(run, other)), None)
-        error, _ = check_run(run)
-        if twin is not None:
-            refused[run.id] = f"the same samples as run {twin}: a test counts once [E_TWICE]"
-        elif error is not None:
-            refused[run.id] = _reason(error, run)
-        else:
-            kept.append(run)
-    refused |= _of_another_size(kept)
-    return [run for run in kept if run.id not in refused], refused
-
-
-def _are_one_test(run: Run, other: Run) -> bool:
-    """Tell if two runs hold the same samples, possibly rounded, cropped or shifted in time."""
-    size = min(run.time.size, other.time.size)
-    for channel in ("displacement", "force"):
-        one, two = getattr(run, channel)[:size], getattr(other, channel)[:size]
-        near = _DUPLICATE_TOLERANCE * float(np.ptp(one))
-        if np.abs(one[::97] - two[::97]).max() > near or np.abs(one - two).max() > near:
-            return False
-    return True
-
-
-def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
-    """Return runs whose force, stroke or current is so far from all others' that its unit must be another."""
-    reasons: dict[str, str] = {}
-    for what, unit, most, size_of in _SIZES:
-        sizes = {run.id: size_of(run) for run in runs}
-        counted = [size for size in sizes.values() if size > 0]
-        if len(counted) < _MIN_RUNS:
-            continue
-        usual = float(np.median(counted))
-        for name, size in sizes.items():
-            thousandth = {"peak-to-peak force": "kN", "stroke": "m", "current": ""}[what]
-            like = f", as if in {thousandth}" if size < usual / most and thousandth else ""
-            like = ", as if in mA" if what == "current" and size > 50 * usual else like
-            if size > most * usual or (what != "current" and size < usual / most):
-                reasons[name] = (
-                    f"{what} of {size:.3g} {unit}, {usual:.3g} {unit} in the other runs{like}; "
-                    "state its unit when it is imported, or take it out of the dataset [E_OTHER_SIZE]"
-                )
-    return reasons
-
-
-def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], dict[str, str]]:
-    """Return the runs whose motion is a sine at one current, and why the others are not used."""
-    sines: list[Run] = []
-    kept, refused = accepted_runs(dataset)
-    for run in kept:
-        try:
-            refuse_unusable(with_findings(run), clipped)
-            run.current_A  # noqa: B018
-            sine = equivalent_sine(run)
-            rate = (run.time.size - 1) / float(run.time[-1] - run.time[0])
-            if sine.is_sine and rate < _MIN_SAMPLES_PER_CYCLE * sine.condition.frequency_Hz:
-                raise IdentificationError(
-                    f"{rate / sine.condition.frequency_Hz:.1f} samples per cycle",
-                    where=f"run {run.id}",
-                    remedy=f"record at least {_MIN_SAMPLES_PER_CYCLE}",
-                )
-        except InputError as error:
-            refused[run.id] = _reason(error, run)
-            continue
-        if sine.is_sine and analyse_motion(run).distortion < _MAX_DISTORTION:
-            sines.append(run)
-        else:
-            refused[run.id] = "the motion is not a sine, which individual fits require"
-    return sines, refused
 
 
 def _steps(

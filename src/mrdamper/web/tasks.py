@@ -27,7 +27,8 @@ from mrdamper.study.recipe import (
     modified,
     whole_damper,
 )
-from mrdamper.study.workflow import Study, run_study, usable_sines
+from mrdamper.study.usable_runs import usable_sines
+from mrdamper.study.workflow import Study, run_study
 
 if TYPE_CHECKING:
     from mrdamper.report.about import About

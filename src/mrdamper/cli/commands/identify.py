@@ -37,7 +37,7 @@ def identify(
     from mrdamper.models import model_type
     from mrdamper.report.tables import identification_rows
     from mrdamper.rig_files.dataset_folder import load_dataset
-    from mrdamper.study import workflow
+    from mrdamper.study.usable_runs import usable_sines
 
     chosen_model, chosen_method = model_type(model), method_named(method, parse_pairs(setting, "--set"))
     spring = parse_gas(gas)
@@ -46,7 +46,7 @@ def identify(
     dataset = load_dataset(data)
     if run:
         dataset = dataset.only([dataset[name] for name in run])
-    sines, refused = workflow.usable_sines(dataset, clipped)
+    sines, refused = usable_sines(dataset, clipped)
     identifications = []
     with progress_on_stderr() as progress:
         for number, entry in enumerate(sines):

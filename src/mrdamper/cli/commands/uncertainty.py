@@ -91,7 +91,7 @@ def _write(out: Path, rows: Rows, curves: list[LikelihoodProfile], drawn: Sample
 def _used(data: Path | None, rig: str) -> list[Run]:
     """Select the runs of the rig that a study identifies from: identification runs with a steady sine."""
     from mrdamper.rig_files.dataset_folder import load_dataset
-    from mrdamper.study.workflow import usable_sines
+    from mrdamper.study.usable_runs import usable_sines
 
     dataset = load_dataset(data)
     if rig not in dataset.rigs:
