@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +20,8 @@ _DUPLICATE_TOLERANCE = 1e-4  # of the range: two tests never agree so well, a fi
 _MIN_RUNS = 4  # runs that say what is usual
 
 
-class _Quantity(NamedTuple):
+@dataclass(frozen=True)
+class _Quantity:
     """A size of runs, and the units that explain one far from the others' (empty: none does)."""
 
     name: str
