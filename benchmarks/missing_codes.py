@@ -20,9 +20,8 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from support.noise import changing_current, constant_current
 from support.rig_records import clean_record
 
-from mrdamper.rig_files.quality.leaps import OFF_BY as SPIKES
-from mrdamper.rig_files.quality.leaps import spikes_in
-from mrdamper.rig_files.quality.sentinel import COARSEST, code_in
+from mrdamper.rig_files.quality.sentinel import COARSEST, code_in, spikes_in
+from mrdamper.rig_files.quality.sentinel import OFF_BY as SPIKES
 
 CODES = (-9999.0, 9999.0, -999.0, -999.25, 999.9, 99999.0, 32767.0, -32768.0, 65535.0, 9.91e37, 0.0)
 CHANNELS = ("force", "displacement", "current")

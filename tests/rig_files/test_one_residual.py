@@ -12,11 +12,10 @@ from mrdamper.errors import QualityError
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.physics.motion import sine
 from mrdamper.physics.simulation import simulate
-from mrdamper.rig_files.quality.cycles import POINTS, steady_cycles
-from mrdamper.rig_files.quality.effects import damping, elastic_plastic
-from mrdamper.rig_files.quality.filtered import noise_by_octave
-from mrdamper.rig_files.quality.force_lag import force_lag
-from mrdamper.rig_files.quality.names import agrees_with_its_name
+from mrdamper.rig_files.quality.cycles import POINTS, damping, elastic_plastic, steady_cycles
+from mrdamper.rig_files.quality.disturbance import noise_by_octave
+from mrdamper.rig_files.quality.lag import force_lag
+from mrdamper.rig_files.quality.ranges import agrees_with_its_name
 from mrdamper.rig_files.quality.table import check_run, record_of
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Record
@@ -125,7 +124,7 @@ def test_the_time_constant_of_a_first_order_filter_is_recovered_within_its_inter
 
 
 def test_a_filtered_force_is_reported_with_its_effect_on_damping_and_force():
-    from mrdamper.rig_files.quality.force_lag import force_channel
+    from mrdamper.rig_files.quality.lag import force_channel
 
     record = sine_record(elastic_plastic_force(0.1))
     (finding,) = force_channel(View(low_passed(record, 0.06)))
@@ -195,7 +194,7 @@ def test_a_yield_force_that_leaks_is_not_early(leak, stiffness, power):
 @pytest.mark.parametrize("share", [-0.06, 0.0, 0.06])
 def test_ending_the_search_for_a_lag_early_changes_no_finding(noise, share, monkeypatch):
     """Where noise leaves no lag that could be reported, none is fitted: fitting them all reports none either."""
-    from mrdamper.rig_files.quality import force_lag as module
+    from mrdamper.rig_files.quality import lag as module
 
     clean = sine_record(with_corners)
     moved = np.interp(clean.time - share, clean.time, clean.force)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mrdamper.data.arrays import drop_pages
 from mrdamper.errors import InputError
-from mrdamper.rig_files.quality.current import change_of
+from mrdamper.rig_files.quality.motion import change_of
 from mrdamper.rig_files.record import Finding, Record, part_of_record
 
 PART = 2**19  # samples: a minute of a test at 10 kHz, some megabytes a channel

@@ -357,7 +357,7 @@ def _tests(count: int) -> str:
 
 def _current(record: Record) -> str:
     from mrdamper.data import held_current
-    from mrdamper.rig_files.quality.current import current_in
+    from mrdamper.rig_files.quality.motion import current_in
 
     mean, change = held_current(current := current_in(record, None))
     return f"{current.min():.4g} to {current.max():.4g} A" if change else f"{round(mean, 3) + 0.0:g} A"

@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.rig_files.quality.cycles import POINTS, CycleChannel, steady_cycles
-from mrdamper.rig_files.quality.effects import NOTED, percent
+from mrdamper.rig_files.quality.cycles import NOTED, POINTS, CycleChannel, percent, steady_cycles
 from mrdamper.rig_files.quality.view import View, sample_noise
 from mrdamper.rig_files.record import Finding
 

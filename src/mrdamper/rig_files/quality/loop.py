@@ -1,4 +1,4 @@
-"""The loop's physics: a damper takes energy out, and does the same in every cycle."""
+"""The loop's physics: the force follows the motion, takes energy out of it, and is the same in every cycle."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from mrdamper.data import Floats, once_per_run
 from mrdamper.errors import QualityError
 from mrdamper.identification.loop_analysis import damping_share as share_of_damping
 from mrdamper.rig_files.quality.cycles import POINTS, Folded, every_cycle, steady_cycles
-from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, steady_window
-from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
+from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, held_in, steady_window
+from mrdamper.rig_files.quality.view import MOST_SAMPLES, View, runs_of, sample_noise
 from mrdamper.rig_files.record import SIGNED, Finding, SteadyPart
 
 _SLOW, _FAST = 0.1, 0.5  # of the largest velocity: samples near the reversals, and away from them
@@ -25,6 +25,12 @@ _SAME_CURRENT = 0.1  # [A]
 _FEWEST = 20  # samples of a cycle
 _LONG = 0.08  # of a cycle: a stretch of the other sign that no timing makes
 POOR_REPEATABILITY = 0.03  # of the peak-to-peak force; good rigs have 0.2 to 1.7 %
+_NOISE = 0.7  # of a channel's standard deviation: white noise has 1, a noisy load cell 0.1
+_LEAP, _LEAPS = 0.4, 0.4  # a step of such a share of the range, and the part of the path in such steps
+_NO_ENERGY = 0.002  # share of the force that opposes the velocity: a spring's
+_STILL, _GOES_ON = 0.01, 0.5  # of the steady stroke and of the steady force, peak to peak
+_FEWEST_AT_REST = 5  # samples
+_UNLIKE = 0.25  # scatter from cycle to cycle over the peak-to-peak force; beyond, it is no answer to the motion
 
 
 def dissipates(view: View) -> None:
@@ -213,3 +219,62 @@ def steady_part(view: View) -> SteadyPart:
     """Steady window and repeatability of a record."""
     scatter = repeatability(view)
     return SteadyPart(steady_window(view), None if scatter is None else round(scatter[0], 6))
+
+
+def motion_is_told(view: View) -> None:
+    """Refuse channels without memory from sample to sample, and a motion of fewer samples than its strokes need."""
+    long = view.record.time.size > MOST_SAMPLES
+    for name in ("displacement", "force"):
+        values = getattr(view.run, name) if long else view.channels[name]
+        if sample_noise(values) > _NOISE * float(np.nanstd(values)):
+            remedy = "check the sensor's cable and amplifier, and that the record has enough samples per cycle"
+            raise view.refused("E_NOISE", f"the {name} is noise: it does not go on from sample to sample", remedy)
+    x = view.channels["displacement"]
+    steps = np.abs(np.diff(x[np.isfinite(x)]))
+    leaps = float(np.sum(steps[steps > _LEAP * float(np.nanmax(x) - np.nanmin(x))]))
+    if leaps > _LEAPS * float(np.sum(steps)):
+        problem = "the displacement leaps from sample to sample: the speed cannot be determined"
+        remedy = "record at least eight samples per cycle, and a motion that the drive can follow"
+        raise view.refused("E_UNRESOLVED", problem, remedy)
+
+
+def force_follows(view: View) -> None:
+    """Refuse a force that takes no energy, or that differs from cycle to cycle of the same motion and current."""
+    if cycles_of(view) >= LEAST_CYCLES and abs(damping_share(view)) < _NO_ENERGY:
+        problem = "the force takes no energy out of the motion: that of a spring, or of no damper"
+        raise view.refused("E_NO_ENERGY", problem, "check the load cell, and that the damper is mounted")
+    _force_rests_with_the_motion(view)
+    repeated = repeatability(view)
+    if (
+        repeated is None
+        or repeated[0] < _UNLIKE
+        or view.noticed("W_FROZEN")
+        or held_in(view.record, steady_window(view))[1]
+    ):
+        return
+    raise view.refused(
+        "E_UNRELATED",
+        f"the force differs from cycle to cycle by {100 * repeated[0]:.0f} % of its peak-to-peak value: it does not "
+        "follow the motion",
+        "check that force and displacement are of the same test, and that the load cell does not drift",
+    )
+
+
+def _force_rests_with_the_motion(view: View) -> None:
+    """Refuse a force that goes on through cycles in which the displacement stands still."""
+    steady, period = view.strokes.steady, view.strokes.period
+    if steady is None or period is None or view.noticed("W_FROZEN"):
+        return
+    time, run = view.run.time, view.run
+    stroke, swing = (float(np.ptp(values[slice(*steady)])) for values in (run.displacement, run.force))
+    for start, stop in ((0, steady[0]), (steady[1], time.size)):
+        if stop - start < _FEWEST_AT_REST:
+            continue
+        # The force may relax for half a cycle after the motion has stopped.
+        rest = slice(int(np.searchsorted(time, time[start] + 0.5 * period)) if start else 0, stop)
+        if stop - rest.start < _FEWEST_AT_REST or time[stop - 1] - time[rest.start] < 0.4 * period:
+            continue
+        still = float(np.ptp(run.displacement[rest])) < _STILL * stroke
+        if still and float(np.ptp(run.force[rest])) > _GOES_ON * swing:
+            problem = f"the force goes on from {time[rest.start]:.4g} s on while the displacement rests"
+            raise view.refused("E_UNRELATED", problem, "check the displacement channel there, or cut the record")

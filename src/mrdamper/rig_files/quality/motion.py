@@ -1,4 +1,4 @@
-"""The motion of a record: that there is one, how many cycles, whether a sine, whether it wanders."""
+"""The motion of a record: that there is one, how many cycles, whether a sine, whether it wanders; the current in it."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mrdamper.data import Floats
+from mrdamper.data import Floats, held_current
+from mrdamper.data.arrays import take
 from mrdamper.physics.motion.sines import SINE_DISTORTION_LIMIT
 from mrdamper.rig_files.quality.view import View
-from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.record import Finding, Record
 
 LEAST_MOTION = 20e-6  # [m] peak to peak: below it a displacement sensor's noise
 NOISE_MOTION = 500e-6  # [m]: up to here a motion without memory from sample to sample is noise
@@ -18,6 +19,7 @@ _FEW = 1.5  # cycles under which drift and a slow harmonic cannot be told apart
 DRIFT = 0.1  # of the amplitude over the record, for a short one
 DRIFT_A_CYCLE = 0.015  # of the amplitude a cycle: less does not open a loop
 DRIFT_AT_MOST = 0.3  # of the amplitude over the record, however long
+_MOST = 1_000_000  # samples looked at
 
 
 def moves(view: View) -> None:
@@ -122,3 +124,33 @@ def _slope(t: Floats, y: Floats) -> float:
     t, y = t[::step], y[::step]
     i, j = np.triu_indices(t.size, 1)
     return float(np.median((y[j] - y[i]) / (t[j] - t[i])))
+
+
+def changes(view: View) -> Iterator[Finding]:
+    """Report a current that changes within the steady motion."""
+    yield from change_of(view.record, steady_window(view))
+
+
+def change_of(record: Record, window: tuple[float, float] | None) -> Iterator[Finding]:
+    """Yield the finding that a record's current changes within a window of time."""
+    change = held_in(record, window)[1]
+    if change:
+        text = f"{change}: only methods that take a current channel use the run, nothing is identified from it alone"
+        yield Finding("W_CURRENT_VARIES", text)
+
+
+def held_in(record: Record, window: tuple[float, float] | None) -> tuple[float, str]:
+    """Mean of a record's current within a window of time [A], NaN without three samples, and how it changes there."""
+    current = np.empty(0) if record.current is None else current_in(record, window)
+    return held_current(current) if current.size >= 3 else (np.nan, "")
+
+
+def current_in(record: Record, window: tuple[float, float] | None) -> Floats:
+    """Return the current's samples that are there within a window of time, thinned where they are many."""
+    assert record.current is not None
+    thinned = np.arange(0, record.time.size, max(1, record.time.size // _MOST))
+    time, current = take(record.time, thinned), take(record.current, thinned)
+    there = np.isfinite(current)
+    if window is not None:
+        there &= (time >= window[0]) & (time <= window[1])
+    return current[there]

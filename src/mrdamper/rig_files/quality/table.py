@@ -12,11 +12,9 @@ import numpy as np
 from mrdamper.data import Run, once_per_run
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.quality import check_record, checked
-from mrdamper.rig_files.quality.current import held_in
-from mrdamper.rig_files.quality.follow import force_follows
-from mrdamper.rig_files.quality.force_lag import force_channel
-from mrdamper.rig_files.quality.loop import repeatability
-from mrdamper.rig_files.quality.motion import cycles_of, drift_of, steady_window
+from mrdamper.rig_files.quality.lag import force_channel
+from mrdamper.rig_files.quality.loop import force_follows, repeatability
+from mrdamper.rig_files.quality.motion import cycles_of, drift_of, held_in, steady_window
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import FURTHER, Finding, Record
 

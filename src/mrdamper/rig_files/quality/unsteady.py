@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.rig_files.quality.cycles import Cycles, steady_cycles
-from mrdamper.rig_files.quality.effects import percent
+from mrdamper.rig_files.quality.cycles import Cycles, percent, steady_cycles
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
