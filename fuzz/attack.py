@@ -21,7 +21,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 from fuzz import counting
-from fuzz.bench_soak import SECONDS, attack_bench
+from fuzz.app_soak import SECONDS, attack_bench
 from fuzz.extremes import attack_extremes
 from fuzz.hostile_input import attack_calls, attack_datasets, attack_models
 from fuzz.hostile_names import attack_names

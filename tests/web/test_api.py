@@ -29,7 +29,7 @@ from mrdamper.exporters.base import identifier
 from mrdamper.identification import identify
 from mrdamper.identification.loop_analysis import analyse_loop
 from mrdamper.identification.methods import all_methods
-from mrdamper.web.answers import frame
+from mrdamper.web.responses import frame
 from mrdamper.web.saved_project import DATA
 from mrdamper.web.tasks import export_name
 

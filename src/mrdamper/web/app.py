@@ -24,11 +24,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mrdamper.errors import InputError, MissingExtraError
 from mrdamper.web.api import routers
+from mrdamper.web.jobs import refusal
 from mrdamper.web.page import STATIC, PageFiles, page
 from mrdamper.web.security import Guard
 from mrdamper.web.sessions import BrowserSessions
 from mrdamper.web.uploads import NothingTakenError
-from mrdamper.web.work import refusal
 
 _SWEEP_SECONDS = 60.0
 # Two arenas (M_ARENA_MAX), as one a thread keeps what each has held; arrays of 256 KB and more

@@ -27,9 +27,9 @@ from mrdamper.errors import InputError, UnknownNameError
 from mrdamper.study.recipe import RecipeResult
 from mrdamper.web.bundled_studies import BundledStudies
 from mrdamper.web.imported_data import bundled
+from mrdamper.web.jobs import Job
 from mrdamper.web.rig_table import RigTable, rig_table
 from mrdamper.web.uploads import ImportedData, Upload
-from mrdamper.web.work import Job
 
 IDLE_SECONDS = 12 * 3600  # a page that is open says so every minute; a closed one is forgotten after this
 MOST_SESSIONS = 64

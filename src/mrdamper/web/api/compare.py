@@ -17,8 +17,8 @@ from mrdamper.study.comparison import Comparison, RigComparison
 from mrdamper.study.recipe import WHOLE_DAMPER, RecipeResult, recipes
 from mrdamper.study.validation import RunScore, Validation
 from mrdamper.study.workflow import STUDIED
-from mrdamper.web.answers import archive, download, frame
 from mrdamper.web.curves import measured_cycle, measured_window, predicted_on_run
+from mrdamper.web.responses import archive, download, frame
 from mrdamper.web.rig_table import condition_on_screen
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import compare_models, write_compared

@@ -12,9 +12,9 @@ from pydantic import BaseModel, Field
 
 from mrdamper.errors import UnknownNameError
 from mrdamper.rig_files.quality.table import Quality
-from mrdamper.web.answers import frame
 from mrdamper.web.curves import measured_cycle, measured_window, raw_record
 from mrdamper.web.imported_data import bundled, bundled_dampers, read_upload
+from mrdamper.web.responses import frame
 from mrdamper.web.rig_table import condition_on_screen, describe
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.uploads import FILE_LIMIT, UPLOAD_LIMIT, ImportedData, Upload, UploadError

@@ -22,9 +22,9 @@ from mrdamper.report.about import About, about_of, logo_of
 from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import Validation
 from mrdamper.study.workflow import Study
-from mrdamper.web.answers import frame
 from mrdamper.web.bundled_studies import BundledStudies
 from mrdamper.web.curves import measured_cycle, modelled_cycle, predicted_on_run
+from mrdamper.web.responses import frame
 from mrdamper.web.rig_table import condition_on_screen
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import ALL_AT_ONCE, RUN_BY_RUN, identify_rig, study

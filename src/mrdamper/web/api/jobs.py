@@ -10,8 +10,8 @@ from typing import Any
 from fastapi import APIRouter, Request
 from fastapi.responses import StreamingResponse
 
+from mrdamper.web.jobs import Job
 from mrdamper.web.sessions import Current
-from mrdamper.web.work import Job
 
 router = APIRouter(prefix="/sessions/{session}/jobs")
 _BETWEEN = 0.1  # seconds between two looks at a job

@@ -18,9 +18,9 @@ from mrdamper.data import Condition, Floats
 from mrdamper.data.encoding import finite
 from mrdamper.physics.motion import Excitation
 from mrdamper.statistics.metrics import dissipated_power, peak_force
-from mrdamper.web.answers import frame
-from mrdamper.web.bench_model import held_model, loop_held, predict_held, sliders
 from mrdamper.web.curves import on_screen, predicted_cycle
+from mrdamper.web.held_parameters import held_model, loop_held, predict_held, sliders
+from mrdamper.web.responses import frame
 from mrdamper.web.rig_table import RigTable, condition_on_screen
 from mrdamper.web.sessions import Bench, Current, Session, shared
 

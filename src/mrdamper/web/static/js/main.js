@@ -2,7 +2,7 @@
 
 import { Address } from "./address.js";
 import { BenchError } from "./api.js";
-import { Bench } from "./bench.js";
+import { Bench } from "./app.js";
 import { library } from "./chart.js";
 import { capital, h, note, problem, put } from "./dom.js";
 import { openSession } from "./session.js";
@@ -14,8 +14,8 @@ import * as data from "./views/data.js";
 import * as identify from "./views/identify.js";
 import * as model from "./views/model.js";
 import * as compare from "./views/compare.js";
-import * as ride from "./views/ride.js";
-import * as takeaway from "./views/takeaway.js";
+import * as ride from "./views/simulate.js";
+import * as takeaway from "./views/export.js";
 
 const VIEWS = [data, identify, model, compare, ride, takeaway];
 const BEAT = 60_000;

@@ -6,7 +6,7 @@ import { busy, card, empty, h, note, put, renew, table } from "../dom.js";
 import { condition, percent, seconds } from "../format.js";
 import { swatch } from "../legend.js";
 import { rigChooser } from "../rig_chooser.js";
-import { workBox } from "../work.js";
+import { workBox } from "../job_progress.js";
 
 export const id = "compare";
 export const label = "Compare";

@@ -4,7 +4,7 @@ import { Chart } from "../chart.js";
 import { busy, empty, h, put, renew } from "../dom.js";
 import { DropZone } from "../drop_zone.js";
 import { count, quantity } from "../format.js";
-import { fileList, profilePanel } from "../intake_panels.js";
+import { fileList, profilePanel } from "../import_panels.js";
 import { rigChooser } from "../rig_chooser.js";
 import { RunFacts } from "../run_facts.js";
 import { TestList } from "../test_list.js";

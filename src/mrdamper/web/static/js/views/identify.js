@@ -5,7 +5,7 @@ import { busy, card, empty, h, note, put, table } from "../dom.js";
 import { column, condition, count, figures, heading, percent, seconds, unit } from "../format.js";
 import { IdentifyForm } from "../identify_form.js";
 import { onScreen } from "../units.js";
-import { workBox } from "../work.js";
+import { workBox } from "../job_progress.js";
 
 export const id = "identify";
 export const label = "Identify";

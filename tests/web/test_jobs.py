@@ -15,7 +15,7 @@ from web.processes import alive
 
 from mrdamper.study.workflow import Study
 from mrdamper.web.api.identify import Head
-from mrdamper.web.work import Job
+from mrdamper.web.jobs import Job
 
 
 def run(task, *arguments, conclude=lambda result: {"result": result}):
@@ -136,7 +136,7 @@ def test_workers_end_with_a_bench_that_was_killed(tmp_path):
     The script has no guard: a worker must not run it once more.
     """
     code = (
-        "from web import slow_tasks; from mrdamper.web.work import Job; import sys, time\n"
+        "from web import slow_tasks; from mrdamper.web.jobs import Job; import sys, time\n"
         "open(sys.argv[1] + '/begun', 'a').write('x')\n"
         "Job('job1', 'test', slow_tasks.sleep_with_child, (sys.argv[1],), lambda r: {}).start(); time.sleep(20)\n"
     )

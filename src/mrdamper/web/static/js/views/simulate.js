@@ -4,7 +4,7 @@ import { Latest } from "../api.js";
 import { Chart } from "../chart.js";
 import { busy, empty, h, note, problem, put } from "../dom.js";
 import { figures, percent, quantity } from "../format.js";
-import { scene } from "../ride_scene.js";
+import { scene } from "../simulation_scene.js";
 
 export const id = "ride";
 export const label = "Ride";

@@ -26,7 +26,7 @@ from mrdamper.systems.result import Simulation
 from mrdamper.systems.simulate import SystemLoop, simulate_system
 from mrdamper.systems.structure import System
 from mrdamper.systems.system_file import bundled_systems, load_system
-from mrdamper.web.answers import frame
+from mrdamper.web.responses import frame
 from mrdamper.web.sessions import Current, shared
 
 router = APIRouter(prefix="/sessions/{session}/ride")

@@ -14,9 +14,9 @@ from mrdamper.data.encoding import csv_text
 from mrdamper.errors import InputError
 from mrdamper.exporters import all_exporters
 from mrdamper.report.tables import prediction_rows
-from mrdamper.web.answers import archive, download, in_units, zipped
 from mrdamper.web.api.model import PredictionRequest
-from mrdamper.web.bench_model import as_damper, predict_held
+from mrdamper.web.held_parameters import as_damper, predict_held
+from mrdamper.web.responses import archive, download, in_units, zipped
 from mrdamper.web.saved_project import SavedProject, open_saved_project, save_project
 from mrdamper.web.sessions import Current, Session
 from mrdamper.web.tasks import export_damper

@@ -5,7 +5,7 @@ import { save } from "../files.js";
 import { bytes, condition, figures } from "../format.js";
 import { portable } from "../state.js";
 import { AboutForm } from "../about_form.js";
-import { workBox } from "../work.js";
+import { workBox } from "../job_progress.js";
 
 export const id = "takeaway";
 export const label = "Export";
