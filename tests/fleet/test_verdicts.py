@@ -12,7 +12,7 @@ from mrdamper.fleet.page import write_page
 from mrdamper.fleet.profile import ColumnLimits, FleetProfile, load_limits
 from mrdamper.fleet.run import run_fleet
 from mrdamper.fleet.verdicts import clock_findings, drift, suspects, with_features
-from mrdamper.rig_files.limits_file import LimitsError
+from mrdamper.rig_files.strict_toml import LimitsError
 
 
 def line_of(seed, rig=0.0, made=0.0, golden=2, dampers=200, sessions=10):

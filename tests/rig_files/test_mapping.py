@@ -14,12 +14,12 @@ from mrdamper.cli import application
 from mrdamper.errors import InputError
 from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.mapping.proposals import damping_share
-from mrdamper.rig_files.mapping.questions import question_of
 from mrdamper.rig_files.mapping.results import results_in
-from mrdamper.rig_files.mapping.session import stretches_of_session
+from mrdamper.rig_files.preview import question_of
 from mrdamper.rig_files.profile import CurrentSource, Profile, ProfileError, parse_profile
 from mrdamper.rig_files.readers import raw_tables
 from mrdamper.rig_files.rig_import import import_files, to_dataset
+from mrdamper.rig_files.sequences import stretches_of_session
 
 FAST = ("mts_dat", "picoscope", "timeseries_structs", "matrix_beside_files", "merged_headings", "json_lines", "uff58",
         "controller_and_supply", "yokogawa", "graphtec", "tidy_long_table", "crank_dynamometer",

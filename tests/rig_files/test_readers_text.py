@@ -287,13 +287,13 @@ def test_the_profile_says_what_blocks_are(tmp_path, say, codes):
 
 
 def test_a_long_record_is_judged_in_parts_as_it_is_in_one(monkeypatch, tmp_path):
-    from mrdamper.rig_files import long_records
+    from mrdamper.rig_files import quality
 
     lines = text(rows(4000)).split("\n")
     lines[1500] = lines[1500].rsplit(",", 1)[0] + ","
     path = write(tmp_path, "a.csv", "\n".join([*lines[:2500], *lines[2700:]]))
     whole = read_run(path)
-    monkeypatch.setattr(long_records, "PART", 1000)
+    monkeypatch.setattr(quality, "PART", 1000)
     parts = read_run(path)
     assert {f.code for f in whole.findings} == {"W_MISSING", "W_TIME_GAP"} <= {f.code for f in parts.findings}
     assert parts.segments == whole.segments == ((0, 2499), (2499, 3800))

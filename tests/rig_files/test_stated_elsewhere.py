@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from mrdamper.rig_files.mapping.integration import displacement_of
-from mrdamper.rig_files.mapping.questions import question_of
+from mrdamper.rig_files.mapping.proposals import displacement_of
+from mrdamper.rig_files.preview import question_of
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.recorded_at import recording_time
 from mrdamper.rig_files.rig_import import import_files

@@ -10,9 +10,8 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from mrdamper.rig_files.limits_file import COLUMN_LIMITS, load_part
 from mrdamper.rig_files.profile import ProfileError
-from mrdamper.rig_files.strict_toml import load_toml
+from mrdamper.rig_files.strict_toml import COLUMN_LIMITS, load_part, load_toml
 
 FACTS = ("serial", "session", "batch", "date", "golden")
 COLUMNS: dict[str, tuple[str, ...]] = {

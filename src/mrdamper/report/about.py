@@ -16,8 +16,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, WithJson
 
 from mrdamper.data.strict_text import content_of
 from mrdamper.errors import InputError
-from mrdamper.rig_files.limits_file import FORCE_LIMITS, load_part
-from mrdamper.rig_files.strict_toml import checked_table, load_toml
+from mrdamper.rig_files.strict_toml import FORCE_LIMITS, checked_table, load_part, load_toml
 
 _HELP = "mrdamper init about shows the fields"
 _LARGEST_LOGO = 500_000  # bytes; it stands in every page

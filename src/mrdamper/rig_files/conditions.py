@@ -59,6 +59,10 @@ _LISTED = re.compile(  # 0, 1, 2 A; 0 to 2 A; 0-2A; 0.5-2A: of 3-2A, 3 may be th
 _LABELLED_RATING = re.compile(
     "|".join([r"fuse|suppl|amplif|rated|range|clamp|(?<![a-z])(?:max|limit)(?![a-z])", *words("probe")]), re.IGNORECASE
 )
+_MOTIONS = {
+    unit: re.compile(rf"(?i)(?<![\d.,x])(?<!\dp)(\d{{1,4}}(?:[.,xp]\d{{1,4}})?)[ _]?{behind}")
+    for unit, behind in (("Hz", "(m?)hz(?![a-z])"), ("mm", "mm()(?![a-z/]|[ _]?s)"))
+}
 _SAMPLING = "|".join(words("sampling"))
 _RATE = re.compile(rf"{_SAMPLING}|messrate|^(?:data )?rate$|scan|acquisition|^fs$|^f_s$", re.IGNORECASE)
 _STEP = re.compile(
@@ -111,6 +115,14 @@ def currents_in(text: str) -> tuple[float, ...]:
 def currents_in_cells(line: str) -> list[float]:
     """Coil currents [A] in the cells of a line, one after the other."""
     return [value for cell in re.split(r"[\t;,|]", line) for value in currents_in(cell)]
+
+
+def motions_in(text: str, unit: str) -> set[float]:
+    """Frequencies in Hz or lengths in mm that a title or a name states: 0p5Hz, 500 mHz, 10mm."""
+    return {
+        float(re.sub("[,xp]", ".", number.lower())) * (1e-3 if milli else 1.0)
+        for number, milli in _MOTIONS[unit].findall(text)
+    }
 
 
 def without_currents(text: str) -> str:

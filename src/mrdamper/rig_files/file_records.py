@@ -14,12 +14,10 @@ from mrdamper.rig_files.columns import assign, partly_assigned
 from mrdamper.rig_files.mapping.clocks import with_time_stated
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.description import with_description, with_notes
-from mrdamper.rig_files.mapping.integration import with_integrated_velocity
-from mrdamper.rig_files.mapping.long_table import with_channels_as_columns
-from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_unit_of_time
+from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_integrated_velocity, with_unit_of_time
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
 from mrdamper.rig_files.mapping.results import form_of_tests, with_results
-from mrdamper.rig_files.parts import tests_of
+from mrdamper.rig_files.parts import tests_of, with_channels_as_columns
 from mrdamper.rig_files.profile import Profile, profile_hash
 from mrdamper.rig_files.readers import raw_tables
 from mrdamper.rig_files.readers.base import RawTable, RigFileError

@@ -19,7 +19,6 @@ from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown,
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, with_stated_current
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.folder import files_in, unpacked
-from mrdamper.rig_files.long_records import check_long_record
 from mrdamper.rig_files.mapping.agreement import contradictions, repeated
 from mrdamper.rig_files.mapping.companions import (
     TEXTS,
@@ -34,7 +33,7 @@ from mrdamper.rig_files.mapping.companions import (
     within_times,
 )
 from mrdamper.rig_files.mapping.description import is_description, is_readme
-from mrdamper.rig_files.mapping.integration import is_integrated
+from mrdamper.rig_files.mapping.proposals import is_integrated
 from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.profile import Profile, profile_of
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
@@ -94,12 +93,12 @@ def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> R
 
 def read_runs(path: str | Path, profile: Profile | str | Path | None = None) -> tuple[Record, ...]:
     """Read every test of a rig's file and check it: testing machines record several blocks; as `read_run`."""
-    from mrdamper.rig_files.quality import check_record
+    from mrdamper.rig_files.quality import check_long_record
 
     with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused as such
         records, problems = records_of_file(Path(path), profile_of(profile))
         CombinedError.raise_from(problems)
-        return tuple(check_long_record(record, check_record) for record in records)
+        return tuple(check_long_record(record) for record in records)
 
 
 @contextlib.contextmanager
@@ -244,10 +243,10 @@ class _Intake:
             self._check(path, record, problems, several=several)
 
     def _check(self, path: Path, record: Record, problems: list[InputError], *, several: bool) -> None:
-        from mrdamper.rig_files.quality import check_record
+        from mrdamper.rig_files.quality import check_long_record
 
         checked = record
-        for step in (_with_current, lambda record: check_long_record(record, check_record)):
+        for step in (_with_current, check_long_record):
             try:
                 with np.errstate(all="ignore"):
                     checked = step(checked)

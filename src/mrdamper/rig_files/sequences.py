@@ -1,4 +1,4 @@
-"""Records that go on in time: pages of one file and files that a logger began anew are one test, or one session."""
+"""Records that go on in time, as one test or one session; a session in one record is cut into its tests."""
 
 from __future__ import annotations
 
@@ -10,19 +10,32 @@ from pathlib import Path
 
 import numpy as np
 
-from mrdamper.data import Floats
+from mrdamper.data import Floats, held_current
+from mrdamper.errors import ColumnError
 from mrdamper.rig_files.coil_current import as_data, constant
-from mrdamper.rig_files.conditions import currents_in
-from mrdamper.rig_files.mapping.session import OFF_S, OFF_STEPS, stretches_of_session
+from mrdamper.rig_files.conditions import currents_in, motions_in
 from mrdamper.rig_files.profile import Profile
+from mrdamper.rig_files.quality.strokes import find_strokes
+from mrdamper.rig_files.quality.view import runs_of
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import OPTIONAL, Finding, Record, part_of_record
 
-_HZ = re.compile(r"(?<![\w.,])([0-9]{1,4}(?:[.,][0-9]{1,4})?) ?Hz(?![A-Za-z])")
 _NUMBERED = re.compile(
     r"(?i)(?P<name>.*?)[ _-]*(?:(?:part|teil|partie|parte|seq|buffer)[ _-]*)?(?<![0-9.,])(?P<n>[0-9]+)"
 )
 _MOST_STEPS = 3.0  # between the last sample of a file and the first of the next
+MOST_TESTS = 500  # of a record: more is a cut at noise
+_BLOCK_S = 0.1  # [s] in which a motion at rest stays within a share of its range
+_REST = 0.03  # of the motion's range
+OFF_S, OFF_STEPS = 1.0, 20  # a gap in time that is longer than both is a rest: the recording was off [s], [steps]
+_FEWEST_BLOCKS = 3  # of a rest
+_FEWEST_REVERSALS = 3  # of a test
+_FEWEST_REVERSALS_HELD = 5  # of a test at a current that steps to the next without a rest
+_SETTLED_PERIODS = 0.25  # of the motion: time over which a step of the current is looked for
+_ALIKE = 0.1  # relative difference of period and stroke of two tests at one condition
+_ALIKE_A = 0.05  # difference of current of two tests at one condition [A]
+_LONGEST = 5_000_000  # samples
+_Condition = tuple[float, float, float, bool]
 
 
 def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> list[Record]:
@@ -128,8 +141,123 @@ def _gap(one: Record, other: Record) -> float:
 
 def _state_different_conditions(tables: list[RawTable]) -> bool:
     """Return whether the titles of blocks state different currents or frequencies: each is a test."""
-    for values_in in (currents_in, lambda line: tuple(_HZ.findall(line[:255]))):
+    for values_in in (currents_in, lambda line: sorted(motions_in(line[:255], "Hz"))):
         stated = {tuple(value for line in table.remarks for value in values_in(line)) for table in tables} - {()}
         if len(stated) > 1:
             return True
     return False
+
+
+def stretches_of_session(time: Floats, displacement: Floats, current: Floats | None) -> list[slice]:
+    """Return the tests of a record that rests between them, with half of each rest; one stretch where it is one test.
+
+    A record is cut only if every part between two rests is a motion of several strokes at a constant
+    current, or at currents that step from one to the next, and not all parts are of one condition: a
+    pause within a test, the dwell of a trapezoidal motion, and a slow stretch of a random one at one
+    current do not separate tests. Time in which nothing was recorded is a rest.
+
+    Raises `ColumnError`: E_BLOCKS if there are more than 500 tests.
+    """
+    whole = [slice(0, time.size)]
+    if not 400 <= time.size <= _LONGEST:  # a longer record lies in a file and is not read as a whole
+        return whole
+    there = np.isfinite(time) & np.isfinite(displacement)
+    current = np.zeros(time.size) if current is None else current
+    if not there.all() or np.any(np.diff(time) <= 0):
+        return whole
+    ends = [0, *_boundaries(time, displacement), time.size]
+    parts = [slice(a, b) for a, b in pairwise(ends) if _moves(displacement[a:b], displacement)]
+    parts = _with_soft_ends(parts, time, displacement)
+    parts = [piece for part in parts for piece in _pieces(part, time, displacement, current)]
+    if len(parts) < 2:
+        return whole
+    motions: list[_Condition] = []
+    for part in parts:
+        condition = _condition(time[part], displacement[part], current[part])
+        if condition is None:
+            return whole
+        motions.append(condition)
+    held = np.ptp([current_A for *_, current_A, _ in motions]) <= _ALIKE_A
+    if all(_same(motions[0], other) for other in motions) or (held and not all(regular for *_, regular in motions)):
+        return whole
+    if len(parts) > MOST_TESTS:
+        problem = f"rests cut the record into {len(parts)} tests of several conditions, more than {MOST_TESTS}"
+        remedy = 'export it in parts, or set blocks = "join" under [file] of a profile to keep it whole'
+        raise ColumnError(problem, remedy=remedy, code="E_BLOCKS")
+    return parts
+
+
+def _with_soft_ends(parts: list[slice], time: Floats, x: Floats) -> list[slice]:
+    """Join parts of fewer strokes than a test has with the part they lead to or come from without a gap."""
+    joined: list[slice] = []
+    short = False
+    for part in parts:
+        few = find_strokes(time[part], x[part]).reversals.size < _FEWEST_REVERSALS
+        near = bool(joined) and joined[-1].stop == part.start and time[part.start] - time[part.start - 1] <= OFF_S
+        if near and (short or (few and part is parts[-1])):
+            joined[-1], short = slice(joined[-1].start, part.stop), short and few
+        else:
+            joined.append(part)
+            short = few
+    return joined
+
+
+def _pieces(part: slice, time: Floats, displacement: Floats, current: Floats) -> list[slice]:
+    """Split a part where the current changes from one held value to another while the motion goes on.
+
+    Between two steps the motion turns back several times: a shorter stretch is a test of the coil's response.
+    Pieces without motion at the ends are omitted; a part whose current does not step is returned whole.
+    """
+    t, x, i = time[part], displacement[part], current[part]
+    if i.size < 3 or not np.isfinite(i).all() or not held_current(i)[1]:
+        return [part]
+    strokes = find_strokes(t, x)
+    if strokes.period is None:
+        return [part]
+    size = max(1, round(_SETTLED_PERIODS * strokes.period / float(np.median(np.diff(t)))))
+    if t.size < 2 * size:
+        return [part]
+    ahead = np.abs(i[size:] - i[:-size]) > _ALIKE_A  # two sides of a step are so far apart
+    steps = [(int(a), int(b)) for a, b in zip(*runs_of(ahead), strict=True)]
+    if not steps or any(not 0.5 * size <= b - a <= 2 * size for a, b in steps):
+        return [part]
+    # The first sample of which the one `size` ahead differs stands `size` before the step.
+    starts, stops = [0, *(max(b, a + size) for a, b in steps)], [*(a + size for a, _ in steps), t.size]
+    pieces = [(a, b) for a, b in zip(starts, stops, strict=True) if _moves(x[a:b], x)]
+    turns = [np.count_nonzero((strokes.reversals >= a) & (strokes.reversals < b)) for a, b in pieces]
+    if min(turns, default=0) < _FEWEST_REVERSALS_HELD:
+        return [part]
+    return [slice(part.start + a, part.start + b) for a, b in pieces]
+
+
+def _boundaries(time: Floats, x: Floats) -> list[int]:
+    """Middles of the rests of a motion, and the gaps in its time."""
+    steps = np.diff(time)
+    step = float(np.median(steps))
+    off = np.flatnonzero(steps > max(OFF_S, OFF_STEPS * step)) + 1
+    size = max(2, round(_BLOCK_S / step))
+    count = x.size // size
+    blocks = x[: count * size].reshape(count, size)
+    still = np.ptp(blocks, axis=1) < _REST * np.ptp(x)
+    rests = [(a, b) for a, b in zip(*runs_of(still), strict=True) if b - a >= _FEWEST_BLOCKS]
+    return sorted({*off.tolist(), *(int((a + b) * size // 2) for a, b in rests if a > 0 and b < count)})
+
+
+def _moves(part: Floats, x: Floats) -> bool:
+    return part.size > 0 and float(np.ptp(part)) > 2 * _REST * float(np.ptp(x))
+
+
+def _condition(time: Floats, x: Floats, current: Floats) -> _Condition | None:
+    """Period [s], stroke [m] and current [A] of a part, and if its strokes are regular; None at no constant current."""
+    strokes = find_strokes(time, x)
+    if strokes.reversals.size < _FEWEST_REVERSALS or strokes.period is None:
+        return None
+    inside = slice(int(strokes.reversals[0]), int(strokes.reversals[-1]) + 1)
+    finite = current[inside][np.isfinite(current[inside])]
+    mean, change = held_current(finite) if finite.size >= 3 else (0.0, "no samples")
+    return None if change else (strokes.period, float(np.median(strokes.lengths)), mean, strokes.steady is not None)
+
+
+def _same(one: _Condition, other: _Condition) -> bool:
+    near = all(abs(a - b) <= _ALIKE * max(a, b) for a, b in zip(one[:2], other[:2], strict=True))
+    return near and abs(one[2] - other[2]) <= _ALIKE_A

@@ -1,4 +1,4 @@
-"""TOML files that people write, by their schema."""
+"""TOML files that people write, by their schema: profiles, limits."""
 
 from __future__ import annotations
 
@@ -9,12 +9,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 from mrdamper.data.strict_text import content_of, read_toml
 from mrdamper.errors import InputError
 
 T = TypeVar("T", bound=BaseModel)
+FORCE_LIMITS = "limit"  # [[limit]] tables, for reports and studies
+COLUMN_LIMITS = "limits"  # [limits.COLUMN] tables, for fleets
+RIG_LIMITS = (
+    "current_A", "frequency_Hz", "amplitude_mm", "velocity_m_s", "force_N", "cycles", "sample_rate_Hz",
+    "minutes_between", "session_minutes", "sessions",
+)  # fmt: skip
 
 
 def load_toml(path: Path, kind: type[T], refuse: type[InputError], help: str, largest: int = 2**16) -> T:
@@ -68,3 +74,20 @@ def _models(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [model for inner in get_args(annotation) for model in _models(inner)]
+
+
+class LimitsError(InputError):
+    """A limits file cannot be read, or a limit is impossible."""
+
+    code = "E_LIMITS"
+
+
+def load_part(path: str | Path, part: Mapping[str, Any], refuse: type[InputError] = LimitsError) -> dict[str, Any]:
+    """Read the keys of one part of a limits file, each given by its type and default; keys of other parts may be there.
+
+    Raises `refuse` if the file cannot be read, is no TOML, or a key is unknown, missing or of another kind.
+    """
+    others: dict[str, Any] = {name: (Any, None) for name in (FORCE_LIMITS, COLUMN_LIMITS, *RIG_LIMITS)}
+    kind = create_model("Limits", __config__=ConfigDict(extra="forbid"), **{**others, **part})
+    content = load_toml(Path(path), kind, refuse, "mrdamper init limits shows the keys")
+    return {name: getattr(content, name) for name in part}

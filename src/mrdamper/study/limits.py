@@ -13,7 +13,7 @@ from pydantic import Field
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition, Floats
-from mrdamper.rig_files.limits_file import LimitsError, load_part
+from mrdamper.rig_files.strict_toml import LimitsError, load_part
 
 _MAX_SAMPLES = 500_000  # of a planned record
 _RANGES = ("current_A", "frequency_Hz", "amplitude_mm")

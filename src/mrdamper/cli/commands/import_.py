@@ -255,8 +255,7 @@ def _asked(
     files: list[Path], settings: Profile, result: ImportResult, tests: Path | None
 ) -> tuple[Profile, ImportResult]:
     """Ask what the refusals leave open, one question at a time, and read the files again with each answer."""
-    from mrdamper.rig_files.mapping.questions import question_of
-    from mrdamper.rig_files.preview import columns_of
+    from mrdamper.rig_files.preview import columns_of, question_of
     from mrdamper.rig_files.profile import profile_text
     from mrdamper.rig_files.rig_import import import_files
 

@@ -98,7 +98,7 @@ def _predict(
     from mrdamper.data import Condition
 
     if motion is not None:
-        from mrdamper.rig_files.motion_file import load_motion
+        from mrdamper.rig_files.dataset_samples import load_motion
 
         if frequency is not None or amplitude is not None:
             raise InputError("--motion together with --frequency or --amplitude", remedy="give one of them")

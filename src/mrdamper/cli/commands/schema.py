@@ -55,7 +55,7 @@ def _limits() -> dict:
 
     from mrdamper.fleet.profile import ColumnLimits
     from mrdamper.report.about import Limit
-    from mrdamper.rig_files.limits_file import COLUMN_LIMITS, FORCE_LIMITS
+    from mrdamper.rig_files.strict_toml import COLUMN_LIMITS, FORCE_LIMITS
     from mrdamper.study.limits import Limits
 
     parts = {

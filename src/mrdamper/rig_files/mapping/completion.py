@@ -19,8 +19,15 @@ from mrdamper.rig_files.column_names import (
 )
 from mrdamper.rig_files.conditions import currents_in, without_currents
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
-from mrdamper.rig_files.mapping.scales import SCALE, scaled, scales_in, with_counts, with_scales
-from mrdamper.rig_files.mapping.signs import with_sense, with_stated_signs
+from mrdamper.rig_files.mapping.scales import (
+    SCALE,
+    scaled,
+    scales_in,
+    with_counts,
+    with_scales,
+    with_sense,
+    with_stated_signs,
+)
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.layout import LISTED, X_VALUE, cells_of

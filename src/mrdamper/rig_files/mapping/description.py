@@ -14,8 +14,14 @@ from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_by_lines
 from mrdamper.rig_files.mapping.completion import NUMBERED, states_si
 from mrdamper.rig_files.mapping.results import numbered_tests
-from mrdamper.rig_files.mapping.scales import NUMBER_IS, scaled_columns, scales_in, states_scale, states_shift
-from mrdamper.rig_files.mapping.signs import states_sign
+from mrdamper.rig_files.mapping.scales import (
+    NUMBER_IS,
+    scaled_columns,
+    scales_in,
+    states_scale,
+    states_shift,
+    states_sign,
+)
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding

@@ -8,26 +8,26 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, InputError
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.columns import candidates_of, column_called
-from mrdamper.rig_files.conditions import BARE_RATE, stated_rate
+from mrdamper.rig_files.conditions import BARE_RATE, motions_in, stated_rate
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import REQUIRED, Finding
+from mrdamper.rig_files.record import REQUIRED, Finding, Record
 
-_FREQUENCY = re.compile(
-    r"(?<![0-9A-Za-z.,])(?:f|freq|frequency)?[_ =]?([0-9]{1,3}(?:[.,px][0-9]{1,4})?)[ _]?(m?)Hz(?![A-Za-z])"
-)
 _KEYED = re.compile(r"[\s#%\"]*([^=:;,\t]{1,40}?)\"?\s*[=:;,\t]\s*\"?([0-9]{1,9}(?:\.[0-9]{1,9})?)[\s;,\"]*")
 _LONGEST_LINE = 80
 _CLOCK_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
+_LEAST_RATE = 1000.0  # [Hz], of which a number in a text is no frequency of a motion
 _AGREE = 0.05  # of a frequency that is stated
 _LARGEST = 64 * 2**20  # bytes of a file whose columns are tried
 _MOST_SAMPLES = 20_000
 _MOST_TRIED = 24  # combinations of columns
 _CLEAR, _POOR = 0.5, 0.2  # share of the force that velocity explains: of a damper's, and of another channel
+_INTEGRAL = "the displacement is the integral of"  # beginning of the finding
 
 
 def with_unit_of_time(table: RawTable) -> RawTable:
@@ -139,8 +139,7 @@ def _smooth_slope(time: Floats, x: Floats) -> Floats:
 def stated_frequencies(table: RawTable) -> Iterator[float]:
     """Frequencies [Hz] that the title, the file's name or a number beside the columns states."""
     for text in (table.label, table.source.name, *table.remarks[-20:]):
-        for match in _FREQUENCY.finditer(text[:255]):
-            yield float(re.sub("[,px]", ".", match[1])) * (1e-3 if match[2] else 1.0)
+        yield from (frequency for frequency in motions_in(text[:255], "Hz") if frequency < _LEAST_RATE)
     for name, value in table.constants.items():
         header = split_name(name)
         if header.dimension == "frequency" and re.search(r"(?i)freq|^f$", header.name) and header.known:
@@ -159,3 +158,58 @@ def frequency_of(time: Floats, x: Floats) -> float | None:
     except (ExcitationError, ValueError):
         return None
     return 1 / period if period else None
+
+
+def with_integrated_velocity(table: RawTable) -> RawTable:
+    """Return a table of time, velocity and force with the displacement that the velocity states, about its middle.
+
+    Only where no column may be a displacement and the motion repeats: the whole cycles give the
+    transducer's zero, and the mean position, which a velocity does not state, is zero.
+    """
+    by_role = [table.columns(role) for role in ("time", "velocity", "force")]
+    others = any("displacement" in (h.role, h.channel) or h.dimension == "length" for h in table.headers)
+    if others or any(len(columns) != 1 for columns in by_role) or table.source.size > _LARGEST:
+        return table
+    clock, speed = by_role[0][0], by_role[1][0]
+    units, values = (table.headers[clock].known, table.headers[speed].known), table.try_read(clock, speed)
+    if [unit and unit.dimension for unit in units] != ["time", "velocity"] or values is None:
+        return table
+    moved = displacement_of(*(unit.factor * values[i] for unit, i in zip(units, (clock, speed), strict=True) if unit))
+    if moved is None:
+        return table
+    text = f"{_INTEGRAL} {table.names[speed]!r}, without drift and about its middle"
+    last = len(table.names)
+    table = table.computed(last, (speed,), lambda _: moved).named({last: ("displacement", "m")})
+    return table.noted(Finding("W_CHOSEN", text))
+
+
+def is_integrated(record: Record) -> bool:
+    """Tell if the displacement of a record is the integral of a velocity."""
+    return any(finding.code == "W_CHOSEN" and finding.text.startswith(_INTEGRAL) for finding in record.findings)
+
+
+def integral(time: Floats, velocity: Floats) -> Floats:
+    """Integral of a velocity [m/s] over time [s] by the trapezoidal rule [m]; NaN where a sample is missing."""
+    there = np.isfinite(time) & np.isfinite(velocity)
+    moved = np.full(time.shape, np.nan)
+    moved[there] = cumulative_trapezoid(velocity[there], time[there], initial=0) if there.any() else ()
+    return moved
+
+
+def displacement_of(time: Floats, velocity: Floats) -> Floats | None:
+    """Displacement [m] of a velocity [m/s] that repeats, about the middle of its whole cycles; None under one cycle.
+
+    NaN where a sample is missing, as in what is returned.
+    """
+    there = np.isfinite(time) & np.isfinite(velocity)
+    t, v = time[there], velocity[there]
+    above = v >= np.mean(v) if v.size else there
+    rising = np.flatnonzero(~above[:-1] & above[1:])
+    if rising.size < 2 or np.any(np.diff(t) <= 0):
+        return None
+    moved, (first, *_, last) = integral(time, velocity), rising
+    x = moved[there]
+    x -= (x[last] - x[first]) / (t[last] - t[first]) * (t - t[first])
+    whole = x[first : last + 1]
+    moved[there] = x - (np.max(whole) + np.min(whole)) / 2
+    return moved

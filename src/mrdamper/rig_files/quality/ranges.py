@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
 import numpy as np
 
+from mrdamper.rig_files.conditions import motions_in
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
@@ -19,9 +19,6 @@ SHORT_STROKE, LONG_STROKE = 0.15e-3, 0.9  # [m] peak to peak: beyond, a slip of 
 SMALL_FORCE, LARGE_FORCE = 8.0, 1.5e6  # [N] peak to peak
 SLOW = 300.0  # [s] of a cycle
 FEWEST_LEVELS, _MANY = 16, 8  # values of a channel, and samples for each
-_NUMBER = r"(?<![\d.,x])(?<!\dp)(\d{1,4}(?:[.,xp]\d{1,4})?)[ _]?"
-_FREQUENCY = re.compile(_NUMBER + r"hz(?![a-z])", re.IGNORECASE)
-_AMPLITUDE = re.compile(_NUMBER + r"mm(?![a-z/]|[ _]?s)", re.IGNORECASE)
 _SAME_FREQUENCY = 0.2  # relative difference of what is measured
 # Measured amplitude over the one stated, which may be the stroke peak to peak: a machine falls short of its command.
 _AMPLITUDES = (0.25, 1.6)
@@ -94,7 +91,8 @@ def agrees_with_its_name(view: View) -> Iterator[Finding]:
     notes = view.record.provenance
     name = f"{notes.get('file', '')} {view.record.id} {notes.get('motion_stated', '')}"
     measured = motion.condition
-    frequency, amplitude = _stated(_FREQUENCY, name), _stated(_AMPLITUDE, name)
+    values = (motions_in(name, unit) for unit in ("Hz", "mm"))
+    frequency, amplitude = (own.pop() if len(own) == 1 and 0.0 not in own else None for own in values)
     contradictions = []
     if frequency is not None and abs(measured.frequency_Hz / frequency - 1) > _SAME_FREQUENCY:
         contradictions.append((f"{frequency:g} Hz", f"{measured.frequency_Hz:.3g} Hz", "time"))
@@ -116,9 +114,3 @@ def agrees_with_its_name(view: View) -> Iterator[Finding]:
     for stated, has, channel in contradictions:
         text = f"the name or heading states {stated} and the record has {has}: check the unit of {channel}, or the name"
         yield Finding("W_NAME", text)
-
-
-def _stated(pattern: re.Pattern[str], name: str) -> float | None:
-    """Return the one value a name states; None for none, for several, and for zero."""
-    values = {float(re.sub("[,xp]", ".", number.lower())) for number in pattern.findall(name)}
-    return values.pop() if len(values) == 1 and 0.0 not in values else None

@@ -18,11 +18,10 @@ from mrdamper.rig_files.text.blocks import Block, find_blocks
 from mrdamper.rig_files.text.bulk import read_bulk
 from mrdamper.rig_files.text.cells import RowFormat, field_count, read_cells, split_rows
 from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
-from mrdamper.rig_files.text.programs import as_plain_table
+from mrdamper.rig_files.text.programs import as_plain_table, turned_table
 from mrdamper.rig_files.text.spool import Spool
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, line_feeds, open_text, too_long
 from mrdamper.rig_files.text.tokens import looks_numeric
-from mrdamper.rig_files.text.turned import turned_table
 
 _ODD = re.compile("[\udc80-\udcff\ufffd\x80-\x9fÿþðÞÐ¤¦¬¸¨÷×]")  # bytes of another encoding, as they come out
 _HEADER_LINES, _BREAKS = 200, 12  # lines in which a quoted name may be broken, and into how many

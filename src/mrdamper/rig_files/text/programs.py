@@ -1,13 +1,20 @@
-"""Texts of programs that keep names, units and samples apart, as plain tables: ARFF, Igor waves, blocks, sections."""
+"""Texts of programs that keep names, units and samples apart, or channels in rows, as plain tables."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import zip_longest
+from itertools import islice, zip_longest
 
-from mrdamper.rig_files.readers.base import Source, scratch
+import numpy as np
+
+from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.readers.arrays import array_table
+from mrdamper.rig_files.readers.base import RawTable, Source, scratch
+from mrdamper.rig_files.text.layout import cells_of
+from mrdamper.rig_files.text.tokens import looks_numeric, number
+from mrdamper.rig_files.units import is_unit
 
 _HEAD = 8192  # bytes
 _LARGEST = 50 * 10**6  # bytes
@@ -19,6 +26,8 @@ _X_SCALE = re.compile(rf"(?i)setscale */p *x +{_NUMBER}, *{_NUMBER}, *\"([^\"\n]
 _Y_SCALE = re.compile(r"(?i)setscale *(?:/\w+ *)?[yd] +[^,\n]+,[^,\n]+, *\"([^\"\n]*)\" *, *(\w+)")
 _CLOCK = r"[0-9]{6}(?:\.[0-9]+)?"  # 142003.25
 _BLOCK = re.compile(r"(?m)^\{ChannelBlock\}\n(?:Time)\t([^\n]+)\n([^{]*)")
+_MOST_LINES, _FEWEST_SAMPLES = 60, 30
+_TELLING = 2  # rows whose names tell what they are
 
 
 def as_plain_table(source: Source) -> Source:
@@ -91,3 +100,36 @@ _WAYS = {
     rb"^IGOR\s": _igor,
     rb"(?m)^\{ChannelBlock\}": _blocks,
 }
+
+
+def turned_table(source: Source, lines: Sequence[str]) -> RawTable | None:
+    """Return the table of a text with its channels in rows; None if it is none.
+
+    Raises `RigFileError`, its code E_NUMBER, if a cell of such a row is no number.
+    """
+    filled = list(islice((line for line in lines if line.strip()), _MOST_LINES + 1))
+    for separator in ("\t", ";", ",") if 1 < len(filled) <= _MOST_LINES else ():
+        cells = [[cell.strip('"') for cell in cells_of(line.rstrip(separator), separator)] for line in filled]
+        width = max(map(len, cells))
+        rows = [row for row in cells if len(row) == width and not looks_numeric(row[0]) and looks_numeric(row[-1])]
+        roles = {split_name(row[0]).role for row in rows} - {None}
+        if width <= _FEWEST_SAMPLES or len(roles) < _TELLING:
+            continue
+        united = all(is_unit(row[1].strip("[]()")) for row in rows)
+        headers = [split_name(row[0], row[1].strip("[]()") if united else "") for row in rows]
+        remarks = [line for line, row in zip(filled, cells, strict=True) if row not in rows]
+        rows = [[row[0], *row[2:]] for row in rows] if united else rows
+        commas = separator != "," and any("," in cell for row in rows for cell in row[1:])
+        mark = "," if commas and not any("." in cell for row in rows for cell in row[1:]) else "."
+
+        def load(column: int, rows: list[list[str]] = rows, mark: str = mark, shift: int = 2 + united) -> np.ndarray:
+            values = [number(cell, mark) for cell in rows[column][1:]]
+            if None in values:
+                at = values.index(None)
+                problem = f"{rows[column][at + 1][:40]!a} in row {rows[column][0]!r} is no number"
+                raise source.refuse("E_NUMBER", problem, "correct the cell", column=at + shift)
+            return np.array(values, dtype=float)
+
+        names, units = [header.name for header in headers], [header.unit for header in headers]
+        return replace(array_table(source, names, units, load), remarks=tuple(remarks))
+    return None

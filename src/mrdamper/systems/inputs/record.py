@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ColumnError, RecordError, UnitError
-from mrdamper.rig_files.motion_file import read_table
+from mrdamper.rig_files.dataset_samples import read_table
 from mrdamper.systems.inputs.base import Input
 
 STANDARD_GRAVITY = 9.81  # m/s² in a g of the records that come with the package; the figure published tables used
