@@ -336,7 +336,7 @@ def _convert(
 
 def _refuse_factor(table: RawTable, role: str, unit: str) -> None:
     """Refuse a channel that a line says to multiply, or to have been multiplied: multiply force by 2."""
-    for line in (line[:300] for line in table.remarks):
+    for line in table.lines:
         times = _TIMES.search(line)
         if times is None or role not in map(role_of, words_of(line)):
             continue

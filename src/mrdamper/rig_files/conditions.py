@@ -37,7 +37,7 @@ _LINE = re.compile(
     r"[\s;,\t\"]*[\[(]?(?P<unit>(?:1/)?(?:[^\W\d_]|/){0,9}(?:-1)?)[\])]?[\s;,\t\"]*$"
 )
 CELL = re.compile(r"\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*((?:[^\W\d_]|°){0,8})\s*")  # a number, and a unit behind it
-_LONGEST_LINE, _MOST_PARTS = 300, 20
+LONGEST_LINE, _MOST_PARTS = 300, 20
 _TOLERANCE = re.compile(r"\s*(?:\+\s?/?\s?[-−]|±)\s*[0-9]+(?:[.,][0-9]+)?\s*%?")
 FULL_SCALES = ("100", "1000", "255", "1023", "4095", "16383", "32767", "65535")  # largest numbers of converters
 _OF_SCALE = r"(?:m?[VA]|k?N|[mµ]?m|bar|counts?|bits?)"  # units
@@ -149,8 +149,8 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
                 rated.append(value)
             elif unit.dimension == "current" and coil and not _SCALE.search(line):
                 currents.append(Statement(value, f"the line {line.strip()[:60]!r}"))
-    rated += [amperes(match[1], match[2]) for line in lines if (match := _WHOLE.search(line[:_LONGEST_LINE]))]
-    shares = [(match, line) for line in lines if len(set(rated)) == 1 and (match := _SHARE.match(line[:_LONGEST_LINE]))]
+    rated += [amperes(match[1], match[2]) for line in lines if (match := _WHOLE.search(line[:LONGEST_LINE]))]
+    shares = [(match, line) for line in lines if len(set(rated)) == 1 and (match := _SHARE.match(line[:LONGEST_LINE]))]
     for match, line in shares:
         share = float(match["number"].replace(",", ".")) / 100
         currents.append(Statement(share * rated[0], f"the line {line.strip()[:60]!r}"))
@@ -277,7 +277,7 @@ def stated_speed(quantities: Iterable[Quantity]) -> float | None:
 
 def _quantities(line: str, decimal: str | None) -> Iterator[Quantity]:
     """Yield what a line states: one quantity, or several behind each other."""
-    line = _TOLERANCE.sub("", unicodedata.normalize("NFKC", line[:_LONGEST_LINE]))  # a colon of full width
+    line = _TOLERANCE.sub("", unicodedata.normalize("NFKC", line[:LONGEST_LINE]))  # a colon of full width
     match = _LINE.match(line) or _SPACED.match(line)
     parts = [line] if match else re.split(r"[,;|]\s+|[{}\t]|\s{2,}", re.sub(r" *= +", "=", line))
     for part in parts[:_MOST_PARTS]:

@@ -39,7 +39,6 @@ from mrdamper.rig_files.vocabulary import words
 _KEPT = {**FURTHER, "length": "m", "force": "N"}
 _SCALES = words("scale")
 _SCALE_CELL = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)(?:\s*[A-Za-zµ]+/(?:digit|bit|count|cnt|lsb|inc)s?)?")
-_LONGEST_LINE = 300
 _SAMPLE = 10_000  # samples looked at
 _LEAST_CURRENT = 0.02  # [A] largest of a record: less is no current of a coil
 _MOST_FURTHER = 12  # channels
@@ -158,8 +157,8 @@ def _refuse_unscaled(table: RawTable, assigned: dict[str, Assigned], raw: dict[i
 def _numbers_in_lines(table: RawTable) -> Iterator[tuple[str, float]]:
     """Yield what lines beside the columns call a number, or one a column: Load gain: 0.5; Gain; 1; 0.5."""
     marks = r"[:=;\t|]" if table.decimal == "," else r"[:=;,\t|]"
-    for line in table.remarks:
-        key, *cells = (cell.strip(' "#%') for cell in re.split(marks, line[:_LONGEST_LINE]))
+    for line in table.lines:
+        key, *cells = (cell.strip(' "#%') for cell in re.split(marks, line))
         own = 0 <= len(table.names) - len(cells) <= 1 < len(cells)
         names = [header.name for header in table.headers][-len(cells) :] if own else [""]
         for name, cell in zip(names, cells if own or len(cells) == 1 else (), strict=False):

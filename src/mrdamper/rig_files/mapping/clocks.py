@@ -28,7 +28,6 @@ _AXIS_UNIT = re.compile(
     r"(?i)^[\s\"]*(?P<axis>[xyz])[ _-]?axis[ _-]?unit\"?\s*[;,:=\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s;,\"]*$"
 )
 _SAMPLE_TIME = re.compile(r"(?i)^\s*\"?sample ?time ?\[(?P<unit>[mµun]?s)\]")  # of traces of controllers
-_LONGEST_LINE = 300
 _DAY_S = 86_400.0
 _EPOCHS = (  # the years 2000 to 2100 by a clock: its first and last number, its unit, the factor to it, what it counts
     (9.4e17, 4.2e18, "ns", 1.0, "nanoseconds from the year 1970"),
@@ -38,7 +37,6 @@ _EPOCHS = (  # the years 2000 to 2100 by a clock: its first and last number, its
 )
 _FRACTION_S = 0.1  # [s] between samples: in a smaller unit no logger would be as fast
 _COARSE_S = 2.0  # [s] between the durations of a clock and of one of whole seconds
-_LARGEST = 64 * 2**20  # bytes of a file whose clock without a unit is looked at
 _LONGEST = 5_000_000  # samples; a longer record lies in a file and is not read as a whole
 _SAME_RATE, _SAME_FREQUENCY = 0.2, 0.1  # relative differences of what is stated from what is measured
 _SAMPLES = 100_000  # looked at
@@ -47,10 +45,10 @@ _SAMPLES = 100_000  # looked at
 def with_axis_as_time(table: RawTable) -> RawTable:
     """Take the x axis as time where a line gives it a unit of time: of keyed rows, or X and Y."""
     clock_of = {i: n for i, n in enumerate(table.names) if n.casefold() == "name"}
-    steps = {m["unit"] for line in table.remarks if (m := _SAMPLE_TIME.match(line[:_LONGEST_LINE]))}
+    steps = {m["unit"] for line in table.lines if (m := _SAMPLE_TIME.match(line))}
     if len(steps) == 1 and list(clock_of) == list(range(0, len(table.names), 2)):  # each before its channel
         return table.named(dict.fromkeys(clock_of, ("time", steps.pop())))
-    axes = [m for line in table.remarks if (m := _AXIS_UNIT.match(line[:_LONGEST_LINE])) and is_unit(m["unit"])]
+    axes = [m for line in table.lines if (m := _AXIS_UNIT.match(line)) and is_unit(m["unit"])]
     clocks = {m["unit"] for m in axes if m["axis"] in "xX" and split_name("", m["unit"]).dimension == "time"}
     if len(clocks) != 1 or not table.names:
         return table
@@ -72,7 +70,7 @@ def with_epoch(table: RawTable) -> RawTable:
     """
     clocks = table.columns("time")
     unsure = [i for i in clocks if not table.headers[i].unit or (len(clocks) == 2 and table.headers[i].unit != "s")]
-    values = table.try_read(*clocks) if unsure and len(clocks) < 3 and table.source.size <= _LARGEST else None
+    values = table.peek(*clocks) if unsure and len(clocks) < 3 else None
     if values is None:
         return table
     for i, (begin, end, unit, factor, what) in itertools.product(unsure, _EPOCHS):
@@ -144,7 +142,7 @@ def with_time_stated(table: RawTable) -> RawTable:
 def _with_cycles(table: RawTable, clock: int) -> RawTable:
     """Join a clock that restarts in every cycle, where a column counts the cycles: no test begins there."""
     counters = [i for i, name in enumerate(table.names) if i != clock and _CYCLE.match(name.strip())]
-    values = table.try_read(clock, *counters[:1]) if len(counters) == 1 and table.source.size <= _LARGEST else None
+    values = table.peek(clock, *counters[:1]) if len(counters) == 1 else None
     steps = {i: np.diff(column) for i, column in values.items()} if values else {}
     falls = steps[clock] < 0 if steps else np.zeros(0, dtype=bool)
     if not falls.any() or not np.array_equal(steps[counters[0]], falls.astype(float)):
@@ -179,7 +177,7 @@ def _with_fractions(table: RawTable, clock: int) -> RawTable:
 def _with_samples_counted(table: RawTable, clock: int) -> RawTable:
     """Return a clock whose steps are longer than the samples', counted at the rate that the file states."""
     rate = _rate_beside(table)
-    values = table.try_read(clock) if rate and table.source.size <= _LARGEST else None
+    values = table.peek(clock) if rate else None
     if values is None or not rate:
         return table
     factor, steps = table.headers[clock].factor, np.diff(values[clock])

@@ -17,7 +17,7 @@ from mrdamper.rig_files.column_names import (
     says_nothing,
     split_name,
 )
-from mrdamper.rig_files.conditions import currents_in, without_currents
+from mrdamper.rig_files.conditions import LONGEST_LINE, currents_in, without_currents
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
 from mrdamper.rig_files.mapping.scales import (
     SCALE,
@@ -66,7 +66,7 @@ _FULL_SCALE = re.compile(  # sections of a header: Name=Stroke, FullScale=75, Un
     r"(?im)^name *= *(?P<name>[^=\n]{1,60})\n(?:[^=\n]*=[^\n]*\n){0,4}?full[ _]?scale *= *(?P<full>[0-9.]{1,12})\n"
     r"(?:[^=\n]*=[^\n]*\n){0,4}?unit *= *(?P<unit>\S{1,12})$"
 )
-_LONGEST_LINE, _LONGEST_CONDITIONS = 300, 4000
+_LONGEST_CONDITIONS = 4000  # characters
 
 
 def completed(table: RawTable) -> RawTable:
@@ -97,13 +97,13 @@ def _without_shared_path(table: RawTable) -> RawTable:
 
 def states_si(line: str) -> bool:
     """Tell if a line states that all units are those of the SI: All quantities in SI units."""
-    if len(line) > _LONGEST_LINE or not _SI_UNITS.search(line) or _EXCEPT.search(line):
+    if len(line) > LONGEST_LINE or not _SI_UNITS.search(line) or _EXCEPT.search(line):
         return False
     named = [parse_unit(word) for word in re.split(r"[\s,;:()\[\]=]+", line) if word != "in" and is_unit(word)]
     return all(unit is None or unit.factor == 1 for unit in named)
 
 
-def _keyed_cells(table: RawTable, longest: int = _LONGEST_LINE) -> Iterator[tuple[str, list[str]]]:
+def _keyed_cells(table: RawTable, longest: int = LONGEST_LINE) -> Iterator[tuple[str, list[str]]]:
     """Yield the first cell of every line beside the columns and the cells behind it, by every separator."""
     for line in table.remarks:
         for separator in filter(line.__contains__, _SEPARATORS):
@@ -130,7 +130,7 @@ def _with_values_for_all(table: RawTable) -> RawTable:
         lines += [f"{key}: {cell} {unit}" for key, cell in numbers.items() if start and key.startswith(start)]
     sections = _FULL_SCALE.finditer("\n".join(table.remarks))
     lines += [f"{m['name']}: 100 % = {m['full']} {m['unit']}" for m in sections]
-    plain = {match[1]: match[2] for line in table.remarks if (match := _KEY.fullmatch(line[:_LONGEST_LINE]))}
+    plain = {match[1]: match[2] for line in table.lines if (match := _KEY.fullmatch(line))}
     numbers = {key: cell for key, cell in plain.items() if looks_numeric(cell)}
     for end in ("Unit", "_unit", " unit"):
         lines += [f"{key}: {cell} {plain[key + end]}" for key, cell in numbers.items() if key + end in plain]
@@ -178,7 +178,7 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
 
 def _with_listed_names(table: RawTable) -> RawTable:
     """Names, units and scales of columns without any that numbered lines state: 1=Time;min, or UNITS.CHAN_1=mm."""
-    listed = [match for line in table.remarks if (match := LISTED.match(line[:_LONGEST_LINE]))]
+    listed = [match for line in table.lines if (match := LISTED.match(line))]
     texts: dict[str, dict[int, str]] = {"name": {}, "unit": {}, "scal": {}}
     for match in listed if all(is_unit(match["unit"].strip()) for match in listed) else ():
         texts["name"][int(match["number"])] = match["name"].strip()
@@ -186,7 +186,7 @@ def _with_listed_names(table: RawTable) -> RawTable:
     width = range(1, len(table.names) + 1)
     if {*texts["name"]} != {*width}:
         texts = {"name": {}, "unit": {}, "scal": {}}
-        for match in filter(None, (_INDEXED.match(line[:_LONGEST_LINE]) for line in table.remarks)):
+        for match in filter(None, map(_INDEXED.match, table.lines)):
             what = (match["what"] or match["after"]).casefold()[:4].replace("desc", "name").replace("labe", "name")
             texts[what][int(match["number"])] = match["value"]
     if any(i not in texts["name"] or not is_unit(texts["unit"].get(i, "")) for i in width):
@@ -205,8 +205,8 @@ def _with_numbered_channels(table: RawTable) -> RawTable:
     called = table.names if any(table.names) else map(str, range(1, len(table.names) + 1))
     numbers = [match[1] if (match := NUMBERED.fullmatch(name.strip())) else "" for name in called]
     says: dict[str, set[str]] = {}
-    for line in table.remarks if any(numbers) else ():
-        for match in _CHANNEL_IS.finditer(line[:_LONGEST_LINE]):
+    for line in table.lines if any(numbers) else ():
+        for match in _CHANNEL_IS.finditer(line):
             says.setdefault(str(int(match["number"])), set()).add(match["what"].strip())
     meant = [says.get(str(int(number)), set()) if number else set() for number in numbers]
     if sum(map(bool, numbers)) < min(2, len(list(filter(None, table.names))) - 1) or any(
@@ -219,7 +219,7 @@ def _with_numbered_channels(table: RawTable) -> RawTable:
 
 def _with_explained_names(table: RawTable) -> RawTable:
     """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm; y0 = load, N."""
-    lines = [[cell.strip(' "') for cell in re.split(r"[,;|\t=:]", line[:_LONGEST_LINE])] for line in table.remarks]
+    lines = [[cell.strip(' "') for cell in re.split(r"[,;|\t=:]", line)] for line in table.lines]
     headings = {}
     for i, (name, header) in enumerate(zip(table.names, table.headers, strict=True)):
         called = {name.casefold(), header.name.casefold()} - {""}
@@ -268,15 +268,15 @@ def _with_listed_units(table: RawTable) -> RawTable:
     wanted |= {name.strip(): i for i, name in names.items()}  # t is no T
     behind: dict[int, set[str]] = {}
     listed: dict[int, set[str]] = {}
-    for line in table.remarks if names else ():
-        cells = [cell.strip(' "') for cell in re.split(r"[,;|\t]", line[:_LONGEST_LINE].lstrip("#%/ "))]
+    for line in table.lines if names else ():
+        cells = [cell.strip(' "') for cell in re.split(r"[,;|\t]", line.lstrip("#%/ "))]
         both = [*cells, *(cell.partition(": ")[2] for cell in cells)]  # rig 7, columns: time [s], load [N]
         for header in (split_name(_COLON.sub(r"\1 [\2]", cell)) for cell in both):
             name = header.name.strip()
             i = wanted.get(name, wanted.get(name.casefold()))
             if i is not None and header.dimension and header.dimension == DIMENSION.get(header.role or ""):
                 behind.setdefault(i, set()).add(header.unit)
-        match = _TIME_UNIT.match(line[:_LONGEST_LINE])
+        match = _TIME_UNIT.match(line)
         if match and len(times) == 1 and times[0] in bare and split_name("", match["unit"]).dimension == "time":
             behind.setdefault(times[0], set()).add(match["unit"])
         named = [wanted.get(cell, wanted[cell.casefold()]) for cell in cells if cell.casefold() in wanted]

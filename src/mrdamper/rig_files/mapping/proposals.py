@@ -23,7 +23,6 @@ _LONGEST_LINE = 80
 _CLOCK_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
 _LEAST_RATE = 1000.0  # [Hz], of which a number in a text is no frequency of a motion
 _AGREE = 0.05  # of a frequency that is stated
-_LARGEST = 64 * 2**20  # bytes of a file whose columns are tried
 _MOST_SAMPLES = 20_000
 _MOST_TRIED = 24  # combinations of columns
 _CLEAR, _POOR = 0.5, 0.2  # share of the force that velocity explains: of a damper's, and of another channel
@@ -38,11 +37,11 @@ def with_unit_of_time(table: RawTable) -> RawTable:
     times, moved = table.columns("time"), [i for i, h in enumerate(table.headers) if h.channel == "displacement"]
     if not times and len(moved) == 1:
         return _with_rate(table, moved[0])
-    if len(times) != 1 or len(moved) != 1 or table.headers[times[0]].unit or table.source.size > _LARGEST:
+    if len(times) != 1 or len(moved) != 1 or table.headers[times[0]].unit:
         return table
     rates = {rate for q in table.quantities if (rate := stated_rate([q]))}
     stated = set(stated_frequencies(table)) - rates or {*rates}
-    values = table.try_read(times[0], moved[0]) if len(stated) == 1 else None
+    values = table.peek(times[0], moved[0]) if len(stated) == 1 else None
     if values is None:
         return table
     steps, frequency = np.diff(values[times[0]]), stated.pop()
@@ -61,7 +60,7 @@ def _with_rate(table: RawTable, moved: int) -> RawTable:
     keyed = filter(None, (_KEYED.fullmatch(line) for line in lines if len(line) < _LONGEST_LINE))
     rates = {float(match[2]) for match in keyed if BARE_RATE.fullmatch(match[1])}
     stated = {*stated_frequencies(table)}
-    values = table.try_read(moved) if len(rates) == len(stated) == 1 and table.source.size <= _LARGEST else None
+    values = table.peek(moved) if len(rates) == len(stated) == 1 else None
     if values is None or not (rate := rates.pop()) or any(stated_rate([q]) for q in table.quantities):
         return table
     frequency, measured = stated.pop(), frequency_of(np.arange(values[moved].size) / rate, values[moved])
@@ -76,8 +75,6 @@ def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -
 
     The columns that are `stated`, by channel, are not open.
     """
-    if table.source.size > _LARGEST:
-        return table
     try:
         open_roles = {
             role: [column_called(table, stated[role], role)] if role in stated else candidates_of(table, role)
@@ -87,7 +84,7 @@ def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -
         return table
     if all(len(columns) == 1 for columns in open_roles.values()) or not all(open_roles.values()):
         return table
-    values = table.try_read(*sorted({column for columns in open_roles.values() for column in columns}))
+    values = table.peek(*sorted({column for columns in open_roles.values() for column in columns}))
     tried = [
         columns for columns in list(product(*open_roles.values()))[: _MOST_TRIED + 1] if len({*columns}) == len(columns)
     ]
@@ -168,10 +165,10 @@ def with_integrated_velocity(table: RawTable) -> RawTable:
     """
     by_role = [table.columns(role) for role in ("time", "velocity", "force")]
     others = any("displacement" in (h.role, h.channel) or h.dimension == "length" for h in table.headers)
-    if others or any(len(columns) != 1 for columns in by_role) or table.source.size > _LARGEST:
+    if others or any(len(columns) != 1 for columns in by_role):
         return table
     clock, speed = by_role[0][0], by_role[1][0]
-    units, values = (table.headers[clock].known, table.headers[speed].known), table.try_read(clock, speed)
+    units, values = (table.headers[clock].known, table.headers[speed].known), table.peek(clock, speed)
     if [unit and unit.dimension for unit in units] != ["time", "velocity"] or values is None:
         return table
     moved = displacement_of(*(unit.factor * values[i] for unit, i in zip(units, (clock, speed), strict=True) if unit))

@@ -11,7 +11,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.rig_files.column_names import Header, holds, role_of, split_name, unknown_unit, words_of
-from mrdamper.rig_files.conditions import FULL_SCALES, stated_by_lines, stated_in_titles
+from mrdamper.rig_files.conditions import FULL_SCALES, LONGEST_LINE, stated_by_lines, stated_in_titles
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED, Finding
 from mrdamper.rig_files.text.spool import rescale
@@ -53,7 +53,7 @@ NUMBER_IS = re.compile(  # pwm 255 = 1.5 A
     r"(?<!\w)(?P<name>[^\W\d]\w{0,20})[ =]+(?P<number>[0-9]{1,5})"
     r"\s*(?:=|->|entspricht)\s*(?P<value>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>m?A)(?![\w/])"
 )
-_LONGEST_LINE, _MARKS = 300, ' #%/*"\t-'
+_MARKS = ' #%/*"\t-'
 _CONVENTION = words("sign")
 _SENSE_NAMES = words("sense") | _CONVENTION
 _SENSES = {1: tuple(words("tension_stems")), -1: tuple(words("compression_stems"))}
@@ -75,7 +75,7 @@ def with_counts(table: RawTable) -> RawTable:
             bare = re.sub(r"[\s_]*(?:counts?|cnts?|raw)$", "", table.headers[i].name, flags=re.IGNORECASE)
             text = f"column {name!r} is scaled as its heading states"
             table = scaled(table, i, bare or table.headers[i].name, match["unit"], factor, text)
-    stated = {m.groups() for line in table.remarks for m in NUMBER_IS.finditer(line[:_LONGEST_LINE])}
+    stated = {m.groups() for line in table.lines for m in NUMBER_IS.finditer(line)}
     for i, header in enumerate(table.headers):
         own = [of for of in stated if of[0].casefold() == header.name.casefold()]  # two: which, or a line through both
         if len(own) == 1 and own[0][1] in FULL_SCALES and not header.unit and _is_whole(table, i):
@@ -156,19 +156,18 @@ def scaled_columns(table: RawTable) -> list[int]:
 
 def states_scale(line: str) -> bool:
     """Tell if a line states a scale: 0.5 A/V; 100 % PWM = 2 A."""
-    return bool(scales_in(line[:_LONGEST_LINE]))
+    return bool(scales_in(line[:LONGEST_LINE]))
 
 
 def states_shift(line: str) -> bool:
     """Tell if a line states the zero or a gain of a scale, and no current: offset: 0.4 V; gain 100."""
-    shift = _ZERO.search(line[:_LONGEST_LINE]) or _SHIFT.search(line[:_LONGEST_LINE])
+    shift = _ZERO.search(line[:LONGEST_LINE]) or _SHIFT.search(line[:LONGEST_LINE])
     return bool(shift) and not (stated_by_lines([line], ".") or stated_in_titles([line]))
 
 
 def _parts(table: RawTable) -> list[str]:
     """Return the lines beside a table, and the parts of those with several scales."""
-    beside = [line[:_LONGEST_LINE] for line in table.remarks]
-    return [part for t in beside for part in (re.split(r"[,;|\t]\s*", t) if len(scales_in(t)) > 1 else [t])]
+    return [part for t in table.lines for part in (re.split(r"[,;|\t]\s*", t) if len(scales_in(t)) > 1 else [t])]
 
 
 def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[str, str, float, str] | None:
@@ -250,8 +249,7 @@ def with_stated_signs(table: RawTable) -> RawTable:
     about the sign leaves it unclear, as a clause does whose sense is none of the words known.
     """
     stated: dict[str, set[int]] = {}
-    for line in table.remarks:
-        whole = line[:_LONGEST_LINE]
+    for whole in table.lines:
         counted, clauses = _counted(whole), _CLAUSE.split(whole)
         each = [clause for clause in clauses if _signs(_POLARITIES, clause)]
         apart = len(each) > 1 and all(_named(clause) & {*SIGNED} for clause in each) and counted
@@ -272,7 +270,7 @@ def with_stated_signs(table: RawTable) -> RawTable:
 
 def states_sign(line: str) -> bool:
     """Tell if a line may state in which sense a channel counts positive."""
-    line = line[:_LONGEST_LINE]
+    line = line[:LONGEST_LINE]
     others = _others(line)
     if others & _CONVENTION:
         return bool(_signs(_POLARITIES, line))

@@ -20,7 +20,7 @@ import numpy as np
 from mrdamper.data.arrays import Floats
 from mrdamper.errors import InputError, printable
 from mrdamper.rig_files.column_names import Header, split_name
-from mrdamper.rig_files.conditions import Quantity, stated_quantities
+from mrdamper.rig_files.conditions import LONGEST_LINE, Quantity, stated_quantities
 from mrdamper.rig_files.file_form import FileForm
 from mrdamper.rig_files.record import Finding
 
@@ -31,6 +31,7 @@ RATIO_MATTERS_FROM = 24 * 2**20  # bytes a column of numbers may always unpack t
 
 
 _IN_MEMORY = 32 * 2**20  # bytes
+_LARGEST_LOOKED_AT = 64 * 2**20  # bytes of a file whose samples are tried
 
 
 def scratch(keep: ExitStack) -> IO[bytes]:
@@ -144,6 +145,11 @@ class RawTable:
         return mark if isinstance(mark, str) else None
 
     @cached_property
+    def lines(self) -> tuple[str, ...]:
+        """The lines beside the columns, cut where they are long: to match them all could take long."""
+        return tuple(line[:LONGEST_LINE] for line in self.remarks)
+
+    @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
         """Quantities that lines and single numbers beside the columns state."""
         return tuple(stated_quantities(self.remarks, self.constants, self.decimal))
@@ -159,6 +165,10 @@ class RawTable:
             return self.read(columns).values
         except InputError:
             return None
+
+    def peek(self, *columns: int) -> Mapping[int, Floats] | None:
+        """Return columns as `try_read`; None also where the file is too large to be looked at."""
+        return self.try_read(*columns) if self.source.size <= _LARGEST_LOOKED_AT else None
 
     def noted(self, *findings: Finding) -> RawTable:
         """Return the table with further findings."""
