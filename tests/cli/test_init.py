@@ -11,8 +11,7 @@ from mrdamper.cli.commands.init import template
 from mrdamper.errors import InputError, OutputError, UnknownNameError
 from mrdamper.fleet.profile import load_limits as load_column_limits
 from mrdamper.report.about import About, AboutError, Limit, load_about, load_limits
-from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.profile import Channel, Correction, CurrentSource, Profile, load_profile
+from mrdamper.rig_files.profile import Channel, Correction, CurrentSource, FileForm, Profile, load_profile
 from mrdamper.rig_files.strict_toml import RIG_LIMITS
 from mrdamper.rig_files.tests_table import COLUMNS, load_tests
 from mrdamper.study.limits import Limits

@@ -8,8 +8,7 @@ import pytest
 from mrdamper import register
 from mrdamper.discovery import _registries
 from mrdamper.errors import InputError
-from mrdamper.rig_files.file_form import FileForm
-from mrdamper.rig_files.profile import Channel, Profile
+from mrdamper.rig_files.profile import Channel, FileForm, Profile
 from mrdamper.rig_files.readers.column_list import ColumnList
 from mrdamper.rig_files.rig_import import import_files, read_run, read_runs
 

@@ -3,7 +3,7 @@
 import pytest
 
 from mrdamper.rig_files.column_names import role_of, split_name
-from mrdamper.rig_files.units import DIMENSION, is_unit, parse_unit
+from mrdamper.rig_files.vocabulary import DIMENSION, is_unit, parse_unit
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from support.rig_files import NAMES, channels, lines_of, rows, text, write
 from mrdamper.errors import CombinedError, InputError
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import read_run, read_runs
-from mrdamper.rig_files.text.bulk import read_bulk
+from mrdamper.rig_files.text.cells import read_bulk
 from mrdamper.rig_files.text.tokens import stamp
 
 CLEAN = text()

@@ -9,8 +9,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
-from mrdamper.rig_files.units import Unit, is_unit, parse_unit
-from mrdamper.rig_files.vocabulary import TABLES, meanings, words
+from mrdamper.rig_files.vocabulary import TABLES, Unit, is_unit, meanings, parse_unit, words
 
 WORDS = {role: frozenset(names) for role, names in TABLES["channels"].items()}
 _ROLES, _SYMBOLS, _COMPOUNDS = meanings("channels"), meanings("symbols"), meanings("compounds")

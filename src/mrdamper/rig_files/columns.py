@@ -28,8 +28,7 @@ from mrdamper.rig_files.column_names import (
 from mrdamper.rig_files.conditions import currents_in, rate_in_name, stated_rate
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, SIGNED
-from mrdamper.rig_files.units import DIMENSION, Unit, parse_unit
-from mrdamper.rig_files.vocabulary import words
+from mrdamper.rig_files.vocabulary import DIMENSION, Unit, parse_unit, words
 
 if TYPE_CHECKING:
     from mrdamper.rig_files.profile import Profile

@@ -18,7 +18,7 @@ import numpy as np
 
 from mrdamper.data import Floats, Run
 from mrdamper.errors import ColumnError, DatasetError, RunError, UnitError
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import opened
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
 from mrdamper.rig_files.readers.parquet import Parquet, words_in

@@ -19,7 +19,7 @@ from mrdamper.rig_files.profile import Channel, Profile, current_pattern, profil
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED
-from mrdamper.rig_files.units import DIMENSION
+from mrdamper.rig_files.vocabulary import DIMENSION
 
 _ROWS_SHOWN, _MOST_SHOWN = 6, 30  # rows and columns of a preview
 _MOST_COLUMNS, _MOST_REMARKS, _MOST_NAMES = 40, 6, 3  # of a tree that is shown

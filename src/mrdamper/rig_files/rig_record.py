@@ -22,7 +22,7 @@ from mrdamper.rig_files.columns import (
     measured_beside_others,
     rate_of,
 )
-from mrdamper.rig_files.conditions import stated_motion, stated_quantities
+from mrdamper.rig_files.conditions import recording_time, stated_motion, stated_quantities
 from mrdamper.rig_files.mapping.clocks import past_midnight, refuse_two_rates
 from mrdamper.rig_files.mapping.proposals import integral
 from mrdamper.rig_files.parts import stretches_of_time
@@ -30,11 +30,9 @@ from mrdamper.rig_files.profile import Correction, Profile
 from mrdamper.rig_files.readers import suffixes
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import FURTHER, OPTIONAL, Finding, Record
-from mrdamper.rig_files.recorded_at import recording_time
 from mrdamper.rig_files.sequences import stretches_of_session
 from mrdamper.rig_files.text.spool import rescale
-from mrdamper.rig_files.units import Unit
-from mrdamper.rig_files.vocabulary import words
+from mrdamper.rig_files.vocabulary import Unit, words
 
 _KEPT = {**FURTHER, "length": "m", "force": "N"}
 _SCALES = words("scale")

@@ -21,7 +21,7 @@ import numpy as np
 
 from mrdamper.data.child import Child
 from mrdamper.errors import CombinedError, MissingExtraError
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import (
     MOST_RATIO,
     Content,

@@ -14,7 +14,7 @@ import numpy as np
 
 from mrdamper.data.child import send, standard_output, writable_memory
 from mrdamper.errors import CombinedError, MissingExtraError
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, RigFileError, Source
 
 _SAYS = ("names", "units", "line", "label", "form", "fallback", "constants", "odd", "remarks", "over")

@@ -18,8 +18,7 @@ from mrdamper.rig_files.quality.presence import COARSE_CLOCK
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.tokens import stamp
-from mrdamper.rig_files.units import is_unit, parse_unit
-from mrdamper.rig_files.vocabulary import words
+from mrdamper.rig_files.vocabulary import is_unit, parse_unit, words
 
 _FRACTIONS = {"millisekunden": "ms", "millitm": "ms"}
 _DATES = words("date")

@@ -32,8 +32,7 @@ from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.layout import LISTED, X_VALUE, cells_of
 from mrdamper.rig_files.text.tokens import looks_numeric, number
-from mrdamper.rig_files.units import DIMENSION, SI, is_unit, parse_unit
-from mrdamper.rig_files.vocabulary import meanings, words
+from mrdamper.rig_files.vocabulary import DIMENSION, SI, is_unit, meanings, parse_unit, words
 
 _SEPARATORS = ("\t", ";", ",", "|")
 _CLOCKS, _WEIGHTS = meanings("clocks") | {"time since start": ""}, meanings("weights")

@@ -26,7 +26,7 @@ from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding
 from mrdamper.rig_files.text.short import packaged_lines, short_lines
-from mrdamper.rig_files.units import is_unit, parse_unit
+from mrdamper.rig_files.vocabulary import is_unit, parse_unit
 
 _MOST = 200  # lines
 _FEWEST_ROWS = 50  # of a record

@@ -15,8 +15,7 @@ from mrdamper.rig_files.conditions import FULL_SCALES, LONGEST_LINE, stated_by_l
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED, Finding
 from mrdamper.rig_files.text.spool import rescale
-from mrdamper.rig_files.units import DIMENSION, is_unit, parse_unit
-from mrdamper.rig_files.vocabulary import words
+from mrdamper.rig_files.vocabulary import DIMENSION, is_unit, parse_unit, words
 
 _MONITOR = words("monitor")
 SCALE = re.compile(

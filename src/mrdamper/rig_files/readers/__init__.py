@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from mrdamper.discovery import Registry
 from mrdamper.errors import InputError
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import opened
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.sandbox import guarded_tables

@@ -28,7 +28,7 @@ from mrdamper.rig_files.readers.base import (
     Source,
     Words,
 )
-from mrdamper.rig_files.units import is_unit
+from mrdamper.rig_files.vocabulary import is_unit
 
 _MOST_ACROSS = 50  # channels of a matrix that has its samples in rows
 _PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value")

@@ -21,7 +21,7 @@ from mrdamper.data.arrays import Floats
 from mrdamper.errors import InputError, printable
 from mrdamper.rig_files.column_names import Header, split_name
 from mrdamper.rig_files.conditions import LONGEST_LINE, Quantity, stated_quantities
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.record import Finding
 
 MOST_COLUMNS = 1000

@@ -11,12 +11,11 @@ import numpy as np
 
 from mrdamper.errors import printable
 from mrdamper.rig_files.column_names import Header, split_name
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words, scratch
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.blocks import Block, find_blocks
-from mrdamper.rig_files.text.bulk import read_bulk
-from mrdamper.rig_files.text.cells import RowFormat, field_count, read_cells, split_rows
+from mrdamper.rig_files.text.cells import RowFormat, field_count, read_bulk, read_cells, split_rows
 from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
 from mrdamper.rig_files.text.programs import as_plain_table, turned_table
 from mrdamper.rig_files.text.spool import Spool

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_clock
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import (
     Stored,
     check_unpacked,
@@ -22,7 +22,7 @@ from mrdamper.rig_files.readers.arrays import (
 )
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
-from mrdamper.rig_files.units import is_unit
+from mrdamper.rig_files.vocabulary import is_unit
 
 # pyright: reportMissingImports=false, reportAttributeAccessIssue=false
 

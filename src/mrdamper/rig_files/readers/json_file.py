@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import damaged, refuse_twice, whole
 from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, RigFileError, Source
 from mrdamper.rig_files.readers.nested import nested_tables

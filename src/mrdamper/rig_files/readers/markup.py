@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import refusing_damage, whole
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, Reader, RigFileError, Source
 from mrdamper.rig_files.readers.nested import nested_tables

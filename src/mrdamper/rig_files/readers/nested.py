@@ -21,8 +21,7 @@ from mrdamper.rig_files.conditions import stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
 from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES, MOST_ITEMS, with_tests_apart
-from mrdamper.rig_files.units import is_unit, parse_unit
-from mrdamper.rig_files.vocabulary import KEYS, words
+from mrdamper.rig_files.vocabulary import KEYS, is_unit, parse_unit, words
 
 _VALUE = words("value")
 DEEPEST = 8  # levels

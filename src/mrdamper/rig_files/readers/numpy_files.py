@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_arrays, zipped_names
 from mrdamper.rig_files.readers.arrays import (
     array_table,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, damaged, refusing_damage
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source, Words
 from mrdamper.rig_files.readers.nested import nested_tables

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.column_names import holds
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import Stored, check_unpacked, damaged, load, refusing_damage
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import damaged, refusing_damage, whole
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables

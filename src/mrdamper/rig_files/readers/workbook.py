@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_workbook, zipped_names
 from mrdamper.rig_files.readers.arrays import damaged, load, refusing_damage
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source, scratch

@@ -16,8 +16,7 @@ from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import split_name, words_of
 from mrdamper.rig_files.text.elements import Elements, numbers_in
 from mrdamper.rig_files.text.stream import decoded
-from mrdamper.rig_files.units import DIMENSION, is_unit
-from mrdamper.rig_files.vocabulary import words
+from mrdamper.rig_files.vocabulary import DIMENSION, is_unit, words
 
 _LARGEST = 2**18  # bytes
 _RULE = re.compile(r"[\s|:+=-]*")  # below the names of columns of a table in Markdown

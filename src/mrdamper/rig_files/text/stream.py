@@ -11,7 +11,7 @@ from typing import IO
 import numpy as np
 
 from mrdamper.rig_files.column_names import role_of
-from mrdamper.rig_files.file_form import FileForm
+from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RigFileError, Source, scratch
 
 LONGEST_LINE = 64 * 1024
