@@ -70,20 +70,20 @@ def is_plain_zip(source: Source) -> bool:
         return False
     if source.suffix in (".xlsx", ".xlsm", ".xlsb", ".ods", ".npz"):
         return False
+    names = zipped_names(source)
+    return names is None or not (is_workbook(names) or is_arrays(names))
+
+
+def zipped_names(source: Source) -> list[str] | None:
+    """Names of the members of a zip; None if it cannot be read."""
+    source.file.seek(0)
     try:
-        names = zipped_names(source)
+        with zipfile.ZipFile(source.file) as archive:
+            return archive.namelist()
     except UNREADABLE_ZIP:
-        return True
-    return not is_workbook(names) and not is_arrays(names)
-
-
-def zipped_names(source: Source) -> list[str]:
-    """Names of the members of a zip."""
-    source.file.seek(0)
-    with zipfile.ZipFile(source.file) as archive:
-        names = archive.namelist()
-    source.file.seek(0)
-    return names
+        return None
+    finally:
+        source.file.seek(0)
 
 
 def is_workbook(names: list[str]) -> bool:

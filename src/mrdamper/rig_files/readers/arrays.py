@@ -106,10 +106,21 @@ def words_of(cells: Sequence[str]) -> Words:
 
 
 def text_of(item: object) -> str:
-    """Return one item of an array or an attribute as text."""
+    """Return one item, or the first of an array or an attribute, as text; empty where there is none."""
+    if isinstance(item, np.ndarray):
+        item = item.reshape(-1)[0] if item.size else None
     if isinstance(item, bytes):
         return item.decode("utf-8", "replace").strip()
-    return f"{item:g}" if isinstance(item, float) else str(item).strip()
+    return f"{item:g}" if isinstance(item, float) else "" if item is None else str(item).strip()
+
+
+def texts_in(values: Any) -> list[str]:
+    """Return the texts of an array or an attribute of several; empty if it holds anything else."""
+    array = np.asarray(values).reshape(-1)
+    if array.dtype.kind not in "SUO" or not 1 < array.size <= MOST_COLUMNS:
+        return []
+    cells = [np.asarray(item) for item in array.tolist()]
+    return [] if any(cell.dtype.kind not in "SU" or cell.size > 1 for cell in cells) else list(map(text_of, cells))
 
 
 def value_of(array: np.ndarray) -> Any:

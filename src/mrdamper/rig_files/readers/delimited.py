@@ -76,6 +76,9 @@ class DelimitedText(Reader):
 
     def _table(self, stream: TextStream, layout: Layout, block: Block, index: int, count: int) -> RawTable:
         units = tuple("s" if k == "stamp" else u for k, u in zip(layout.kinds, layout.units, strict=True))
+        # What a profile may keep: not the place of the header, which differs from file to file.
+        form: dict[str, str | int] = {"separator": layout.separator, "decimal": layout.decimal}
+        form |= {} if stream.original_encoding.startswith("utf") else {"encoding": stream.original_encoding}
         return RawTable(
             stream.source,
             layout.names,
@@ -83,7 +86,7 @@ class DelimitedText(Reader):
             lambda columns: _read(stream, layout, block, tuple(dict.fromkeys(columns))),
             layout.header_line,
             f"block {index + 1}" if count > 1 else "",
-            _form(stream, layout),
+            form,
             odd=layout.odd,
             remarks=block.remarks or layout.remarks,
             over=layout.over,
@@ -100,12 +103,12 @@ def _plain(source: Source) -> Source:
     file = scratch(source.keep)
     source.file.seek(0)
     for line in source.file:
-        file.write(_ARRIVED.sub(b"", line) if arrived else _LATEX.sub(_without_command, line.rstrip()) + b"\n")
+        file.write(
+            _ARRIVED.sub(b"", line)
+            if arrived
+            else _LATEX.sub(lambda of: b"\t" if of[1] else of[2] or b"", line.rstrip()) + b"\n"
+        )
     return replace(source, file=file, size=file.tell())
-
-
-def _without_command(match: re.Match[bytes]) -> bytes:
-    return b"\t" if match[1] else match[2] or b""
 
 
 def _with_keys_above(source: Source) -> Source:
@@ -165,12 +168,6 @@ def _with_whole_quotes(lines: list[str]) -> list[str]:
                     lines[j] = whole
                 break
     return lines
-
-
-def _form(stream: TextStream, layout: Layout) -> dict[str, str | int]:
-    """Return the form that a profile may keep: not the place of the header, which differs from file to file."""
-    form: dict[str, str | int] = {"separator": layout.separator, "decimal": layout.decimal}
-    return form if stream.original_encoding.startswith("utf") else {**form, "encoding": stream.original_encoding}
 
 
 def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, ...]) -> Content:

@@ -18,6 +18,7 @@ from mrdamper.rig_files.readers.arrays import (
     load,
     refusing_damage,
     text_of,
+    texts_in,
     unpacked,
 )
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
@@ -108,7 +109,7 @@ class _Walk:
             references = np.reshape(item[()], -1) if _is_matlab(item) else []
             cells = [self._at(item.file, r, depth) for r in references] if len(references) <= MOST_STRUCTS else []
             return {name: cells or np.empty(2, dtype=object)}
-        unit = next((_text(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), "")
+        unit = next((text_of(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), "")
         kind = getattr(h5py.check_vlen_dtype(item.dtype), "kind", "")  # of vectors of samples
         if kind and kind in "iuf" and len(item.shape) == 1 and len(item) <= MOST_STRUCTS:
             return {name: list(item[()]), f"{name}_unit": unit}
@@ -117,7 +118,7 @@ class _Walk:
             stated = f"{name} [{unit}]" if isinstance(value, float) and is_unit(unit) else name
             return {stated: value} if value is not None else {}
         lists = {
-            f"{name} {key}": words for key in list(item.attrs)[:MOST_COLUMNS] if (words := _words(item.attrs[key]))
+            f"{name} {key}": words for key in list(item.attrs)[:MOST_COLUMNS] if (words := texts_in(item.attrs[key]))
         }
         if item.dtype.names:  # a table of records states its conditions itself
             units = next((w for w in lists.values() if len(w) == len(item.dtype.names) and any(map(is_unit, w))), None)
@@ -139,7 +140,7 @@ class _Walk:
         """Return an array, or the number or the text of one item; None for what is empty."""
         import h5py
 
-        kind, says = dataset.dtype, _text(dataset.attrs.get("MATLAB_class"))
+        kind, says = dataset.dtype, text_of(dataset.attrs.get("MATLAB_class"))
         if dataset.external or dataset.is_virtual:
             raise self._source.refuse("E_UNSAFE", f"{name!r} lies in another file", "export one whole file")
         if says == "char":
@@ -148,12 +149,12 @@ class _Walk:
             return None
         if dataset.size == 1 and (kind.kind in "iufS" or h5py.check_string_dtype(kind)):
             value = np.reshape(dataset[()], -1)[0]
-            return float(value) if kind.kind in "iuf" else _text(value)[:_MOST_TEXT]
+            return float(value) if kind.kind in "iuf" else text_of(value)[:_MOST_TEXT]
         if dataset.size == 1:
             return None
         texts = h5py.check_string_dtype(kind) or kind.kind == "S"
         if texts and 1 < dataset.size <= MOST_COLUMNS and dataset.ndim == 1:
-            return _words(dataset[()])
+            return texts_in(dataset[()])
         check_unpacked(self._source, int(dataset.size) * max(8, kind.itemsize if not kind.names else 8))
         turned = bool(says) and dataset.ndim == 2  # MATLAB stores its matrices so
         shape = dataset.shape[::-1] if turned else dataset.shape
@@ -175,7 +176,7 @@ def _is_field(item: Any) -> bool:
     import h5py
 
     references = isinstance(item, h5py.Dataset) and h5py.check_ref_dtype(item.dtype) is h5py.Reference
-    return references and _is_matlab(item) and _text(item.attrs.get("MATLAB_class")) != "cell"
+    return references and _is_matlab(item) and text_of(item.attrs.get("MATLAB_class")) != "cell"
 
 
 def _frame(items: Mapping[str, Any]) -> dict[str, Any]:
@@ -183,13 +184,13 @@ def _frame(items: Mapping[str, Any]) -> dict[str, Any]:
     if not {"axis1", "block0_items"} <= set(items):
         return {}
     index = items["axis1"]
-    name = _text(index.attrs.get("name"))
+    name = text_of(index.attrs.get("name"))
     framed: dict[str, Any] = {
         "index" if name in ("", "N.") else name: Stored(index.shape, index.dtype, index.__array__)
     }
     for key, block in items.items():
         if re.fullmatch(r"block[0-9]+_values", key) and key.replace("values", "items") in items:
-            for i, item in enumerate(_words(items[key.replace("values", "items")][()])):
+            for i, item in enumerate(texts_in(items[key.replace("values", "items")][()])):
                 framed[item] = Stored(block.shape[:1], block.dtype, lambda block=block, i=i: block[:, i])
     return framed
 
@@ -200,23 +201,10 @@ def _attributes(item: Any) -> dict[str, Any]:
     for name in list(item.attrs)[:MOST_COLUMNS]:
         value = np.asarray(item.attrs[name])
         if value.size == 1 and value.dtype.kind in "iuf":
-            unit = next((_text(item.attrs[f"{name}_{u}"]) for u in _UNIT_NAMES if f"{name}_{u}" in item.attrs), "")
+            unit = next((text_of(item.attrs[f"{name}_{u}"]) for u in _UNIT_NAMES if f"{name}_{u}" in item.attrs), "")
             says[f"{name} [{unit}]" if is_unit(unit) else name] = float(value.reshape(-1)[0])
         elif value.size == 1 and value.dtype.kind in "SUO":
-            says[name] = _text(item.attrs[name])[:_MOST_TEXT]
-        elif words := _words(value):
+            says[name] = text_of(item.attrs[name])[:_MOST_TEXT]
+        elif words := texts_in(value):
             says[name] = words
     return says
-
-
-def _words(values: Any) -> list[str]:
-    """Return the texts of an attribute or a dataset of several; empty if it holds anything else."""
-    array = np.asarray(values).reshape(-1)
-    texts = array.dtype.kind in "SU" or all(isinstance(item, str | bytes) for item in array[:MOST_COLUMNS])
-    return [_text(item).strip() for item in array[:MOST_COLUMNS].tolist()] if texts and array.size > 1 else []
-
-
-def _text(value: object) -> str:
-    if isinstance(value, np.ndarray):
-        value = value.reshape(-1)[0] if value.size else ""
-    return text_of(value or "")

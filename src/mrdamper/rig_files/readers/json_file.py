@@ -11,8 +11,8 @@ import numpy as np
 
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import damaged, refuse_twice, whole
-from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, RigFileError, Source
-from mrdamper.rig_files.readers.nested import nested_tables
+from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, Source
+from mrdamper.rig_files.readers.nested import document_tables
 from mrdamper.rig_files.text.tokens import stamp
 
 _SAVED_MODEL = "mrdamper-model"
@@ -38,16 +38,7 @@ class Json(Reader):
         if isinstance(tree, Mapping) and _SAVED_MODEL in map(str, tree.values()):
             remedy = "give it to mrdamper predict, validate or export; tests are what import reads"
             raise NoTableError("E_FORMAT", "a saved model", file=source.name, remedy=remedy)
-        try:
-            tables = nested_tables(source, tree if isinstance(tree, Mapping) else {"": tree}, self.title)
-        except RigFileError as error:
-            if error.code != "E_NO_DATA":
-                raise
-            tables = []
-        if any(len(table.names) > 1 for table in tables):
-            return tables
-        remedy = "export it as CSV, or the samples of every channel as a list"
-        raise NoTableError("E_FORMAT", "JSON without lists of numbers", file=source.name, remedy=remedy)
+        return document_tables(source, tree if isinstance(tree, Mapping) else {"": tree}, self.title)
 
 
 def _parsed(source: Source, content: bytes) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import refusing_damage, whole
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, Reader, RigFileError, Source
-from mrdamper.rig_files.readers.nested import nested_tables
+from mrdamper.rig_files.readers.nested import document_tables
 from mrdamper.rig_files.readers.workbook import as_text, tables_of_sheets
 from mrdamper.rig_files.text.elements import Elements, Sheets, numbers_in
 
@@ -37,19 +37,15 @@ class Markup(Reader):
             page = _Page()
             page.feed(content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8", "replace"))
             return _of_cells(source, page.sheets, form)
-        elements, tables = Elements(), list[RawTable]()
+        elements = Elements()
         try:
             with refusing_damage(source, self.title):
                 elements.read(content)
-            tables = [] if elements.sheets else nested_tables(source, elements.root, self.title)
         except RigFileError as error:
-            if error.code != "E_NO_DATA":
-                raise error if error.file else source.refuse(error.code, error.found, error.remedy) from None
+            raise error if error.file else source.refuse(error.code, error.found, error.remedy) from None
         if elements.sheets:
             return _of_cells(source, elements.sheets, form)
-        if any(len(table.names) > 1 for table in tables):
-            return tables
-        raise NoTableError("E_FORMAT", "XML without samples", file=source.name, remedy="export it as CSV")
+        return document_tables(source, elements.root, self.title)
 
 
 def _plain(head: bytes) -> bytes:

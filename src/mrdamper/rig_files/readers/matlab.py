@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.arrays import check_unpacked, refuse_twice, refusing_damage, value_of
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
+from mrdamper.rig_files.readers.arrays import check_unpacked, refuse_twice, refusing_damage, texts_in, value_of
+from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, MOST_STRUCTS, hdf5_tables
 from mrdamper.rig_files.readers.nested import DEEPEST, nested_tables
 
@@ -63,7 +63,7 @@ def _tree(value: Any, depth: int = 0) -> Any:
         items = array.reshape(-1)[:MOST_STRUCTS] if depth < DEEPEST else []
         members = [{name: _tree(item[name], depth + 1) for name in names} for item in items]
         return members[0] if len(members) == 1 else members
-    if words := _words(array):
+    if words := texts_in(array):
         return words
     if kind == "O" and size and depth < DEEPEST:
         cells = [np.asarray(cell) for cell in array.flat]
@@ -76,16 +76,6 @@ def _tree(value: Any, depth: int = 0) -> Any:
             return [trees[i : i + array.shape[1]] for i in range(0, size, array.shape[1])]
         return array
     return value_of(array) if size else ""
-
-
-def _words(array: np.ndarray) -> list[str]:
-    """Return the texts of a cell array of several; empty if it holds anything else."""
-    if array.dtype.kind != "O" or not 1 < array.size <= MOST_COLUMNS:
-        return []
-    cells = [np.asarray(item) for item in array.reshape(-1)]
-    if any(cell.dtype.kind != "U" or cell.size > 1 for cell in cells):
-        return []
-    return [str(cell.reshape(-1)[0]).strip() if cell.size else "" for cell in cells]
 
 
 def _is_version_4(head: bytes) -> bool:

@@ -19,7 +19,7 @@ import numpy as np
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.conditions import stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, titles_of
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, RigFileError, Source
 from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES, MOST_ITEMS, with_tests_apart
 from mrdamper.rig_files.vocabulary import KEYS, is_unit, parse_unit, words
 
@@ -72,6 +72,20 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, togeth
     if together and len(nodes) > 1:
         whole = replace(every[0], columns=[column for node in nodes for column in node.columns], remarks=[])
         tables.append(replace(_table(source, whole, title), fallback=True))
+    return tables
+
+
+def document_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[RawTable]:
+    """Return tables as `nested_tables`; `NoTableError`, E_FORMAT, if none has two columns: it may be notes."""
+    try:
+        tables = nested_tables(source, tree, title)
+    except RigFileError as error:
+        if error.code != "E_NO_DATA":
+            raise
+        tables = []
+    if not any(len(table.names) > 1 for table in tables):
+        remedy = "export it as CSV, or the samples of every channel as a list"
+        raise NoTableError("E_FORMAT", f"{title} without lists of numbers", file=source.name, remedy=remedy)
     return tables
 
 

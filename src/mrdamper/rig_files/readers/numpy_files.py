@@ -69,10 +69,8 @@ class Npz(Reader):
         """Recognise a zip of arrays, or a damaged zip of that name."""
         if not source.head(4).startswith(b"PK"):
             return False
-        try:
-            return is_arrays(zipped_names(source))
-        except UNREADABLE_ZIP:
-            return source.suffix in self.suffixes
+        names = zipped_names(source)
+        return source.suffix in self.suffixes if names is None else is_arrays(names)
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """Return the arrays as columns of one table; a matrix gives numbered ones, a structured array its fields."""
@@ -80,13 +78,13 @@ class Npz(Reader):
             fields = _check_headers(source)
             source.file.seek(0)
             with np.load(source.file, allow_pickle=False) as archive:
-                tree = {name: _value(archive[name]) for name in archive.files if name not in fields}
+                arrays = {name: archive[name] for name in archive.files if name not in fields}
+                tree: dict[str, Any] = {
+                    name: {"unit": "s", "data": array} if array.dtype.kind in "Mm" else value_of(array)
+                    for name, array in arrays.items()
+                }
                 tree |= {field: archive[name][field] for name, inner in fields.items() for field in inner}
         return nested_tables(source, tree, self.title)
-
-
-def _value(array: np.ndarray) -> Any:
-    return {"unit": "s", "data": array} if array.dtype.kind in "Mm" else value_of(array)
 
 
 def _check_headers(source: Source) -> dict[str, tuple[str, ...]]:

@@ -106,7 +106,8 @@ def _table(
     def column_of(column: int) -> np.ndarray:
         kind = schema[names[column]]
         plain = kind.is_numeric() or isinstance(kind, (pl.Datetime, pl.Duration, pl.Null))
-        return _plain(loaded(names[column])) if plain else _no_numbers(kind)
+        no_numbers = object if kind == pl.Object else bool if kind == pl.Boolean else "U1"
+        return _plain(loaded(names[column])) if plain else np.empty(1, dtype=no_numbers)
 
     def words(column: int) -> Words:
         if schema[names[column]].is_nested():  # a list may hold anything any number of times
@@ -136,12 +137,6 @@ def _of_test(value: object) -> object:
     if isinstance(value, (int, float)):
         return float(value)
     return _plain(value) if hasattr(value, "dtype") else str(value)  # type: ignore[arg-type]
-
-
-def _no_numbers(kind: pl.DataType) -> np.ndarray:
-    import polars as pl
-
-    return np.empty(1, dtype=object if kind == pl.Object else bool if kind == pl.Boolean else "U1")
 
 
 def _plain(values: pl.Series) -> np.ndarray:

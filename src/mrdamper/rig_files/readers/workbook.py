@@ -34,10 +34,8 @@ class Workbook(Reader):
         """Recognise a zip with sheets, or a damaged zip or an old compound file of that name."""
         if not source.head(4).startswith(b"PK"):
             return source.head(8) == _COMPOUND and source.suffix in self.suffixes
-        try:
-            return is_workbook(zipped_names(source))
-        except UNREADABLE_ZIP:
-            return source.suffix in self.suffixes
+        names = zipped_names(source)
+        return source.suffix in self.suffixes if names is None else is_workbook(names)
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a sheet that holds one."""
@@ -67,7 +65,12 @@ def tables_of_sheets(source: Source, sheets: Sequence[tuple[str, Source]], form:
             first = first or error
             tables = []
         tables = [replace(t, label=t.label or name, form={"sheet": name}) for t in tables if len(t.names) >= _FEWEST]
-        noted = sheet.size <= _NOTES and all(map(_is_list, tables))
+        noted = (
+            sheet.size <= _NOTES
+            and all(  # lists of quantities, one a line, that name no channel
+                any(table.odd[:1]) and not any(header.channel for header in table.headers) for table in tables
+            )
+        )
         beside += sheet.head(_NOTES).decode("utf-8", "replace").splitlines() if noted or not tables else ()
         (lists if noted else all_tables).extend(tables)
     all_tables = all_tables or lists
@@ -75,11 +78,6 @@ def tables_of_sheets(source: Source, sheets: Sequence[tuple[str, Source]], form:
         raise first or source.refuse("E_NO_DATA", "no sheet holds data", "export the file again")
     all_tables = [replace(table, remarks=(*table.remarks, *beside)) for table in all_tables]
     return all_tables if len(all_tables) > 1 else [replace(all_tables[0], label="")]
-
-
-def _is_list(table: RawTable) -> bool:
-    """Tell if a table is a list of quantities, one a line, and names no channel."""
-    return any(table.odd[:1]) and not any(header.channel for header in table.headers)
 
 
 def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
