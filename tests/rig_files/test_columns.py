@@ -2,8 +2,7 @@
 
 import pytest
 
-from mrdamper.rig_files.column_names import role_of, split_name
-from mrdamper.rig_files.vocabulary import DIMENSION, is_unit, parse_unit
+from mrdamper.rig_files.column_names import DIMENSION, is_unit, parse_unit, role_of, split_name
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from mrdamper import import_files
+from mrdamper.rig_files.mapping.description import short_lines
 from mrdamper.rig_files.profile import Profile
-from mrdamper.rig_files.text.short import short_lines
 
 T = np.arange(1001) / 200.0
 X = 12.0 * np.sin(2 * np.pi * T)

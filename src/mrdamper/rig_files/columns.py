@@ -14,21 +14,24 @@ from mrdamper.data import Floats
 from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, printable
 from mrdamper.rig_files.column_names import (
     COIL,
+    DIMENSION,
     WORDS,
     Header,
+    Unit,
     holds,
     names_command,
     names_compression,
+    parse_unit,
     role_of,
     says_nothing,
     split_name,
     unknown_unit,
+    words,
     words_of,
 )
 from mrdamper.rig_files.conditions import currents_in, rate_in_name, stated_rate
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, SIGNED
-from mrdamper.rig_files.vocabulary import DIMENSION, Unit, parse_unit, words
 
 if TYPE_CHECKING:
     from mrdamper.rig_files.profile import Profile

@@ -18,8 +18,7 @@ import numpy as np
 
 from mrdamper.data.arrays import Floats
 from mrdamper.data.runs import held_current
-from mrdamper.rig_files.column_names import COIL, RATING, holds, names_condition, split_name
-from mrdamper.rig_files.vocabulary import Unit, parse_unit, words
+from mrdamper.rig_files.column_names import COIL, RATING, Unit, holds, names_condition, parse_unit, split_name, words
 
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
 _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it

@@ -12,13 +12,12 @@ import numpy as np
 
 from mrdamper.data.arrays import chunks
 from mrdamper.errors import InputError
-from mrdamper.rig_files.column_names import role_of, split_name, words_of
+from mrdamper.rig_files.column_names import DIMENSION, is_unit, role_of, split_name, words, words_of
 from mrdamper.rig_files.columns import column_called
 from mrdamper.rig_files.conditions import currents_in, currents_in_cells
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable, Words
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
-from mrdamper.rig_files.vocabulary import DIMENSION, is_unit, words
 
 MOST_RUNS = 2000
 _FEWEST_ROWS = 5  # of a test, on average

@@ -11,15 +11,13 @@ from typing import Any
 
 from mrdamper.errors import InputError, listed
 from mrdamper.rig_files.coil_current import held_current_of
-from mrdamper.rig_files.column_names import Header, names_compression
+from mrdamper.rig_files.column_names import DIMENSION, Header, names_compression
 from mrdamper.rig_files.columns import assign, column_called, propose, rate_of, sign_of
-from mrdamper.rig_files.file_records import tables_of_tests, test_tables
-from mrdamper.rig_files.folder import files_in, unpacked
+from mrdamper.rig_files.file_records import files_in, tables_of_tests, test_tables, unpacked
 from mrdamper.rig_files.profile import Channel, Profile, current_pattern, profile_of
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED
-from mrdamper.rig_files.vocabulary import DIMENSION
 
 _ROWS_SHOWN, _MOST_SHOWN = 6, 30  # rows and columns of a preview
 _MOST_COLUMNS, _MOST_REMARKS, _MOST_NAMES = 40, 6, 3  # of a tree that is shown

@@ -13,10 +13,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, field_validator, model_validator
 
 from mrdamper.errors import InputError
+from mrdamper.rig_files.column_names import DIMENSION, TABLES, parse_unit
 from mrdamper.rig_files.conditions import amperes, currents_in
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 from mrdamper.rig_files.strict_toml import load_toml, parse_toml
-from mrdamper.rig_files.vocabulary import DIMENSION, TABLES, parse_unit
 
 _HELP = "mrdamper init profile shows the keys"
 NAME = Annotated[str, StringConstraints(min_length=1, max_length=200)]

@@ -17,8 +17,7 @@ from mrdamper.data import Dataset
 from mrdamper.data.displayable import Displayable
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, with_stated_current
-from mrdamper.rig_files.file_records import records_of_file
-from mrdamper.rig_files.folder import files_in, unpacked
+from mrdamper.rig_files.file_records import files_in, records_of_file, unpacked
 from mrdamper.rig_files.mapping.agreement import contradictions, repeated
 from mrdamper.rig_files.mapping.companions import (
     TEXTS,

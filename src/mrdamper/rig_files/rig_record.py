@@ -13,7 +13,7 @@ from mrdamper.data.arrays import chunks
 from mrdamper.errors import ColumnError, InputError, listed, printable
 from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, constant, current_of, without_gaps
-from mrdamper.rig_files.column_names import role_of
+from mrdamper.rig_files.column_names import Unit, role_of, words
 from mrdamper.rig_files.columns import (
     Assigned,
     assign,
@@ -32,7 +32,6 @@ from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import FURTHER, OPTIONAL, Finding, Record
 from mrdamper.rig_files.sequences import stretches_of_session
 from mrdamper.rig_files.text.spool import rescale
-from mrdamper.rig_files.vocabulary import Unit, words
 
 _KEPT = {**FURTHER, "length": "m", "force": "N"}
 _SCALES = words("scale")

@@ -15,8 +15,7 @@ from mrdamper.errors import ColumnError
 from mrdamper.rig_files.coil_current import as_data, constant
 from mrdamper.rig_files.conditions import currents_in, motions_in
 from mrdamper.rig_files.profile import Profile
-from mrdamper.rig_files.quality.strokes import find_strokes
-from mrdamper.rig_files.quality.view import runs_of
+from mrdamper.rig_files.quality.view import find_strokes, runs_of
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import OPTIONAL, Finding, Record, part_of_record
 

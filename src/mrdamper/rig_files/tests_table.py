@@ -12,11 +12,10 @@ from mrdamper.data import held_current
 from mrdamper.data.strict_text import content_of
 from mrdamper.errors import CombinedError, InputError, listed
 from mrdamper.rig_files.coil_current import with_stated_current
-from mrdamper.rig_files.column_names import names_condition, split_name
+from mrdamper.rig_files.column_names import names_condition, split_name, words
 from mrdamper.rig_files.conditions import CELL, LARGEST_STATED, quantity_in_cell
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.text.stream import decoded
-from mrdamper.rig_files.vocabulary import words
 
 NAME = "tests.csv"
 COLUMNS = ("file", "run", "current_A", "temperature_C", "split", "session", "specimen", "notes")

@@ -10,7 +10,7 @@ import numpy as np
 from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import take
 from mrdamper.errors import QualityError
-from mrdamper.rig_files.quality.strokes import find_strokes
+from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.record import Record
 
 _ALIKE = 0.1  # relative difference of frequency and amplitude within which two motions are one

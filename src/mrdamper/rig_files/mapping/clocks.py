@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.column_names import is_unit, parse_unit, split_name, words
 from mrdamper.rig_files.conditions import stated_rate, stated_speed
 from mrdamper.rig_files.mapping.proposals import frequency_of, stated_frequencies
 from mrdamper.rig_files.profile import Profile
@@ -18,7 +18,6 @@ from mrdamper.rig_files.quality.presence import COARSE_CLOCK
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.tokens import stamp
-from mrdamper.rig_files.vocabulary import is_unit, parse_unit, words
 
 _FRACTIONS = {"millisekunden": "ms", "millitm": "ms"}
 _DATES = words("date")

@@ -13,12 +13,12 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import InputError
 from mrdamper.rig_files.coil_current import as_data, current_of, with_value_of_name
-from mrdamper.rig_files.column_names import RATING, role_of, split_name, words_of
+from mrdamper.rig_files.column_names import RATING, SI, role_of, split_name, words_of
 from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.conditions import amperes
 from mrdamper.rig_files.file_records import digest_of, records_of_file
 from mrdamper.rig_files.mapping.completion import completed
-from mrdamper.rig_files.mapping.description import with_notes
+from mrdamper.rig_files.mapping.description import short_lines, with_notes
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
 from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
 from mrdamper.rig_files.profile import Channel, FileForm, Profile
@@ -27,9 +27,7 @@ from mrdamper.rig_files.readers.arrays import array_table
 from mrdamper.rig_files.readers.base import RawTable, Source
 from mrdamper.rig_files.record import Finding, Record, part_of_record
 from mrdamper.rig_files.rig_record import records_of
-from mrdamper.rig_files.text.short import short_lines
 from mrdamper.rig_files.text.spool import rescale
-from mrdamper.rig_files.vocabulary import SI
 
 _FEWEST_ROWS = 50  # of a record
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")  # short ones

@@ -10,12 +10,18 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.rig_files.column_names import (
+    DIMENSION,
+    SI,
     WEIGHT,
     holds,
+    is_unit,
+    meanings,
     names_condition,
+    parse_unit,
     role_of,
     says_nothing,
     split_name,
+    words,
 )
 from mrdamper.rig_files.conditions import LONGEST_LINE, currents_in, without_currents
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
@@ -32,7 +38,6 @@ from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.layout import LISTED, X_VALUE, cells_of
 from mrdamper.rig_files.text.tokens import looks_numeric, number
-from mrdamper.rig_files.vocabulary import DIMENSION, SI, is_unit, meanings, parse_unit, words
 
 _SEPARATORS = ("\t", ";", ",", "|")
 _CLOCKS, _WEIGHTS = meanings("clocks") | {"time since start": ""}, meanings("weights")

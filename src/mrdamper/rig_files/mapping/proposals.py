@@ -145,7 +145,7 @@ def stated_frequencies(table: RawTable) -> Iterator[float]:
 
 def frequency_of(time: Floats, x: Floats) -> float | None:
     """Frequency of a motion, by the reversals of its sign about the middle."""
-    from mrdamper.rig_files.quality.strokes import find_strokes
+    from mrdamper.rig_files.quality.view import find_strokes
 
     there = np.isfinite(time) & np.isfinite(x)
     if np.count_nonzero(there) < 20 or np.any(np.diff(time[there]) <= 0):

@@ -9,12 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.rig_files.column_names import COIL, holds, names_condition, split_name, words_of
+from mrdamper.rig_files.column_names import COIL, holds, names_condition, split_name, words, words_of
 from mrdamper.rig_files.conditions import contradicts, currents_in, quantity_in_cell
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of, is_units
-from mrdamper.rig_files.vocabulary import words
 
 _SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
 _NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")

@@ -10,12 +10,22 @@ from itertools import product
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.rig_files.column_names import Header, holds, role_of, split_name, unknown_unit, words_of
+from mrdamper.rig_files.column_names import (
+    DIMENSION,
+    Header,
+    holds,
+    is_unit,
+    parse_unit,
+    role_of,
+    split_name,
+    unknown_unit,
+    words,
+    words_of,
+)
 from mrdamper.rig_files.conditions import FULL_SCALES, LONGEST_LINE, stated_by_lines, stated_in_titles
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED, Finding
 from mrdamper.rig_files.text.spool import rescale
-from mrdamper.rig_files.vocabulary import DIMENSION, is_unit, parse_unit, words
 
 _MONITOR = words("monitor")
 SCALE = re.compile(

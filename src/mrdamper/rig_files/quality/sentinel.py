@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.rig_files.column_names import SI
 from mrdamper.rig_files.quality.presence import USED
 from mrdamper.rig_files.quality.view import View, runs_of
 from mrdamper.rig_files.record import Finding
-from mrdamper.rig_files.vocabulary import SI
 
 # Leading digits of the codes in use: 999, 9999, ..., 999.25, 9.91e37, and the ends of 16-, 24- and 32-bit counts.
 # Only digits are compared: a unit prefix moves the decimal point.

@@ -16,7 +16,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import InputError, MissingExtraError
-from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.column_names import is_unit, split_name
 from mrdamper.rig_files.readers.base import (
     MOST_COLUMNS,
     MOST_RATIO,
@@ -28,7 +28,6 @@ from mrdamper.rig_files.readers.base import (
     Source,
     Words,
 )
-from mrdamper.rig_files.vocabulary import is_unit
 
 _MOST_ACROSS = 50  # channels of a matrix that has its samples in rows
 _PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value")

@@ -16,12 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.column_names import KEYS, is_unit, parse_unit, split_name, words
 from mrdamper.rig_files.conditions import stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, RigFileError, Source
 from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES, MOST_ITEMS, with_tests_apart
-from mrdamper.rig_files.vocabulary import KEYS, is_unit, parse_unit, words
 
 _VALUE = words("value")
 DEEPEST = 8  # levels

@@ -11,11 +11,11 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import CombinedError
+from mrdamper.rig_files.column_names import parse_unit
 from mrdamper.rig_files.readers.base import RigFileError
 from mrdamper.rig_files.text.layout import QUANTITY, SPACES, Layout, is_comment, split
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, too_long
 from mrdamper.rig_files.text.tokens import MISSING, NUMBER, number, stamp
-from mrdamper.rig_files.vocabulary import parse_unit
 
 _MARKS = "#%/"
 _MOST_SHOWN = 10  # wrong cells and rows of a file

@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from mrdamper.rig_files.column_names import KEYS, is_unit
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RigFileError
 from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES
-from mrdamper.rig_files.vocabulary import KEYS, is_unit
 
 _SHEETS = "{urn:schemas-microsoft-com:office:spreadsheet}"
 _BETWEEN = re.compile(r"[\s;,]+")

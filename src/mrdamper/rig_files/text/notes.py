@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+from mrdamper.rig_files.column_names import is_unit
 from mrdamper.rig_files.text.tokens import looks_numeric
-from mrdamper.rig_files.vocabulary import is_unit
 
 _ROWS = 60  # looked at
 

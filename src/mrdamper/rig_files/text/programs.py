@@ -9,12 +9,11 @@ from itertools import islice, zip_longest
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.column_names import is_unit, split_name
 from mrdamper.rig_files.readers.arrays import array_table
 from mrdamper.rig_files.readers.base import RawTable, Source, scratch
 from mrdamper.rig_files.text.layout import cells_of
 from mrdamper.rig_files.text.tokens import looks_numeric, number
-from mrdamper.rig_files.vocabulary import is_unit
 
 _HEAD = 8192  # bytes
 _LARGEST = 50 * 10**6  # bytes

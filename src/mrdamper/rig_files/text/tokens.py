@@ -14,7 +14,7 @@ import unicodedata
 from datetime import date
 from functools import lru_cache
 
-from mrdamper.rig_files.vocabulary import TABLES, words
+from mrdamper.rig_files.column_names import TABLES, words
 
 NUMBER = {
     mark: re.compile(rf"[+-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.data import Run
-from mrdamper.rig_files.vocabulary import DIMENSION, SI, Unit, parse_unit
+from mrdamper.rig_files.column_names import DIMENSION, SI, Unit, parse_unit
 from mrdamper.study.contradictions.copies import Copy
 from mrdamper.study.contradictions.explanations import Explanation, Trial
 from mrdamper.study.contradictions.tracks import SAME_CURRENT
