@@ -388,7 +388,7 @@ def test_the_fast_reader_takes_no_cell_the_strict_one_refuses(tmp_path, cell, mo
 def test_columns_too_large_for_memory_lie_in_files_and_hold_the_same(tmp_path, monkeypatch):
     path = write(tmp_path, "a.csv", CLEAN)
     small = read_run(path)
-    monkeypatch.setattr("mrdamper.rig_files.text.spool.LARGE", 0)
+    monkeypatch.setattr("mrdamper.rig_files.text.cells.LARGE", 0)
     monkeypatch.setattr("mrdamper.rig_files.text.stream.CHUNK", 1000)
     large = read_run(path)
     assert isinstance(large.force, np.memmap)

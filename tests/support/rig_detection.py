@@ -10,8 +10,7 @@ import numpy as np
 
 from mrdamper.errors import QualityError
 from mrdamper.physics.motion import analyse_motion
-from mrdamper.rig_files.quality import check_record
-from mrdamper.rig_files.quality.table import record_of
+from mrdamper.rig_files.quality import check_record, record_of
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.to_run import to_run
 from support.rig_records import clean_record, codes_of, with_channel

@@ -31,7 +31,7 @@ from mrdamper.rig_files.readers import suffixes
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import FURTHER, OPTIONAL, Finding, Record
 from mrdamper.rig_files.sequences import stretches_of_session
-from mrdamper.rig_files.text.spool import rescale
+from mrdamper.rig_files.text.cells import rescale
 
 _KEPT = {**FURTHER, "length": "m", "force": "N"}
 _SCALES = words("scale")

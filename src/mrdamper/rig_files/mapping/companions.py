@@ -27,7 +27,7 @@ from mrdamper.rig_files.readers.arrays import array_table
 from mrdamper.rig_files.readers.base import RawTable, Source
 from mrdamper.rig_files.record import Finding, Record, part_of_record
 from mrdamper.rig_files.rig_record import records_of
-from mrdamper.rig_files.text.spool import rescale
+from mrdamper.rig_files.text.cells import rescale
 
 _FEWEST_ROWS = 50  # of a record
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")  # short ones

@@ -25,7 +25,7 @@ from mrdamper.rig_files.column_names import (
 from mrdamper.rig_files.conditions import FULL_SCALES, LONGEST_LINE, stated_by_lines, stated_in_titles
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED, Finding
-from mrdamper.rig_files.text.spool import rescale
+from mrdamper.rig_files.text.cells import rescale
 
 _MONITOR = words("monitor")
 SCALE = re.compile(

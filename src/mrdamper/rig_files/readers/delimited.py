@@ -15,10 +15,9 @@ from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words, scratch
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.blocks import Block, find_blocks
-from mrdamper.rig_files.text.cells import RowFormat, field_count, read_bulk, read_cells, split_rows
+from mrdamper.rig_files.text.cells import RowFormat, Spool, field_count, read_bulk, read_cells, split_rows
 from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
 from mrdamper.rig_files.text.programs import as_plain_table, turned_table
-from mrdamper.rig_files.text.spool import Spool
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, line_feeds, open_text, too_long
 from mrdamper.rig_files.text.tokens import looks_numeric
 

@@ -1,15 +1,20 @@
-"""Rows of text to numbers: cell by cell, the reference, and blocks of plain rows at the speed of the disk."""
+"""Rows of text to numbers: cell by cell, the reference, and blocks of plain rows at the speed of the disk; as columns
+that grow, in memory while small, in unnamed temporary files once they are large.
+"""
 
 from __future__ import annotations
 
 import csv
 import math
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import IO
 
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.arrays import chunks
 from mrdamper.errors import CombinedError
 from mrdamper.rig_files.column_names import parse_unit
 from mrdamper.rig_files.readers.base import RigFileError
@@ -22,6 +27,7 @@ _MOST_SHOWN = 10  # wrong cells and rows of a file
 _MOST_STRAY = 0.05  # above this share, reading the whole block cell by cell is no slower
 _ALLOWED = bytes(range(256))
 _COMMA_MARK = _ALLOWED.replace(b",", b"\0").replace(b".", b"\x01").replace(b"\0", b".")
+LARGE = 16 * 2**20  # bytes
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -259,3 +265,52 @@ def _columns(block: bytes, form: RowFormat) -> list[np.ndarray]:
         ignore_errors=True,
     )
     return [table[f"c{i}"].to_numpy(writable=True) for i in form.wanted]
+
+
+class Spool:
+    """Columns of numbers written piece by piece and given back as arrays."""
+
+    def __init__(self, columns: Sequence[int]):
+        self._columns = tuple(columns)
+        self._pieces: dict[int, list[Floats]] = {c: [] for c in columns}
+        self._files: dict[int, IO[bytes]] | None = None
+        self._bytes = 0
+
+    def add(self, values: dict[int, Floats]) -> None:
+        """Append one piece of every column."""
+        for column in self._columns:
+            self._pieces[column].append(values[column])
+            self._bytes += values[column].nbytes
+        if self._bytes > LARGE:
+            self._to_files()
+
+    def arrays(self) -> dict[int, Floats]:
+        """Every column, whole; memory-mapped where it is large."""
+        if self._files is None:
+            return {c: np.concatenate(p) if p else np.empty(0) for c, p in self._pieces.items()}
+        self._to_files()
+        arrays = {}
+        for column, file in self._files.items():
+            file.flush()
+            arrays[column] = np.memmap(file, dtype=np.float64, mode="r+")
+            file.close()  # the mapping holds it
+        return arrays
+
+    def _to_files(self) -> None:
+        files = self._files or {c: tempfile.TemporaryFile(prefix="mrdamper-") for c in self._columns}  # noqa: SIM115
+        self._files = files
+        for column, waiting in self._pieces.items():
+            for piece in waiting:
+                files[column].write(np.ascontiguousarray(piece).data)
+            waiting.clear()
+
+
+def rescale(values: Floats, factor: float, offset: float = 0.0) -> Floats:
+    """Values times a factor, plus an offset; a memory-mapped array is changed in place, piece by piece."""
+    if factor == 1.0 and offset == 0.0:
+        return values
+    if not isinstance(values, np.memmap):
+        return factor * values + offset if offset else factor * values
+    for _, piece in chunks(values):
+        piece[:] = factor * piece + offset
+    return values
