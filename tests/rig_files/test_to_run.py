@@ -11,8 +11,7 @@ from mrdamper.errors import ColumnError, ExcitationError, QualityError
 from mrdamper.identification import identify
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
-from mrdamper.rig_files.quality import check_record, quality_table, record_of, row, view
-from mrdamper.rig_files.to_run import to_run
+from mrdamper.rig_files.quality import check_record, quality_table, record_of, row, to_run, view
 
 
 @pytest.fixture

@@ -10,9 +10,8 @@ import numpy as np
 
 from mrdamper.errors import QualityError
 from mrdamper.physics.motion import analyse_motion
-from mrdamper.rig_files.quality import check_record, record_of
+from mrdamper.rig_files.quality import check_record, record_of, to_run
 from mrdamper.rig_files.record import Record
-from mrdamper.rig_files.to_run import to_run
 from support.rig_records import clean_record, codes_of, with_channel
 
 EXCHANGED_UNITS = (1.0, 1e3, 1e-4)  # metres that stand for a newton where the columns are exchanged

@@ -18,15 +18,16 @@ from mrdamper.data.displayable import Displayable
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, with_stated_current
 from mrdamper.rig_files.file_records import files_in, records_of_file, unpacked
-from mrdamper.rig_files.mapping.agreement import contradictions, repeated
 from mrdamper.rig_files.mapping.companions import (
     TEXTS,
+    contradictions,
     currents_beside,
     holds_channels,
     is_list,
     joined_files,
     number_of,
     part_of,
+    repeated,
     results_of,
     tests_by,
     within_times,
@@ -412,7 +413,7 @@ def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
 
     Raises `InputError` if a record has no current, or there is no record.
     """
-    from mrdamper.rig_files.to_run import to_run
+    from mrdamper.rig_files.quality import to_run
 
     return Dataset(tuple(to_run(_with_current(record)) for record in records), name)
 

@@ -1,4 +1,4 @@
-"""Quality checks of a record in their order: findings are added, or the record is refused; and the table of a set.
+"""Quality checks of a record in their order: findings are added, or the record is refused; the table of a set; runs.
 
 A check is a function of a `View` that yields findings or raises `QualityError`. The order
 matters: a check relies on those before it. A further module of this folder with a function
@@ -12,17 +12,18 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from mrdamper.data import Run, once_per_run
-from mrdamper.data.arrays import drop_pages
+from mrdamper.data.arrays import chunks, drop_pages
 from mrdamper.discovery import modules_with
-from mrdamper.errors import InputError, QualityError
-from mrdamper.rig_files.quality import converter, disturbance, flat, lag, loop, motion, presence, ranges, sentinel
-from mrdamper.rig_files.quality.view import View
+from mrdamper.errors import ColumnError, InputError, QualityError, RunError
+from mrdamper.rig_files.quality import converter, disturbance, flat, lag, loop, motion, presence, sentinel
+from mrdamper.rig_files.quality.view import SHORTEST, View
 from mrdamper.rig_files.record import FURTHER, Finding, Record, part_of_record
 
 Check = Callable[[View], Iterable[Finding] | None]
@@ -40,7 +41,7 @@ CHECKS: tuple[Check, ...] = (
     presence.order_of_time,
     presence.gaps_in_time,
     motion.moves,
-    ranges.exchanged_or_out_of_range,
+    motion.exchanged_or_out_of_range,
     sentinel.spikes,
     sentinel.wraps,
     loop.dissipates,
@@ -50,11 +51,11 @@ CHECKS: tuple[Check, ...] = (
     flat.frozen,
     loop.keeps_its_sign,
     loop.force_follows,
-    ranges.unusual,
+    motion.unusual,
     motion.enough_cycles,
     motion.is_a_sine,
     motion.drifts,
-    ranges.agrees_with_its_name,
+    motion.agrees_with_its_name,
     converter.changes_at_every_sample,
     converter.is_not_stored_on_change,
     disturbance.motion_is_one,
@@ -302,3 +303,60 @@ def _quality(record: Record) -> Quality:
         "distortion_percent": np.nan if motion is None else 100 * motion.distortion,
     }
     return Quality(result, figures)
+
+
+def to_run(record: Record) -> Run:
+    """Return the run a record holds.
+
+    Missing samples are left out, as are segments of under five samples. Where the motion is
+    periodic, the steady window is the largest whole number of its last steady cycles. The
+    codes of the findings stand in the notes under "findings", separated by spaces. Nothing
+    is zeroed, filtered or resampled.
+
+    Parameters
+    ----------
+    record : Record
+        Judged; a record that was not is judged first.
+
+    Raises `QualityError` if the record cannot be used; `ColumnError` if it has no current; `RunError` if under three
+    samples are left.
+    """
+    if not record.segments:
+        record = check_record(record)
+    if record.current is None:
+        raise ColumnError("no current", where=f"run {record.id}", remedy="name its column or value in the rig profile")
+    keep = _kept(record)
+    count = np.count_nonzero(keep)
+    sizes = [int(np.count_nonzero(keep[start:stop])) for start, stop in record.segments]
+    bounds = np.cumsum([0, *(size for size in sizes if size)]).tolist()
+    if count == keep.size:
+        keep = slice(None)  # nothing is copied: a long record lies in a file
+    if count < 3:
+        raise RunError(f"{count} samples", where=f"run {record.id}", remedy="a run needs at least 3")
+    steady = record.steady or loop.steady_part(View(record))
+    codes = " ".join(dict.fromkeys(finding.code for finding in record.findings))
+    further = {f"{name}_{unit}": getattr(record, name) for name, unit in FURTHER.items()} | dict(record.further)
+    own: dict[str, Any] = {name: getattr(record, name) for name in ("id", "rig", "excitation", "split")}
+    own |= {name: values[keep] for name, values in record.channels.items() if name in presence.USED}
+    run = Run(
+        **own,
+        further={name: values[keep] for name, values in further.items() if values is not None},
+        window=steady.window,
+        repeatability=steady.repeatability,
+        segments=tuple(pairwise(bounds)),
+        notes={**record.provenance, **({"findings": codes} if codes else {})},
+    )
+    for values in (record.time, record.displacement, record.force, record.current):
+        if values is not None:
+            drop_pages(values)
+    return run
+
+
+def _kept(record: Record) -> np.ndarray:
+    keep = record.present
+    for at, piece in () if record.velocity is None else chunks(record.velocity):
+        keep[at : at + piece.size] &= np.isfinite(piece)
+    for start, stop in record.segments:
+        if np.count_nonzero(keep[start:stop]) < SHORTEST:
+            keep[start:stop] = False
+    return keep
