@@ -29,11 +29,11 @@ class Goal:
         return {True: "met", False: "missed", None: "not measured"}[self.met]
 
 
-_STUDY = "every fold of every candidate is fitted again, for both rigs: see the parts below"
-_STATE = "passes of NumPy that cut the record into strokes, and one tanh a sample, remain; hand-written C takes 2 ns"
-_IN_C = "other exponents than 1 and 2 read tables of degree five, and a step checks its input and makes the velocity"
-_MOTION = "seven harmonics, a smoothed motion and its strokes are made for every record"
-_STREAM = "a step is the whole force of the model, every parameter free to change, not the state alone"
+_STUDY = "every fold of every candidate is fitted again, for both rigs"
+_STATE = "NumPy operations that divide the record into strokes, and one tanh per sample; hand-written C takes 2 ns"
+_IN_C = "other exponents than 1 and 2 use tables of degree five, and a step checks its input and computes the velocity"
+_MOTION = "seven harmonics, a smoothed motion and its strokes are computed for every record"
+_STREAM = "a step computes the whole force of the model with variable parameters, not the state alone"
 
 
 def goals(results: Any) -> list[Goal]:
@@ -85,7 +85,7 @@ def _of_streams(results: Any) -> list[Goal]:
     loop = {row.name: row.nanoseconds for row in results.simulation}
     in_c = [row.c for row in results.streams if row.c]
     return [
-        Goal("streaming compiled", 15, _least(loop, "streaming, compiled"), "ns a sample", why=_STREAM),
+        Goal("streaming compiled", 15, _least(loop, "streaming, compiled"), "ns per sample", why=_STREAM),
         Goal("a step of the slowest damper in C", 50, max(in_c, default=None), "ns", why=_IN_C),
     ]
 

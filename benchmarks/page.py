@@ -34,14 +34,14 @@ def page(results: Results) -> str:
     parts = [
         "# Benchmarks",
         f"`make bench` prints this page; `python -m benchmarks --write docs/benchmarks.md` keeps it. {machine()}. "
-        "All ways of a table take turns in one run, and the least of many calls counts. Times are processor time on "
-        "one thread, which a busy machine disturbs least, though it does: the load average was "
-        f"{os.getloadavg()[1]:.1f} on {os.cpu_count()} processors. Whole processes in wall time too. "
+        "The rows of a table are measured in turns; the minimum of many calls counts. Times are processor time on one "
+        "thread, which depends little on the load of the machine: the load average was "
+        f"{os.getloadavg()[1]:.1f} on {os.cpu_count()} processors. Whole processes also have wall times. "
         + ("This was a quick run: few repetitions. " if results.quick else "")
-        + "Figures marked * are multiplied up from a part that was measured.",
-        "Separate commands: reading a large file, `python -m benchmarks.import_large --megabytes 1000`; what the "
-        "importer finds, `python -m benchmarks.import_detection`; the app, `python -m benchmarks.web`. A peer that is "
-        "not installed is omitted (`pip install openseespy` brings the one that `make bench` does not).",
+        + "Figures marked * are extrapolated from a part that was measured.",
+        "Separate commands: reading a large file, `python -m benchmarks.import_large --megabytes 1000`; "
+        "detection by the importer, `python -m benchmarks.import_detection`; the app, `python -m benchmarks.web`. A "
+        "peer that is not installed is omitted (`make bench` does not install `openseespy`).",
         "## Goals",
         _table(
             ("goal", "limit", "measured", "verdict", "why missed"),
@@ -57,18 +57,18 @@ def page(results: Results) -> str:
             ),
         ),
         "## The state at 3,000 samples, n = 2",
-        "The closed form between reversals is exact; what is left of it is the reversal itself, which falls between "
-        "two samples. A stream knows no peak between samples either.",
+        "The closed form between reversals is exact; the remaining error is caused by reversals between two samples, "
+        "which a stream does not contain either.",
         _table(
-            ("times ours", "way", "ns a sample", "largest error / z_max"),
+            ("relative time", "method", "ns per sample", "largest error / z_max"),
             ((_number(r.ratio), r.name, _number(r.nanoseconds), f"{r.error:.0e}") for r in results.simulation),
         ),
-        "## One sample after the other",
-        "From displacement, current and time step to force, in nanoseconds a step. C is what `mrdamper export --to c` "
-        "writes, at -O3 -march=native; its step makes velocity and acceleration of the displacement itself, checks its "
+        "## One sample per call",
+        "From displacement, current and time step to force, in nanoseconds per step. C is what `mrdamper export --to c` "
+        "writes, at -O3 -march=native; its step computes velocity and acceleration from the displacement, checks its "
         "input and flags extrapolation. Code and tables of its object at -Os.",
         _table(
-            ("damper", "Python, one call a step", "compiled, a whole motion", "C", "bytes, double", "bytes, single"),
+            ("damper", "Python, one call per step", "compiled, a whole motion", "C", "bytes, double", "bytes, single"),
             (
                 (
                     r.name,
@@ -80,23 +80,23 @@ def page(results: Results) -> str:
                 for r in results.streams
             ),
         ),
-        "## One condition identified",
+        "## Identification of one condition",
         "1,000 noisy samples (3 % of the standard deviation of the force), five parameters. Reached: within 1 % of the "
         "best known squared error, over the seeds tried.",
         _table(
-            ("times ours", "way", "ms a condition", "reached"),
+            ("relative time", "method", "ms per condition", "reached"),
             (
                 (_number(r.ratio), r.name + " *" * r.computed, _number(1e3 * r.seconds), r.reached)
                 for r in results.identification
             ),
         ),
-        "## Many",
+        "## Many conditions",
         _table(
-            ("what", "ms"),
+            ("operation", "ms"),
             ((r.name, _number(1e3 * r.seconds)) for r in results.many),
         ),
         _table(
-            ("grid of a search, the linear parameters eliminated", "ms", "ns a sample and shape"),
+            ("grid of a search, the linear parameters eliminated", "ms", "ns per sample and shape"),
             ((r.name, _number(1e3 * r.seconds), _number(r.nanoseconds)) for r in results.batches),
         ),
         _table(
@@ -104,7 +104,7 @@ def page(results: Results) -> str:
             ((r.name, r.sizes, f"{r.exponent:.2f}") for r in results.growth),
         ),
         "## The bundled rigs",
-        _table(("what", "s"), ((r.name, _number(r.seconds)) for r in results.real)),
+        _table(("operation", "s"), ((r.name, _number(r.seconds)) for r in results.real)),
         *(_study(results.study) if results.study else ()),
         "## Whole processes",
         _table(
@@ -118,8 +118,8 @@ def page(results: Results) -> str:
 def _study(rows: Sequence) -> list[str]:
     return [
         "## A study of the bundled rigs, part by part",
-        "Processor seconds, one part after the other in one process. `mrdamper study` studies the rigs in a process "
-        "each at once, so that the slower rig counts.",
+        "Processor seconds, the parts in sequence in one process. `mrdamper study` studies each rig in its own process, "
+        "so the slower rig determines the time.",
         _table(
             ("part", "s", "rig by rig"),
             (

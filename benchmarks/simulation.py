@@ -78,7 +78,7 @@ def _streaming(x: np.ndarray) -> dict[str, Callable[[], np.ndarray]]:
         return np.array([stream.step_motion(value, 0.0, 0.0, 0.0, dt) for value in samples])
 
     # The first sample only says where the motion starts: a stream knows no peaks between samples.
-    return {"mrdamper streaming, compiled": compiled, "mrdamper streaming, Python, one call a sample": one_by_one}
+    return {"mrdamper streaming, compiled": compiled, "mrdamper streaming, Python, one call per sample": one_by_one}
 
 
 def _numba_rk4() -> dict[str, Callable[[], np.ndarray]]:

@@ -364,7 +364,7 @@ def test_the_command_refuses_several_rigs_without_a_choice(tmp_path, bundled):
 
 def test_the_page_on_the_method_names_every_figure_and_table_of_the_paper():
     page = (ROOT / "docs" / "paper-method.md").read_text(encoding="utf-8")
-    walk = page[page.index("## Section by section") : page.index("## Where the text is open")]
+    walk = page[page.index("## Section by section") : page.index("## Options for points")]
     for name in (*FIGURES, *NUMBERED):
         if name.startswith(("fig", "table", "function_")):
             assert walk.count(f"`{name}`") == 1, name
