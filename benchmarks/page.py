@@ -64,9 +64,9 @@ def page(results: Results) -> str:
             ((_number(r.ratio), r.name, _number(r.nanoseconds), f"{r.error:.0e}") for r in results.simulation),
         ),
         "## One sample per call",
-        "From displacement, current and time step to force, in nanoseconds per step. C is what `mrdamper export --to c` "
-        "writes, at -O3 -march=native; its step computes velocity and acceleration from the displacement, checks its "
-        "input and flags extrapolation. Code and tables of its object at -Os.",
+        "From displacement, current and time step to force, in nanoseconds per step. C is what `mrdamper export --to "
+        "c` writes, at -O3 -march=native; its step computes velocity and acceleration from the displacement, checks "
+        "its input and flags extrapolation. Code and tables of its object at -Os.",
         _table(
             ("damper", "Python, one call per step", "compiled, a whole motion", "C", "bytes, double", "bytes, single"),
             (
@@ -118,8 +118,8 @@ def page(results: Results) -> str:
 def _study(rows: Sequence) -> list[str]:
     return [
         "## A study of the bundled rigs, part by part",
-        "Processor seconds, the parts in sequence in one process. `mrdamper study` studies each rig in its own process, "
-        "so the slower rig determines the time.",
+        "Processor seconds, the parts in sequence in one process. `mrdamper study` uses one process per rig, so that the "
+        "slower rig determines the time.",
         _table(
             ("part", "s", "rig by rig"),
             (

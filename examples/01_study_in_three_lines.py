@@ -1,12 +1,12 @@
 """
-The whole method in three lines
-===============================
+A study in three lines
+======================
 
-The whole method on the bundled tests of two dampers."""
+The study of the bundled tests of two dampers."""
 
 from mrdamper import load_dataset, run_study
 
 dataset = load_dataset()
 study = run_study(dataset)
 for rig in study.rigs:
-    print(f"{rig.rig}: {rig.chosen.title}, held-out runs {100 * rig.chosen.validation.median():.1f} % of peak-to-peak")
+    print(f"{rig.rig}: {rig.chosen.title}, validation {100 * rig.chosen.validation.median():.1f} % of peak-to-peak")

@@ -1,8 +1,8 @@
 """
-One test, and how much of it to believe
-=======================================
+Identification of one run
+=========================
 
-A Bouc–Wen model from one test, and how much of it to believe."""
+A Bouc–Wen model from one test, with the uncertainty of its parameters."""
 
 from mrdamper import identify, load_dataset, plot_loop
 from mrdamper.physics.motion import measured_motion

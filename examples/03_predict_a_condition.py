@@ -1,8 +1,8 @@
 """
-A condition nobody tested
-=========================
+Prediction of an untested condition
+===================================
 
-The loop of a condition nobody tested, with its extrapolation flags."""
+The loops of two untested conditions, with their extrapolation flags."""
 
 import numpy as np
 

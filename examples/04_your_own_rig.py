@@ -1,8 +1,8 @@
 """
-A rig's own files
-=================
+From rig files to a model
+=========================
 
-From a folder of a rig's own files to a model: decimal commas, units in a row, currents in file names, one bad file.
+The files have decimal commas, units in a row and currents in their names; one of them has an inverted force.
 
 With `--keep FOLDER` the files are only written, for the commands of docs/how-to/your-own-rig.md.
 """
@@ -31,14 +31,14 @@ def rig_test(condition: Condition, rng: np.random.Generator) -> np.ndarray:
 
 
 def write_like_a_rig(path: Path, columns: np.ndarray) -> None:
-    """Semicolons, decimal commas, two lines of remarks, names and units in rows of their own."""
+    """Write semicolons, decimal commas, two lines of remarks, a row of names and a row of units."""
     head = ["Dämpferprüfstand 2", f"Prüfung;{path.stem}", "Zeit;Weg;Kraft", "s;mm;kN"]
     rows = [";".join(f"{cell:.5f}".replace(".", ",") for cell in row) for row in columns]
     path.write_text("\r\n".join([*head, *rows]) + "\r\n", encoding="cp1252")
 
 
 def make_folder(folder: Path) -> None:
-    """Nine tests at three currents; in one the load cell was connected the wrong way round."""
+    """Write nine tests at three currents; in one of them the sign of the force is inverted."""
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(4)
     for current in (0.0, 0.5, 1.0):
@@ -51,7 +51,7 @@ def make_folder(folder: Path) -> None:
 
 
 def main(folder: Path) -> None:
-    """Write the files, import them, look at their quality, study them."""
+    """Write the files, import them, check their quality, study them."""
     make_folder(folder)
     imported = import_files([folder])
     for refusal in imported.refusals:

@@ -2,10 +2,10 @@
 A damper in a closed loop
 =========================
 
-A damper in a closed loop: a body on a spring, passive, at full current, and under skyhook control.
+A body on a spring and a damper: passive, at full current, and under skyhook control.
 
-The damper is identified from the bundled tests and asked sample by sample, as a real-time
-target would ask the exported C.
+The damper is identified from the bundled tests and evaluated sample by sample, as the exported C
+on a real-time target.
 """
 
 import math

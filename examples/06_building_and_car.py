@@ -1,8 +1,8 @@
 """
-A building and a car
-====================
+A building in an earthquake
+===========================
 
-A damper at work: a frame in an earthquake, and the current for a wanted force."""
+A frame with and without a damper, and the current for a required force."""
 
 import math
 
@@ -29,6 +29,4 @@ for i in range(100):
     t = i * 1e-3
     motion = 0.01 * math.sin(10 * t), 0.1 * math.cos(10 * t), -math.sin(10 * t)
     found = inverse.step(*motion, wanted=600.0, dt=1e-3)
-print(
-    f"600 N wanted: {found.force:.0f} N at {found.current:.3f} A, reachable {found.lowest:.0f} to {found.highest:.0f} N"
-)
+print(f"600 N: {found.force:.0f} N at {found.current:.3f} A, reachable {found.lowest:.0f} to {found.highest:.0f} N")

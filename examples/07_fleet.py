@@ -1,8 +1,8 @@
 """
-A line of dampers
-=================
+A fleet of dampers
+==================
 
-Synthetic dampers of a line, tested, identified and watched: who stands out, which limit is missed."""
+Ten synthetic dampers are identified and compared; the report states outliers and violated limits."""
 
 import tempfile
 from dataclasses import replace

@@ -2,10 +2,10 @@
 A force-driven Bouc–Wen system
 ==============================
 
-Force in, displacement out: the system of the field's hysteretic benchmark, simulated and identified.
+The system of the benchmark of Noël and Schoukens is simulated and identified from force and displacement.
 
 A mass of 2 kg on a spring and a hysteretic element that stiffens while it is loaded, driven by a
-multisine of 5 to 150 Hz and 50 N. The data are made here, with noise 40 dB below the displacement;
+multisine of 5 to 150 Hz and 50 N. The data are synthetic, with noise 40 dB below the displacement;
 another multisine is the test.
 """
 
