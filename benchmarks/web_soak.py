@@ -1,6 +1,6 @@
 """The app under many sessions, and the cost of each request: `python -m benchmarks.web_soak [--seconds 600]`.
 
-Thirty sessions open the bundled tests. Each moves a slider every two seconds, rides once a minute, and studies,
+Thirty sessions open the bundled tests. Each moves a slider every two seconds, simulates once a minute, and studies,
 exports and saves its project once, at times of its own. Latencies hold for a machine that does nothing else;
 processor seconds hold on a busy one too: `--costs` measures these alone, one request after the other.
 """
@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-SESSIONS, SLIDER_S, RIDE_S = 30, 2.0, 60.0
+SESSIONS, SLIDER_S, SIMULATION_S = 30, 2.0, 60.0
 _TICK = os.sysconf("SC_CLK_TCK")
 _CLOSED_S = 70.0  # until the memory of closed sessions is given back: the app looks every minute
 _LAWS = ("skyhook", "passive", "clipped-optimal", "groundhook", "add")
@@ -46,7 +46,7 @@ class Server:
 
     def ask(self, method: str, path: str, body: Any = None) -> bytes:
         """Answer to a request; raises `OSError` on an error or after two minutes."""
-        headers = {"Origin": self.base.rstrip("/"), "Content-Type": "application/json", "X-Bench-Token": self.token}
+        headers = {"Origin": self.base.rstrip("/"), "Content-Type": "application/json", "X-App-Token": self.token}
         content = None if body is None else json.dumps(body).encode()
         request = urllib.request.Request(f"{self.base}api/sessions{path}", content, headers, method=method)
         with urllib.request.urlopen(request, timeout=120) as answer:
@@ -100,18 +100,20 @@ class User:
         name = self.rng.choice(["current_A", "current_A", "frequency_Hz", "amplitude_m"])
         low, high = {"current_A": (0, 1), "frequency_Hz": (0.5, 3), "amplitude_m": (0.004, 0.02)}[name]
         self.where[name] = self.rng.uniform(low, high)
-        self.timed("predict", "POST", f"/dampers/{self.keys[0]}/predict", {**self.where, "currents": 15, "band": True})
+        self.timed(
+            "predict", "POST", f"/dampers/{self.keys[0]}/predict", {**self.where, "currents": 15, "interval": True}
+        )
 
-    def ride(self) -> None:
-        """Ride with any current: no two rides of the soak are the same."""
+    def simulate(self) -> None:
+        """Simulate with any current: no two simulations of the soak are the same."""
         system, source = self.rng.choice(_SYSTEMS)
         ask = {"damper": self.rng.choice(self.keys), "system": system, "source": source, "scaled": True}
         ask |= {"control": self.rng.choice(_LAWS), "current_A": self.rng.uniform(0.2, 1.0)}
-        self.timed("ride", "POST", "/ride", ask)
+        self.timed("simulation", "POST", "/simulate", ask)
 
     def save(self) -> None:
         """Save the project."""
-        self.timed("save", "POST", "/bench.zip", {"state": "{}", "damper": self.keys[0], "logo": ""})
+        self.timed("save", "POST", "/project.zip", {"state": "{}", "damper": self.keys[0], "logo": ""})
 
     def work(self, kind: str, path: str, body: Any = None) -> Callable[[], None]:
         """Long work: begin it and look at it until it ends, while the sliders move on."""
@@ -138,7 +140,10 @@ class User:
         self.open()
         rng, begin = self.rng, time.perf_counter()
         plan = [(rng.uniform(0, SLIDER_S) + SLIDER_S * i, self.slide) for i in range(int(seconds / SLIDER_S))]
-        plan += [(rng.uniform(0, RIDE_S) + RIDE_S * i, self.ride) for i in range(max(1, int(seconds / RIDE_S)))]
+        plan += [
+            (rng.uniform(0, SIMULATION_S) + SIMULATION_S * i, self.simulate)
+            for i in range(max(1, int(seconds / SIMULATION_S)))
+        ]
         once = (self.work("study", "/study"), self.work("export", f"/dampers/{self.keys[0]}/export/c"), self.save)
         plan += [(rng.uniform(0, 0.8 * seconds), action) for action in once]
         for moment, action in sorted(plan, key=lambda step: step[0]):
@@ -156,7 +161,7 @@ def soak(seconds: float) -> list[str]:
         first = User(server, 0, {}, errors)
         first.open()
         first.timed("rig", "GET", "/data/rigs/0/quality")
-        first.ride()
+        first.simulate()
         server.ask("DELETE", first.at)
         time.sleep(_CLOSED_S)
         start, began = server.megabytes(), server.seconds()
@@ -181,7 +186,7 @@ def soak(seconds: float) -> list[str]:
     rows = [
         ("answers 5xx, lost or failed", f"{len(refused)} of {sum(map(len, times.values()))}", "0"),
         ("predict p95", f"{1e3 * p95['predict']:.0f} ms of {len(times['predict'])}", "300 ms"),
-        ("ride p95", f"{p95['ride']:.2f} s of {len(times['ride'])}", "5 s"),
+        ("simulation p95", f"{p95['simulation']:.2f} s of {len(times['simulation'])}", "5 s"),
         (
             "memory after close over start",
             f"{closed / start:.2f} ({start:.0f}, most {most:.0f}, {closed:.0f} MB)",
@@ -213,8 +218,8 @@ def costs() -> list[str]:
         cost("open a session with the bundled tests", lambda: others.pop().open(), 10)
         cost("first prediction with its interval", user.slide, 1)
         cost("prediction after a slider", user.slide, 100, "20 ms")
-        cost("ten rides, compiling what is not compiled yet", user.ride, 10)
-        cost("ride, compiled", user.ride, 40, "500 ms")
+        cost("ten simulations, compiling what is not compiled yet", user.simulate, 10)
+        cost("simulation, compiled", user.simulate, 40, "500 ms")
         cost("save the project", user.save, 10)
     finally:
         server.stop()

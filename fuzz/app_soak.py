@@ -92,7 +92,7 @@ class _User:
     def ask(self, method: str, path: str, body: Any = None, raw: bytes | None = None) -> Any:
         """The answer as JSON, None if it is none or a refusal."""
         content = raw if raw is not None else b"" if body is None else json.dumps(body).encode()
-        headers = {"Origin": self.address.rstrip("/"), "X-Bench-Token": self.token, "Content-Type": "application/json"}
+        headers = {"Origin": self.address.rstrip("/"), "X-App-Token": self.token, "Content-Type": "application/json"}
         url = f"{self.address}api/sessions{path}"
         request = urllib.request.Request(url, None if method == "GET" else content, headers, method=method)
         began, status, found = time.monotonic(), 0, b""
@@ -139,7 +139,7 @@ class _User:
                 asked = {**usual, rng.choice([*usual, "held", "family"]): rng.choice([odd, 1.0, {"c": odd}, True])}
                 self.ask("POST", f"{at}/dampers/{damper.get('key')}/predict", asked)
         elif chance < 0.9:
-            path = rng.choice(["/identify", "/study", "/drops", "/compare", "/dampers", "/bench.zip", "/jobs/1"])
+            path = rng.choice(["/identify", "/study", "/uploads", "/compare", "/dampers", "/project.zip", "/jobs/1"])
             self.ask(
                 rng.choice(["POST", "DELETE", "PUT", "GET"]), at + path, {rng.choice(["rig", "model", "runs"]): odd}
             )
@@ -153,7 +153,7 @@ class _User:
     def drop(self, name: str) -> None:
         """Files of a rig or a dataset, good and bad, read at once and dropped anew."""
         rng = self.rng
-        key = (self.ask("POST", f"/{self.session}/drops") or {}).get("key", "0")
+        key = (self.ask("POST", f"/{self.session}/uploads") or {}).get("key", "0")
         rows = "".join(f"{i / 100},{10 * ((i % 100) - 50) / 50},{300 if i % 100 < 50 else -300}\n" for i in range(400))
         contents = [
             b"time [s],displacement [mm],force [N]\n" + rows.encode(),
@@ -163,8 +163,8 @@ class _User:
         ]
         for part in (f"{rng.randrange(3)}A 1Hz.csv", "runs.csv", "samples.parquet")[: rng.randint(1, 3)]:
             named = quote(rng.choice([part, part, name[:40]]), safe="", errors="replace")
-            self.ask("PUT", f"/{self.session}/drops/{key}/files?name={named}", raw=rng.choice(contents))
-        self.ask("POST", f"/{self.session}/drops/{key}/read", {"toml": rng.choice(["", "", "[file]\n", name])})
+            self.ask("PUT", f"/{self.session}/uploads/{key}/files?name={named}", raw=rng.choice(contents))
+        self.ask("POST", f"/{self.session}/uploads/{key}/read", {"toml": rng.choice(["", "", "[file]\n", name])})
 
 
 def _saved_model(rng: random.Random, odd: object) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 from fuzz.counting import NASTY, ODD, Count, bench_damper, within
 
-HOST = "bench.test:1"
+HOST = "app.test:1"
 BODIES = (
     b"", b"null", b"[]", b"{", b'{"a":' * 5000, b"[" * 200_000, b'"\\ud800"', b"\xff\xfe", b'{"key": 1e999}', b"NaN",
     b'{"rig": ' + b"9" * 5000 + b"}", b'{"a": 1, "a": 2}', b"--x\r\nContent-Disposition: form-data; name=a\r\n\r\n1",
@@ -23,7 +23,7 @@ HEADERS = (
     {"content-type": "application/json; charset=utf-99"}, {"content-type": ""}, {"range": "bytes=5-1"}, {"range": "bytes=-0"},
     {"range": "lines=1"}, {"range": "bytes=0-1,2-3,1-9"}, {"if-modified-since": "never"}, {"if-none-match": "*"},
     {"accept": "\xff"}, {"accept-encoding": "gzip;q=x"}, {"content-length": "-1"}, {"content-length": "x"},
-    {"content-encoding": "gzip"}, {"expect": "100-continue"}, {"x-bench-token": ""}, {"cookie": "a=\xff"}, {"last-event-id": "x"},
+    {"content-encoding": "gzip"}, {"expect": "100-continue"}, {"x-app-token": ""}, {"cookie": "a=\xff"}, {"last-event-id": "x"},
     {"transfer-encoding": "chunked"}, {"upgrade": "websocket", "connection": "upgrade"}, {"x-http-method-override": "DELETE"},
 )  # fmt: skip
 
@@ -39,7 +39,7 @@ def attack_requests(share: float) -> list[Count]:
     rng, said = random.Random(9), io.StringIO()
     app, origin = create_app([HOST], token="the token"), f"http://{HOST}"
     asks = list(_asks(app.openapi()))
-    common = {"origin": origin, "x-bench-token": "the token"}
+    common = {"origin": origin, "x-app-token": "the token"}
     with (
         contextlib.redirect_stderr(said),
         TestClient(app, base_url=origin, headers=common, raise_server_exceptions=False) as client,
@@ -137,10 +137,10 @@ def _strangers(client: Any, count: Count, asks: list[tuple[str, str, Mapping[str
         ["wrong", "the token"],
         ["THE TOKEN"],
     ):
-        headers = [("origin", f"http://{HOST}"), *(("x-bench-token", token) for token in tokens)]
-        del client.headers["x-bench-token"]
+        headers = [("origin", f"http://{HOST}"), *(("x-app-token", token) for token in tokens)]
+        del client.headers["x-app-token"]
         answer = client.post("/api/sessions", headers=headers)
-        client.headers["x-bench-token"] = "the token"
+        client.headers["x-app-token"] = "the token"
         count.check(answer.status_code == 403, (tokens, answer.status_code))
     for method, path, _ in asks:
         for stranger in ("x" * len(session), session[:-1], session.swapcase(), f"{session}%00", f"..%2F{session}", "*"):
@@ -168,11 +168,11 @@ def _at_once(client: Any, count: Count, rng: random.Random) -> None:
         return answer
 
     def drop() -> None:
-        begun = ask("POST", "/drops")
+        begun = ask("POST", "/uploads")
         key = begun.json().get("key", "0") if begun.status_code == 200 else "0"
         for name in ("0A 1Hz.csv", "runs.csv"):
-            ask("PUT", f"/drops/{key}/files?name={name}", content=rows)
-        ask("POST", f"/drops/{key}/read", json={"toml": ""})
+            ask("PUT", f"/uploads/{key}/files?name={name}", content=rows)
+        ask("POST", f"/uploads/{key}/read", json={"toml": ""})
 
     works = [drop, drop, lambda: ask("GET", "/tests"), lambda: ask("GET", "/data"), lambda: ask("POST", "/bundled")]
     if rng.random() < 0.5:

@@ -164,7 +164,7 @@ def test_no_cell_of_a_printed_table_is_cut_inside_a_number(texts):
 
 
 def test_one_number_stands_everywhere(bundled, bundled_study, written, tmp_path, monkeypatch):
-    """Terminal, table, page, comparison and bench say the same of the same model on the same runs."""
+    """Terminal, table, page, comparison and app show the same scores of a model on the same runs."""
     from mrdamper.report.study import _validation_table
     from mrdamper.web.api.identify import _candidate
 
@@ -192,8 +192,8 @@ def test_one_number_stands_everywhere(bundled, bundled_study, written, tmp_path,
             cells = "".join(rf"<td>{100 * said[name]:.1f} \([^<]*</td>" for name in said)
             cells = rf"<td>{re.escape(candidate.title)}</td>.*?{cells}"
             assert re.search(cells, chapter), candidate.title
-            bench = _candidate(candidate, "damper1")
-            assert (bench["left_out"], bench["held_out"]) == tuple(said.values())
+            shown = _candidate(candidate, "damper1")
+            assert (shown["cross_validation"], shown["validation"]) == tuple(said.values())
             if rig.rig in compared and candidate.recipe.name == "bingham":
                 (entry,) = compared[rig.rig].entries
                 assert entry.cross_validated.median() == pytest.approx(said["cross-validation"], rel=1e-9)

@@ -1,4 +1,4 @@
-"""A bench to ask, and a browser to look at it."""
+"""An app with a test client, and a browser."""
 
 import os
 import threading
@@ -17,7 +17,7 @@ from support.browser import AUDIT
 
 from mrdamper.web.app import create_app
 
-HOST = "bench.test:1"
+HOST = "app.test:1"
 ORIGIN = f"http://{HOST}"
 SCREENSHOTS = Path(__file__).parents[2] / "artefacts"
 WINDOW = {"width": 1366, "height": 768}
@@ -44,7 +44,7 @@ def session(client):
 
 
 @pytest.fixture
-def bench(client, session):
+def loaded(client, session):
     """A session with the bundled data."""
     client.post(f"{session}/bundled").raise_for_status()
     return session
@@ -52,14 +52,14 @@ def bench(client, session):
 
 @pytest.fixture(scope="session")
 def address():
-    """A bench that is served, for browsers and streams."""
+    """Address of a served app, for browsers and streams."""
     with served() as address:
         yield address
 
 
 @contextmanager
 def served(**options):
-    """A bench in a thread of its own; options are uvicorn's."""
+    """An app in a thread of its own; options are those of uvicorn."""
     import uvicorn
 
     from mrdamper.web.server import Connection, _listen
@@ -90,7 +90,7 @@ def profile(browser):
 
 @contextmanager
 def watched_page(profile, address):
-    """A page on the bench; anything on its console but notes is a complaint, and fails the test."""
+    """A page of the app; anything on its console but notes is a complaint, and fails the test."""
     page, complaints = profile.new_page(), []
     page.on("console", lambda m: complaints.append(m.text) if m.type in ("error", "warning") else None)
     page.on("pageerror", lambda error: complaints.append(str(error)))

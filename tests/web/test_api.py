@@ -1,4 +1,4 @@
-"""What the bench answers is what the package computes."""
+"""Responses of the app are the results of the package."""
 
 import base64
 import io
@@ -60,15 +60,15 @@ def modified(bundled):
     return fit_modified([identify(run, "bingham") for run in runs]).damper
 
 
-def test_a_methods_tool_tip_is_its_own(client, bench):
-    methods = client.get(f"{bench}/choices").json()["methods"]
+def test_a_methods_tool_tip_is_its_own(client, loaded):
+    methods = client.get(f"{loaded}/choices").json()["methods"]
     assert {m["name"]: m["about"] for m in methods} == {
         name: cls.__doc__.split("\n")[0] for name, cls in all_methods().items()
     }
 
 
-def put_on(client, bench, damper):
-    return client.post(f"{bench}/dampers", json={"text": dump_model(damper)}).json()["damper"]
+def put_on(client, loaded, damper):
+    return client.post(f"{loaded}/dampers", json={"text": dump_model(damper)}).json()["damper"]
 
 
 @given(
@@ -93,16 +93,16 @@ def test_the_bundled_data_are_one_call_away(client, session, bundled):
     assert overview["runs"] == len(bundled)
 
 
-def test_the_matrix_holds_every_steady_sine_once(client, bench):
-    table = client.get(f"{bench}/data/rigs/1").json()
+def test_the_matrix_holds_every_steady_sine_once(client, loaded):
+    table = client.get(f"{loaded}/data/rigs/1").json()
     in_matrix = [key for m in table["matrix"]["motions"] for cell in m["cells"] for key in cell]
     sines = [run["key"] for run in table["runs"] if run["peak_N"] is not None]
     assert sorted(in_matrix) == sorted(sines)
     assert len(set(in_matrix)) == len(in_matrix)
 
 
-def test_figures_of_a_run_are_the_loop_analysis(client, bench, bundled):
-    table = client.get(f"{bench}/data/rigs/1").json()
+def test_figures_of_a_run_are_the_loop_analysis(client, loaded, bundled):
+    table = client.get(f"{loaded}/data/rigs/1").json()
     shown = next(run for run in table["runs"] if run["peak_N"] is not None)
     found = analyse_loop(bundled[shown["id"]])
     assert shown["peak_N"] == found.peak_force
@@ -110,12 +110,12 @@ def test_figures_of_a_run_are_the_loop_analysis(client, bench, bundled):
     assert shown["condition"]["amplitude_mm"] == pytest.approx(1e3 * found.condition.amplitude_m, rel=1e-12)
 
 
-def test_a_measured_cycle_closes_and_begins_on_the_way_up(client, bench):
-    table = client.get(f"{bench}/data/rigs/1").json()
+def test_a_measured_cycle_closes_and_begins_on_the_way_up(client, loaded):
+    table = client.get(f"{loaded}/data/rigs/1").json()
     for run in table["runs"][:6]:
         if run["peak_N"] is None:
             continue
-        _, curve = opened(client.get(f"{bench}/data/rigs/1/runs/{run['key']}/cycle").content)
+        _, curve = opened(client.get(f"{loaded}/data/rigs/1/runs/{run['key']}/cycle").content)
         amplitude = run["condition"]["amplitude_mm"]
         # A twentieth of the amplitude is how far a cycle's start is off by harmonics and drift.
         assert abs(curve["x"][0]) < 0.1 * amplitude
@@ -125,12 +125,12 @@ def test_a_measured_cycle_closes_and_begins_on_the_way_up(client, bench):
 
 
 @pytest.mark.parametrize("kind", ["joint", "modified"])
-def test_a_prediction_is_the_dampers(client, bench, request, kind):
+def test_a_prediction_is_the_dampers(client, loaded, request, kind):
     damper = request.getfixturevalue(kind)
-    key = put_on(client, bench, damper)
+    key = put_on(client, loaded, damper)
     condition = Condition(0.4, 1.1, 0.012)
     ask = {"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012, "family": True, "currents": 5}
-    head, curves = opened(client.post(f"{bench}/dampers/{key}/predict", json=ask).content)
+    head, curves = opened(client.post(f"{loaded}/dampers/{key}/predict", json=ask).content)
     expected = damper.predict(condition)
     picked = np.linspace(0, expected.force.size - 1, curves["now.F"].size).round().astype(int)
     scale = np.ptp(expected.force)
@@ -143,32 +143,32 @@ def test_a_prediction_is_the_dampers(client, bench, request, kind):
     assert curves["over.peak"][0] == pytest.approx(np.ptp(at_zero.force) / 2, rel=SCREEN)
 
 
-def test_a_held_parameter_replaces_the_models(client, bench, joint):
-    key = put_on(client, bench, joint)
+def test_a_held_parameter_replaces_the_models(client, loaded, joint):
+    key = put_on(client, loaded, joint)
     condition = Condition(0.4, 1.1, 0.012)
     ask = {"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012, "held": {"f0": 100.0}}
-    head, curves = opened(client.post(f"{bench}/dampers/{key}/predict", json=ask).content)
+    head, curves = opened(client.post(f"{loaded}/dampers/{key}/predict", json=ask).content)
     moved = replace(joint, model=replace(joint.model, f0=100.0)).predict(condition).force
     assert head["parameters"]["f0"] == 100.0
     assert np.mean(curves["now.F"]) == pytest.approx(np.mean(moved), abs=1e-3 * np.ptp(moved))  # thinned by a sample
-    text = client.post(f"{bench}/dampers/{key}/document", json={"held": {"f0": 100.0}}).json()["text"]
+    text = client.post(f"{loaded}/dampers/{key}/document", json={"held": {"f0": 100.0}}).json()["text"]
     assert parse_model(text).model.f0 == 100.0
     assert "held by hand" in parse_model(text).provenance
-    refused = client.post(f"{bench}/dampers/{key}/document", json={"held": {"nothing": 1.0}})
+    refused = client.post(f"{loaded}/dampers/{key}/document", json={"held": {"nothing": 1.0}})
     assert refused.json()["code"] == "E_HELD"
 
 
-def test_a_function_can_be_held_in_a_saved_model(client, bench, modified):
-    key = put_on(client, bench, modified)
-    text = client.post(f"{bench}/dampers/{key}/document", json={"held": {"c": 1234.5}}).json()["text"]
+def test_a_function_can_be_held_in_a_saved_model(client, loaded, modified):
+    key = put_on(client, loaded, modified)
+    text = client.post(f"{loaded}/dampers/{key}/document", json={"held": {"c": 1234.5}}).json()["text"]
     model = parse_model(text).parameters.at(Condition(0.3, 2.0, 0.01))
     assert model.c == pytest.approx(1234.5, rel=1e-12)
 
 
-def test_documents_come_back_bit_for_bit(client, bench, joint, modified):
+def test_documents_come_back_bit_for_bit(client, loaded, joint, modified):
     for damper in (joint, modified):
-        key = put_on(client, bench, damper)
-        assert client.post(f"{bench}/dampers/{key}/document", json={}).json()["text"] == dump_model(damper)
+        key = put_on(client, loaded, damper)
+        assert client.post(f"{loaded}/dampers/{key}/document", json={}).json()["text"] == dump_model(damper)
 
 
 @pytest.mark.parametrize(
@@ -180,16 +180,16 @@ def test_documents_come_back_bit_for_bit(client, bench, joint, modified):
         ({"current_A": 0.1, "frequency_Hz": 1, "amplitude_m": 0.01, "other": 1}, "E_REQUEST"),
     ],
 )
-def test_questions_out_of_bounds_are_refused(client, bench, joint, ask, code):
-    key = put_on(client, bench, joint)
-    answer = client.post(f"{bench}/dampers/{key}/predict", json=ask)
+def test_questions_out_of_bounds_are_refused(client, loaded, joint, ask, code):
+    key = put_on(client, loaded, joint)
+    answer = client.post(f"{loaded}/dampers/{key}/predict", json=ask)
     assert answer.status_code == 422
     assert answer.json()["code"] == code
 
 
-def test_sliders_reach_around_their_values_inside_the_bounds(client, bench, joint, modified):
+def test_sliders_reach_around_their_values_inside_the_bounds(client, loaded, joint, modified):
     for damper in (joint, modified):
-        shown = client.get(f"{bench}/dampers/{put_on(client, bench, damper)}").json()
+        shown = client.get(f"{loaded}/dampers/{put_on(client, loaded, damper)}").json()
         assert shown["parameters"]
         for p in shown["parameters"]:
             low, high = p["bounds"]
@@ -199,18 +199,18 @@ def test_sliders_reach_around_their_values_inside_the_bounds(client, bench, join
             assert high is None or p["high"] <= high
 
 
-def test_the_loop_leaves_as_csv_(client, bench, joint):
-    key = put_on(client, bench, joint)
+def test_the_loop_leaves_as_csv_(client, loaded, joint):
+    key = put_on(client, loaded, joint)
     ask = {"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012}
-    table = client.post(f"{bench}/dampers/{key}/csv", json=ask)
+    table = client.post(f"{loaded}/dampers/{key}/csv", json=ask)
     assert table.text.splitlines()[0].startswith("time_s,displacement_m,velocity_m_s,current_A,force_N")
 
 
-def test_the_table_of_a_loop_is_in_the_units_asked_for(client, bench, joint):
-    key = put_on(client, bench, joint)
+def test_the_table_of_a_loop_is_in_the_units_asked_for(client, loaded, joint):
+    key = put_on(client, loaded, joint)
     texts = [
         client.post(
-            f"{bench}/dampers/{key}/csv",
+            f"{loaded}/dampers/{key}/csv",
             json={"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012, "units": units},
         ).text
         for units in ({}, {"force": "lbf", "length": "in"}, {"force": "kN", "length": "mm"})
@@ -224,7 +224,7 @@ def test_the_table_of_a_loop_is_in_the_units_asked_for(client, bench, joint):
     assert np.allclose(1e3 * mixed["force_kN"], si["force_N"], rtol=1e-12, atol=0)
     assert (
         client.post(
-            f"{bench}/dampers/{key}/csv",
+            f"{loaded}/dampers/{key}/csv",
             json={"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012, "units": {"force": "in"}},
         ).status_code
         == 422
@@ -232,12 +232,12 @@ def test_the_table_of_a_loop_is_in_the_units_asked_for(client, bench, joint):
 
 
 @pytest.mark.parametrize("form", ["c", "latex"])
-def test_exports_are_made_in_a_worker(client, bench, joint, form):
-    assert form in {f["name"] for f in client.get(f"{bench}/exports").json()}
-    key = put_on(client, bench, joint)
-    report = wait(client, bench, client.post(f"{bench}/dampers/{key}/export/{form}", json={}).json())
+def test_exports_are_made_in_a_worker(client, loaded, joint, form):
+    assert form in {f["name"] for f in client.get(f"{loaded}/exports").json()}
+    key = put_on(client, loaded, joint)
+    report = wait(client, loaded, client.post(f"{loaded}/dampers/{key}/export/{form}", json={}).json())
     assert report["state"] == "done", report
-    answer = client.get(f"{bench}/exported/{report['answer']['exported']}")
+    answer = client.get(f"{loaded}/exported/{report['result']['exported']}")
     assert "attachment" in answer.headers["content-disposition"]
     expected = exporter(form)().export(joint, identifier(joint.rig)).files
     if len(expected) == 1:
@@ -247,12 +247,12 @@ def test_exports_are_made_in_a_worker(client, bench, joint, form):
         assert {name: packed.read(name) for name in packed.namelist()} == dict(expected)
 
 
-def test_the_curve_over_current_has_points_where_the_tests_end_on_both_sides(client, bench, bundled):
+def test_the_curve_over_current_has_points_where_the_tests_end_on_both_sides(client, loaded, bundled):
     runs = [run for run in bundled.rig("utfsm").split("train") if run.excitation == "sine" and run.current_A > 0.1]
     damper = JointProblem(runs[:5], "play-bypass").fit(rounds=1, most_steps=2).damper
-    key = put_on(client, bench, damper)
+    key = put_on(client, loaded, damper)
     ask = {"current_A": 0.1, "frequency_Hz": 1.1, "amplitude_m": 0.012, "currents": 11}
-    head, curves = opened(client.post(f"{bench}/dampers/{key}/predict", json=ask).content)
+    head, curves = opened(client.post(f"{loaded}/dampers/{key}/predict", json=ask).content)
     low, high = head["tested_A"]
     assert low > 0.2
     assert curves["over.current"][0] == 0.0
@@ -261,12 +261,12 @@ def test_the_curve_over_current_has_points_where_the_tests_end_on_both_sides(cli
     assert "current" in head["extrapolation"]
 
 
-def test_a_band_is_the_dampers_own_and_not_of_a_held_one(client, bench, bundled, joint):
+def test_a_band_is_the_dampers_own_and_not_of_a_held_one(client, loaded, bundled, joint):
     runs = list(bundled.rig("utfsm").split("train"))[:5]
     damper = estimate_uncertainty(joint, runs)
-    key = put_on(client, bench, damper)
-    ask = {"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012, "currents": 0, "band": True}
-    head, curves = opened(client.post(f"{bench}/dampers/{key}/predict", json=ask).content)
+    key = put_on(client, loaded, damper)
+    ask = {"current_A": 0.4, "frequency_Hz": 1.1, "amplitude_m": 0.012, "currents": 0, "interval": True}
+    head, curves = opened(client.post(f"{loaded}/dampers/{key}/predict", json=ask).content)
     prediction = damper.predict(Condition(0.4, 1.1, 0.012))
     around = band(damper, prediction, 0.9)
     picked = np.linspace(0, prediction.force.size - 1, curves["low.F"].size).round().astype(int)
@@ -274,23 +274,23 @@ def test_a_band_is_the_dampers_own_and_not_of_a_held_one(client, bench, bundled,
     assert np.all(curves["low.F"] < curves["now.F"])
     assert head["loops"][0]["peak_to_N"] == pytest.approx(around.peak[1])
     held = {**ask, "held": {"f0": 10.0}}
-    _, curves = opened(client.post(f"{bench}/dampers/{key}/predict", json=held).content)
+    _, curves = opened(client.post(f"{loaded}/dampers/{key}/predict", json=held).content)
     assert "low.F" not in curves
 
 
-def test_a_kept_bench_comes_back_with_data_dampers_and_state(client, app, session, small_rig, joint, modified):
+def test_a_saved_project_has_data_dampers_and_state(client, app, session, small_rig, joint, modified):
     from mrdamper.web.uploads import ImportedData
 
-    next(iter(app.state.sessions)).put(ImportedData(small_rig, "drop"))
+    next(iter(app.state.sessions)).load(ImportedData(small_rig, "upload"))
     keys = [put_on(client, session, damper) for damper in (joint, modified)]
     logo = base64.b64encode(LOGO).decode()
-    shown = {"state": json.dumps({"format": "mrdamper-bench-state"}), "damper": keys[1], "logo": logo}
-    kept = client.post(f"{session}/bench.zip", json=shown)
-    assert kept.status_code == 200, kept.text
-    assert kept.content[30:40] == b"bench.json"  # by which the page knows it
+    shown = {"state": json.dumps({"format": "mrdamper-state"}), "damper": keys[1], "logo": logo}
+    saved = client.post(f"{session}/project.zip", json=shown)
+    assert saved.status_code == 200, saved.text
+    assert saved.content[30:42] == b"project.json"  # by which the page knows it
 
     other = f"/api/sessions/{client.post('/api/sessions').json()['session']}"
-    answer = drop_kept(client, other, kept.content)
+    answer = open_project(client, other, saved.content)
     assert answer.status_code == 200, answer.text
     found = answer.json()
     assert (found["state"], found["logo"]) == (shown["state"], logo)
@@ -304,57 +304,57 @@ def test_a_kept_bench_comes_back_with_data_dampers_and_state(client, app, sessio
         np.testing.assert_array_equal(back[run.id].force, run.force)
 
 
-def drop_kept(client, session, content):
-    key = client.post(f"{session}/drops").json()["drop"]
-    client.put(f"{session}/drops/{key}/files", params={"name": "kept.zip"}, content=content).raise_for_status()
-    return client.post(f"{session}/drops/{key}/open")
+def open_project(client, session, content):
+    key = client.post(f"{session}/uploads").json()["upload"]
+    client.put(f"{session}/uploads/{key}/files", params={"name": "project.zip"}, content=content).raise_for_status()
+    return client.post(f"{session}/uploads/{key}/open")
 
 
 def test_what_is_wrong_in_a_saved_project_is_told_without_the_servers_folders(client, app, session):
-    parts = {"bench.json": {**LIST, "source": "drop"}, "bench-state.json": {}, f"{DATA}/runs.csv": "run_id\na\n"}
+    parts = {"project.json": {**LIST, "source": "upload"}, "state.json": {}, f"{DATA}/runs.csv": "run_id\na\n"}
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as archive:
         for name, part in parts.items():
             archive.writestr(name, part if isinstance(part, str) else json.dumps(part))
-    answer = drop_kept(client, session, content.getvalue())
+    answer = open_project(client, session, content.getvalue())
     assert answer.status_code >= 400
     assert "runs.csv" in answer.text or "samples" in answer.text
     assert str(app.state.sessions.folder) not in answer.text
 
 
-LIST = {"format": "mrdamper-bench", "version": 1, "source": "", "name": "", "dampers": [], "current": None}
+LIST = {"format": "mrdamper-project", "version": 1, "source": "", "name": "", "dampers": [], "current": None}
 
 
 @pytest.mark.parametrize(
     ("parts", "said"),
     [
-        ([("bench.json", LIST)], "holds no bench-state.json"),
-        ([("bench.json", LIST), ("bench-state.json", {}), ("../evil", {})], "holds 'evil'"),
-        ([("bench.json", {**LIST, "version": 2}), ("bench-state.json", {})], "has another version"),
-        ([("bench.json", {**LIST, "more": 1}), ("bench-state.json", {})], "has another version"),
-        ([("bench.json", {**LIST, "current": 0}), ("bench-state.json", {})], "names a damper"),
-        ([("bench.json", LIST), ("bench-state.json", "0" * 6_000_000)], "over 5 MB"),
-        ([("bench.json", {**LIST, "source": "drop"}), ("bench-state.json", {})], "runs.csv"),
-        ([("bench.json", LIST), ("bench-state.json", {}), ("logo", "<svg>")], "neither PNG nor JPEG"),
+        ([("project.json", LIST)], "has no state.json"),
+        ([("project.json", LIST), ("state.json", {}), ("../evil", {})], "contains 'evil'"),
+        ([("project.json", {**LIST, "version": 2}), ("state.json", {})], "has another version"),
+        ([("project.json", {**LIST, "more": 1}), ("state.json", {})], "has another version"),
+        ([("project.json", {**LIST, "current": 0}), ("state.json", {})], "names a damper"),
+        ([("project.json", LIST), ("state.json", "0" * 6_000_000)], "over 5 MB"),
+        ([("project.json", {**LIST, "source": "upload"}), ("state.json", {})], "runs.csv"),
+        ([("project.json", LIST), ("state.json", {}), ("logo", "<svg>")], "neither PNG nor JPEG"),
     ],
 )
-def test_what_is_no_kept_bench_is_refused(client, session, parts, said):
+def test_a_file_that_is_no_project_is_refused(client, session, parts, said):
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as made:
         for name, content in parts:
             made.writestr(name, content if isinstance(content, str) else json.dumps(content))
-    answer = drop_kept(client, session, packed.getvalue())
+    answer = open_project(client, session, packed.getvalue())
     assert answer.status_code == 422
     assert said in answer.json()["text"]
 
 
-def test_a_damaged_kept_bench_is_refused_and_nothing_is_lost(client, bench):
-    kept = client.post(f"{bench}/bench.zip", json={"state": "{}"}).content
-    for damaged in (kept[:-30], kept[:60] + b"\0\0\0" + kept[63:], b"PK\3\4"):
-        answer = drop_kept(client, bench, damaged)
+def test_a_damaged_project_is_refused_and_nothing_is_lost(client, loaded):
+    saved = client.post(f"{loaded}/project.zip", json={"state": "{}"}).content
+    for damaged in (saved[:-30], saved[:60] + b"\0\0\0" + saved[63:], b"PK\3\4"):
+        answer = open_project(client, loaded, damaged)
         assert answer.status_code == 422
-        assert answer.json()["code"] == "E_KEPT"
-    assert client.get(bench).json()["data"] is not None
+        assert answer.json()["code"] == "E_PROJECT"
+    assert client.get(loaded).json()["data"] is not None
 
 
 @pytest.mark.parametrize(
@@ -367,8 +367,8 @@ def test_a_damaged_kept_bench_is_refused_and_nothing_is_lost(client, bench):
         ({"other": 1}, "E_REQUEST"),
     ],
 )
-def test_a_head_that_cannot_be_printed_is_refused_before_the_study(client, bench, head, code):
-    answer = client.post(f"{bench}/study", json=head)
+def test_a_head_that_cannot_be_printed_is_refused_before_the_study(client, loaded, head, code):
+    answer = client.post(f"{loaded}/study", json=head)
     assert answer.status_code == 422
     assert answer.json()["code"] == code
 
@@ -386,40 +386,40 @@ def wait(client, session, job):
 def test_identified_values_are_those_of_identify(client, app, session, small_rig):
     from mrdamper.web.uploads import ImportedData
 
-    next(iter(app.state.sessions)).put(ImportedData(small_rig, "drop"))
+    next(iter(app.state.sessions)).load(ImportedData(small_rig, "upload"))
     choice = {"rig": 0, "model": "bingham", "method": "projection", "runs": ["run0", "run1", "run2"]}
     report = wait(client, session, client.post(f"{session}/identify", json=choice).json())
     assert report["state"] == "done", report
-    for shown in report["answer"]["runs"]:
+    for shown in report["result"]["runs"]:
         assert shown["values"] == pytest.approx(identify(small_rig[shown["id"]], "bingham").model.values(), rel=1e-12)
         alone = identify(small_rig[shown["id"]], "bingham")
         assert shown["intervals"]
         for name, ends in shown["intervals"].items():
             assert ends == pytest.approx(alone.interval(name))
     held = wait(client, session, client.post(f"{session}/identify", json={**choice, "fixed": {"f0": 12.0}}).json())
-    assert all(run["values"]["f0"] == 12.0 and "f0" not in run["intervals"] for run in held["answer"]["runs"])
+    assert all(run["values"]["f0"] == 12.0 and "f0" not in run["intervals"] for run in held["result"]["runs"])
     head, curves = opened(client.get(f"{session}/identified/runs/0").content)
-    assert head["id"] == report["answer"]["runs"][0]["id"]
+    assert head["id"] == report["result"]["runs"][0]["id"]
     np.testing.assert_allclose(
         curves["residual"], curves["model.F"] - curves["measured.F"], atol=SCREEN * np.ptp(curves["measured.F"])
     )
     # The residual over one cycle is what the error of the whole window says, to the drift between cycles.
     share = np.sqrt(np.mean(curves["residual"] ** 2)) / np.ptp(curves["measured.F"])
-    assert share == pytest.approx(held["answer"]["runs"][0]["nrmse_pp"], rel=0.5)
+    assert share == pytest.approx(held["result"]["runs"][0]["nrmse_pp"], rel=0.5)
 
 
-def test_input_a_model_cannot_use_is_told_with_its_remedy(client, bench):
+def test_input_a_model_cannot_use_is_told_with_its_remedy(client, loaded):
     choice = {"rig": 0, "model": "bing-ham", "method": "projection"}
-    report = wait(client, bench, client.post(f"{bench}/identify", json=choice).json())
+    report = wait(client, loaded, client.post(f"{loaded}/identify", json=choice).json())
     assert report["state"] == "refused"
     assert report["error"]["code"] == "E_NAME"
     assert "bingham" in report["error"]["remedy"]
 
 
-def test_downloads_have_harmless_names(client, bench, joint):
-    key = put_on(client, bench, replace(joint, rig='"X-Evil: <b>'))
-    report = wait(client, bench, client.post(f"{bench}/dampers/{key}/export/latex", json={}).json())
-    answer = client.get(f"{bench}/exported/{report['answer']['exported']}")
+def test_downloads_have_harmless_names(client, loaded, joint):
+    key = put_on(client, loaded, replace(joint, rig='"X-Evil: <b>'))
+    report = wait(client, loaded, client.post(f"{loaded}/dampers/{key}/export/latex", json={}).json())
+    answer = client.get(f"{loaded}/exported/{report['result']['exported']}")
     assert "x-evil" not in answer.headers
     assert answer.headers["content-disposition"] == 'attachment; filename="x_evil_b.tex"'
     assert answer.headers["x-content-type-options"] == "nosniff"
@@ -430,10 +430,10 @@ def test_any_rig_gives_files_a_name(rig):
     assert re.fullmatch(r"[a-z_][a-z0-9_]*", export_name(rig), re.ASCII)
 
 
-def test_a_damper_without_a_model_behind_it_moves_too(client, bench, bundled):
+def test_a_damper_without_a_model_behind_it_moves_too(client, loaded, bundled):
     rig = bundled.rig("utfsm")
     kernel = KernelDamper.fit([run for run in rig.split("train")][:4], [])
-    key = put_on(client, bench, kernel)
-    assert client.get(f"{bench}/dampers/{key}").json()["parameters"] == []
+    key = put_on(client, loaded, kernel)
+    assert client.get(f"{loaded}/dampers/{key}").json()["parameters"] == []
     ask = {"current_A": 0.5, "frequency_Hz": 1.0, "amplitude_m": 0.01, "currents": 3}
-    assert client.post(f"{bench}/dampers/{key}/predict", json=ask).status_code == 200
+    assert client.post(f"{loaded}/dampers/{key}/predict", json=ask).status_code == 200

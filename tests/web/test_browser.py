@@ -130,8 +130,8 @@ def test_from_drop_to_report(page, small_rig, tmp_path, shoot):
     page.locator("section[aria-label='Residual over time'] .js-line").wait_for(state="attached")
 
     open_tab(page, "Compare")
-    page.locator("input[name=contestant]").first.wait_for()
-    for box in page.locator("input[name=contestant]").all():
+    page.locator("input[name=compared]").first.wait_for()
+    for box in page.locator("input[name=compared]").all():
         box.set_checked(box.get_attribute("value") in ("bingham", "smooth-bingham"))
     page.get_by_role("button", name="Compare", exact=True).click()
     page.locator("#compare-run").wait_for()
@@ -159,7 +159,7 @@ def test_from_drop_to_report(page, small_rig, tmp_path, shoot):
     page.get_by_role("button", name="Create the report").click()
     page.get_by_role("progressbar").wait_for()
     page.get_by_role("link", name="report.html").wait_for()
-    shoot(page, "5-take-away")
+    shoot(page, "5-export")
     with page.expect_download() as waiting:
         page.get_by_role("link", name="report.html").click()
     report = tmp_path / "report.html"
@@ -308,12 +308,12 @@ def test_the_bundled_tests_come_with_models_and_every_view_shows_something(page,
     page.locator(".matrix").wait_for()
     for tab, sight in (
         ("Model", "section[aria-label='Force over displacement'] .js-line"),
-        ("Ride", "section[aria-label='Acceleration'] .js-line"),
-        ("Export", "#take-damper option"),
+        ("Simulate", "section[aria-label='Acceleration'] .js-line"),
+        ("Export", "#export-damper option"),
     ):
         open_tab(page, tab)
         page.locator(sight).first.wait_for(state="attached")
-    assert page.locator("#take-damper optgroup").count() == 2
+    assert page.locator("#export-damper optgroup").count() == 2
     open_tab(page, "Model")
     for typed in ("90", "1e9", "-1", "0.4"):  # far outside, impossible twice, inside
         type_number(page, "current_A", typed)
@@ -330,7 +330,7 @@ def test_a_parameter_is_held_until_released(on_model):
     type_number(page, "f0", str(at_first + 50))
     row.get_by_role("button", name="Release f0").wait_for()
     assert number(page, "f0") == pytest.approx(at_first + 50)
-    page.get_by_text("No band: of a parameter held by hand the tests say nothing.").wait_for()
+    page.get_by_text("No prediction interval: the tests carry no information on a parameter held by hand.").wait_for()
     row.get_by_role("button", name="Release f0").click()
     comes_to(page, lambda: number(page, "f0"), pytest.approx(at_first, rel=1e-4))  # the field shows five figures
 
@@ -364,7 +364,7 @@ def test_a_link_brings_the_state_back(on_model):
     type_number(other, "current_A", "0.9")
     assert curve(at_rest(other), "Force over velocity") != shown
     open_tab(page, "Export")
-    for button, name in (("Save the state", "bench-state.json"), ("Save the project", "kept.zip")):
+    for button, name in (("Save the state", "mrdamper-state.json"), ("Save the project", "project.zip")):
         with page.expect_download() as waiting:
             page.get_by_role("button", name=button).click()
         drop(other, {name: waiting.value.path().read_bytes()})
@@ -404,7 +404,7 @@ def test_a_bad_file_says_what_where_and_how_to_mend_it(page, shoot):
     assert "no rows" in message.inner_text()
     assert "Add one row a run" in message.inner_text()
     assert "E_DATASET" in message.inner_text()
-    assert "mrdamper-bench" not in message.inner_text()  # no path of this machine
+    assert ".scratch" not in message.inner_text()  # no path of this machine
     shoot(page, "10-bad-file")
     expect_refusal(page)
 
@@ -437,14 +437,14 @@ def test_dark_projector_and_narrow(on_model, shoot):
     page.get_by_role("button", name="Use light colours").click()
 
 
-def test_a_ride_moves_with_its_loop(on_model, shoot):
+def test_a_simulation_is_animated_with_its_loop(on_model, shoot):
     page = on_model
     page.emulate_media(reduced_motion="no-preference")  # else it stands still at first
-    open_tab(page, "Ride")
-    mark = page.locator('section[aria-label="The damper\'s loop"] .points path')
+    open_tab(page, "Simulate")
+    mark = page.locator('section[aria-label="Loop of the damper"] .points path')
     mark.wait_for(state="attached")
     page.get_by_role("button", name="Pause").click()
-    tyre, moment = page.locator(".ride-tyre"), page.get_by_label("Moment of the ride")
+    tyre, moment = page.locator(".scene .tyre"), page.get_by_label("Time of the simulation")
 
     def at(sample):
         moment.fill(str(sample))
@@ -454,13 +454,13 @@ def test_a_ride_moves_with_its_loop(on_model, shoot):
     assert first[0] != later[0]
     assert first[1] != later[1]
     assert at(400) == first
-    shoot(page, "ride-car")
+    shoot(page, "22-vehicle")
     page.get_by_label("In", exact=True).select_option("dyke1996")
-    page.locator(".ride-scene[aria-label^='Three-storey']").wait_for()
-    comes_to(page, lambda: page.locator(".ride-mass").get_attribute("d").count("M"), 3)
+    page.locator(".scene[aria-label^='Three-storey']").wait_for()
+    comes_to(page, lambda: page.locator(".scene .mass").get_attribute("d").count("M"), 3)
     page.get_by_role("button", name="Pause").click()
     moment.fill("600")
-    shoot(page, "ride-frame")
+    shoot(page, "23-building")
     page.emulate_media(reduced_motion="reduce")
 
 
@@ -496,10 +496,10 @@ def test_the_keyboard_reaches_everything(on_model):
 
 def test_every_view_passes_axe(on_model):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
-    for tab in ("Model", "Data", "Identify", "Compare", "Ride", "Export"):
+    for tab in ("Model", "Data", "Identify", "Compare", "Simulate", "Export"):
         open_tab(on_model, tab)
-        if tab == "Ride":
-            on_model.locator(".ride-bar").wait_for()
+        if tab == "Simulate":
+            on_model.locator(".playback").wait_for()
         assert axe.run(on_model).response["violations"] == [], tab
     on_model.get_by_text("Units", exact=True).click()
     assert axe.run(on_model).response["violations"] == [], "units"
@@ -509,8 +509,8 @@ def test_every_view_passes_axe(on_model):
 def test_the_main_action_of_every_view_is_a_few_tab_stops_away(on_model):
     page = on_model
     actions = {
-        "Data": ".matrix .cell", "Identify": "Start", "Model": "#damper", "Compare": "Compare", "Ride": "#ride-damper",
-        "Export": "Create the report",
+        "Data": ".matrix .cell", "Identify": "Start", "Model": "#damper", "Compare": "Compare",
+        "Simulate": "#simulate-damper", "Export": "Create the report",
     }  # fmt: skip
     for tab, action in actions.items():
         open_tab(page, tab)
@@ -555,10 +555,10 @@ def test_every_number_and_axis_follows_the_units_chosen(on_model, shoot):
     type_number(page, "amplitude_m", "0.5")
     assert number(page, "amplitude_m") == 0.5
     shoot(page, "20-imperial")
-    for tab, texts in {"Data": (" in", "lbf"), "Ride": ("lbf", "in/s²"), "Export": (" in.",)}.items():
+    for tab, texts in {"Data": (" in", "lbf"), "Simulate": ("lbf", "in/s²"), "Export": (" in.",)}.items():
         open_tab(page, tab)
-        if tab == "Ride":
-            page.locator(".ride-bar").wait_for()
+        if tab == "Simulate":
+            page.locator(".playback").wait_for()
         for text in texts:
             page.locator("#view").get_by_text(text).first.wait_for()
     with page.expect_download() as waiting:
@@ -664,7 +664,7 @@ def test_a_browser_without_webassembly_gets_the_app(profile, address):
     )
     page.goto(f"{address}#s=eJw")  # a link that cannot be unpacked here
     page.locator("html[data-ready]").wait_for()
-    page.get_by_text("This browser cannot pack the state into a link").first.wait_for()
+    page.get_by_text("This browser cannot write the state into a link").first.wait_for()
     page.get_by_role("button", name="Open the bundled tests", exact=True).click()
     page.locator(".matrix").wait_for()
     open_tab(page, "Model")

@@ -1,4 +1,4 @@
-"""Dropped files become data on the bench, or an answer that says what to do."""
+"""Uploaded files become data, or an error with a remedy."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from web.rig_files import csv_of
 from mrdamper.errors import InputError
 from mrdamper.rig_files.dataset_folder import save_dataset
 from mrdamper.web.imported_data import bundled, read_upload
-from mrdamper.web.uploads import FILE_COUNT_LIMIT, ImportedData, NothingTakenError, Upload, UploadError
+from mrdamper.web.uploads import FILE_COUNT_LIMIT, AllRefusedError, ImportedData, Upload, UploadError
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def test_the_profile_shown_reads_the_same(drop, small_rig):
 def test_a_refused_drop_brings_the_profile_that_mends_it(drop, small_rig):
     run = next(iter(small_rig))
     put(drop, "no current in this name.csv", csv_of(run))
-    with pytest.raises(NothingTakenError) as caught:
+    with pytest.raises(AllRefusedError) as caught:
         read_upload(drop)
     (verdict,) = caught.value.verdicts
     assert verdict.name == "no current in this name.csv"
@@ -76,11 +76,11 @@ def test_a_wrong_profile_is_told(drop, small_rig):
 @pytest.mark.parametrize(
     ("files", "code"),
     [
-        ({}, "E_DROP"),
+        ({}, "E_UPLOAD"),
         ({"runs.csv": b"run_id,rig\n"}, "E_DATASET"),
         ({"runs.csv": b"run_id,rig\na,b\n", "samples.csv": b"run_id,time_s\na,0\n"}, "E_COLUMN"),
         ({"runs.csv": b"\xff\xfe\x00"}, "E_DATASET"),
-        ({"photo.png": b"\x89PNG\r\n\x1a\n\x00"}, "E_DROP_REFUSED"),
+        ({"photo.png": b"\x89PNG\r\n\x1a\n\x00"}, "E_UPLOAD_REFUSED"),
     ],
 )
 def test_what_cannot_be_read_is_refused_by_name(drop, files, code):
@@ -106,7 +106,7 @@ def test_the_bundled_tests_are_read_once():
 def test_runs_that_do_not_move_are_shown_and_not_used(client, app, session, small_rig):
     one = next(iter(small_rig))
     still = replace(one, id="still", displacement=np.zeros(one.time.size))
-    next(iter(app.state.sessions)).put(ImportedData(small_rig.only([*small_rig, still]), "drop"))
+    next(iter(app.state.sessions)).load(ImportedData(small_rig.only([*small_rig, still]), "upload"))
     table = client.get(f"{session}/data/rigs/0").json()
     shown = next(run for run in table["runs"] if run["id"] == "still")
     assert shown["condition"] is None
@@ -143,10 +143,10 @@ def test_files_of_one_name_in_two_folders_are_two_runs(drop, small_rig):
 
 
 def put_files(client, session, files):
-    drop = client.post(f"{session}/drops").json()["drop"]
+    upload = client.post(f"{session}/uploads").json()["upload"]
     for name, content in files.items():
-        client.put(f"{session}/drops/{drop}/files", params={"name": name}, content=content).raise_for_status()
-    return client.post(f"{session}/drops/{drop}/read", json={})
+        client.put(f"{session}/uploads/{upload}/files", params={"name": name}, content=content).raise_for_status()
+    return client.post(f"{session}/uploads/{upload}/read", json={})
 
 
 def test_a_file_may_hold_good_and_refused_tests(client, session, small_rig):

@@ -35,7 +35,7 @@ def test_progress_is_told_on_the_way_and_the_result_at_the_end():
         shares.append(job.share)
         time.sleep(0.01)
     assert job.state == "done"
-    assert job.answer == {"result": 6}
+    assert job.result == {"result": 6}
     assert shares == sorted(shares)
     assert len(set(shares)) > 2
 
@@ -58,14 +58,14 @@ def test_a_refusal_keeps_what_where_and_remedy():
     assert (job.error["found"], job.error["where"], job.error["remedy"]) == ("too few runs", "rig x", "record more")
 
 
-def test_a_fault_of_ours_is_said_to_be_ours(capsys):
+def test_an_internal_error_is_reported_as_one(capsys):
     job = ended(run(slow_tasks.break_down))
     assert job.state == "failed"
-    assert job.error["code"] == "E_OURS"
+    assert job.error["code"] == "E_INTERNAL"
     assert "a fault of ours" in capsys.readouterr().out
 
 
-def test_a_result_that_cannot_be_shown_is_a_fault_of_ours(capsys):
+def test_a_result_that_cannot_be_shown_is_an_internal_error(capsys):
     job = ended(run(slow_tasks.count, 1, conclude=lambda result: result / 0))
     assert job.state == "failed"
     assert "ZeroDivisionError" in capsys.readouterr().out
@@ -91,9 +91,9 @@ def test_cancelling_before_it_runs_is_enough():
     assert ended(job).state == "cancelled"
 
 
-def test_new_data_end_the_work_on_the_old(client, app, bench):
-    job = client.post(f"{bench}/study").json()
-    client.post(f"{bench}/bundled")
+def test_new_data_end_the_work_on_the_old(client, app, loaded):
+    job = client.post(f"{loaded}/study").json()
+    client.post(f"{loaded}/bundled")
     session = next(iter(app.state.sessions))
     assert ended(session.jobs[job["key"]]).state == "cancelled"
 
@@ -130,7 +130,7 @@ def test_a_worker_that_is_killed_is_told_from_our_faults(capsys):
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks into /proc for what is left running")
-def test_workers_end_with_a_bench_that_was_killed(tmp_path):
+def test_workers_end_with_an_app_that_was_killed(tmp_path):
     """Whatever a worker is doing: it waits for a child here, and would never look at its pipe again.
 
     The script has no guard: a worker must not run it once more.
@@ -140,18 +140,18 @@ def test_workers_end_with_a_bench_that_was_killed(tmp_path):
         "open(sys.argv[1] + '/begun', 'a').write('x')\n"
         "Job('job1', 'test', slow_tasks.sleep_with_child, (sys.argv[1],), lambda r: {}).start(); time.sleep(20)\n"
     )
-    script = tmp_path / "bench.py"
+    script = tmp_path / "app.py"
     script.write_text(code)
     tests = Path(__file__).parents[1]
-    bench = subprocess.Popen(
+    app = subprocess.Popen(
         [sys.executable, str(script), str(tmp_path)],
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tests), os.environ.get("PYTHONPATH", "")])},
     )
     note = tmp_path / "child"
     while not (note.is_file() and note.read_text()):
         time.sleep(0.01)
-    bench.kill()
-    bench.wait()
+    app.kill()
+    app.wait()
     assert (tmp_path / "begun").read_text() == "x"
     child = int(note.read_text())
     deadline = time.monotonic() + 20
@@ -160,48 +160,48 @@ def test_workers_end_with_a_bench_that_was_killed(tmp_path):
     assert not alive(child)
 
 
-def test_a_page_loaded_again_finds_the_work(client, bench):
+def test_a_page_loaded_again_finds_the_work(client, loaded):
     choice = {"rig": 1, "model": "bingham", "method": "projection"}
-    job = client.post(f"{bench}/identify", json=choice).json()
+    job = client.post(f"{loaded}/identify", json=choice).json()
     deadline = time.monotonic() + 60
-    while (found := client.get(f"{bench}/jobs").json())[-1]["state"] != "done" and time.monotonic() < deadline:
+    while (found := client.get(f"{loaded}/jobs").json())[-1]["state"] != "done" and time.monotonic() < deadline:
         time.sleep(0.05)
     assert [(report["key"], report["state"]) for report in found] == [(job["key"], "done")]
-    assert found[0]["answer"]["runs"]
-    client.post(f"{bench}/bundled")  # other data: what was found of these is gone
-    assert client.get(f"{bench}/jobs").json() == []
+    assert found[0]["result"]["runs"]
+    client.post(f"{loaded}/bundled")  # other data: what was found of these is gone
+    assert client.get(f"{loaded}/jobs").json() == []
 
 
-def test_work_of_one_kind_takes_the_place_of_the_same_kind_only(client, app, bench):
+def test_work_of_one_kind_takes_the_place_of_the_same_kind_only(client, app, loaded):
     study, first = (
-        client.post(f"{bench}/{path}", json=body).json()
+        client.post(f"{loaded}/{path}", json=body).json()
         for path, body in (("study", None), ("identify", {"rig": 0, "model": "bouc-wen", "method": "projection"}))
     )
     session = next(iter(app.state.sessions))
     replaced = session.jobs[first["key"]]  # jobs that have ended are not kept there
-    second = client.post(f"{bench}/identify", json={"rig": 0, "model": "bingham", "method": "projection"}).json()
+    second = client.post(f"{loaded}/identify", json={"rig": 0, "model": "bingham", "method": "projection"}).json()
     assert {job.key for job in session.newest.values()} == {study["key"], second["key"]}
     assert session.newest["study"]._stop.is_set() is False
     assert ended(replaced).state == "cancelled"
 
 
-def test_a_known_result_is_recalled_without_a_worker():
+def test_a_stored_result_is_used_without_a_worker():
     job = ended(Job("job1", "test", slow_tasks.break_down, (), lambda result: {"result": result}, lambda: 7).start())
-    assert (job.state, job.answer, job._process) == ("done", {"result": 7}, None)
+    assert (job.state, job.result, job._process) == ("done", {"result": 7}, None)
 
 
 def test_workers_leave_the_processors_to_the_page():
-    assert ended(run(slow_tasks.niceness)).answer == {"result": min(os.nice(0) + 15, 19)}
+    assert ended(run(slow_tasks.niceness)).result == {"result": min(os.nice(0) + 15, 19)}
 
 
-def test_a_study_of_the_bundled_tests_is_calculated_once_for_all_sessions(client, app, bench, tmp_path):
+def test_a_study_of_the_bundled_tests_is_calculated_once_for_all_sessions(client, app, loaded, tmp_path):
     (session,) = app.state.sessions
     report = tmp_path / "report.html"
     report.write_text("report")
     shared = app.state.sessions.studies
     shared.keep(Head().model_dump_json(), Study(session.dataset, (), 1.0), tmp_path, [report])
     report.unlink()  # the first session is over
-    job = client.post(f"{bench}/study").json()
+    job = client.post(f"{loaded}/study").json()
     assert ended(session.job(job["key"])).state == "done"
     assert [path.read_text() for path in session.results["study.files"]] == ["report"]
     assert session.results["study.files"][0].is_relative_to(session.folder)

@@ -49,7 +49,7 @@ def test_other_sites_may_not_even_read(site):
 def test_the_guard_stands_before_the_application(client):
     for headers in ({"host": "evil.example"}, {"origin": "http://evil.example"}, {"origin": "null"}):
         assert client.post("/api/sessions", headers=headers).status_code == 403
-    assert client.get("/", headers={"host": "bench.test:2"}).status_code == 403
+    assert client.get("/", headers={"host": "app.test:2"}).status_code == 403
 
 
 @pytest.mark.parametrize(
@@ -65,8 +65,8 @@ def test_every_answer_forbids_what_is_not_ours(client, path):
     assert "cache-control" in answer.headers
 
 
-def test_data_are_not_cached(client, bench):
-    for path in (f"{bench}/data", f"{bench}/data/rigs/0", f"{bench}/data/rigs/0/runs/run0/cycle"):
+def test_data_are_not_cached(client, loaded):
+    for path in (f"{loaded}/data", f"{loaded}/data/rigs/0", f"{loaded}/data/rigs/0/runs/run0/cycle"):
         assert client.get(path).headers["cache-control"] == "no-store"
 
 
@@ -83,14 +83,14 @@ def test_nothing_but_the_page_is_served(client, path):
 
 
 def test_a_large_file_is_refused_before_it_is_sent(client, session):
-    drop = client.post(f"{session}/drops").json()["drop"]
-    answer = client.put(f"{session}/drops/{drop}/files?name=big.csv", content=bytes(FILE_LIMIT + 1))
+    upload = client.post(f"{session}/uploads").json()["upload"]
+    answer = client.put(f"{session}/uploads/{upload}/files?name=big.csv", content=bytes(FILE_LIMIT + 1))
     assert answer.status_code == 413
-    assert answer.json()["code"] == "E_DROP_SIZE"
+    assert answer.json()["code"] == "E_UPLOAD_SIZE"
 
 
 def test_a_large_file_of_unsaid_length_is_stopped_on_the_way(client, app, session):
-    drop = client.post(f"{session}/drops").json()["drop"]
+    upload = client.post(f"{session}/uploads").json()["upload"]
     sent = []
 
     def pieces():
@@ -98,7 +98,7 @@ def test_a_large_file_of_unsaid_length_is_stopped_on_the_way(client, app, sessio
             sent.append(1)
             yield bytes(1_000_000)
 
-    answer = client.put(f"{session}/drops/{drop}/files?name=big.csv", content=pieces())
+    answer = client.put(f"{session}/uploads/{upload}/files?name=big.csv", content=pieces())
     assert answer.status_code == 413
     assert not [path for path in app.state.sessions.folder.rglob("*") if path.is_file()]
 
@@ -117,8 +117,8 @@ HOSTILE = [
 
 @pytest.mark.parametrize("name", HOSTILE)
 def test_files_are_stored_under_names_made_here(client, app, session, name):
-    drop = client.post(f"{session}/drops").json()["drop"]
-    answer = client.put(f"{session}/drops/{drop}/files", params={"name": name}, content=b"1,2,3\n")
+    upload = client.post(f"{session}/uploads").json()["upload"]
+    answer = client.put(f"{session}/uploads/{upload}/files", params={"name": name}, content=b"1,2,3\n")
     assert answer.status_code == 200
     stored = [path for path in app.state.sessions.folder.rglob("*") if path.is_file()]
     assert len(stored) == 1
@@ -127,16 +127,16 @@ def test_files_are_stored_under_names_made_here(client, app, session, name):
     assert not stored[0].name.startswith(".")
 
 
-def test_sessions_do_not_see_each_other(client, bench):
+def test_sessions_do_not_see_each_other(client, loaded):
     other = f"/api/sessions/{client.post('/api/sessions').json()['session']}"
-    assert other != bench
+    assert other != loaded
     assert client.get(f"{other}/data").json()["code"] == "E_NO_DATA"
-    assert client.get(f"{bench}/data").status_code == 200
+    assert client.get(f"{loaded}/data").status_code == 200
 
 
 def test_a_session_that_ended_is_gone_with_its_files(client, app, session):
-    drop = client.post(f"{session}/drops").json()["drop"]
-    client.put(f"{session}/drops/{drop}/files?name=a.csv", content=b"1,2,3\n")
+    upload = client.post(f"{session}/uploads").json()["upload"]
+    client.put(f"{session}/uploads/{upload}/files?name=a.csv", content=b"1,2,3\n")
     folder = next(iter(app.state.sessions)).folder
     assert any(folder.rglob("*"))
     client.delete(session)
@@ -146,26 +146,26 @@ def test_a_session_that_ended_is_gone_with_its_files(client, app, session):
 
 
 def test_an_unused_session_is_swept(client, app, session):
-    app.state.sessions.sweep(idle_seconds=3600)
+    app.state.sessions.sweep(idle_s=3600)
     assert len(app.state.sessions) == 1
-    app.state.sessions.sweep(idle_seconds=-1)
+    app.state.sessions.sweep(idle_s=-1)
     assert len(app.state.sessions) == 0
 
 
 def test_stopping_leaves_nothing_behind(app):
     from fastapi.testclient import TestClient
 
-    with TestClient(app, base_url="http://bench.test:1", headers={"origin": "http://bench.test:1"}) as client:
+    with TestClient(app, base_url="http://app.test:1", headers={"origin": "http://app.test:1"}) as client:
         client.post("/api/sessions")
         assert app.state.sessions.folder.is_dir()
     assert not app.state.sessions.folder.exists()
 
 
-def test_a_fault_of_ours_shows_no_inside(client, session, monkeypatch, capsys):
+def test_an_internal_error_shows_no_details(client, session, monkeypatch, capsys):
     monkeypatch.setattr("mrdamper.web.api.data.bundled", lambda: 1 / 0)
     answer = client.get(f"{session}/data")
     assert answer.status_code == 500
-    assert answer.json()["code"] == "E_OURS"
+    assert answer.json()["code"] == "E_INTERNAL"
     assert "division" not in answer.text
     assert "division" in capsys.readouterr().err
     assert answer.headers["content-security-policy"] == HEADERS["Content-Security-Policy"]
@@ -178,8 +178,8 @@ def test_a_question_too_long_is_declined(client, session):
 
 
 def test_a_file_that_broke_off_does_not_stop_the_next(client, session):
-    drop = client.post(f"{session}/drops").json()["drop"]
-    path = f"{session}/drops/{drop}/files"
+    upload = client.post(f"{session}/uploads").json()["upload"]
+    path = f"{session}/uploads/{upload}/files"
     client.put(f"{path}?name=a.csv", content=b"1\n")
     assert client.put(f"{path}?name=big.csv", content=bytes(FILE_LIMIT + 1)).status_code == 413
     assert client.put(f"{path}?name=b.csv", content=b"1\n").status_code == 200
@@ -199,7 +199,7 @@ def test_the_page_announces_its_modules_and_no_more(client):
 def test_a_session_that_ends_while_it_is_asked_is_said_to_have_ended(client, app, session, monkeypatch, capsys):
     mine = app.state.sessions.find(session.rsplit("/", 1)[-1])
     monkeypatch.setattr(type(mine), "key", lambda self, kind: app.state.sessions.end(self.name) or kind)
-    answer = client.post(f"{session}/drops")  # its folder is gone by now
+    answer = client.post(f"{session}/uploads")  # its folder is gone by now
     assert (answer.status_code, answer.json()["code"]) == (410, "E_SESSION_ENDED")
     assert "Traceback" not in capsys.readouterr().err
 
@@ -215,7 +215,7 @@ def test_a_half_sent_request_opens_no_session(app):
     async def send(message):
         sent.append(message)
 
-    host = "bench.test:1"
+    host = "app.test:1"
     scope = {
         "type": "http", "asgi": {"version": "3.0"}, "http_version": "1.1", "method": "POST", "path": "/api/sessions",
         "raw_path": b"/api/sessions", "query_string": b"", "root_path": "", "scheme": "http",

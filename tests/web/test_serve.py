@@ -56,7 +56,7 @@ def test_it_starts_answers_and_stops_cleanly(tmp_path, name):
 
 
 def post(address, path, token):
-    headers = {"Origin": address.rstrip("/"), "X-Bench-Token": token}
+    headers = {"Origin": address.rstrip("/"), "X-App-Token": token}
     request = urllib.request.Request(f"{address}api/sessions{path}", b"", headers)
     with urllib.request.urlopen(request, timeout=20) as answer:
         return json.load(answer)
@@ -139,8 +139,8 @@ def test_the_help_shows_an_example():
     ids=["head", "nothing", "second head", "header", "body"],
 )
 def test_half_sent_requests_are_given_up(monkeypatch, sent, answer):
-    monkeypatch.setattr(server, "HALF_SENT_S", 0.3)
-    monkeypatch.setattr(security, "HALF_SENT_S", 0.3)
+    monkeypatch.setattr(server, "HEAD_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(security, "MAX_PAUSE_S", 0.3)
     with (
         served(timeout_keep_alive=0.3) as address,
         socket.create_connection(("127.0.0.1", int(address.rsplit(":", 1)[1])), 10) as line,

@@ -173,12 +173,14 @@ def scope(damper: Damper, level: float) -> str:
 
 
 def no_band(damper: Damper) -> str:
-    """Reason why there is no band."""
+    """Reason why there is no prediction interval."""
     if not damper.fitted_parameters:
-        return "no band: the uncertainty of a model of this kind is not known"
-    if damper.uncertainty is None:
-        return "no band: the model was saved without its covariance; mrdamper study --model NAME saves it"
-    return "no band: its runs are too few to show how runs differ; test more conditions, on another day too"
+        reason = "the uncertainty of a model of this kind is not known"
+    elif damper.uncertainty is None:
+        reason = "the model was saved without its covariance; mrdamper study --model NAME saves it"
+    else:
+        reason = "its runs are too few to show how runs differ; test more conditions, on another day too"
+    return f"no prediction interval: {reason}"
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The application: guard, views, page, and an end that leaves nothing behind."""
+"""The application: routes, error responses, and the removal of all files at its end."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -24,17 +23,17 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mrdamper.errors import InputError, MissingExtraError
 from mrdamper.web.api import routers
-from mrdamper.web.jobs import refusal
+from mrdamper.web.jobs import error_parts
 from mrdamper.web.page import STATIC, PageFiles, page
 from mrdamper.web.security import Guard
 from mrdamper.web.sessions import BrowserSessions
-from mrdamper.web.uploads import NothingTakenError
+from mrdamper.web.uploads import AllRefusedError
 
-_SWEEP_SECONDS = 60.0
-# Two arenas (M_ARENA_MAX), as one a thread keeps what each has held; arrays of 256 KB and more
+_SWEEP_S = 60.0
+# Two arenas (M_ARENA_MAX), as one a thread keeps all it has held; arrays of 256 KB and more
 # (M_MMAP_THRESHOLD) return to the system when they are freed.
 _ALLOCATOR = {-8: 2, -3: 1 << 18}
-_STATUS = {"E_SESSION_ENDED": 410, "E_DROP_SIZE": 413}
+_STATUS = {"E_SESSION_ENDED": 410, "E_UPLOAD_SIZE": 413}
 
 
 def create_app(
@@ -45,36 +44,36 @@ def create_app(
 ) -> FastAPI:
     """Make the application; raises `MissingExtraError` if the chart library is not installed.
 
-    `hosts`: values of the Host header that are this app, with the port. `stopping`: true once the server is about to
-    stop, so that open streams end. `read_ahead`: the first session reads the bundled tests before they are asked for.
-    `token`: what a page has to show to open a session. It is part of the printed address, so that other users of this
-    machine cannot open one; without a token, anybody who reaches the app can.
+    `hosts`: accepted values of the Host header, with the port. `stopping`: true once the server is about to stop, so
+    that open streams end. `read_ahead`: the first session reads the bundled tests before they are requested. `token`:
+    required to open a session. It is part of the printed address, so that other users of this machine cannot open one;
+    without a token, everybody who reaches the app can.
     """
-    chart_library = plotly_script().read_bytes()  # sent in one piece: the first picture waits for it
+    chart_library = plotly_script().read_bytes()  # sent in one piece: the first chart waits for it
     sessions = BrowserSessions()
 
     @asynccontextmanager
-    async def life(app: FastAPI) -> AsyncIterator[None]:
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         for option, value in _ALLOCATOR.items():
-            _of_the_allocator("mallopt", option, value)
+            _call_allocator("mallopt", option, value)
         sweeper = asyncio.create_task(_sweep(sessions))
         yield
         sweeper.cancel()
         sessions.close()
 
-    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, redirect_slashes=False, lifespan=life)
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, redirect_slashes=False, lifespan=lifespan)
     app.state.sessions, app.state.stopping = sessions, stopping
     app.state.read_ahead, app.state.token = read_ahead, token
-    app.add_exception_handler(InputError, _refuse)
-    app.add_exception_handler(RequestValidationError, _misunderstand)
-    app.add_exception_handler(HTTPException, _decline)
+    app.exception_handler(InputError)(_input_error)
+    app.exception_handler(RequestValidationError)(_invalid_request)
+    app.exception_handler(HTTPException)(_http_error)
     for router in routers():
         app.include_router(router, prefix="/api")
 
     front = HTMLResponse(page(), headers={"Cache-Control": "no-cache"})
 
     @app.get("/")
-    async def first() -> HTMLResponse:
+    async def front_page() -> HTMLResponse:
         return front
 
     @app.get("/static/plotly.js")
@@ -82,13 +81,13 @@ def create_app(
         return Response(chart_library, media_type="text/javascript", headers={"Cache-Control": "max-age=3600"})
 
     app.mount("/static", PageFiles(directory=STATIC))
-    app.add_middleware(_Faults)
+    app.add_middleware(_InternalErrors)
     app.add_middleware(Guard, hosts=tuple(hosts))
     return app
 
 
 def plotly_script() -> Path:
-    """Return the chart library's script inside the plotly package, found without importing it.
+    """Return the script of the chart library inside the plotly package, found without importing it.
 
     Raises `MissingExtraError` if the package is not installed.
     """
@@ -101,52 +100,45 @@ def plotly_script() -> Path:
 
 async def _sweep(sessions: BrowserSessions) -> None:
     while True:
-        await asyncio.sleep(_SWEEP_SECONDS)
+        await asyncio.sleep(_SWEEP_S)
         await asyncio.to_thread(sessions.sweep)
-        await asyncio.to_thread(_give_memory_back)
+        await asyncio.to_thread(_return_memory)
 
 
-def _give_memory_back() -> None:
+def _return_memory() -> None:
     """Return the memory of ended sessions to the system; the allocator would keep it."""
     gc.collect()
-    _of_the_allocator("malloc_trim", 0)
+    _call_allocator("malloc_trim", 0)
 
 
-def _of_the_allocator(name: str, *arguments: int) -> None:
-    """Call one of its functions, where this system's C library has it."""
+def _call_allocator(name: str, *arguments: int) -> None:
+    """Call a function of the allocator where the C library of this system has it."""
     if sys.platform == "linux":
         with contextlib.suppress(OSError, AttributeError):
             getattr(ctypes.CDLL(None), name)(*arguments)
 
 
-def _refuse(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, InputError)
-    return _refusal(error)
+def _input_error(request: Request | None, error: InputError) -> JSONResponse:
+    more = {}
+    if isinstance(error, AllRefusedError):
+        more = {"verdicts": [asdict(v) for v in error.verdicts], "profile": error.profile}
+    return JSONResponse({**error_parts(error), **more}, status_code=_STATUS.get(error.code, 422))
 
 
-def _refusal(error: InputError) -> JSONResponse:
-    body: dict[str, Any] = dict(refusal(error))
-    if isinstance(error, NothingTakenError):
-        body |= {"verdicts": [asdict(v) for v in error.verdicts], "profile": error.profile}
-    return JSONResponse(body, status_code=_STATUS.get(error.code, 422))
-
-
-def _decline(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, HTTPException)
+def _http_error(request: Request, error: HTTPException) -> JSONResponse:
     return JSONResponse({"text": error.detail, "code": f"E_{error.status_code}"}, status_code=error.status_code)
 
 
-def _misunderstand(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, RequestValidationError)
+def _invalid_request(request: Request, error: RequestValidationError) -> JSONResponse:
     first = error.errors()[0]
     where = ".".join(str(part) for part in first["loc"][1:])
-    return JSONResponse(refusal(InputError(first["msg"], where=where, code="E_REQUEST")), status_code=422)
+    return _input_error(request, InputError(first["msg"], where=where, code="E_REQUEST"))
 
 
-class _Faults:
-    """Our own faults: traced on the terminal, admitted on the page, the inside kept in.
+class _InternalErrors:
+    """Response to an internal error: the terminal shows the traceback, the page a message without details.
 
-    Inside the guard, so that this answer too carries its headers.
+    Inside the guard, which adds its headers to this response too.
     """
 
     def __init__(self, app: ASGIApp):
@@ -163,24 +155,24 @@ class _Faults:
         try:
             await self.app(scope, receive, watched)
         except ClientDisconnect:
-            return  # an upload that broke off: nobody is left to answer
+            return  # an interrupted upload: nobody receives a response
         except Exception:
-            if not begun and (ended := _ended(scope)):
+            if not begun and (ended := _session_ended(scope)):
                 await ended(scope, receive, send)
                 return
             traceback.print_exc(file=sys.stderr)
             if scope["type"] != "http" or begun:
                 raise
             text = "Internal error (please report); the details are in the terminal."
-            await JSONResponse({"text": text, "code": "E_OURS"}, status_code=500)(scope, receive, send)
+            await JSONResponse({"text": text, "code": "E_INTERNAL"}, status_code=500)(scope, receive, send)
 
 
-def _ended(scope: Scope) -> JSONResponse | None:
-    """Return the answer to a request whose session has ended; None where it named no session."""
+def _session_ended(scope: Scope) -> JSONResponse | None:
+    """Return the response to a request whose session has ended; None where it named no session."""
     try:
         scope["app"].state.sessions.find(scope["path_params"]["session"])
     except InputError as error:
-        return _refusal(error)
+        return _input_error(None, error)
     except KeyError:
-        return None  # it asked for no session
+        return None
     return None

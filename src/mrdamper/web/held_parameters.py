@@ -1,4 +1,4 @@
-"""A damper under the sliders: its model at a condition, with some parameters held by hand."""
+"""Sliders of a damper: its model at a condition, with some parameters held by the user."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mrdamper.data.parameters import ParameterInfo
 from mrdamper.errors import ParameterError
 from mrdamper.physics.simulation import ForceLaw, Response, steady_loop
 
-_DECADES = 10.0  # a slider without bounds reaches this factor up and down, or twice the value
+_RANGE = 10.0  # factor from the value to the ends of a logarithmic slider
 
 
 def held_model(damper: Damper, condition: Condition, held: Mapping[str, float]) -> ForceLaw:
@@ -25,29 +25,28 @@ def held_model(damper: Damper, condition: Condition, held: Mapping[str, float]) 
     model = damper.model_at(condition)
     if not held:
         return model
-    values = model.values()
     for name in held:
-        if name not in values:
+        if name not in model.values():
             raise ParameterError(f"this damper has no parameter {name!r}", remedy="load the page again")
     return replace(model, **held)  # type: ignore[type-var]
 
 
-def loop_held(damper: Damper, condition: Condition, held: Mapping[str, float]) -> Response:
-    """Steady loop at a condition; raises as `held_model`."""
+def held_loop(damper: Damper, condition: Condition, held: Mapping[str, float]) -> Response:
+    """Return the steady loop at a condition; raises as `held_model`."""
     return steady_loop(held_model(damper, condition, held), condition) if held else damper.loop(condition)
 
 
 def predict_held(damper: Damper, condition: Condition, held: Mapping[str, float]) -> Prediction:
-    """Steady loop at a condition with its flags; raises as `held_model`."""
-    loop = loop_held(damper, condition, held)
+    """Predict the steady loop at a condition with its flags; raises as `held_model`."""
+    loop = held_loop(damper, condition, held)
     return Prediction(loop.excitation, loop.force, condition, damper.envelope.flags(condition), steady=True)
 
 
 def as_damper(damper: Damper, held: Mapping[str, float]) -> Damper:
-    """Return the damper with the held parameters made its own.
+    """Return a damper that has the held parameters.
 
-    Raises `InputError` if a held parameter is not one the damper is made of: a function of the condition gives
-    another coordinate, from which it follows.
+    Raises `InputError` if a held parameter is not one of the damper but follows from a function of the condition
+    for another coordinate.
     """
     if not held:
         return damper
@@ -56,30 +55,28 @@ def as_damper(damper: Damper, held: Mapping[str, float]) -> Damper:
 
 
 def sliders(damper: Damper) -> list[dict[str, Any]]:
-    """One slider a parameter, at the middle of the tested conditions."""
+    """Describe a slider per parameter, at the middle of the tested conditions."""
     model = damper.model_at(damper.envelope.middle)
-    return [
-        {
-            "name": info.name,
-            "unit": info.unit,
-            "meaning": info.meaning,
-            "preset": info.preset,
-            "value": value,
-            "scale": "log" if info.scale == "log" and value > 0 else "linear",
-            "low": low,
-            "high": high,
-            "bounds": [finite(bound) for bound in info.bounds],
-        }
-        for info in model.parameters()
-        for value in (float(model.values()[info.name]),)
-        for low, high in (reach(info, value),)
-    ]
+    described = []
+    for info in model.parameters():
+        value = float(model.values()[info.name])
+        low, high = slider_ends(info, value)
+        described.append({
+            **{name: getattr(info, name) for name in ("name", "unit", "meaning", "preset")},
+            "value": value, "low": low, "high": high, "bounds": [finite(bound) for bound in info.bounds],
+            "scale": "log" if _logarithmic(info, value) else "linear",
+        })  # fmt: skip
+    return described
 
 
-def reach(info: ParameterInfo, value: float) -> tuple[float, float]:
-    """Return ends of a parameter's slider [its unit]: its bounds, or as far as a look makes sense."""
+def slider_ends(info: ParameterInfo, value: float) -> tuple[float, float]:
+    """Return the ends of a slider [unit of the parameter]: a range around the value inside the bounds."""
     low, high = info.bounds
-    if info.scale == "log" and value > 0:
-        return max(low, value / _DECADES), min(high, value * _DECADES)
+    if _logarithmic(info, value):
+        return max(low, value / _RANGE), min(high, value * _RANGE)
     span = 2 * abs(value) or 1.0
     return max(low, value - span), min(high, value + span)
+
+
+def _logarithmic(info: ParameterInfo, value: float) -> bool:
+    return info.scale == "log" and value > 0

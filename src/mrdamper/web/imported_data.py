@@ -1,6 +1,6 @@
-"""From dropped files to data on the bench: a dataset folder, or the files of a test rig.
+"""Data of a session: the bundled tests, or uploaded files of a dataset folder or a test rig.
 
-Files arrive under names made here; the names they came with are text to be shown and nothing else.
+Files are stored under names made here; the names on the user's computer are text to show and nothing else.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from mrdamper.errors import InputError
 from mrdamper.rig_files.dataset_folder import load_dataset
 from mrdamper.rig_files.dataset_samples import SAMPLE_FILES
 from mrdamper.web.rig_upload import read_rig_files
-from mrdamper.web.uploads import ImportedData, NothingTakenError, Upload, UploadError
+from mrdamper.web.uploads import AllRefusedError, ImportedData, Upload, UploadError
 
 RUNS_FILE = "runs.csv"
 _READING = threading.Lock()
@@ -27,7 +27,7 @@ _READING = threading.Lock()
 
 def bundled() -> ImportedData:
     """Return the bundled tests: read once, shared by every session, since runs are frozen."""
-    with _READING:  # the bench reads them ahead while a page may ask
+    with _READING:  # they are read ahead while a page may request them
         return _bundled()
 
 
@@ -47,41 +47,33 @@ def bundled_dampers() -> tuple[Damper, ...]:
 def read_upload(
     upload: Upload, profile: str = "", refused_only: bool = False, only: Path | None = None
 ) -> ImportedData:
-    """Make data of a drop; raises `InputError` with the names the files came with.
+    """Read uploaded files; raises `InputError` with their names on the user's computer.
 
-    `profile` is a rig profile as TOML that replaces the guessed one; empty to guess. With `refused_only` the rig files
-    that were taken before are kept and the refused ones read; with `only`, that file is, and the others stay.
+    `profile` is a rig profile as TOML that replaces the guessed one; empty to guess. With `refused_only` the refused
+    rig files are read and those taken are kept; with `only`, that file is read, and the others are kept.
     """
     if not upload.names:
         raise UploadError("no files", remedy="drop rig files, or a dataset folder")
+    wanted = (RUNS_FILE, *SAMPLE_FILES)
+    parts = {name: path for path in upload.names if (name := PurePosixPath(upload.names[path]).name) in wanted}
     try:
-        parts = _dataset_parts(upload.names)
-        return _read_dataset(upload, parts) if parts else read_rig_files(upload, profile, refused_only, only)
-    except NothingTakenError:
+        if RUNS_FILE in parts:
+            return _read_dataset(upload, parts)
+        return read_rig_files(upload, profile, refused_only, only)
+    except AllRefusedError:
         raise
     except InputError as error:
-        raise InputError(
-            upload.named(error.found),
-            where=upload.named(error.where),
-            remedy=upload.named(error.remedy),
-            code=error.code,
-        ) from error
-
-
-def _dataset_parts(names: Mapping[Path, str]) -> dict[str, Path]:
-    """Return the files of a dataset folder by the names they must have; empty if this is none."""
-    wanted = (RUNS_FILE, *SAMPLE_FILES)
-    parts = {PurePosixPath(name).name: path for path, name in names.items() if PurePosixPath(name).name in wanted}
-    return parts if RUNS_FILE in parts else {}
+        problem, where, remedy = map(upload.with_user_names, (error.found, error.where, error.remedy))
+        raise InputError(problem, where=where, remedy=remedy, code=error.code) from error
 
 
 def _read_dataset(upload: Upload, parts: Mapping[str, Path]) -> ImportedData:
-    top = PurePosixPath(upload.names[parts[RUNS_FILE]]).parent.name
+    name = PurePosixPath(upload.names[parts[RUNS_FILE]]).parent.name
     folder = upload.folder / "dataset"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
-    for name, path in parts.items():
-        (folder / name).hardlink_to(path)
-    upload.names[folder] = top or "the dropped dataset"
+    for part, path in parts.items():
+        (folder / part).hardlink_to(path)
+    upload.names[folder] = name or "the dropped dataset"
     dataset = load_dataset(folder)
-    return ImportedData(Dataset(dataset.runs, top or "dropped dataset"), "drop")
+    return ImportedData(Dataset(dataset.runs, name or "dropped dataset"), "upload")

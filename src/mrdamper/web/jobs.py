@@ -1,7 +1,6 @@
-"""Long work in a process of its own: told apart, watched, and stopped when nobody wants it.
+"""Jobs: long work in a process of its own, with progress, that ends when it is cancelled.
 
-The page stays answered while a study runs, and a cancelled one costs nothing more. A task is
-a module-level function `task(tell, *arguments)` of `tasks.py`; `tell(what, share)` reports.
+A job runs a module-level function `task(progress, *arguments)` of `tasks.py`; `progress(step, share)` reports.
 """
 
 from __future__ import annotations
@@ -20,28 +19,27 @@ from mrdamper.data.child import end_with_parent
 from mrdamper.errors import InputError
 from mrdamper.study.processes import SPAWNED
 
-_AT_ONCE = max(1, os.cpu_count() or 1)  # processes of all sessions together
-_NICENESS = 15  # of workers, so that the page is answered first
-_BETWEEN = 0.05  # seconds between two reports: a page shows no more
-_FREE = threading.BoundedSemaphore(_AT_ONCE)
+_MAX_PROCESSES = max(1, os.cpu_count() or 1)  # of all sessions together
+_NICENESS = 15  # of workers: the page has priority
+_REPORT_INTERVAL_S = 0.05
+_FREE = threading.BoundedSemaphore(_MAX_PROCESSES)
 
 
 @dataclass(eq=False)
 class Job:
-    """One piece of long work."""
+    """A task in a worker process."""
 
-    key: str  # made by the session
-    kind: str  # what it is about
+    key: str
+    kind: str
     task: Callable[..., Any]
     arguments: tuple[Any, ...]
-    conclude: Callable[[Any], dict[str, Any]]
-    recall: Callable[[], Any] = lambda: None  # a result that is known already, asked for when it is this work's turn
-    # "waiting", "running", "done", "refused" (by the input), "failed" (our fault) or "cancelled"
-    state: str = "waiting"
-    what: str = "waiting for a free processor"  # is being done
-    share: float = 0.0  # of it that is done, 0...1
-    error: dict[str, str] | None = None  # as the page shows it
-    answer: dict[str, Any] | None = None  # what the page is told at the end
+    conclude: Callable[[Any], dict[str, Any]]  # stores the result of the task, and returns that for the page
+    stored: Callable[[], Any] = lambda: None  # an earlier result of the same task, looked up when it is this job's turn
+    state: str = "waiting"  # or "running", "done", "refused" (invalid input), "failed" (internal error), "cancelled"
+    step: str = "waiting for a free processor"
+    share: float = 0.0  # completed, 0...1
+    error: dict[str, str] | None = None
+    result: dict[str, Any] | None = None  # for the page
     began: float = field(default_factory=time.monotonic)
     seconds: float = 0.0
     _process: Any = None
@@ -51,91 +49,79 @@ class Job:
 
     def start(self) -> Job:
         """Begin; returns at once."""
-        self._thread = threading.Thread(target=self._watch, name=f"bench-{self.kind}", daemon=True)
+        self._thread = threading.Thread(target=self._follow, name=f"job-{self.kind}", daemon=True)
         self._thread.start()
         return self
 
     def wait(self, seconds: float) -> None:
-        """Until it has ended, but no longer than so."""
+        """Wait for the end, no longer than some time."""
         if self._thread is not None:
             self._thread.join(seconds)
 
     @property
     def ended(self) -> bool:
-        """True once the work has ended."""
+        """True once the job has ended."""
         return self.state not in ("waiting", "running")
 
     def cancel(self) -> None:
-        """Stop the process; harmless where it has ended."""
+        """Stop the process; harmless after its end."""
         self._stop.set()
-        with self._starting:  # one that is half started cannot be ended, and would complain when left alone
+        with self._starting:  # a process can be ended only after its start is complete
             if self._process is not None and self._process.is_alive():
                 _end_group(self._process)
 
     def report(self) -> dict[str, Any]:
-        """Return the state of the work as the page shows it."""
+        """Return the state of the job for the page."""
         seconds = self.seconds if self.ended else time.monotonic() - self.began
-        return {
-            "key": self.key,
-            "kind": self.kind,
-            "state": self.state,
-            "what": self.what,
-            "share": round(self.share, 4),
-            "seconds": round(seconds, 1),
-            "error": self.error,
-            "answer": self.answer,
-        }
+        shown = {name: getattr(self, name) for name in ("key", "kind", "state", "step", "error", "result")}
+        return {**shown, "share": round(self.share, 4), "seconds": round(seconds, 1)}
 
-    def _watch(self) -> None:
+    def _follow(self) -> None:
         while not _FREE.acquire(timeout=0.1):
             if self._stop.is_set():
-                self._end("cancelled")
-                return
+                return self._end("cancelled")
         try:
             if self._stop.is_set():
                 self._end("cancelled")
-            elif (result := self.recall()) is not None:
+            elif (result := self.stored()) is not None:
                 self._conclude(result)
             else:
                 self._run()
         except Exception:
-            self._fail(traceback.format_exc())  # a page waits for this: say how it ended
+            self._fail(traceback.format_exc())  # the page waits for an end
         finally:
             _FREE.release()
 
     def _run(self) -> None:
-        self.state, self.what = "running", "starting"
-        here, there = SPAWNED.Pipe(duplex=False)
+        self.state, self.step = "running", "starting"
+        reports, sender = SPAWNED.Pipe(duplex=False)
         with self._starting:
-            self._process = SPAWNED.Process(target=_work, args=(there, self.task, self.arguments))
+            self._process = SPAWNED.Process(target=_work, args=(sender, self.task, self.arguments))
             self._process.start()
-        there.close()
-        if self._stop.is_set():  # cancelled while it was being started
+        sender.close()
+        if self._stop.is_set():  # cancelled during the start
             _end_group(self._process)
         try:
-            self._listen(here)
+            self._receive(reports)
         finally:
-            here.close()
+            reports.close()
             self._process.join()
-            with self._starting:  # its descriptors would stay for as long as the report is kept
+            with self._starting:  # its descriptors would stay open as long as the report is kept
                 self._process.close()
                 self._process = None
 
-    def _listen(self, here: Connection) -> None:
+    def _receive(self, reports: Connection) -> None:
         while True:
             try:
-                kind, *content = here.recv()
+                kind, *content = reports.recv()
             except EOFError:
-                if self._stop.is_set():
-                    return self._end("cancelled")
-                return self._lose()
-            if kind == "tell":
-                self.what, self.share = content
+                return self._end("cancelled") if self._stop.is_set() else self._report_lost_worker()
+            if kind == "progress":
+                self.step, self.share = content
             elif kind == "done":
                 return self._conclude(content[0])
             elif kind == "refused":
-                self.error = content[0]
-                return self._end("refused")
+                return self._end("refused", content[0])
             else:
                 return self._fail(content[0])
 
@@ -143,71 +129,63 @@ class Job:
         if self._stop.is_set():
             return self._end("cancelled")
         try:
-            self.answer = self.conclude(result)
+            self.result = self.conclude(result)
         except Exception:
             return self._fail(traceback.format_exc())
         self.share = 1.0
         return self._end("done")
 
-    def _lose(self) -> None:
-        """Report a worker that ended without a result: the system or a user ended it."""
+    def _report_lost_worker(self) -> None:
         self._process.join()
         code = self._process.exitcode
         how = f"by signal {-code}" if code and code < 0 else f"with code {code}"
-        lost = InputError(
-            f"the worker process was ended from outside, {how}",
-            remedy="start it again; where memory ran short, close other programs or take fewer runs",
-            code="E_WORKER",
-        )
-        self.error = refusal(lost)
-        self._end("failed")
+        remedy = "start it again; where memory ran short, close other programs or take fewer runs"
+        error = InputError(f"the worker process was ended from outside, {how}", remedy=remedy, code="E_WORKER")
+        self._end("failed", error_parts(error))
 
     def _fail(self, trace: str) -> None:
         print(trace, flush=True)
-        self.error = {
-            "text": "The work stopped on an error of ours, not yours. The terminal shows the details.",
-            "code": "E_OURS",
-        }
-        self._end("failed")
+        text = "The job stopped on an internal error (please report); the details are in the terminal."
+        self._end("failed", {"text": text, "code": "E_INTERNAL"})
 
-    def _end(self, state: str) -> None:
-        self.seconds = time.monotonic() - self.began
+    def _end(self, state: str, error: dict[str, str] | None = None) -> None:
+        self.error, self.seconds = error, time.monotonic() - self.began
         self.state = state  # last: whoever sees it finds the rest in place
 
 
-def refusal(error: InputError) -> dict[str, str]:
-    """Return an error of the input in the parts the page shows."""
+def error_parts(error: InputError) -> dict[str, str]:
+    """Return an error of the input in the parts that the page shows."""
     return {"text": str(error), "found": error.found, "where": error.where, "remedy": error.remedy, "code": error.code}
 
 
 def _end_group(process: Any) -> None:
-    """End a worker and the processes it started; a task may run a pool of its own."""
+    """End a worker and the processes it started, as a task may run a pool of its own."""
     try:
         os.killpg(process.pid, signal.SIGTERM)
     except (AttributeError, ProcessLookupError, PermissionError):
-        process.terminate()  # no process groups here, or not yet one of its own
+        process.terminate()  # no process groups on this system, or the worker has none yet
 
 
 def _work(pipe: Connection, task: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
-    """Run a task and send what comes of it: the body of the worker process."""
+    """Run a task and send its reports and result: the worker process."""
     if hasattr(os, "setsid"):
-        os.setsid()  # a group of its own, so that cancelling reaches the processes a task starts
+        os.setsid()  # a group of its own, so that cancelling ends the processes of the task too
         os.nice(_NICENESS)
     end_with_parent(group=True)
     last = 0.0
 
-    def tell(what: str, share: float) -> None:
+    def progress(step: str, share: float) -> None:
         nonlocal last
         now = time.monotonic()
-        if now - last > _BETWEEN:
+        if now - last > _REPORT_INTERVAL_S:
             last = now
-            pipe.send(("tell", what, float(share)))
+            pipe.send(("progress", step, float(share)))
 
     try:
-        pipe.send(("done", task(tell, *arguments)))
+        pipe.send(("done", task(progress, *arguments)))
     except InputError as error:
-        pipe.send(("refused", refusal(error)))
+        pipe.send(("refused", error_parts(error)))
     except (BrokenPipeError, KeyboardInterrupt):
-        return  # the bench has gone
+        return  # the app has ended
     except Exception:
         pipe.send(("failed", traceback.format_exc()))

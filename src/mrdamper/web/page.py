@@ -1,4 +1,4 @@
-"""The page and its own files."""
+"""The page and its files."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
 STATIC = Path(__file__).parent / "static"
-mimetypes.add_type("text/javascript", ".js")  # what a system's registry says of scripts differs, and browsers insist
+mimetypes.add_type("text/javascript", ".js")  # systems register other types, which browsers refuse
 
 
 class PageFiles(StaticFiles):
-    """Serves the folder of the page; browsers ask each time whether a file has changed, so that an update is seen."""
+    """Files of the page; browsers check each time whether they have changed, for an update of the package."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         """Return the file of that path."""
@@ -24,7 +24,7 @@ class PageFiles(StaticFiles):
 
 
 def page() -> str:
-    """Return the page, with every module announced: fetched at once instead of one import after the other."""
+    """Return the page with a preload link for every module, so that all are fetched at once."""
     modules = [path.relative_to(STATIC).as_posix() for path in sorted(STATIC.rglob("*.js"))]
     links = "".join(f'  <link rel="modulepreload" href="/static/{name}">\n' for name in modules)
     return (STATIC / "index.html").read_text(encoding="utf-8").replace("</head>", f"{links}</head>")

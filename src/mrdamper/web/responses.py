@@ -1,4 +1,4 @@
-"""Answers to the page: numbers as a JSON head and 32-bit floats one after the other, and files to be saved.
+"""Responses to the page: arrays of 32-bit floats behind a JSON head, and files to save.
 
 A screen shows no more than 32 bits of a curve, and the page reads the arrays without parsing.
 """
@@ -18,11 +18,11 @@ from starlette.responses import Response
 
 from mrdamper.data import Floats
 
-_STEP = 4  # bytes a float32 takes; a typed array must begin at a multiple
+_FLOAT_BYTES = 4  # a typed array begins at a multiple
 
 
 def frame(head: Mapping[str, Any], arrays: Mapping[str, Floats]) -> Response:
-    """Answer with named arrays (N,), and with a head that is ready for JSON.
+    """Return named arrays (N,) and a head of JSON values.
 
     Layout: length of the head (uint32, little endian), the head as JSON padded with blanks to a
     multiple of four bytes, then the arrays as little-endian float32 in the order of
@@ -30,8 +30,8 @@ def frame(head: Mapping[str, Any], arrays: Mapping[str, Floats]) -> Response:
     """
     index = [[name, int(values.size)] for name, values in arrays.items()]
     text = json.dumps({**head, "arrays": index}, ensure_ascii=False, allow_nan=False).encode()
-    text += b" " * (-len(text) % _STEP)
-    with np.errstate(over="ignore"):  # of single precision: drawn as infinite, which is no point
+    text += b" " * (-len(text) % _FLOAT_BYTES)
+    with np.errstate(over="ignore"):  # in single precision infinite, which is not drawn
         body = b"".join(np.ascontiguousarray(values, dtype="<f4").tobytes() for values in arrays.values())
     return Response(struct.pack("<I", len(text)) + text + body, media_type="application/octet-stream")
 
@@ -40,7 +40,7 @@ _FACTORS = {"N": 1.0, "kN": 1e-3, "lbf": 1 / 4.4482216152605, "m": 1.0, "mm": 1e
 
 
 def in_units(rows: Sequence[Mapping[str, Any]], force: str, length: str) -> list[dict[str, Any]]:
-    """Rows of a prediction with forces and lengths in other units, said in their columns; in mm, velocities in m/s."""
+    """Convert rows of a prediction, and their names, to other units; with mm, velocities are in m/s."""
     speed = "m" if length == "mm" else length
     columns = {
         "displacement_m": (f"displacement_{length}", _FACTORS[length]),
@@ -54,18 +54,18 @@ def in_units(rows: Sequence[Mapping[str, Any]], force: str, length: str) -> list
 
 
 def download(content: bytes, name: str, kind: str) -> Response:
-    """One file."""
+    """Return one file to save."""
     return Response(content, media_type=kind, headers={"Content-Disposition": f'attachment; filename="{name}"'})
 
 
 def archive(written: Sequence[Path], name: str) -> Response:
-    """Files of one folder, named as they stand in it, the first at its top."""
+    """Return the files of a folder as a zip with their relative paths; the first file is at its top."""
     top = written[0].parent
     return zipped({f"{name}/{path.relative_to(top).as_posix()}": path.read_bytes() for path in written}, f"{name}.zip")
 
 
 def zipped(files: Mapping[str, bytes], name: str) -> Response:
-    """Several files by their names."""
+    """Return files by their names as a zip."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for inside, content in files.items():

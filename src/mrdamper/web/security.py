@@ -1,9 +1,8 @@
 """Access to the server, and the content that the page may load.
 
-The bench listens on the loopback device, but any page in the same browser can reach that:
-a request must name this host (against DNS rebinding) and, if it changes something, come from
-the bench's own page (against forged requests). The page itself may load nothing from
-elsewhere and run no inline script or style.
+The app listens on the loopback device, but any page in the same browser can reach that: a request
+must name this host (against DNS rebinding) and, if it changes something, come from the app's own page
+(against forged requests). The page itself may load nothing from elsewhere and run no inline script or style.
 """
 
 from __future__ import annotations
@@ -38,16 +37,16 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
 }
-FORM_LIMIT = 5_000_000  # bytes of a question; files come by PUT and stream under a limit of their own
-HALF_SENT_S = 30.0  # between two pieces of a body
-_HARMLESS = frozenset({"GET", "HEAD"})
-_OWN_SITES = frozenset({"same-origin", "none"})  # what a browser says of our page, and of a typed address
+FORM_LIMIT = 5_000_000  # bytes of a request body; files come by PUT and have a limit of their own
+MAX_PAUSE_S = 30.0  # between two pieces of a body
+_SAFE_METHODS = frozenset({"GET", "HEAD"})
+_OWN_SITES = frozenset({"same-origin", "none"})  # sec-fetch-site of the app's page, and of a typed address
 
 
 class Guard:
-    """Refuse strangers, and send every answer with the headers above.
+    """Refuse foreign requests, and add the headers above to every response.
 
-    `hosts` are the values of the Host header that are this bench, with the port.
+    `hosts`: accepted values of the Host header, with the port.
     """
 
     def __init__(self, app: ASGIApp, hosts: Iterable[str]):
@@ -57,24 +56,24 @@ class Guard:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
-            # Nothing here speaks WebSocket; start and stop of the application pass.
+            # WebSocket is not used; start and stop of the application pass.
             if scope["type"] == "lifespan":
                 await self.app(scope, receive, send)
             return
         headers = Headers(scope=scope)
         refusal = self.refusal(scope["method"], headers)
-        received, whole = 0, False
+        received, complete = 0, False
 
         async def receive_some() -> Message:
-            nonlocal received, whole
-            try:  # once the body is there, the next message is the end of the connection: any time
-                message = await asyncio.wait_for(receive(), None if whole else HALF_SENT_S)
+            nonlocal received, complete
+            try:  # after the body, the next message is the end of the connection, whenever it comes
+                message = await asyncio.wait_for(receive(), None if complete else MAX_PAUSE_S)
             except TimeoutError:
-                raise HTTPException(408, "the request did not go on") from None
-            whole = whole or not message.get("more_body", False)
+                raise HTTPException(408, "the request was not completed in time") from None
+            complete = complete or not message.get("more_body", False)
             received += len(message.get("body", b""))
             if received > FORM_LIMIT and scope["method"] != "PUT":
-                raise HTTPException(413, "the question is too long")
+                raise HTTPException(413, "the request is too long")
             return message
 
         async def send_guarded(message: Message) -> None:
@@ -86,7 +85,7 @@ class Guard:
             await send(message)
 
         if refusal:
-            body = {"text": refusal, "code": "E_STRANGER"}
+            body = {"text": refusal, "code": "E_FORBIDDEN"}
             await JSONResponse(body, status_code=403)(scope, receive, send_guarded)
         else:
             await self.app(scope, receive_some, send_guarded)
@@ -94,12 +93,12 @@ class Guard:
     def refusal(self, method: str, headers: Headers) -> str | None:
         """Return the reason a request is refused, or None."""
         if headers.get("host", "").lower() not in self.hosts:
-            return "This host name is not the bench's."
+            return "This host name is not that of the app."
         if headers.get("sec-fetch-site", "same-origin") not in _OWN_SITES:
-            return "Other pages may not use the bench."
+            return "Other pages may not use the app."
         origin = headers.get("origin")
-        if method in _HARMLESS and origin is None:
+        if method in _SAFE_METHODS and origin is None:
             return None
         if origin not in self.origins:
-            return "Changes are taken from the bench's own page only."
+            return "Changes are accepted from the app's own page only."
         return None

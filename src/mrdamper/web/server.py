@@ -1,4 +1,4 @@
-"""Run the bench on this machine, and only there."""
+"""Server of the app, on this machine only."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from mrdamper.errors import InputError
 
-HALF_SENT_S = 15.0  # that the head of a request may take
+HEAD_TIMEOUT_S = 15.0  # for the head of a request
 LOOPBACK = "127.0.0.1"
-_ENDS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 def serve(create_app: Callable[..., Starlette], port: int, open_browser: bool = True) -> int:
-    """Serve an app until a signal ends it; then every file and process of the bench is gone. Gives the signal.
+    """Serve an app until a signal ends it, and remove all its files and processes; returns the signal.
 
-    Port 0 is any that is free. Raises `InputError` if the port is taken, `MissingExtraError` without the chart library.
+    Port 0: any free port. Raises `InputError` if the port is taken, `MissingExtraError` without the chart library.
     """
     listener = _listen(port)
     port = listener.getsockname()[1]
@@ -57,40 +57,43 @@ def serve(create_app: Callable[..., Starlette], port: int, open_browser: bool = 
 
 
 class Connection(H11Protocol):
-    """One that is closed when a request's head is begun and not finished; `Guard` looks after bodies."""
+    """Connection that is closed when the head of a request stays incomplete; `Guard` limits bodies."""
 
     _deadline: asyncio.TimerHandle | None = None
 
+    @property
+    def _busy(self) -> bool:
+        return self.cycle is not None and not self.cycle.response_complete
+
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
-        self._watch()
+        self._set_deadline()
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
-        self._watch()
+        self._set_deadline()
 
     def connection_lost(self, exc: Exception | None) -> None:
         if self._deadline is not None:
             self._deadline.cancel()
         super().connection_lost(exc)
 
-    def _watch(self) -> None:
-        if self.cycle is not None and not self.cycle.response_complete:
+    def _set_deadline(self) -> None:
+        if self._busy:
             if self._deadline is not None:
                 self._deadline.cancel()
             self._deadline = None
         elif self._deadline is None:
-            self._deadline = self.loop.call_later(HALF_SENT_S, self._give_up)
+            self._deadline = self.loop.call_later(HEAD_TIMEOUT_S, self._time_out)
 
-    def _give_up(self) -> None:
+    def _time_out(self) -> None:
         self._deadline = None
-        busy = self.cycle is not None and not self.cycle.response_complete
-        if not busy and not self.transport.is_closing():
+        if not self._busy and not self.transport.is_closing():
             self.transport.close()
 
 
 class _Server(uvicorn.Server):
-    """Says where it is once it answers, and opens the browser there."""
+    """Server that prints its address when it is ready, and opens the browser."""
 
     def __init__(self, config: uvicorn.Config, address: str, open_browser: bool):
         super().__init__(config)
@@ -98,8 +101,8 @@ class _Server(uvicorn.Server):
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        # uvicorn would raise the signal again, and the process would end before it has cleaned up.
-        before = {number: signal.signal(number, self.handle_exit) for number in _ENDS}
+        # uvicorn would raise the signal again, and end the process before the files are removed
+        before = {number: signal.signal(number, self.handle_exit) for number in _SIGNALS}
         try:
             yield
         finally:
@@ -119,7 +122,7 @@ class _Server(uvicorn.Server):
 
 def _listen(port: int) -> socket.socket:
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    if os.name == "posix":  # elsewhere it would let two programs share the port
+    if os.name == "posix":  # on other systems two programs could share the port
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((LOOPBACK, port))

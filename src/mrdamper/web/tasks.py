@@ -1,6 +1,6 @@
 """Tasks of worker processes, with progress reports.
 
-A worker imports what its task takes and no more: it starts sooner.
+Imports of single tasks stand inside them: workers start sooner.
 """
 
 from __future__ import annotations
@@ -34,22 +34,22 @@ if TYPE_CHECKING:
     from mrdamper.report.about import About
     from mrdamper.study.comparison import Comparison
 
-Tell = Callable[[str, float], None]
-ALL_AT_ONCE = "joint"
-RUN_BY_RUN = "functions"
+Progress = Callable[[str, float], None]
+JOINT = "joint"
+FUNCTIONS = "functions"
 
 
-def study(tell: Tell, dataset: Dataset, folder: Path, about: About | None = None) -> tuple[Study, list[Path]]:
-    """Return the whole method, and its report, models, tables and figures in a folder."""
+def study(progress: Progress, dataset: Dataset, folder: Path, about: About | None = None) -> tuple[Study, list[Path]]:
+    """Run the whole study, and write its report, models, tables and figures into a folder."""
     from mrdamper.report.study import write_study
 
-    result = run_study(dataset, lambda what, share: tell(what, 0.6 * share))
-    report = lambda what, share: tell(what, 0.6 + 0.4 * share)  # noqa: E731
+    result = run_study(dataset, lambda step, share: progress(step, 0.6 * share))
+    report = lambda step, share: progress(step, 0.6 + 0.4 * share)  # noqa: E731
     return result, write_study(result, folder, report, about=about, also=("pdf",))
 
 
 def identify_rig(
-    tell: Tell,
+    progress: Progress,
     dataset: Dataset,
     run_ids: Sequence[str],
     model: str,
@@ -60,12 +60,12 @@ def identify_rig(
 ) -> tuple[tuple[Identification, ...], RecipeResult | str, dict[str, str]]:
     """Identify a model from runs of one rig, then over their conditions.
 
-    `run_ids`: runs to identify from; empty for all identification runs with a steady sine. `over`: how one damper is
-    made of them: "functions" through the identified values, or "joint", all forces at once. `free`: preset parameters
+    `run_ids`: runs to identify from; empty for all identification runs with a steady sine. `over`: the fit over the
+    conditions: "functions" through the identified values, or "joint", all forces at once. `free`: preset parameters
     to determine as well. `fixed`: parameters held at a value [SI].
 
-    Gives the identifications, none for a model of one set of parameters; the damper over all conditions, or why the
-    runs allow none; and the reason by run for those refused.
+    Returns the identifications, none for a model of one set of parameters; the damper over all conditions, or the
+    reason why the runs allow none; and the reason for each refused run.
     """
     sines, refused = usable_sines(dataset)
     runs = [run for run in sines if (run.id in run_ids if run_ids else run.split == "train")]
@@ -77,39 +77,39 @@ def identify_rig(
     else:
         recipe = modified(model, method)
         basis = Basis(model, method, tuple(free), tuple(sorted(fixed.items())))
-        recipe = replace(recipe, basis=basis, make=fit_functions_jointly if over == ALL_AT_ONCE else fit_per_run)
-    identifications, spent = identified(recipe.basis, runs, {}, lambda what, share: tell(what, 0.8 * share))
-    tell("over all conditions", 0.8)
+        recipe = replace(recipe, basis=basis, make=fit_functions_jointly if over == JOINT else fit_per_run)
+    identifications, spent = identified(recipe.basis, runs, {}, lambda step, share: progress(step, 0.8 * share))
+    progress("over all conditions", 0.8)
     try:
         scored = fit_and_score(recipe, runs, identifications, dataset.split("validate"), spent=spent, leave_out=False)
     except InputError as error:
         if not identifications:
             raise
         return tuple(identifications), str(error), refused
-    tell("uncertainty", 0.95)
+    progress("uncertainty", 0.95)
     return tuple(identifications), replace(scored, damper=estimate_uncertainty(scored.damper, runs)), refused
 
 
-def compare_models(tell: Tell, dataset: Dataset, names: Sequence[str], jobs: int) -> Comparison:
-    """Models on the same runs."""
+def compare_models(progress: Progress, dataset: Dataset, names: Sequence[str], jobs: int) -> Comparison:
+    """Compare models on the same runs."""
     from mrdamper.study.comparison import compare
 
-    return compare(dataset, names, jobs=jobs, progress=tell)
+    return compare(dataset, names, jobs=jobs, progress=progress)
 
 
-def write_compared(tell: Tell, comparison: Comparison, folder: Path) -> list[Path]:
-    """Return a comparison as page, tables, figures and models in a folder."""
+def write_compared(progress: Progress, comparison: Comparison, folder: Path) -> list[Path]:
+    """Write a comparison as page, tables, figures and models into a folder."""
     from mrdamper.report.comparison import write_comparison
 
-    return write_comparison(comparison, folder, tell)
+    return write_comparison(comparison, folder, progress)
 
 
-def export_damper(tell: Tell, damper: Damper, form: str, folder: Path) -> tuple[list[Path], tuple[str, ...]]:
-    """Return a damper in an export format: files in a folder, and what to know about them."""
+def export_damper(progress: Progress, damper: Damper, form: str, folder: Path) -> tuple[list[Path], tuple[str, ...]]:
+    """Write a damper in an export format into a folder; returns the files and the notes of the exporter."""
     from mrdamper.exporters import exporter
     from mrdamper.exporters.base import write_export
 
-    tell(f"making {form}", 0.1)
+    progress(f"exporting {form}", 0.1)
     kind, name = exporter(form), export_name(damper.rig)
     written = kind().export(damper, name)
     folder.mkdir()
@@ -118,7 +118,7 @@ def export_damper(tell: Tell, damper: Damper, form: str, folder: Path) -> tuple[
 
 
 def export_name(rig: str) -> str:
-    """Return a name for files and symbols: of the rig, where its letters make one."""
+    """Return a name for files and symbols, from the rig where its letters allow one."""
     from mrdamper.exporters.base import identifier
 
     try:

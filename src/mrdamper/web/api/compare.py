@@ -1,4 +1,4 @@
-"""The Compare view: models on runs none of them has seen."""
+"""The Compare view: errors of several models on the validation runs."""
 
 from __future__ import annotations
 
@@ -10,21 +10,18 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
-from mrdamper.data import Dataset
 from mrdamper.data.encoding import csv_text, finite
 from mrdamper.report.comparison import summary_rows
-from mrdamper.study.comparison import Comparison, RigComparison
+from mrdamper.study.comparison import Comparison
 from mrdamper.study.recipe import WHOLE_DAMPER, RecipeResult, recipes
-from mrdamper.study.validation import RunScore, Validation
 from mrdamper.study.workflow import STUDIED
 from mrdamper.web.curves import measured_cycle, measured_window, predicted_on_run
 from mrdamper.web.responses import archive, download, frame
-from mrdamper.web.rig_table import condition_on_screen
-from mrdamper.web.sessions import Current, Session
+from mrdamper.web.rig_table import screen_condition
+from mrdamper.web.sessions import OpenSession, Session
 from mrdamper.web.tasks import compare_models, write_compared
 
 router = APIRouter(prefix="/sessions/{session}/compare")
-_NOTHING = ("nothing is compared yet", "start a comparison")
 
 
 class CompareRequest(BaseModel, extra="forbid"):
@@ -35,8 +32,8 @@ class CompareRequest(BaseModel, extra="forbid"):
 
 
 @router.get("/choices")
-def choices(session: Current) -> list[dict[str, Any]]:
-    """Models that can be compared; those of a study are chosen at first."""
+def choices(session: OpenSession) -> list[dict[str, Any]]:
+    """List the models that can be compared; those of a study are selected at first."""
     return [
         {
             "name": c.name,
@@ -50,111 +47,91 @@ def choices(session: Current) -> list[dict[str, Any]]:
 
 
 @router.post("")
-def start(choice: CompareRequest, session: Current) -> dict[str, Any]:
-    """Begin a comparison on one rig."""
-    table = session.table(choice.rig)
-    jobs = max(1, (os.cpu_count() or 2) - 1)  # one processor is left to answer the page
-    dataset: Dataset = table.dataset
-    return session.start(
-        "compare",
-        compare_models,
-        (dataset, choice.models, jobs),
-        lambda comparison: _conclude(session, choice, comparison),
-    )
+def start(choice: CompareRequest, session: OpenSession) -> dict[str, Any]:
+    """Start a comparison on one rig."""
+    jobs = max(1, (os.cpu_count() or 2) - 1)  # one processor remains for the page
+    arguments = session.table(choice.rig).dataset, choice.models, jobs
+    return session.start("compare", compare_models, arguments, lambda result: _conclude(session, choice.rig, result))
 
 
 @router.get("/rigs/{rig}/runs/{key}")
-def overlaid(rig: int, key: str, session: Current) -> Response:
-    """One run as measured, and as every compared model predicts it."""
-    comparison: RigComparison = session.result(f"compared.{rig}", *_NOTHING)
+def loops(rig: int, key: str, session: OpenSession) -> Response:
+    """Return one run as measured, and as every compared model predicts it."""
+    comparison = _comparison(session, rig).rigs[0]
     row = session.table(rig).row(key)
     measured = measured_cycle(row.run) if row.loop else measured_window(row.run)
-    arrays = {f"measured.{k}": v for k, v in measured.items()}
-    shown = []
-    for number_, entry in enumerate(comparison.entries):
-        curve, flags = predicted_on_run(entry.damper, row.run)
-        arrays |= {f"model{number_}.{k}": v for k, v in curve.items()}
-        shown.append({"title": entry.title, "extrapolation": flags})
-    return frame({"id": row.run.id, "condition": condition_on_screen(row.condition), "models": shown}, arrays)
+    arrays = {f"measured.{axis}": values for axis, values in measured.items()}
+    for i, entry in enumerate(comparison.entries):
+        curve, _ = predicted_on_run(entry.damper, row.run)
+        arrays |= {f"model{i}.{axis}": values for axis, values in curve.items()}
+    return frame({"id": row.run.id, "condition": screen_condition(row.condition)}, arrays)
 
 
 @router.get("/rigs/{rig}/comparison.csv")
-def table(rig: int, session: Current) -> Response:
+def table(rig: int, session: OpenSession) -> Response:
     """Return the ranking as CSV."""
-    return download(csv_text(summary_rows(_whole(session, rig))).encode(), "comparison.csv", "text/csv; charset=utf-8")
+    text = csv_text(summary_rows(_comparison(session, rig)))
+    return download(text.encode(), "comparison.csv", "text/csv; charset=utf-8")
 
 
 @router.post("/rigs/{rig}/files")
-def start_files(rig: int, session: Current) -> dict[str, Any]:
-    """Begin to write the comparison as a page with tables, figures and models."""
+def start_files(rig: int, session: OpenSession) -> dict[str, Any]:
+    """Start to write the comparison as a page with tables, figures and models."""
     folder = session.folder / session.key("comparison")
 
     def conclude(written: list[Path]) -> dict[str, Any]:
-        session.results[f"compared.files.{rig}"] = written
+        session.results[f"comparison.files.{rig}"] = written
         return {"files": len(written)}
 
-    return session.start("comparison files", write_compared, (_whole(session, rig), folder), conclude)
+    return session.start("comparison files", write_compared, (_comparison(session, rig), folder), conclude)
 
 
 @router.get("/rigs/{rig}/files.zip")
-def files(rig: int, session: Current) -> Response:
+def files(rig: int, session: OpenSession) -> Response:
     """Return the written files in one archive."""
-    missing = "the comparison is not written yet", "press “Page and tables” again"
-    return archive(session.result(f"compared.files.{rig}", *missing), "mrdamper-comparison")
+    missing = "the comparison is not written yet", "press “Page, tables and models as zip” again"
+    return archive(session.result(f"comparison.files.{rig}", *missing), "mrdamper-comparison")
 
 
-def _whole(session: Session, rig: int) -> Comparison:
-    return session.result(f"compared.whole.{rig}", *_NOTHING)
+def _comparison(session: Session, rig: int) -> Comparison:
+    return session.result(f"comparison.{rig}", "no comparison yet", "start a comparison")
 
 
-def _conclude(session: Session, choice: CompareRequest, comparison: Comparison) -> dict[str, Any]:
+def _conclude(session: Session, number: int, comparison: Comparison) -> dict[str, Any]:
     rig = comparison.rigs[0]
-    table = session.table(choice.rig)
-    session.results[f"compared.{choice.rig}"] = rig
-    session.results[f"compared.whole.{choice.rig}"] = comparison
-    keys = {row.run.id: row.key for row in table.rows}
+    session.results[f"comparison.{number}"] = comparison
+    keys = {row.run.id: row.key for row in session.table(number).rows}
     entries = []
     for entry in rig.entries:
         note = f"cross-validation {100 * entry.cross_validated.median():.1f} %"
-        entries.append(_entry(rig, entry, session.scored(entry, "comparison", note).key, keys))
+        entries.append(_entry(entry, session.add_scored(entry, "comparison", note).key, keys))
+    runs = {
+        split: [{"key": keys[run.id], "id": run.id} for run in rig.dataset.split(split)]
+        for split in ("validate", "train")
+    }
     return {
         "rig": rig.rig,
-        "number": choice.rig,
+        "number": number,
         "entries": entries,
         "refused": dict(rig.refused),
-        "held_out": [{"key": keys[run.id], "id": run.id} for run in rig.dataset.split("validate")],
-        "train": [{"key": keys[run.id], "id": run.id} for run in rig.dataset.split("train")],
-        "seconds": round(comparison.seconds, 1),
+        "validation_runs": runs["validate"],
+        "identification_runs": runs["train"],
     }
 
 
-def _entry(rig: RigComparison, entry: RecipeResult, key: str, keys: dict[str, str]) -> dict[str, Any]:
+def _entry(entry: RecipeResult, key: str, keys: dict[str, str]) -> dict[str, Any]:
+    scores = [
+        {"key": keys[run.run_id], "nrmse_pp": finite(run.scores.nrmse_pp), "extrapolation": run.extrapolation}
+        for run in entry.validation.runs
+    ]
+    medians = {"cross_validation": entry.cross_validated, "validation": entry.validation}
     return {
         "damper": key,
-        "name": entry.recipe.name,
         "title": entry.title,
         "source": entry.recipe.source,
-        "limits": entry.recipe.limits,
-        "numbers": entry.damper.parameter_count,
+        "parameter_count": entry.damper.parameter_count,
         "runs_needed": entry.conditions_needed,
-        "train": _median(entry.train),
-        "left_out": _median(entry.cross_validated),
-        "held_out": _median(entry.validation),
+        **{name: finite(scored.median()) if scored.runs else None for name, scored in medians.items()},
         "seconds": round(entry.seconds, 2),
-        "scores": [_score(run, keys) for run in entry.validation.runs],
-    }
-
-
-def _median(validation: Validation) -> float | None:
-    return finite(validation.median()) if validation.runs else None
-
-
-def _score(run: RunScore, keys: dict[str, str]) -> dict[str, Any]:
-    return {
-        "key": keys[run.run_id],
-        "nrmse_pp": finite(run.scores.nrmse_pp),
-        "energy_error": finite(run.scores.energy_error),
-        "peak_error": finite(run.scores.peak_error),
-        "floor": finite(run.floor),
-        "extrapolation": run.extrapolation,
+        "scores": scores,
     }

@@ -1,4 +1,4 @@
-"""The Take-away view: report, models and tables as files; and models brought back."""
+"""The Export view: report, models and tables as files, and saved models and projects to open."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from mrdamper.data.encoding import csv_text
 from mrdamper.errors import InputError
 from mrdamper.exporters import all_exporters
 from mrdamper.report.tables import prediction_rows
+from mrdamper.web.api.data import find_upload
 from mrdamper.web.api.model import PredictionRequest
 from mrdamper.web.held_parameters import as_damper, predict_held
 from mrdamper.web.responses import archive, download, in_units, zipped
-from mrdamper.web.saved_project import SavedProject, open_saved_project, save_project
-from mrdamper.web.sessions import Current, Session
+from mrdamper.web.saved_project import open_saved_project, save_project
+from mrdamper.web.sessions import OpenSession, Session
 from mrdamper.web.tasks import export_damper
 
 router = APIRouter(prefix="/sessions/{session}")
@@ -36,47 +37,6 @@ class Held(BaseModel, extra="forbid", allow_inf_nan=False):
     held: dict[str, float] = Field(default_factory=dict, max_length=64)
 
 
-@router.get("/files")
-def files(session: Current) -> list[dict[str, Any]]:
-    """List the files that the last study wrote."""
-    return [
-        {"number": i, "name": path.name, "folder": path.parent.name == "figures", "bytes": path.stat().st_size}
-        for i, path in enumerate(_written(session))
-    ]
-
-
-@router.get("/files/{number}")
-def file(number: int, session: Current) -> FileResponse:
-    """One of these files, always as a download: a report is a page and must not run as ours."""
-    written = _written(session)
-    if not 0 <= number < len(written):
-        raise InputError("no such file", remedy="load the page again", code="E_NAME")
-    path = written[number]
-    return FileResponse(path, filename=path.name, media_type="application/octet-stream")
-
-
-@router.get("/files.zip")
-def everything(session: Current) -> Response:
-    """All of them in one archive."""
-    written = _written(session)
-    if not written:
-        raise InputError("no study yet", remedy="run one on the Identify page", code="E_NO_RESULT")
-    return archive(written, "mrdamper-study")
-
-
-@router.post("/dampers")
-def bring(document: Document, session: Current) -> dict[str, Any]:
-    """Put a saved model on the bench."""
-    damper = parse_model(document.text, where="the model file")
-    return {"damper": session.add(damper, "file").key}
-
-
-@router.post("/dampers/{key}/document")
-def document(key: str, held: Held, session: Current) -> dict[str, str]:
-    """Return a damper as model.json, with held parameters made its own."""
-    return {"text": dump_model(as_damper(session.damper(key).damper, held.held))}
-
-
 class Units(BaseModel, extra="forbid"):
     """Units of forces and lengths in a table."""
 
@@ -90,79 +50,116 @@ class TableRequest(PredictionRequest):
     units: Units = Units()
 
 
-@router.post("/dampers/{key}/csv")
-def table(key: str, ask: TableRequest, session: Current) -> Response:
-    """Return the loop at a condition as CSV."""
-    prediction = predict_held(session.damper(key).damper, ask.condition, ask.held)
-    text = csv_text(in_units(prediction_rows(prediction), ask.units.force, ask.units.length))
-    return download(text.encode(), "prediction.csv", "text/csv; charset=utf-8")
-
-
-@router.get("/exports")
-def exports(session: Current) -> list[dict[str, str]]:
-    """Return formats a damper can leave in."""
-    return [{"name": name, "title": cls.title} for name, cls in all_exporters().items()]
-
-
-@router.post("/dampers/{key}/export/{name}")
-def start_export(key: str, name: str, held: Held, session: Current) -> dict[str, Any]:
-    """Begin to make a damper in one of these formats: some compile, and take their time."""
-    damper = as_damper(session.damper(key).damper, held.held)
-    folder = session.folder / session.key("export")
-    return session.start(
-        "export", export_damper, (damper, name, folder), lambda results: _conclude(session, folder, *results)
-    )
-
-
-@router.get("/exported/{key}")
-def exported(key: str, session: Current) -> Response:
-    """Return an exported file, or an archive of several."""
-    paths: list[Path] | None = session.results.get(f"exported.{key}")
-    if not paths:
-        raise InputError("no such export", remedy="export again", code="E_NAME")
-    if len(paths) == 1:
-        return FileResponse(paths[0], filename=paths[0].name, media_type="application/octet-stream")
-    return zipped({path.name: path.read_bytes() for path in paths}, f"{paths[0].parent.name}.zip")
-
-
 class State(BaseModel, extra="forbid"):
-    """State of the page, the damper shown, and the logo of the report as base64."""
+    """State of the page, the damper of the Model view, and the logo of the report as base64."""
 
     state: str = Field(max_length=2_000_000)
     damper: str | None = Field(default=None, max_length=40)
     logo: str = Field(default="", max_length=1_000_000)
 
 
-@router.post("/bench.zip")
-def keep_bench(shown: State, session: Current) -> Response:
-    """Return data, dampers, logo and state of this bench in one file."""
-    return download(
-        save_project(session, shown.state, shown.damper, shown.logo), "mrdamper-bench.zip", "application/zip"
-    )
+@router.get("/files")
+def files(session: OpenSession) -> list[dict[str, Any]]:
+    """List the files of the last study."""
+    return [
+        {"number": i, "name": path.name, "figure": path.parent.name == "figures", "bytes": path.stat().st_size}
+        for i, path in enumerate(_written(session))
+    ]
 
 
-@router.post("/drops/{key}/open")
-def open_bench(key: str, session: Current) -> dict[str, Any]:
-    """Bring back what such a file holds."""
-    upload = session.uploads.get(key)
-    if upload is None or len(upload.names) != 1:
-        raise InputError("no saved project was dropped", remedy="drop it again, alone", code="E_DROP")
-    kept: SavedProject = open_saved_project(next(iter(upload.names)), upload.folder)
-    if kept.imported is not None:
-        session.put(kept.imported)
-    keys = [session.add(damper, origin, note).key for damper, origin, note in kept.dampers]
+@router.get("/files/{number}")
+def file(number: int, session: OpenSession) -> FileResponse:
+    """Return one of these files, always as a download: a report is a page and must not run as the app's own."""
+    written = _written(session)
+    if not 0 <= number < len(written):
+        raise InputError("no such file", remedy="load the page again", code="E_NAME")
+    return _saved(written[number])
+
+
+@router.get("/files.zip")
+def all_files(session: OpenSession) -> Response:
+    """Return all of them in one archive."""
+    session.result("study.files", "no study yet", "run one on the Identify page")
+    return archive(_written(session), "mrdamper-study")
+
+
+@router.post("/dampers")
+def open_model(document: Document, session: OpenSession) -> dict[str, Any]:
+    """Add the damper of a saved model."""
+    damper = parse_model(document.text, where="the model file")
+    return {"damper": session.add(damper, "file").key}
+
+
+@router.post("/dampers/{key}/document")
+def document(key: str, held: Held, session: OpenSession) -> dict[str, str]:
+    """Return a damper as model.json with the held parameters."""
+    return {"text": dump_model(as_damper(session.damper(key).damper, held.held))}
+
+
+@router.post("/dampers/{key}/csv")
+def table(key: str, query: TableRequest, session: OpenSession) -> Response:
+    """Return the loop at a condition as CSV."""
+    prediction = predict_held(session.damper(key).damper, query.condition, query.held)
+    text = csv_text(in_units(prediction_rows(prediction), query.units.force, query.units.length))
+    return download(text.encode(), "prediction.csv", "text/csv; charset=utf-8")
+
+
+@router.get("/exports")
+def formats(session: OpenSession) -> list[dict[str, str]]:
+    """List the export formats of dampers."""
+    return [{"name": name, "title": cls.title} for name, cls in all_exporters().items()]
+
+
+@router.post("/dampers/{key}/export/{name}")
+def start_export(key: str, name: str, held: Held, session: OpenSession) -> dict[str, Any]:
+    """Start to export a damper: some formats are compiled, which takes time."""
+    damper = as_damper(session.damper(key).damper, held.held)
+    folder = session.folder / session.key("export")
+
+    def conclude(results: tuple[list[Path], tuple[str, ...]]) -> dict[str, Any]:
+        session.results[f"exported.{folder.name}"], notes = results
+        return {"exported": folder.name, "notes": notes}
+
+    return session.start("export", export_damper, (damper, name, folder), conclude)
+
+
+@router.get("/exported/{key}")
+def exported(key: str, session: OpenSession) -> Response:
+    """Return an exported file, or an archive of several."""
+    paths: list[Path] = session.result(f"exported.{key}", "no such export", "export again")
+    if len(paths) == 1:
+        return _saved(paths[0])
+    return zipped({path.name: path.read_bytes() for path in paths}, f"{paths[0].parent.name}.zip")
+
+
+@router.post("/project.zip")
+def project(shown: State, session: OpenSession) -> Response:
+    """Return data, dampers, logo and state of this session in one file."""
+    content = save_project(session, shown.state, shown.damper, shown.logo)
+    return download(content, "mrdamper-project.zip", "application/zip")
+
+
+@router.post("/uploads/{key}/open")
+def open_project(key: str, session: OpenSession) -> dict[str, Any]:
+    """Open a saved project."""
+    upload = find_upload(session, key)
+    if len(upload.names) != 1:
+        raise InputError("no saved project was dropped", remedy="drop it again, alone", code="E_UPLOAD")
+    project = open_saved_project(next(iter(upload.names)), upload.folder)
+    if project.imported is not None:
+        session.load(project.imported)
+    keys = [session.add(damper, origin, note).key for damper, origin, note in project.dampers]
     return {
-        "data": kept.imported is not None,
-        "state": kept.state,
-        "logo": kept.logo,
-        "damper": keys[kept.current] if kept.current is not None else None,
+        "data": project.imported is not None,
+        "state": project.state,
+        "logo": project.logo,
+        "damper": keys[project.current] if project.current is not None else None,
     }
-
-
-def _conclude(session: Session, folder: Path, paths: list[Path], notes: tuple[str, ...]) -> dict[str, Any]:
-    session.results[f"exported.{folder.name}"] = paths
-    return {"exported": folder.name, "notes": notes}
 
 
 def _written(session: Session) -> list[Path]:
     return [path for path in session.results.get("study.files", []) if path.is_file()]
+
+
+def _saved(path: Path) -> FileResponse:
+    return FileResponse(path, filename=path.name, media_type="application/octet-stream")

@@ -25,9 +25,9 @@ from mrdamper.study.workflow import Study
 from mrdamper.web.bundled_studies import BundledStudies
 from mrdamper.web.curves import measured_cycle, modelled_cycle, predicted_on_run
 from mrdamper.web.responses import frame
-from mrdamper.web.rig_table import condition_on_screen
-from mrdamper.web.sessions import Current, Session
-from mrdamper.web.tasks import ALL_AT_ONCE, RUN_BY_RUN, identify_rig, study
+from mrdamper.web.rig_table import screen_condition
+from mrdamper.web.sessions import OpenSession, Session
+from mrdamper.web.tasks import FUNCTIONS, JOINT, identify_rig, study
 
 router = APIRouter(prefix="/sessions/{session}")
 
@@ -38,7 +38,7 @@ class IdentifyRequest(BaseModel, extra="forbid", allow_inf_nan=False):
     rig: int = Field(ge=0)
     model: str = Field(max_length=100)
     method: str = Field(max_length=100)
-    over: str = Field(default=RUN_BY_RUN, pattern=f"^({RUN_BY_RUN}|{ALL_AT_ONCE})$")
+    over: str = Field(default=FUNCTIONS, pattern=f"^({FUNCTIONS}|{JOINT})$")
     runs: list[str] = Field(default_factory=list, max_length=10_000)
     free: list[str] = Field(default_factory=list, max_length=64)
     fixed: dict[str, float] = Field(default_factory=dict, max_length=64)
@@ -51,16 +51,17 @@ class Head(BaseModel, extra="forbid"):
     logo: str = Field(default="", max_length=1_000_000)
 
     @property
-    def given(self) -> About:
-        """Checked, as the report takes it."""
+    def checked(self) -> About:
+        """The head for the report, checked."""
         about = about_of(self.about, "head of the report")
         return about.model_copy(update={"logo": logo_of(self.logo)}) if self.logo else about
 
 
 @router.get("/choices")
-def choices(session: Current) -> dict[str, Any]:
-    """Models and methods there are, and those taken unless others are asked for."""
+def choices(session: OpenSession) -> dict[str, Any]:
+    """List models and methods, and the defaults."""
     defaults = signature(identify).parameters
+    shown = ("name", "unit", "meaning", "preset", "default")
     return {
         "model": defaults["model"].default,
         "method": defaults["method"].default,
@@ -69,13 +70,9 @@ def choices(session: Current) -> dict[str, Any]:
                 "name": name,
                 "title": cls.title,
                 "source": cls.source,
-                "equation": cls.equation,
                 "integrated": cls.integrated,
-                "jointly": bool(cls.current_levels),
-                "parameters": [
-                    {"name": p.name, "unit": p.unit, "meaning": p.meaning, "preset": p.preset, "default": p.default}
-                    for p in cls.parameters()
-                ],
+                "whole_damper": bool(cls.current_levels),
+                "parameters": [{field: getattr(p, field) for field in shown} for p in cls.parameters()],
             }
             for name, cls in all_models().items()
         ],
@@ -86,13 +83,13 @@ def choices(session: Current) -> dict[str, Any]:
     }
 
 
-_NO_HEAD = Head()
+_EMPTY_HEAD = Head()
 
 
 @router.post("/study")
-def start_study(session: Current, request: Request, head: Head = _NO_HEAD) -> dict[str, Any]:
-    """Begin the whole method on all data; of the bundled tests, a study that is there already is recalled."""
-    folder, about = session.folder / session.key("study"), head.given
+def start_study(session: OpenSession, request: Request, head: Head = _EMPTY_HEAD) -> dict[str, Any]:
+    """Start a study of all data; a finished study of the bundled tests with the same head is used again."""
+    folder, about = session.folder / session.key("study"), head.checked
     shared: BundledStudies | None = request.app.state.sessions.studies if session.bundled else None
     key = head.model_dump_json()
 
@@ -101,13 +98,13 @@ def start_study(session: Current, request: Request, head: Head = _NO_HEAD) -> di
             shared.keep(key, results[0], folder, results[1])
         return _conclude_study(session, *results)
 
-    recall = partial(shared.find, key, folder) if shared is not None else lambda: None
-    return session.start("study", study, (session.dataset, folder, about), conclude, recall)
+    stored = partial(shared.find, key, folder) if shared is not None else lambda: None
+    return session.start("study", study, (session.dataset, folder, about), conclude, stored)
 
 
 @router.post("/identify")
-def start_identification(choice: IdentifyRequest, session: Current) -> dict[str, Any]:
-    """Begin to identify one model of one rig."""
+def start_identification(choice: IdentifyRequest, session: OpenSession) -> dict[str, Any]:
+    """Start the identification of one model for one rig."""
     table = session.table(choice.rig)
     names = [table.row(key).run.id for key in choice.runs]
     return session.start(
@@ -119,10 +116,9 @@ def start_identification(choice: IdentifyRequest, session: Current) -> dict[str,
 
 
 @router.get("/identified/runs/{number}")
-def residual(number: int, session: Current) -> Response:
-    """Measured and identified force of one identified run, and the residual."""
-    table = session.result("identified.table", "nothing is identified yet", "start an identification")
-    identifications, scored = session.results["identified"]
+def residual(number: int, session: OpenSession) -> Response:
+    """Return measured and identified force of one identified run, and the residual."""
+    table, identifications, scored = session.result("identified", "no identification yet", "start an identification")
     ids = [i.run_id for i in identifications] or [run.run_id for run in scored.train.runs]
     if not 0 <= number < len(ids):
         raise InputError("no such run", remedy="choose one from the table", code="E_NAME")
@@ -134,19 +130,20 @@ def residual(number: int, session: Current) -> Response:
     measured = measured_cycle(row.run)
     arrays = {f"measured.{k}": v for k, v in measured.items()} | {f"model.{k}": v for k, v in modelled.items()}
     arrays["residual"] = modelled["F"] - measured["F"]
-    return frame({"id": row.run.id, "condition": condition_on_screen(row.condition)}, arrays)
+    return frame({"id": row.run.id, "condition": screen_condition(row.condition)}, arrays)
 
 
 def _conclude_study(session: Session, study: Study, written: list[Path]) -> dict[str, Any]:
     session.results["study.files"] = written
     rigs = []
     for rig in study.rigs:
-        listed = []
+        candidates = []
         for candidate in rig.candidates:
             errors = {"cross-validation": candidate.cross_validated, "validation": candidate.validation}
             note = ", ".join(f"{name} {_percent(scores)}" for name, scores in errors.items() if scores.runs)
-            listed.append(_candidate(candidate, session.scored(candidate, "study", note, candidate is rig.chosen).key))
-        rigs.append({"rig": rig.rig, "chosen": listed[0]["damper"], "candidates": listed})
+            damper = session.add_scored(candidate, "study", note, selected=candidate is rig.chosen)
+            candidates.append(_candidate(candidate, damper.key))
+        rigs.append({"rig": rig.rig, "chosen": candidates[0]["damper"], "candidates": candidates})
     return {"rigs": rigs, "seconds": round(study.seconds, 1)}
 
 
@@ -154,10 +151,10 @@ def _candidate(candidate: RecipeResult, key: str) -> dict[str, Any]:
     return {
         "damper": key,
         "title": candidate.title,
-        "numbers": candidate.damper.parameter_count,
-        "per_run": finite(candidate.per_run),
-        "left_out": finite(candidate.cross_validated.median()),
-        "held_out": finite(candidate.validation.median()) if candidate.validation.runs else None,
+        "parameter_count": candidate.damper.parameter_count,
+        "individual_fits": finite(candidate.per_run),
+        "cross_validation": finite(candidate.cross_validated.median()),
+        "validation": _median(candidate.validation),
         "seconds": round(candidate.seconds, 2),
     }
 
@@ -169,24 +166,26 @@ def _conclude_identification(
     scored: RecipeResult | str,
     refused: dict[str, str],
 ) -> dict[str, Any]:
-    session.results["identified"] = identifications, scored
-    session.results["identified.table"] = session.table(choice.rig)
-    damper, held_out, bench = None, None, None
+    table = session.table(choice.rig)
+    session.results["identified"] = table, identifications, scored
+    about_damper: dict[str, Any] = dict.fromkeys(("damper", "title", "parameter_count", "validation"))
     if isinstance(scored, RecipeResult):
-        damper, held_out = scored.damper, scored.validation
-        bench = session.add(damper, "identification", f"validation {_percent(held_out)}" if held_out.runs else "")
+        note = f"validation {_percent(scored.validation)}" if scored.validation.runs else ""
+        about_damper = {
+            "damper": session.add(scored.damper, "identification", note).key,
+            "title": scored.damper.title,
+            "parameter_count": scored.damper.parameter_count,
+            "validation": _median(scored.validation),
+        }
     errors = [i.scores.nrmse_pp for i in identifications] or _joint_fit(scored).nrmse_pp.tolist()
     return {
-        "rig": session.table(choice.rig).dataset.rigs[0],
-        "damper": bench.key if bench else None,
-        "title": damper.title if damper else None,
-        "numbers": damper.parameter_count if damper else None,
+        **about_damper,
+        "rig": table.dataset.rigs[0],
         "no_damper": scored if isinstance(scored, str) else "",
-        "held_out": finite(held_out.median()) if held_out else None,
         "median": finite(float(np.median(errors))),
         "runs": [_identified(i) for i in identifications],
         "joint": None if identifications else _joint(scored),
-        "units": _units(identifications, scored),
+        "parameters": _parameters(identifications, scored),
         "refused": refused,
     }
 
@@ -194,15 +193,12 @@ def _conclude_identification(
 def _identified(one: Identification) -> dict[str, Any]:
     return {
         "id": one.run_id,
-        "condition": condition_on_screen(one.condition),
         "nrmse_pp": finite(one.scores.nrmse_pp),
         "floor": finite(one.floor),
         "values": {n: finite(v) for n, v in one.model.values().items()},
         "intervals": {name: ends for name in one.free if (ends := one.interval(name))},
         "states": dict(zip(one.table["parameter"], one.table["state"], strict=True)),
         "at_bounds": one.at_bounds,
-        "free": one.free,
-        "message": str(one.ending),
         "notes": (*one.notes, *one.doubts),
     }
 
@@ -228,17 +224,17 @@ def _joint(scored: RecipeResult | str) -> dict[str, Any]:
             {"id": run.run_id, "nrmse_pp": finite(error)}
             for run, error in zip(scored.train.runs, fit.nrmse_pp.tolist(), strict=True)
         ],
-        "message": str(fit.ending),
     }
 
 
-def _units(identifications: tuple[Identification, ...], scored: RecipeResult | str) -> list[dict[str, str]]:
-    if identifications:
-        infos, free = identifications[0].model.parameters(), identifications[0].free
-    else:
-        damper = _joint_fit(scored).damper
-        infos, free = damper.model.parameters(), damper.free
-    return [{"name": i.name, "unit": i.unit, "meaning": i.meaning} for i in infos if i.name in free]
+def _parameters(identifications: tuple[Identification, ...], scored: RecipeResult | str) -> list[dict[str, str]]:
+    fitted = identifications[0] if identifications else _joint_fit(scored).damper
+    infos = fitted.model.parameters()
+    return [{"name": i.name, "unit": i.unit, "meaning": i.meaning} for i in infos if i.name in fitted.free]
+
+
+def _median(validation: Validation) -> float | None:
+    return finite(validation.median()) if validation.runs else None
 
 
 def _percent(validation: Validation) -> str:

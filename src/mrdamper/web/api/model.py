@@ -1,4 +1,4 @@
-"""The Model view: a damper under sliders, answered fast enough to be dragged."""
+"""The Model view: loops of a damper for the values of its sliders, fast enough to drag them."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from pydantic import BaseModel, Field
 
 from mrdamper.dampers.bands import band, no_band, scope
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Condition, Floats
 from mrdamper.data.encoding import finite
 from mrdamper.physics.motion import Excitation
 from mrdamper.statistics.metrics import dissipated_power, peak_force
-from mrdamper.web.curves import on_screen, predicted_cycle
-from mrdamper.web.held_parameters import held_model, loop_held, predict_held, sliders
+from mrdamper.web.curves import predicted_cycle, screen_arrays
+from mrdamper.web.held_parameters import held_loop, held_model, predict_held, sliders
 from mrdamper.web.responses import frame
-from mrdamper.web.rig_table import RigTable, condition_on_screen
-from mrdamper.web.sessions import Bench, Current, Session, shared
+from mrdamper.web.rig_table import RigTable, screen_condition
+from mrdamper.web.sessions import OpenSession, Session, SessionDamper, shared
 
 router = APIRouter(prefix="/sessions/{session}/dampers")
-_FAMILY = 10  # loops of a family over current, at most
-_LEVEL = 0.9  # of the band around a loop
-_OVER = {"peak": "peak_N", "energy": "energy_J"}
-_OF_HAND = "no band: of a parameter held by hand the tests say nothing"
-_TURN = Lock()  # answers in turn: small NumPy calls of many threads at once take the interpreter from each other
+_MAX_FAMILY = 10  # loops of a family over current
+_LEVEL = 0.9  # of the prediction interval
+_HELD = "no prediction interval: the tests carry no information on a parameter held by hand"
+_LOCK = Lock()  # one response at a time: threads with small NumPy calls slow each other down
 _QUANTITIES = ("current_A", "frequency_Hz", "amplitude_m")
-_BEYOND = 1.25  # sliders and curves reach past the tested conditions, where the answer is flagged
+_BEYOND = 1.25  # factor to which sliders and curves exceed the tested conditions
 
 
 class PredictionRequest(BaseModel, extra="forbid", allow_inf_nan=False):
@@ -43,34 +43,34 @@ class PredictionRequest(BaseModel, extra="forbid", allow_inf_nan=False):
     held: dict[str, float] = Field(default_factory=dict, max_length=64)
     family: bool = False
     currents: int = Field(default=33, ge=0, le=100)
-    band: bool = False
+    interval: bool = False
 
     @property
     def condition(self) -> Condition:
-        """The condition asked for."""
+        """The condition of the sliders."""
         return Condition(self.current_A, self.frequency_Hz, self.amplitude_m)
 
 
 @router.get("")
-def dampers(session: Current) -> list[dict[str, Any]]:
-    """All dampers on the bench, the newest last."""
-    return [_head(bench) for bench in session.dampers.values()]
+def dampers(session: OpenSession) -> list[dict[str, Any]]:
+    """List all dampers of the session, the newest last."""
+    return [_describe(damper) for damper in session.dampers.values()]
 
 
 @router.get("/{key}")
-def damper(key: str, session: Current) -> dict[str, Any]:
-    """Return a damper's sliders and tested envelope."""
-    bench = session.damper(key)
-    chosen, e = bench.damper, bench.damper.envelope
-    start = chosen.envelope.middle
-    table = session.table_of(chosen.rig)
-    near = table.nearest(start, 1, anywhere=True) if table else []
-    if near and near[0].condition:
-        start = near[0].condition  # one that was measured: there is something to compare with
+def damper(key: str, session: OpenSession) -> dict[str, Any]:
+    """Return the sliders and the tested envelope of a damper."""
+    damper = session.damper(key)
+    model, e = damper.damper, damper.damper.envelope
+    start = e.middle
+    table = session.table_of(model.rig)
+    nearest = table.nearest(start, 1, any_distance=True) if table else []
+    if nearest and nearest[0].condition:
+        start = nearest[0].condition  # a measured one, for comparison
     return {
-        **_head(bench),
-        "parameters": sliders(chosen),
-        "follows": chosen.one_model is None,
+        **_describe(damper),
+        "parameters": sliders(model),
+        "follows": model.one_model is None,
         "start": {name: getattr(start, name) for name in _QUANTITIES},
         "envelope": {name: getattr(e, name) for name in (*_QUANTITIES, "peak_velocity_m_s")},
         "reach": {
@@ -78,72 +78,69 @@ def damper(key: str, session: Current) -> dict[str, Any]:
             "frequency_Hz": (e.frequency_Hz[0] / _BEYOND, e.frequency_Hz[1] * _BEYOND),
             "amplitude_m": (e.amplitude_m[0] / _BEYOND, e.amplitude_m[1] * _BEYOND),
         },
-        "provenance": dict(chosen.provenance),
     }
 
 
 @router.post("/{key}/predict")
-def predict(key: str, ask: PredictionRequest, session: Current) -> Response:
-    """Loops at a condition with a band or why there is none, the curves over current, what was measured nearest."""
-    damper = session.damper(key, sure=ask.band and not ask.held).damper
-    with _TURN:
-        return _predicted(damper, ask, session)
+def predict(key: str, query: PredictionRequest, session: OpenSession) -> Response:
+    """Return loops at a condition with their interval, the curves over current, and the nearest measured runs."""
+    damper = session.damper(key, with_uncertainty=query.interval and not query.held).damper
+    with _LOCK:
+        return _predicted(damper, query, session)
 
 
-def _predicted(damper: Damper, ask: PredictionRequest, session: Session) -> Response:
+def _predicted(damper: Damper, query: PredictionRequest, session: Session) -> Response:
     arrays: dict[str, Any] = {}
-    loops = []
-    table, paces = session.table_of(damper.rig), []
-    for name, condition in _loops(damper, ask, table):
-        began = thread_time()  # of this damper's work alone, however busy the machine is
-        prediction = predict_held(damper, condition, ask.held)
-        paces.append(1e3 * (thread_time() - began))
-        cycle = predicted_cycle(prediction)
-        arrays |= {f"{name}.{axis}": values for axis, values in cycle.items()}
-        figures = _figures(prediction.motion, prediction.force, ask.frequency_Hz)
-        loops.append({"name": name, "current_A": condition.current_A, **figures})
-        if name == "now" and ask.band and not ask.held and (around := band(damper, prediction, _LEVEL)):
-            for end, force in (("low", around.low), ("high", around.high)):
-                arrays |= {f"{end}.{axis}": v for axis, v in on_screen(prediction.motion, force).items()}
-            loops[-1] |= {
-                "peak_from_N": around.peak[0],
-                "peak_to_N": around.peak[1],
-                "level": _LEVEL,
-                "scope": scope(damper, _LEVEL),
-            }
-        elif name == "now" and ask.band:
-            loops[-1]["no_band"] = _OF_HAND if ask.held else no_band(damper)
-    if ask.currents:
-        held = tuple(sorted(ask.held.items()))
-        arrays |= _over_current(damper, held, ask.frequency_Hz, ask.amplitude_m, ask.currents)
-    model = held_model(damper, ask.condition, ask.held)
+    loops, times = [], []
+    table = session.table_of(damper.rig)
+    for name, condition in _conditions(damper, query, table):
+        began = thread_time()  # of this damper alone, however busy the machine is
+        prediction = predict_held(damper, condition, query.held)
+        times.append(1e3 * (thread_time() - began))
+        arrays |= {f"{name}.{axis}": values for axis, values in predicted_cycle(prediction).items()}
+        peak, energy = _peak_and_energy(prediction.motion, prediction.force, query.frequency_Hz)
+        loops.append({"name": name, "current_A": condition.current_A, "peak_N": peak, "energy_J": energy})
+        if name == "now" and query.interval:
+            loops[-1] |= _interval(damper, prediction, query, arrays)
+    if query.currents:
+        held = tuple(sorted(query.held.items()))
+        arrays |= _over_current(damper, held, query.frequency_Hz, query.amplitude_m, query.currents)
+    model = held_model(damper, query.condition, query.held)
     head = {
         "loops": loops,
-        "pace_ms": min(paces),
-        "peak_velocity_m_s": ask.condition.peak_velocity,
-        "extrapolation": damper.envelope.flags(ask.condition),
+        "loop_ms": min(times),
+        "peak_velocity_m_s": query.condition.peak_velocity,
+        "extrapolation": damper.envelope.flags(query.condition),
         "tested_A": damper.envelope.current_A,
         "parameters": {n: finite(v) for n, v in model.values().items()} if model else {},
-        "nearest": [_measured(row) for row in table.nearest(ask.condition)] if table else [],
-        "measured": [_measured(row) for row in table.at_motion(ask.condition)] if table else [],
+        "nearest": [_measured(row) for row in table.nearest(query.condition)] if table else [],
+        "measured": [_measured(row) for row in table.at_motion(query.condition)] if table else [],
     }
     return frame(head, arrays)
 
 
-def _loops(damper: Damper, ask: PredictionRequest, table: RigTable | None) -> list[tuple[str, Condition]]:
-    """Return the loop asked for, and where wished those at the currents of the tests."""
-    loops = [("now", ask.condition)]
-    if ask.family:
-        currents = _tested_currents(damper, table)
-        loops += [(f"family{i}", Condition(c, ask.frequency_Hz, ask.amplitude_m)) for i, c in enumerate(currents)]
-    return loops
+def _conditions(damper: Damper, query: PredictionRequest, table: RigTable | None) -> list[tuple[str, Condition]]:
+    """Return the condition of the sliders, and for a family those at the currents of the tests."""
+    conditions = [("now", query.condition)]
+    if query.family:  # at the levels of the loaded tests, or the ends of the tested currents
+        levels = list(table.currents) if table else list(damper.envelope.current_A)
+        picked = np.linspace(0, len(levels) - 1, min(len(levels), _MAX_FAMILY - 1)).round().astype(int)
+        for i, level in enumerate(sorted({levels[i] for i in picked})):
+            conditions.append((f"family{i}", Condition(level, query.frequency_Hz, query.amplitude_m)))
+    return conditions
 
 
-def _tested_currents(damper: Damper, table: RigTable | None) -> list[float]:
-    """Levels of the tests on the bench, or the ends of what the damper says was tested."""
-    levels = list(table.currents) if table else list(damper.envelope.current_A)
-    picked = np.linspace(0, len(levels) - 1, min(len(levels), _FAMILY - 1)).round().astype(int)
-    return sorted({levels[i] for i in picked})
+def _interval(
+    damper: Damper, prediction: Prediction, query: PredictionRequest, arrays: dict[str, Any]
+) -> dict[str, Any]:
+    """Return the prediction interval of a loop, or the reason why there is none; its curves are added to `arrays`."""
+    around = None if query.held else band(damper, prediction, _LEVEL)
+    if around is None:
+        return {"no_interval": _HELD if query.held else no_band(damper)}
+    for end, force in (("low", around.low), ("high", around.high)):
+        arrays.update({f"{end}.{axis}": values for axis, values in screen_arrays(prediction.motion, force).items()})
+    low, high = around.peak
+    return {"peak_from_N": low, "peak_to_N": high, "level": _LEVEL, "scope": scope(damper, _LEVEL)}
 
 
 @shared
@@ -152,17 +149,15 @@ def _over_current(
     damper: Damper, held: tuple[tuple[str, float], ...], frequency_Hz: float, amplitude_m: float, points: int
 ) -> dict[str, Any]:
     even = np.linspace(0.0, _BEYOND * (damper.envelope.current_A[1] or 1.0), max(points - 2, 2))
-    currents = np.union1d(even, damper.envelope.current_A)  # the line changes its dash where the tests end
-    conditions = [Condition(float(I), frequency_Hz, amplitude_m) for I in currents]
-    loops = [loop_held(damper, condition, dict(held)) for condition in conditions]
-    figures = [_figures(loop.excitation, loop.force, frequency_Hz) for loop in loops]
-    curves = {f"over.{end}": np.array([f[name] for f in figures]) for end, name in _OVER.items()}
-    return {"over.current": currents, **curves}
+    currents = np.union1d(even, damper.envelope.current_A)  # the curve is dashed from the ends of the tested currents
+    loops = [held_loop(damper, Condition(float(I), frequency_Hz, amplitude_m), dict(held)) for I in currents]
+    peak, energy = np.array([_peak_and_energy(loop.excitation, loop.force, frequency_Hz) for loop in loops]).T
+    return {"over.current": currents, "over.peak": peak, "over.energy": energy}
 
 
-def _figures(motion: Excitation, force: Floats, frequency_Hz: float) -> dict[str, float]:
-    power = dissipated_power(force, motion.velocity, motion.time)
-    return {"peak_N": peak_force(force), "energy_J": power / frequency_Hz}
+def _peak_and_energy(motion: Excitation, force: Floats, frequency_Hz: float) -> tuple[float, float]:
+    """Return peak force [N] and energy per cycle [J]."""
+    return peak_force(force), dissipated_power(force, motion.velocity, motion.time) / frequency_Hz
 
 
 def _measured(row: Any) -> dict[str, Any]:
@@ -170,20 +165,17 @@ def _measured(row: Any) -> dict[str, Any]:
         "key": row.key,
         "id": row.run.id,
         "split": row.run.split,
-        "condition": condition_on_screen(row.condition),
+        "condition": screen_condition(row.condition),
         "peak_N": finite(row.loop.peak_force),
         "energy_J": finite(row.loop.dissipated_energy),
     }
 
 
-def _head(bench: Bench) -> dict[str, Any]:
+def _describe(damper: SessionDamper) -> dict[str, Any]:
     return {
-        "key": bench.key,
-        "title": bench.damper.title,
-        "rig": bench.damper.rig,
-        "numbers": bench.damper.parameter_count,
-        "origin": bench.origin,
-        "note": bench.note,
-        "error": finite(bench.error),
-        "selected": bench.selected,
+        **{name: getattr(damper, name) for name in ("key", "origin", "note", "selected")},
+        "title": damper.damper.title,
+        "rig": damper.damper.rig,
+        "parameter_count": damper.damper.parameter_count,
+        "error": finite(damper.error),
     }

@@ -1,65 +1,57 @@
-"""Open a session, keep it, end it."""
+"""Open a session, keep it alive, end it."""
 
 from __future__ import annotations
 
 import secrets
 import threading
-from importlib.metadata import version
 from typing import Any
 
 from fastapi import APIRouter, Depends, HTTPException, Request
 
 from mrdamper.web.imported_data import bundled
 from mrdamper.web.rig_table import rig_table
-from mrdamper.web.sessions import Current
+from mrdamper.web.sessions import OpenSession
 from mrdamper.web.uploads import FILE_COUNT_LIMIT, FILE_LIMIT
 
 router = APIRouter(prefix="/sessions")
 
 
-async def _whole(request: Request) -> None:
-    """Wait for the end of a request: one that is half sent opens no session and ends none."""
+async def _complete(request: Request) -> None:
+    """Wait for the end of a request: an incomplete one opens no session, and so ends none."""
     await request.body()
 
 
-@router.post("", dependencies=[Depends(_whole)])
+@router.post("", dependencies=[Depends(_complete)])
 def open_session(request: Request) -> dict[str, Any]:
-    """Return a new session and what the page must know of the bench."""
-    token, shown = request.app.state.token, request.headers.get("x-bench-token", "")
-    if token is not None and not secrets.compare_digest(shown.encode(), token.encode()):
+    """Open a session; returns its name and the limits of uploads."""
+    token, given = request.app.state.token, request.headers.get("x-app-token", "")
+    if token is not None and not secrets.compare_digest(given.encode(), token.encode()):
         raise HTTPException(
             403, "Open the address that the terminal shows: its token is missing or of an earlier start of the app."
         )
     session = request.app.state.sessions.open()
-    if request.app.state.read_ahead:  # not before: it would compete with the page being loaded
+    if request.app.state.read_ahead:  # not at the start of the app, where it would delay the page
         request.app.state.read_ahead = False
-        threading.Thread(target=_read_ahead, name="bench-read-ahead", daemon=True).start()
-    return {
-        "session": session.name,
-        "version": version("mrdamper"),
-        "limits": {"file_bytes": FILE_LIMIT, "files": FILE_COUNT_LIMIT},
-    }
+        threading.Thread(target=_read_ahead, name="read-ahead", daemon=True).start()
+    return {"session": session.name, "limits": {"file_bytes": FILE_LIMIT, "files": FILE_COUNT_LIMIT}}
 
 
 @router.get("/{session}")
-def keep(session: Current) -> dict[str, Any]:
-    """Say that the page is still open; says what is on the bench."""
+def keep_alive(session: OpenSession) -> dict[str, Any]:
+    """Keep a session alive; returns the source and name of its data."""
     imported = session.imported
-    return {
-        "data": None if imported is None else {"source": imported.source, "name": imported.dataset.name},
-        "dampers": len(session.dampers),
-    }
+    return {"data": None if imported is None else {"source": imported.source, "name": imported.dataset.name}}
 
 
 @router.delete("/{session}")
-def end(session: Current, request: Request) -> dict[str, bool]:
-    """End it and remove its files."""
+def end(session: OpenSession, request: Request) -> dict[str, bool]:
+    """End a session and remove its files."""
     request.app.state.sessions.end(session.name)
     return {"ended": True}
 
 
 def _read_ahead() -> None:
-    """Analyse and check the bundled tests before they are asked for: they open at once, no drop waits for an import."""
+    """Analyse and check the bundled tests before they are requested: they open at once, with all imports done."""
     data = bundled().dataset
     for table in [rig_table(data, rig) for rig in data.rigs]:
-        _ = table.quality  # also brings the libraries that judging takes
+        _ = table.quality

@@ -1,4 +1,4 @@
-"""The Ride view: a damper of the bench at work in a building or a vehicle, under a control law."""
+"""The Simulate view: a damper in a building or a vehicle, under a control law."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from mrdamper.systems.simulate import SystemLoop, simulate_system
 from mrdamper.systems.structure import System
 from mrdamper.systems.system_file import bundled_systems, load_system
 from mrdamper.web.responses import frame
-from mrdamper.web.sessions import Current, shared
+from mrdamper.web.sessions import OpenSession, shared
 
-router = APIRouter(prefix="/sessions/{session}/ride")
-_LENGTH = 8.0  # s of a road
-_SAMPLES = 2000  # of a history that travel to the page
-_TURN = Lock()  # one at a time: each takes seconds
+router = APIRouter(prefix="/sessions/{session}/simulate")
+_ROAD_S = 8.0
+_MAX_SAMPLES = 2000  # of a history on the page
+_LOCK = Lock()  # one at a time: each takes seconds
 _FORCE_SHARE = 0.08  # force of the dampers over the weight of the body [-]
 _GRAVITY = 9.81  # acceleration of gravity [m/s²]
-_SLOWEST = 0.2  # Hz; what of the ground's motion is slower than this is left out of the picture
+_LOWEST_HZ = 0.2  # slower motion of the ground is not shown
 
 
-class RideRequest(BaseModel, extra="forbid", allow_inf_nan=False):
+class SimulateRequest(BaseModel, extra="forbid", allow_inf_nan=False):
     """Choices of the panel."""
 
     damper: str = Field(max_length=64)
@@ -50,43 +50,42 @@ class RideRequest(BaseModel, extra="forbid", allow_inf_nan=False):
 
 
 @router.get("/choices")
-def choices(session: Current) -> dict[str, Any]:
-    """Systems, what shakes them, and laws."""
-    records = [{"name": f"{name}@{speed}", "title": f"{name}, {speed} × speed" if speed > 1 else name}
+def choices(session: OpenSession) -> dict[str, Any]:
+    """List systems, inputs by their kind, and control laws."""
+    records = [(f"{name}@{speed}", f"{name}, {speed} × speed" if speed > 1 else name)
                for name in bundled_records() for speed in (5, 1)]  # fmt: skip
-    roads = [name for name, (kind, _) in made_inputs().items() if kind.kind == "road"]
-    laws = [{"name": name, "title": kind.title} for name, kind in controller_types().items() if name != "passive"]
-    systems = [(name, load_system(name).system) for name in bundled_systems()]
+    roads = [(name, _road_title(name)) for name, (kind, _) in made_inputs().items() if kind.kind == "road"]
+    laws = [(name, kind.title) for name, kind in controller_types().items() if name != "passive"]
+    systems = {name: load_system(name).system for name in bundled_systems()}
     return {
-        "systems": [{"name": name, "title": s.title, "kind": _kind(s)} for name, s in systems],
-        "sources": {"ground": records, "road": [{"name": name, "title": _road_title(name)} for name in roads]},
-        "controls": [{"name": "passive", "title": Passive.title}, *laws],
+        "systems": [{"name": name, "title": s.title, "kind": _kind(s)} for name, s in systems.items()],
+        "sources": {"ground": _titled(records), "road": _titled(roads)},
+        "controls": _titled([("passive", Passive.title), *laws]),
     }
 
 
 @router.post("")
-def ride(ask: RideRequest, session: Current) -> Response:
-    """Histories of a system with a damper under a law, and with that damper left without current."""
-    if ask.system not in bundled_systems():  # a name, never a path of this machine
-        raise UnknownNameError.of("system", ask.system, bundled_systems())
-    with _TURN:  # whoever asks the same meanwhile gets the same
-        return frame(
-            *_ridden(session.damper(ask.damper).damper, ask.system, ask.source, ask.control, ask.current_A, ask.scaled)
-        )
+def simulate(query: SimulateRequest, session: OpenSession) -> Response:
+    """Return histories of a system with a damper under a control law, and with that damper at 0 A."""
+    if query.system not in bundled_systems():  # a name, never a path of this machine
+        raise UnknownNameError.of("system", query.system, bundled_systems())
+    damper = session.damper(query.damper).damper
+    with _LOCK:  # equal requests meanwhile receive the same result
+        return frame(*_simulated(damper, query.system, query.source, query.control, query.current_A, query.scaled))
 
 
 @shared
 @lru_cache(maxsize=48)
-def _ridden(
-    damper: Damper, name: str, source_name: str, control: str, current_A: float, scaled: bool
+def _simulated(
+    damper: Damper, system_name: str, source_name: str, control: str, current_A: float, scaled: bool
 ) -> tuple[dict[str, Any], dict[str, Floats]]:
-    """Head and histories of a ride; shared by all sessions with the same damper."""
-    system, source, capacity, scale = _setting(damper, name, source_name, scaled)
+    """Return head and histories; shared by all sessions with the same damper."""
+    system, source, capacity, scale = _setup(damper, system_name, source_name, scaled)
     kind = controller_type(control)
     law = with_values(kind, {"current_A": current_A}) if kind is Passive else kind()
     dampers = dict.fromkeys((link.name for link in system.dampers), damper)
-    done = simulate_system(system, source, dampers, law, highest=None if kind is Passive else current_A)
-    idle, idle_cost = _idle(damper, name, source_name, scaled, done.step)
+    result = simulate_system(system, source, dampers, law, highest=None if kind is Passive else current_A)
+    passive, passive_cost = _passive(damper, system_name, source_name, scaled, result.step)
     head = {
         "kind": _kind(system),
         "scale": scale,
@@ -94,43 +93,49 @@ def _ridden(
         "title": f"{system.title}, {type(law).title}",
         "coordinates": system.coordinates,
         "channels": system.channels,
-        "dampers": [link.name for link in done.dampers],
-        "calm": system.coordinates[-1 if system.ground is not None else 0],
-        "peaks": {name: values.tolist() for name, values in done.peaks.items()},
-        "gain": finite(1 - (cost(done) / idle_cost) ** 0.5 if idle_cost > 0 else None),
-        "outside": done.outside,
-        "settled": done.settled,
-        "step_s": done.step,
-        "halving": finite(done.halving),
-        "energy_gap": finite(done.energy_gap),
+        "dampers": [link.name for link in result.dampers],
+        "coordinate": system.coordinates[-1 if system.ground is not None else 0],  # whose acceleration is shown
+        "peaks": {name: values.tolist() for name, values in result.peaks.items()},
+        "gain": finite(1 - (cost(result) / passive_cost) ** 0.5 if passive_cost > 0 else None),
+        "outside": result.outside,
+        "converged": result.settled,
+        "step_s": result.step,
+        "halving": finite(result.halving),
     }
-    return head, _thinned(_histories(done, source)) | idle
+    return head, _thinned(_histories(result, source)) | passive
 
 
 @shared
 @lru_cache(maxsize=16)
-def _setting(damper: Damper, name: str, source: str, scaled: bool) -> tuple[System, Input, float, float]:
-    """System, its input, the force of the damper [N] and the scale of a vehicle."""
-    system, capacity, scale = load_system(name).system, _capacity(damper), 1.0
+def _setup(damper: Damper, system_name: str, source_name: str, scaled: bool) -> tuple[System, Input, float, float]:
+    """Return a system, its input, the force of the damper [N] and the scale of a vehicle."""
+    system, e, scale = load_system(system_name).system, damper.envelope, 1.0
+    capacity = peak_force(damper.predict(replace(e.middle, current_A=e.current_A[1])).force)
     if scaled and _kind(system) == "road":
         scale = float(f"{capacity * len(system.dampers) / (_FORCE_SHARE * _GRAVITY * system.M[0, 0]):.2g}")
         system = _scaled(system, scale)
-    return system, _source(source, system), capacity, scale
+    return system, _source(source_name, system), capacity, scale
 
 
 @shared
 @lru_cache(maxsize=16)
-def _idle(damper: Damper, name: str, source_name: str, scaled: bool, step: float) -> tuple[dict[str, Floats], float]:
-    """Accelerations of the system with that damper left without current, and its cost."""
-    system, source, *_ = _setting(damper, name, source_name, scaled)
+def _passive(
+    damper: Damper, system_name: str, source_name: str, scaled: bool, step: float
+) -> tuple[dict[str, Floats], float]:
+    """Return accelerations of the system with that damper at 0 A, and the cost."""
+    system, source, *_ = _setup(damper, system_name, source_name, scaled)
     dampers = dict.fromkeys((link.name for link in system.dampers), damper)
-    idle = SystemLoop(system, source, dampers, Passive()).run(step)
-    return _thinned({f"idle.{at}": idle.a[:, i] for i, at in enumerate(system.coordinates)}), cost(idle)
+    result = SystemLoop(system, source, dampers, Passive()).run(step)
+    return _thinned({f"passive.{name}": result.a[:, i] for i, name in enumerate(system.coordinates)}), cost(result)
+
+
+def _titled(pairs: list[tuple[str, str]]) -> list[dict[str, str]]:
+    return [{"name": name, "title": title} for name, title in pairs]
 
 
 def _thinned(histories: dict[str, Floats]) -> dict[str, Floats]:
-    """As many samples as the page shows."""
-    return {name: values[:: -(-values.size // _SAMPLES)].astype("<f4") for name, values in histories.items()}
+    """Return as many samples as the page shows."""
+    return {name: values[:: -(-values.size // _MAX_SAMPLES)].astype("<f4") for name, values in histories.items()}
 
 
 def _road_title(name: str) -> str:
@@ -139,14 +144,8 @@ def _road_title(name: str) -> str:
     return f"ISO 8608 road, class {grade.upper()}" if standard == "iso8608" and grade else name
 
 
-def _capacity(damper: Damper) -> float:
-    """Predict the peak force [N] at the highest tested current and a middle motion."""
-    e = damper.envelope
-    return peak_force(damper.predict(replace(e.middle, current_A=e.current_A[1])).force)
-
-
 def _scaled(system: System, factor: float) -> System:
-    """Multiply masses, dashpots and springs; frequencies and strokes under the same road stay."""
+    """Multiply masses, dashpots and springs; frequencies and strokes on the same road remain."""
     links = tuple(
         replace(link, stiffness=factor * link.stiffness, damping=factor * link.damping) for link in system.links
     )
@@ -160,31 +159,32 @@ def _kind(system: System) -> str:
 
 def _source(name: str, system: System) -> Input:
     record, _, speed = name.partition("@")
-    sources = made_inputs() if _kind(system) == "road" else bundled_records()
+    road = _kind(system) == "road"
+    sources = made_inputs() if road else bundled_records()
     if record not in sources:
         raise UnknownNameError.of("input", record, sources)
-    if _kind(system) == "road":
-        return load_input(record, {"length_s": _LENGTH})
+    if road:
+        return load_input(record, {"length_s": _ROAD_S})
     return load_input(record, time_scale=5.0 if speed == "5" else 1.0)
 
 
-def _histories(done: Simulation, source: Input) -> dict[str, Floats]:
-    columns = {"time": done.time}
-    for i, name in enumerate(done.system.coordinates):
-        columns |= {f"x.{name}": done.x[:, i], f"a.{name}": done.a[:, i]}
-    for i, link in enumerate(done.links):
+def _histories(result: Simulation, source: Input) -> dict[str, Floats]:
+    columns = {"time": result.time}
+    for i, name in enumerate(result.system.coordinates):
+        columns |= {f"x.{name}": result.x[:, i], f"a.{name}": result.a[:, i]}
+    for i, link in enumerate(result.links):
         if link.role == "damper":
-            columns |= {f"stroke.{link.name}": done.stroke[:, i], f"force.{link.name}": done.force[:, i]}
-            columns[f"current.{link.name}"] = done.current[:, i]
-    if done.system.ground is not None:
-        return columns | {"way.ground": _moved(source.value(done.time), done.step)}
-    return columns | {f"way.{name}": done.road[:, i] for i, name in enumerate(done.system.channels)}
+            channels = {"stroke": result.stroke, "force": result.force, "current": result.current}
+            columns |= {f"{channel}.{link.name}": values[:, i] for channel, values in channels.items()}
+    if result.system.ground is not None:
+        return columns | {"input.ground": _displacement(source.value(result.time), result.step)}
+    return columns | {f"input.{name}": result.road[:, i] for i, name in enumerate(result.system.channels)}
 
 
-def _moved(acceleration: Floats, step: float) -> Floats:
-    """(N,) displacement [m] behind an acceleration, without what is too slow to be told from drift."""
+def _displacement(acceleration: Floats, step: float) -> Floats:
+    """(N,) displacement [m] of an acceleration, without the low frequencies that drift dominates."""
     omega = 2 * np.pi * np.fft.rfftfreq(2 * acceleration.size, step)
     spectrum = np.fft.rfft(acceleration, 2 * acceleration.size)
-    kept = omega > 2 * np.pi * _SLOWEST
-    moved = np.where(kept, -spectrum / np.where(kept, omega, 1.0) ** 2, 0.0)
-    return np.fft.irfft(moved, 2 * acceleration.size)[: acceleration.size]
+    kept = omega > 2 * np.pi * _LOWEST_HZ
+    displacement = np.where(kept, -spectrum / np.where(kept, omega, 1.0) ** 2, 0.0)
+    return np.fft.irfft(displacement, 2 * acceleration.size)[: acceleration.size]

@@ -1,9 +1,8 @@
-"""The test list: file, run, motion, current and split of every dropped test, mended by a click."""
+"""The test list: file, run, motion, current and split of every uploaded test, to be corrected by the user."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Literal
 
 from fastapi import APIRouter
@@ -15,29 +14,25 @@ from mrdamper.physics.motion import equivalent_sine
 from mrdamper.rig_files.preview import preview
 from mrdamper.rig_files.profile import Channel, Profile, parse_profile, profile_text
 from mrdamper.study.split import hold_out
-from mrdamper.web.api.data import overview
+from mrdamper.web.api.data import find_upload, overview
 from mrdamper.web.imported_data import read_upload
-from mrdamper.web.rig_upload import reasons, split_again
-from mrdamper.web.sessions import Current, Session
-from mrdamper.web.uploads import ImportedData, Upload
+from mrdamper.web.rig_upload import reasons, with_split
+from mrdamper.web.sessions import OpenSession, Session
+from mrdamper.web.uploads import Upload
 
 router = APIRouter(prefix="/sessions/{session}")
-_LARGEST_A = 200.0
+_MAX_CURRENT_A = 200.0
 
 
-class Strict(BaseModel, extra="forbid"):
-    """No other keys."""
-
-
-class StatedCurrent(Strict):
-    """The coil current of a test [A]; None takes back what was stated before."""
+class StatedCurrent(BaseModel, extra="forbid"):
+    """The coil current of a test [A]; None withdraws the current stated before."""
 
     file: int = Field(ge=0)
     run: str = Field(max_length=300)
-    current_A: float | None = Field(default=None, ge=-_LARGEST_A, le=_LARGEST_A, allow_inf_nan=False)
+    current_A: float | None = Field(default=None, ge=-_MAX_CURRENT_A, le=_MAX_CURRENT_A, allow_inf_nan=False)
 
 
-class ChosenColumn(Strict):
+class ChosenColumn(BaseModel, extra="forbid"):
     """Column of a channel, counted from zero, with unit and sign."""
 
     column: int = Field(ge=0, le=1000)
@@ -45,13 +40,13 @@ class ChosenColumn(Strict):
     sign: Literal[1, -1] = 1
 
 
-class Columns(Strict):
-    """The columns of the channels, for all files; a channel that is left out is found by its name."""
+class Columns(BaseModel, extra="forbid"):
+    """Columns of the channels, for all files; other channels are found by their names."""
 
     channels: dict[str, ChosenColumn]
 
 
-class HeldOut(Strict):
+class ValidationRuns(BaseModel, extra="forbid"):
     """Choice of validation runs as in `mrdamper split`; by default a stratified fifth."""
 
     runs: list[str] = Field(default=[], max_length=100_000)
@@ -61,101 +56,91 @@ class HeldOut(Strict):
 
 
 @router.get("/tests")
-def tests(session: Current) -> dict[str, Any]:
-    """Every test that was dropped, the refused ones too, and how the first file begins."""
-    upload = next(iter(session.uploads.values()), None)
+def tests(session: OpenSession) -> dict[str, Any]:
+    """List every test, the refused ones too, and the first rows of a file."""
+    upload = session.upload
     if upload is None or not (upload.taken or upload.refused):
         return {"tests": [_row(run) for run in session.dataset] if session.imported else [], "preview": None}
     return {"tests": _rows(upload, session), "preview": _preview(upload)}
 
 
 @router.post("/tests/current")
-def state_current(stated: StatedCurrent, session: Current) -> dict[str, Any]:
+def state_current(stated: StatedCurrent, session: OpenSession) -> dict[str, Any]:
     """State the current of one test, and read its file again."""
-    upload = _upload(session)
-    path = _file(upload, stated.file)
-    key = path, stated.run
-    before = upload.currents.pop(key, None)
+    upload = find_upload(session)
+    paths = list(upload.names)
+    if stated.file >= len(paths):
+        raise UnknownNameError("no such file", remedy="choose one from the list")
+    path = paths[stated.file]
+    key, before = (path, stated.run), dict(upload.currents)
+    upload.currents.pop(key, None)
     if stated.current_A is not None:
         upload.currents[key] = stated.current_A
     try:
-        session.put(read_upload(upload, upload.toml, only=path))
+        session.load(read_upload(upload, upload.toml, only=path))
     except InputError as error:
         if error.code == "E_TESTS":  # no such test
-            upload.currents.pop(key)
-            upload.currents.update({} if before is None else {key: before})
+            upload.currents = before
         raise
     return overview(session)
 
 
 @router.post("/tests/columns")
-def choose_columns(columns: Columns, session: Current) -> dict[str, Any]:
-    """Say which columns the channels are, and read all files again."""
-    upload = _upload(session)
-    profile = parse_profile(upload.toml) if upload.toml.strip() else Profile()
+def choose_columns(columns: Columns, session: OpenSession) -> dict[str, Any]:
+    """Choose the columns of the channels, and read all files again."""
+    upload = find_upload(session)
+    profile = _profile(upload) or Profile()
     chosen = {name: _channel(profile, name, column) for name, column in columns.channels.items()}
     text = profile_text(profile.model_copy(update={"channels": {**profile.channels, **chosen}}))
-    parse_profile(text)  # units are checked here
-    session.put(read_upload(upload, text))
+    parse_profile(text)  # checks the units
+    session.load(read_upload(upload, text))
     return overview(session)
 
 
 @router.post("/tests/split")
-def split(held: HeldOut, session: Current) -> dict[str, Any]:
-    """Hold runs out, by the rules of `mrdamper split`."""
+def split(choice: ValidationRuns, session: OpenSession) -> dict[str, Any]:
+    """Choose the validation runs by the rules of `mrdamper split`."""
+    chosen = hold_out(session.dataset, **choice.model_dump(), replace=True)
     imported = session.imported
-    chosen = hold_out(
-        session.dataset, runs=held.runs, currents=held.currents, every=held.every, none=held.none, replace=True
-    )
-    assert imported is not None  # session.dataset would have said so
-    for upload in session.uploads.values():
-        upload.held_out = chosen.held_out
-    session.put(replace(imported, dataset=split_again(imported.dataset, chosen.held_out)))
+    assert imported is not None  # session.dataset raises without data
+    if session.upload is not None:
+        session.upload.validation = chosen.held_out
+    session.load(replace(imported, dataset=with_split(imported.dataset, chosen.held_out)))
     return {**overview(session), "reason": chosen.reason}
 
 
+def _profile(upload: Upload) -> Profile | None:
+    return parse_profile(upload.toml) if upload.toml.strip() else None
+
+
 def _channel(profile: Profile, name: str, chosen: ChosenColumn) -> Channel:
-    settings = profile.channel(name)
-    says = settings.model_dump(exclude_unset=True, exclude_none=True)
-    if settings.scale is None:
-        says = {key: value for key, value in says.items() if key != "unit"}
-        says |= {"unit": chosen.unit} if chosen.unit else {}
-    return Channel(**{**says, "column": chosen.column + 1, "sign": chosen.sign})
-
-
-def _upload(session: Session) -> Upload:
-    upload = next(iter(session.uploads.values()), None)
-    if upload is None:
-        raise UnknownNameError("no files were dropped", remedy="drop the files of a rig")
-    return upload
-
-
-def _file(upload: Upload, number: int) -> Path:
-    paths = list(upload.names)
-    if number >= len(paths):
-        raise UnknownNameError("no such file was dropped", remedy="choose one from the list")
-    return paths[number]
+    channel = profile.channel(name)
+    settings = channel.model_dump(exclude_unset=True, exclude_none=True)
+    if channel.scale is None:
+        settings.pop("unit", None)
+        settings |= {"unit": chosen.unit} if chosen.unit else {}
+    return Channel(**{**settings, "column": chosen.column + 1, "sign": chosen.sign})
 
 
 def _rows(upload: Upload, session: Session) -> list[dict[str, Any]]:
-    """Refused tests first, then those taken, in the order of the files."""
-    imported: ImportedData | None = session.imported
-    runs = iter(imported.dataset) if imported is not None and imported.source == "drop" else iter(())
+    """Describe the refused tests, then those taken, in the order of the files."""
+    imported = session.imported
+    runs = iter(imported.dataset if imported is not None and imported.source == "upload" else ())
     refused, taken = [], []
-    for path in sorted(upload.names, key=lambda path: upload.names[path]):
-        number, name = list(upload.names).index(path), upload.names[path]
-        by_run: dict[str, list[Any]] = {}
-        for refusal in upload.refused.get(path, ()):
-            by_run.setdefault(refusal.run, []).append(refusal)
-        for run_id, refusals in by_run.items():
-            stated = upload.currents.get((path, run_id))
+    numbers = {path: number for number, path in enumerate(upload.names)}
+    for path in upload.paths_by_name():
+        file = {"file": numbers[path], "name": upload.names[path]}
+        refusals = upload.refused.get(path, ())
+        for test in dict.fromkeys(refusal.run for refusal in refusals):
+            findings = reasons(upload, path, [refusal for refusal in refusals if refusal.run == test])
+            current = upload.currents.get((path, test))
             refused.append({
-                "file": number, "name": name, "test": run_id, "run": "", "current_A": stated, "motion": "", "split": "",
-                "state": "refused", "findings": reasons(upload, path, refusals),
+                **file, "test": test, "run": "", "current_A": current, "motion": "", "split": "", "state": "refused",
+                "findings": findings,
             })  # fmt: skip
         for record, run in zip(upload.taken.get(path, ()), runs):  # noqa: B905 (the runs of all files in a row)
             findings = [(finding.code, finding.text) for finding in record.findings]
-            taken.append({**_row(run), "file": number, "name": name, "test": record.id, "findings": findings})
+            taken.append({**_row(run), **file, "test": record.id, "findings": findings})
     return refused + taken
 
 
@@ -173,8 +158,9 @@ def _row(run: Run) -> dict[str, Any]:
 
 
 def _preview(upload: Upload) -> dict[str, Any] | None:
-    profile = parse_profile(upload.toml) if upload.toml.strip() else None
-    for path in sorted(upload.names, key=lambda path: (path not in upload.refused, upload.names[path])):
+    """Return the first rows of a file that can be read, refused ones first."""
+    profile = _profile(upload)
+    for path in sorted(upload.paths_by_name(), key=lambda path: path not in upload.refused):
         try:
             shown = preview(path, profile)
         except InputError:

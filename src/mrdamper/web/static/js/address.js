@@ -1,66 +1,63 @@
-// The state of the page in its address, so that a link, a bookmark or loading it again brings it back.
+// The state of the page in its address, so that a link, a bookmark or a reload restores it.
 
-import { fromFragment, imported, packs, portable, toFragment } from "./state.js";
+import { canCompress, fromFragment, parseState, savedState, toFragment } from "./state.js";
 import { tabStorage } from "./storage.js";
 
-const LAST = "mrdamper.last"; // state and damper of this page as it was left, for loading it again
-const BETWEEN = 400; // milliseconds between two writings while a slider moves: browsers refuse many in a row
-
-const pause = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
+const LAST = "mrdamper.last"; // state and damper when the page was left, for a reload
+const INTERVAL_MS = 400; // between two writings while a slider moves: browsers refuse many in a row
 
 export class Address {
-  constructor(bench) {
+  constructor(app) {
     const last = JSON.parse(tabStorage.getItem(LAST) ?? "null");
     tabStorage.removeItem(LAST);
-    Object.assign(this, { bench, behind: false, writing: false, opened: { hash: location.hash, last } });
-    addEventListener("pagehide", () => this.keep());
+    Object.assign(this, { app, outdated: false, writing: false, opened: { hash: location.hash, last } });
+    addEventListener("pagehide", () => this.storeLast());
   }
 
   /**
-   * The state changed: the address follows at once, or BETWEEN after it was written last. Writings
-   * come one after the other, never an older state after a newer. `data-address` of the page says
-   * whether the address holds what is shown.
+   * Write the state into the address, at once or INTERVAL_MS after the last writing; one writing follows the
+   * other, so an older state never replaces a newer. `data-address` of the page shows if the address is current.
    */
   follow() {
-    if (!packs) return;
-    this.behind = true;
-    this.tell();
-    if (!this.writing) this.write().catch((error) => this.bench.fail(error));
+    if (!canCompress) return;
+    this.outdated = true;
+    this.mark();
+    if (!this.writing) this.app.run(this.write());
   }
 
   async write() {
     this.writing = true;
     try {
-      while (this.behind) {
-        this.behind = false;
+      while (this.outdated) {
+        this.outdated = false;
         history.replaceState(null, "", `#${await this.fragment()}`);
-        this.tell();
-        await pause(BETWEEN);
+        this.mark();
+        await new Promise((done) => setTimeout(done, INTERVAL_MS));
       }
     } finally {
       this.writing = false;
     }
   }
 
-  /** The state as a fragment, its model's document in it. */
+  /** The state as a fragment, the model included. */
   async fragment() {
-    await this.bench.keepDocument();
-    return toFragment(this.bench.state);
+    await this.app.includeDocument();
+    return toFragment(this.app.state);
   }
 
-  tell() {
-    document.documentElement.dataset.address = this.behind ? "behind" : "current";
+  mark() {
+    document.documentElement.dataset.address = this.outdated ? "behind" : "current";
   }
 
-  /** Leaving: loading the page again finds the state as it is, even one the address does not hold yet. */
-  keep() {
-    const { state } = this.bench;
-    tabStorage.setItem(LAST, JSON.stringify({ hash: location.hash, damper: state.damper, state: portable(state) }));
+  /** Store the state for a reload, even one that the address does not have yet. */
+  storeLast() {
+    const { state } = this.app;
+    tabStorage.setItem(LAST, JSON.stringify({ hash: location.hash, damper: state.damper, state: savedState(state) }));
   }
 
-  /** The state to begin with, or null; where the same page is loaded again its damper is there too. */
-  async found() {
+  /** The state to begin with, or null; after a reload with the damper of this session. */
+  async initialState() {
     const { hash, last } = this.opened;
-    return last?.hash === hash ? { ...imported(last.state), damper: last.damper } : fromFragment(hash);
+    return last?.hash === hash ? { ...parseState(last.state), damper: last.damper } : fromFragment(hash);
   }
 }

@@ -1,18 +1,108 @@
-// Asking the bench. Every answer that is no success becomes a BenchError with what to show.
+// Requests to the server, and the session of the page. A response that is no success becomes an ApiError.
 
 import { tabStorage } from "./storage.js";
 
-export class BenchError extends Error {
-  constructor(said, status) {
-    super(said.text);
-    this.said = said;
-    this.status = status;
+const [SESSION, TOKEN] = ["mrdamper.session", "mrdamper.token"];
+const RETRIES = 4; // of a progress stream that broke off
+
+/** An error to display; `details`: {found, where, remedy, code} or {text, code}. */
+export class ApiError extends Error {
+  constructor(details, status = 0) {
+    super(details.text ?? details.found);
+    Object.assign(this, { details, status });
   }
 }
 
-const TOKEN = "mrdamper.token";
+/** Requests of one session. */
+export class Api {
+  constructor(session) {
+    this.base = `/api/sessions/${session}`;
+  }
 
-/** What the printed address holds: kept for loading the page again, and taken out of the address. */
+  url(path) {
+    return this.base + path;
+  }
+
+  async get(path) {
+    return (await this.send("GET", path)).json();
+  }
+
+  async post(path, body = {}) {
+    return (await this.send("POST", path, body)).json();
+  }
+
+  async delete(path) {
+    return (await this.send("DELETE", path)).json();
+  }
+
+  /** Arrays, by GET or with a body by POST: {head, arrays: {name: Float32Array}}. */
+  async frame(path, body) {
+    const response = await this.send(body === undefined ? "GET" : "POST", path, body);
+    return unpack(await response.arrayBuffer());
+  }
+
+  /** A file to save, by POST: {blob, name}. */
+  async file(path, body) {
+    const response = await this.send("POST", path, body);
+    const name = /filename="([^"]+)"/.exec(response.headers.get("Content-Disposition") ?? "")?.[1] ?? "mrdamper";
+    return { blob: await response.blob(), name };
+  }
+
+  upload(path, file) {
+    return request("PUT", this.url(path), { body: file });
+  }
+
+  /** Follow a job: `onReport` receives every report, the promise resolves to the last. */
+  follow(job, onReport) {
+    return new Promise((resolve, reject) => {
+      const source = new EventSource(this.url(`/jobs/${job}/events`));
+      let failures = 0;
+      source.onmessage = (event) => {
+        failures = 0;
+        const report = JSON.parse(event.data);
+        onReport(report);
+        if (["waiting", "running"].includes(report.state)) return;
+        source.close();
+        resolve(report);
+      };
+      source.onerror = () => {
+        failures += 1; // the browser connects again by itself
+        if (failures < RETRIES && source.readyState !== EventSource.CLOSED) return;
+        source.close();
+        reject(offline());
+      };
+    });
+  }
+
+  send(method, path, body) {
+    const json = { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
+    return request(method, this.url(path), body === undefined ? {} : json);
+  }
+}
+
+/** The session of this tab, continued after a reload, or a new one: {api, limits, data}; `data` where some are loaded. */
+export async function openSession() {
+  const stored = tabStorage.getItem(SESSION);
+  if (stored) {
+    const { session, limits } = JSON.parse(stored);
+    const api = new Api(session);
+    try {
+      return { api, limits, data: (await api.get("")).data };
+    } catch {
+      forgetSession();
+    }
+  }
+  const { session, limits } = await (await request("POST", "/api/sessions", { headers: { "X-App-Token": token() } })).json();
+  tabStorage.setItem(SESSION, JSON.stringify({ session, limits }));
+  return { api: new Api(session), limits, data: null };
+}
+
+/** Forget a session that has ended. */
+export function forgetSession() {
+  tabStorage.removeItem(SESSION);
+}
+
+/** The token in the printed address: stored for a reload, and removed from the address. */
 function token() {
   const given = new URLSearchParams(location.search).get("token");
   if (given) {
@@ -22,154 +112,51 @@ function token() {
   return tabStorage.getItem(TOKEN) ?? "";
 }
 
-const RETRIES = 4; // of a progress stream that broke off
-
-export class Api {
-  constructor(session) {
-    this.base = `/api/sessions/${session}`;
-  }
-
-  /** Open a session. */
-  static async open() {
-    const headers = { "X-Bench-Token": token() };
-    return (await answer(await send("/api/sessions", { method: "POST", headers }))).json();
-  }
-
-  url(path) {
-    return this.base + path;
-  }
-
-  async get(path) {
-    return (await this.ask("GET", path)).json();
-  }
-
-  async post(path, body = {}) {
-    return (await this.ask("POST", path, body)).json();
-  }
-
-  async delete(path) {
-    return (await this.ask("DELETE", path)).json();
-  }
-
-  /** Arrays, by GET or with a body by POST: {head, arrays: {name: Float32Array}}. */
-  async frame(path, body) {
-    const response = await this.ask(body === undefined ? "GET" : "POST", path, body);
-    return unpack(await response.arrayBuffer());
-  }
-
-  /** A file to be saved, by POST: {blob, name}. */
-  async file(path, body) {
-    const response = await this.ask("POST", path, body);
-    const name = /filename="([^"]+)"/.exec(response.headers.get("Content-Disposition") ?? "")?.[1] ?? "mrdamper";
-    return { blob: await response.blob(), name };
-  }
-
-  async upload(path, file) {
-    return (await answer(await send(this.base + path, { method: "PUT", body: file }))).json();
-  }
-
-  /** Follow a job; `tell` gets every report, the promise the last. */
-  follow(job, tell) {
-    return new Promise((resolve, reject) => {
-      const source = new EventSource(this.url(`/jobs/${job}/events`));
-      let failures = 0;
-      source.onmessage = (event) => {
-        failures = 0;
-        const report = JSON.parse(event.data);
-        tell(report);
-        if (!["waiting", "running"].includes(report.state)) {
-          source.close();
-          resolve(report);
-        }
-      };
-      source.onerror = () => {
-        failures += 1; // the browser tries again by itself
-        if (failures < RETRIES && source.readyState !== EventSource.CLOSED) return;
-        source.close();
-        reject(lost());
-      };
-    });
-  }
-
-  async ask(method, path, body) {
-    const options = { method };
-    if (body !== undefined) {
-      options.headers = { "Content-Type": "application/json" };
-      options.body = JSON.stringify(body);
-    }
-    return answer(await send(this.base + path, options));
-  }
-}
-
-async function send(path, options) {
-  try {
-    return await fetch(path, options);
-  } catch {
-    throw lost();
-  }
-}
-
-function lost() {
-  return new BenchError({ text: "the bench does not answer", found: "the bench does not answer", remedy: "start mrdamper serve again and load the page", code: "E_OFFLINE" }, 0);
-}
-
-async function answer(response) {
+async function request(method, url, settings) {
+  const response = await fetch(url, { method, ...settings }).catch(() => Promise.reject(offline()));
   if (response.ok) return response;
-  let said;
-  try {
-    said = await response.json();
-  } catch {
-    said = { text: `the bench answered ${response.status}` };
-  }
-  throw new BenchError(said, response.status);
+  throw new ApiError(await response.json().catch(() => ({ text: `the app responded with status ${response.status}` })), response.status);
+}
+
+function offline() {
+  return new ApiError({ found: "the app does not respond", remedy: "start mrdamper serve again and load the page again", code: "E_OFFLINE" });
 }
 
 function unpack(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   const arrays = {};
-  let at = 4 + length;
+  let offset = 4 + length;
   for (const [name, size] of head.arrays) {
-    arrays[name] = new Float32Array(buffer, at, size);
-    at += 4 * size;
+    arrays[name] = new Float32Array(buffer, offset, size);
+    offset += 4 * size;
   }
   return { head, arrays };
 }
 
 /**
- * Of many questions in a row, the newest counts: "latest wins". The next is sent as soon as an
- * answer is there, before it is drawn, so that asking and drawing overlap.
+ * Requests of which only the newest counts. The next is sent as soon as a response arrives, before that
+ * response is drawn, so that calculation and drawing overlap.
  */
 export class Latest {
-  constructor(ask, show, fail) {
-    Object.assign(this, { ask, show, fail, waiting: null, asking: false });
+  constructor(fetch, show, fail) {
+    Object.assign(this, { fetch, show, fail, waiting: null, busy: false });
   }
 
-  /** Whether something is being asked. */
-  get busy() {
-    return this.asking;
-  }
-
-  want(question) {
-    this.waiting = question;
-    if (!this.asking) this.next();
+  request(query) {
+    this.waiting = query;
+    if (!this.busy) this.next();
   }
 
   async next() {
-    const question = this.waiting;
-    this.waiting = null;
-    this.asking = true;
-    let [found, trouble] = [null, null];
-    try {
-      found = await this.ask(question);
-    } catch (error) {
-      trouble = error;
-    }
-    this.asking = false;
+    const query = this.waiting;
+    [this.waiting, this.busy] = [null, true];
+    const response = this.fetch(query);
+    await Promise.allSettled([response]);
+    this.busy = false;
     if (this.waiting !== null) this.next();
     try {
-      if (trouble) throw trouble;
-      await this.show(found, question);
+      await this.show(await response, query);
     } catch (error) {
       this.fail(error);
     }

@@ -1,25 +1,20 @@
-// What the views share: the data and dampers on the bench, the state of the page, and ways to speak up.
+// What the views share: the loaded data and dampers, the state of the page, messages and events.
 
-import { BenchError } from "./api.js";
-import { h, note, problem, put } from "./dom.js";
+import { ApiError, forgetSession } from "./api.js";
+import { errorMessage, h, note, options, placeholder, render } from "./dom.js";
 import { percent } from "./format.js";
-import { forgetSession } from "./session.js";
 import { Store } from "./state.js";
 
-/** What the views share. */
-export class Bench {
+/** The app as its views use it. */
+export class App {
   constructor(api, limits) {
-    this.api = api;
-    this.limits = limits;
-    this.store = new Store();
-    this.overview = null; // of the data on the bench
-    this.busy = ""; // what is being done to bring others
-    this.studying = false; // a study runs
-    this.dampers = [];
-    this.tables = new Map(); // rig number to its runs and matrix
-    this.picture = ""; // the logo of the report's head, as base64; too large for a link
-    this.undocumented = null; // the damper last seen that no file holds
-    this.loops = new Map(); // measured loops and verdicts, fetched once
+    Object.assign(this, { api, limits, store: new Store(), dampers: [] });
+    this.overview = null; // of the loaded data
+    this.loading = ""; // description of the loading under way
+    this.studyRunning = false;
+    this.cache = new Map(); // promises of responses about the loaded data, by path
+    this.picture = ""; // logo of the report as base64; too large for a link
+    this.unsavable = null; // key of the last damper without a file format
   }
 
   get state() {
@@ -32,43 +27,42 @@ export class Bench {
 
   set logo(picture) {
     this.picture = picture;
-    this.announce("logo");
+    this.emit("logo");
   }
 
-  /** What the reader wrote for the head of a report. */
-  get head() {
+  /** Head of the report as the user has filled it in. */
+  get reportHead() {
     return { about: this.state.about, logo: this.logo };
   }
 
-  /** New data: `bring` asks the bench for them; until they are there the Data view says `what` is being done. */
-  async takeData(bring, what, change = {}) {
-    this.busy = what;
-    this.announce("busy");
+  /** Replace the data by those that `load` resolves to; meanwhile the Data view shows `description`. */
+  async loadData(load, description, change = {}) {
+    this.loading = description;
+    this.emit("loading");
     try {
-      const overview = await bring();
+      const overview = await load();
       this.overview = overview;
-      this.tables.clear();
-      this.loops.clear();
-      this.busy = "";
-      this.store.settle({ source: overview?.source ?? null, dataName: overview?.name ?? "", rig: 0, run: null, compareRun: null, ...change });
-      this.store.forget();
-      this.announce("data");
+      this.cache.clear();
+      this.loading = "";
+      this.store.amend({ source: overview?.source ?? null, dataName: overview?.name ?? "", rig: 0, run: null, compareRun: null, ...change });
+      this.store.clearHistory();
+      this.emit("data");
     } finally {
-      if (this.busy) {
-        this.busy = "";
-        this.announce("busy");
+      if (this.loading) {
+        this.loading = "";
+        this.emit("loading");
       }
     }
   }
 
   /** Open the bundled tests and the models identified from them. */
   async openBundled() {
-    await this.takeData(() => this.api.post("/bundled"), "Opening the bundled tests");
+    await this.loadData(() => this.api.post("/bundled"), "Opening the bundled tests");
     await this.refreshDampers();
   }
 
-  /** Key of the damper to show where none was chosen: selected by a study, of the rig shown, the newest. */
-  preferred() {
+  /** Key of the damper to show where none was chosen: selected by a study, of the current rig, the newest. */
+  defaultDamper() {
     const rig = this.overview?.rigs[this.state.rig]?.name;
     const rank = (d) => 2 * (d.rig === rig) + d.selected;
     return this.dampers.reduce((best, d) => (best && rank(best) > rank(d) ? best : d), null)?.key ?? null;
@@ -76,113 +70,163 @@ export class Bench {
 
   /** Options of a list of dampers, by rig; the error stands before the name, which may be cut. */
   damperOptions() {
+    const option = (d) => [d.key, `${d.error === null ? "" : `${percent(d.error)} · `}${d.title}${d.selected ? " · selected" : ""}`];
     const rigs = [...new Set(this.dampers.map((d) => d.rig))];
-    const option = (d) => h("option", { value: d.key }, `${d.error === null ? "" : `${percent(d.error)} · `}${d.title}${d.selected ? " · selected" : ""}`);
-    return rigs.map((rig) => h("optgroup", { label: rig || "rig without name" }, this.dampers.filter((d) => d.rig === rig).map(option)));
+    return rigs.map((rig) => h("optgroup", { label: rig || "rig without name" }, options(this.dampers.filter((d) => d.rig === rig).map(option))));
   }
 
-  /** Mark that a study runs, until its work ends. */
-  async study(work) {
-    this.studying = true;
-    this.announce("studying");
+  /** Number of a rig in the loaded data by its name; -1 where it is not among them. */
+  rigNumber(name) {
+    return this.overview?.rigs.findIndex((rig) => rig.name === name) ?? -1;
+  }
+
+  /** Mark that a study runs until the promise settles. */
+  async duringStudy(promise) {
+    this.studyRunning = true;
+    this.emit("study");
     try {
-      return await work;
+      return await promise;
     } finally {
-      this.studying = false;
-      this.announce("studying");
+      this.studyRunning = false;
+      this.emit("study");
     }
   }
 
-  async rigTable(number = this.state.rig) {
-    if (!this.overview) return null;
-    return once(this.tables, number, () => this.api.get(`/data/rigs/${number}`));
+  /** Runs and test matrix of a rig; null without data. */
+  async rigTable(rig = this.state.rig) {
+    return this.overview && this.cached(`/data/rigs/${rig}`, "get");
   }
 
-  /** The verdict on every run of the rig shown. */
-  quality(rig = this.state.rig) {
-    const path = `/data/rigs/${rig}/quality`;
-    return once(this.loops, path, () => this.api.get(path));
+  /** Quality of every run of a rig. */
+  quality(rig) {
+    return this.cached(`/data/rigs/${rig}/quality`, "get");
   }
 
-  /** A measured loop of the rig shown. */
-  loop(key, part = "cycle", rig = this.state.rig) {
-    const path = `/data/rigs/${rig}/runs/${key}/${part}`;
-    return once(this.loops, path, () => this.api.frame(path));
+  /** A measured loop. */
+  loop(key, part, rig) {
+    return this.cached(`/data/rigs/${rig}/runs/${key}/${part}`, "frame");
+  }
+
+  /** Response to a request, sent once for the loaded data; one that failed is sent again. */
+  cached(path, method) {
+    if (!this.cache.has(path)) {
+      const promise = this.api[method](path);
+      this.cache.set(path, promise);
+      promise.catch(() => this.cache.get(path) === promise && this.cache.delete(path));
+    }
+    return this.cache.get(path);
   }
 
   async refreshDampers() {
     this.dampers = await this.api.get("/dampers");
-    this.announce("dampers");
-    return this.dampers;
+    this.emit("dampers");
   }
 
-  /** Put a damper under the sliders. */
-  async choose(key, change = {}) {
+  /** Add a damper from the text of a model.json; resolves to its key. */
+  async addDamper(text) {
+    const { damper } = await this.api.post("/dampers", { text });
+    await this.refreshDampers();
+    return damper;
+  }
+
+  selectDamper(key, change = {}) {
     this.store.commit({ damper: key, document: null, held: {}, condition: null, ...change });
   }
 
-  /** Bring back a state from a link or file: its data where they are bundled, and its model. */
+  showView(view) {
+    this.store.update({ view });
+  }
+
+  /** A button that opens another view. */
+  viewButton(view, text, kind = "primary") {
+    return h("button", { class: kind, onclick: () => this.showView(view) }, text);
+  }
+
+  /** Content of a view that requires data. */
+  noData() {
+    return placeholder("No data", "Open the bundled tests or drop files on the Data page first.", this.viewButton("data", "Open data"));
+  }
+
+  /** Column of a table of models: buttons that open the damper of a row in the Model view. */
+  exploreColumn() {
+    const explore = (row) => () => this.selectDamper(row.damper, { view: "model" });
+    return { title: "", value: (row) => h("button", { class: "link", "aria-label": `Explore ${row.title}`, onclick: explore(row) }, "Explore") };
+  }
+
+  /** Restore a state from a link or file: its data where they are bundled, and its model. */
   async restore(state) {
     if (state.source === "bundled" && this.overview?.source !== "bundled") {
       await this.openBundled();
-    } else if (state.source === "drop" && this.overview?.name !== state.dataName) {
-      this.say(note("warn", h("b", {}, "The data are not part of a link. "), `Drop “${state.dataName}” again to lay measured runs under the model.`));
+    } else if (state.source === "upload" && this.overview?.name !== state.dataName) {
+      this.notify(note("warn", h("b", {}, "A link contains no measured data. "), `Drop “${state.dataName}” again to compare the model with measured runs.`));
     }
     let damper = this.dampers.some((d) => d.key === state.damper) ? state.damper : null;
-    if (state.document && !damper) {
-      damper = (await this.api.post("/dampers", { text: state.document })).damper;
-      await this.refreshDampers();
-    }
+    if (state.document && !damper) damper = await this.addDamper(state.document);
     this.store.commit({ ...state, source: this.overview?.source ?? null, dataName: this.overview?.name ?? "", damper });
   }
 
-  /** The model's document goes into the state, so that a link or file carries it; asked for once a damper. */
-  async keepDocument() {
+  /** Include the model of the selected damper in the state, for a link or file; requested once per damper. */
+  async includeDocument() {
     const { damper, document } = this.state;
-    if (!damper || document || this.undocumented === damper) return;
+    if (!damper || document || this.unsavable === damper) return;
     try {
       const { text } = await this.api.post(`/dampers/${damper}/document`, { held: {} });
-      if (this.state.damper === damper) this.store.settle({ document: JSON.stringify(JSON.parse(text)) });
+      if (this.state.damper === damper) this.store.amend({ document: JSON.stringify(JSON.parse(text)) });
     } catch (error) {
-      this.undocumented = damper;
+      this.unsavable = damper;
       if (error.status !== 422) return this.fail(error);
-      this.say(note("warn", "This kind of damper has no file format yet: a link brings back the data, not the model."), 6000);
+      this.notify(note("warn", "This kind of damper has no file format yet: a link contains the data set's name, not the model."), 6000);
     }
   }
 
-  /** Say something for a while. */
-  say(element, milliseconds = 9000) {
-    const box = document.getElementById("toasts");
-    box.append(element);
+  /** Show an element in the corner of the page for some time. */
+  notify(element, milliseconds = 9000) {
+    document.getElementById("toasts").append(element);
     setTimeout(() => element.remove(), milliseconds);
   }
 
   fail(error) {
-    if (error instanceof BenchError && error.status === 410) {
+    if (error instanceof ApiError && error.status === 410) {
       forgetSession();
-      put(document.getElementById("view"), h("div", { class: "empty" }, problem(error), h("button", { class: "primary", onclick: () => location.reload() }, "Load the page again")));
+      const reload = h("button", { class: "primary", onclick: () => location.reload() }, "Load the page again");
+      render(document.getElementById("view"), h("div", { class: "empty" }, errorMessage(error), reload));
       return;
     }
     console.warn(error);
-    this.say(problem(error), 15000);
+    this.notify(errorMessage(error), 15000);
   }
 
-  /** Tell a screen reader. */
-  speak(text) {
+  /** Run something asynchronous; its error is shown. */
+  run(promise) {
+    promise.catch((error) => this.fail(error));
+  }
+
+  /** Announce a text to screen readers. */
+  announce(text) {
     document.getElementById("spoken").textContent = text;
   }
 
-  announce(what) {
-    document.dispatchEvent(new CustomEvent(`bench:${what}`));
+  emit(event, detail = null) {
+    document.dispatchEvent(new CustomEvent(`app:${event}`, { detail }));
+  }
+
+  on(event, listener) {
+    document.addEventListener(`app:${event}`, (e) => listener(e.detail));
   }
 }
 
-/** What was fetched under a name before, or is fetched now; what failed is tried again. */
-function once(found, name, fetch) {
-  if (!found.has(name)) {
-    const promise = fetch();
-    found.set(name, promise);
-    promise.catch(() => found.get(name) === promise && found.delete(name));
+/** A view of the app under a tab; each has a static `id` and `label`, and an `element`. */
+export class View {
+  constructor(app) {
+    this.app = app;
   }
-  return found.get(name);
+
+  get visible() {
+    return this.app.state.view === this.constructor.id;
+  }
+
+  /** Refresh the view where it is visible. */
+  shown() {
+    if (this.visible) this.app.run(this.refresh());
+  }
 }

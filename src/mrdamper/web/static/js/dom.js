@@ -1,29 +1,33 @@
-// Making elements. Text goes in as text nodes only, so no name of a file or run can become markup.
+// DOM helpers. Text is inserted as text nodes only, so no name of a file or run can become markup.
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** Make an element: `h("button", {class: "primary", onclick: start}, "Start")`. */
+/** Create an element: `h("button", { class: "primary", onclick: start }, "Start")`. */
 export function h(tag, props = {}, ...children) {
   return fill(document.createElement(tag), props, children);
 }
 
-/** Make an SVG element. */
+/** Create an SVG element. */
 export function svg(tag, props = {}, ...children) {
   return fill(document.createElementNS(SVG, tag), props, children);
 }
 
-/** Replace what an element holds. */
-export function put(element, ...children) {
+/** Replace the children of an element; the focus stays on the element with the id that had it. */
+export function render(element, ...children) {
+  const focused = element.contains(document.activeElement) ? document.activeElement.id : "";
   element.replaceChildren(...children.flat(Infinity).filter(present));
+  if (focused) document.getElementById(focused)?.focus({ preventScroll: true });
   return element;
 }
 
-/** Like `put`, for parts that are built anew while the reader is in them: the focus stays where it was. */
-export function renew(element, ...children) {
-  const focused = element.contains(document.activeElement) ? document.activeElement.id : "";
-  put(element, ...children);
-  if (focused) document.getElementById(focused)?.focus({ preventScroll: true });
-  return element;
+/** A control that has an id, below its label. */
+export function field(label, control, ...more) {
+  return h("div", { class: "field" }, h("label", { for: control.id }, label), control, more);
+}
+
+/** Options of a list: pairs of value and text. */
+export function options(pairs) {
+  return pairs.map(([value, text]) => h("option", { value }, text));
 }
 
 /** A card with a heading. */
@@ -31,56 +35,54 @@ export function card(title, ...children) {
   return h("section", { class: "card" }, h("div", { class: "head" }, h("h2", {}, title)), ...children);
 }
 
-/** What a stage shows while there is nothing to see: a heading, a sentence, and what can be done. */
-export function empty(title, text, ...actions) {
+/** Content of an empty view: a heading, a sentence, and buttons. */
+export function placeholder(title, text, ...actions) {
   return h("div", { class: "empty" }, h("h2", {}, title), h("p", {}, text), actions.length ? h("div", { class: "row" }, actions) : null);
 }
 
-/** What a stage shows while the bench works on it. */
-export function busy(title, text = "") {
+/** Content of a view while its results are calculated. */
+export function loading(title, text = "") {
   return h("div", { class: "empty", role: "status" }, h("span", { class: "spinner", "aria-hidden": "true" }), h("h2", {}, title), text ? h("p", {}, text) : null);
 }
 
-/** A table: columns are {title, value(row), number?, head?}; `pick(row)` makes rows choosable. */
-export function table(columns, rows, { pick, chosen, caption } = {}) {
+/** A table; columns: {title, value(row), number?}; `pick(row)` makes rows selectable, `chosen(row)` marks one. */
+export function table(columns, rows, { pick, chosen, caption }) {
   const cells = (row) =>
     columns.map((c, i) => h(i === 0 ? "th" : "td", { class: c.number ? "num" : i === 0 ? "name" : "", scope: i === 0 ? "row" : null }, c.value(row)));
-  const line = (row) => {
-    const props = { class: [pick ? "pick" : "", chosen?.(row) ? "chosen" : ""].join(" ").trim() };
-    if (pick) props.onclick = () => pick(row);
-    return h("tr", props, cells(row));
-  };
+  const line = (row) =>
+    h("tr", { class: [pick ? "pick" : "", chosen?.(row) ? "chosen" : ""].join(" ").trim(), ...(pick ? { onclick: () => pick(row) } : {}) }, cells(row));
   return h(
     "table", {},
-    caption ? h("caption", { class: "hidden-text" }, caption) : null,
+    h("caption", { class: "hidden-text" }, caption),
     h("thead", {}, h("tr", {}, columns.map((c) => h("th", { class: c.number ? "num" : "", scope: "col" }, c.title)))),
     h("tbody", {}, rows.map(line)),
   );
 }
 
-/** What went wrong, where, and how to correct it. */
-export function problem(error) {
-  const said = error.said ?? { text: String(error.message ?? error) };
+/** Message of an error: what was found, where, and what to do; an `ApiError` has these parts as `details`. */
+export function errorMessage(error) {
+  const { text, found = text, where, remedy, code } = error.details ?? { text: String(error.message ?? error) };
   return h(
     "div", { class: "message bad", role: "alert" },
-    h("div", {}, said.where ? [h("b", {}, said.where), ": "] : null, said.where ? said.found : capital(said.found ?? said.text)),
-    said.remedy ? h("div", {}, capital(said.remedy), ".") : null,
-    said.code ? h("code", {}, said.code) : null,
+    h("div", {}, where ? [h("b", {}, where), ": ", found] : capitalise(found)),
+    remedy ? h("div", {}, capitalise(remedy), ".") : null,
+    code ? h("code", {}, code) : null,
   );
 }
 
+/** A message of a kind: "", "good", "warn" or "bad". */
 export function note(kind, ...children) {
   return h("div", { class: `message ${kind}` }, ...children);
 }
 
-/** A sentence begins with a capital. */
-export function capital(text) {
+/** A text with a capital letter at its beginning. */
+export function capitalise(text) {
   return text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 function fill(element, props, children) {
   for (const [name, value] of Object.entries(props)) {
-    if (value === null || value === undefined || value === false) continue;
+    if (!present(value)) continue;
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
     else if (name in element && typeof value !== "string") element[name] = value;
     else element.setAttribute(name, value === true ? "" : value);
@@ -89,6 +91,6 @@ function fill(element, props, children) {
   return element;
 }
 
-function present(child) {
-  return child !== null && child !== undefined && child !== false;
+function present(value) {
+  return value !== null && value !== undefined && value !== false;
 }

@@ -1,37 +1,40 @@
-// Taking files: dropped anywhere on the page or chosen, sent one by one, read, and answered for.
+// Upload of files: dropped anywhere on the page or chosen, sent one by one, and read.
 
-import { h, note, problem, put } from "./dom.js";
-import { collect, isKept, isModel, isState } from "./files.js";
+import { ApiError } from "./api.js";
+import { errorMessage, h, note, render } from "./dom.js";
+import { droppedFiles, isProject } from "./files.js";
 import { bytes } from "./format.js";
-import { imported } from "./state.js";
+import { isModel, isState, parseState } from "./state.js";
 
 export class DropZone {
-  constructor(bench) {
-    this.bench = bench;
-    this.drop = null; // the bench's name for what was dropped last
-    this.said = h("div", { role: "status" });
+  constructor(app) {
+    this.app = app;
+    this.upload = null; // key of the last upload
+    this.message = h("div", { role: "status" });
     this.zone = this.makeZone();
-    this.bundled = h("button", { class: "link small", onclick: () => bench.openBundled().catch((error) => bench.fail(error)) }, "Open the bundled tests of two dampers");
-    this.element = h("div", { class: "group" }, this.zone, this.said, this.bundled);
+    this.bundled = h("button", { class: "link small", onclick: () => app.run(app.openBundled()) }, "Open the bundled tests of two dampers");
+    this.element = h("div", { class: "group" }, this.zone, this.message, this.bundled);
     this.listen();
-    this.offer();
+    app.on("data", () => this.offerBundled());
+    this.offerBundled();
   }
 
   makeZone() {
-    const input = (props, name) => {
-      const chooser = h("input", { type: "file", hidden: true, ...props, onchange: () => {
-        const files = [...chooser.files].map((file) => ({ file, name: name(file) }));
-        chooser.value = "";
+    const chooser = (props, name) => {
+      const input = h("input", { type: "file", hidden: true, ...props });
+      input.addEventListener("change", () => {
+        const files = [...input.files].map((file) => ({ file, name: name(file) }));
+        input.value = "";
         this.take(files);
-      } });
-      return chooser;
+      });
+      return input;
     };
-    const files = input({ multiple: true, "aria-label": "Files" }, (file) => file.name);
-    const folder = input({ webkitdirectory: "", "aria-label": "Folder" }, (file) => file.webkitRelativePath || file.name);
+    const files = chooser({ multiple: true, "aria-label": "Files" }, (file) => file.name);
+    const folder = chooser({ webkitdirectory: "", "aria-label": "Folder" }, (file) => file.webkitRelativePath || file.name);
     return h(
       "div", { class: "drop", id: "drop" },
       h("strong", {}, "Drop rig files, a dataset folder, a model.json or a saved project"),
-      h("span", { class: "small" }, `up to ${bytes(this.bench.limits.file_bytes)} a file`),
+      h("span", { class: "small" }, `up to ${bytes(this.app.limits.file_bytes)} a file`),
       h("div", { class: "row" }, h("button", { onclick: () => files.click() }, "Files …"), h("button", { onclick: () => folder.click() }, "Folder …")),
       files, folder,
     );
@@ -49,103 +52,93 @@ export class DropZone {
     document.addEventListener("drop", async (event) => {
       event.preventDefault();
       classList.remove("over");
-      this.take(await collect(event.dataTransfer).catch((error) => this.refuse(error) ?? []));
+      this.take(await droppedFiles(event.dataTransfer).catch((error) => this.showError(error) ?? []));
     });
-    document.addEventListener("bench:data", () => this.offer());
   }
 
-  /** Without data the stage offers the bundled tests, with them nobody needs to. */
-  offer() {
-    this.bundled.hidden = !this.bench.overview || this.bench.overview.source === "bundled";
+  /** Offer the bundled tests beside other data; without data the Data view offers them. */
+  offerBundled() {
+    this.bundled.hidden = !this.app.overview || this.app.overview.source === "bundled";
   }
 
   async take(files) {
-    const { bench } = this;
+    const { app } = this;
     if (!files.length) return;
-    if (bench.busy) return bench.say(note("warn", "The bench is still reading. Drop these again in a moment."));
-    put(this.said);
+    if (app.loading) return app.notify(note("warn", "Other files are still being read. Drop these again in a moment."));
+    render(this.message);
     try {
-      if (files.length === 1 && files[0].name.toLowerCase().endsWith(".json") && (await this.bring(files[0].file))) return;
-      if (files.length === 1 && (await isKept(files[0].file))) return await this.open(files);
+      if (files.length === 1 && files[0].name.toLowerCase().endsWith(".json") && (await this.openJson(files[0].file))) return;
+      if (files.length === 1 && (await isProject(files[0].file))) return await this.openProject(files);
     } catch (error) {
-      this.refuse(error);
-      return;
+      return this.showError(error);
     }
-    bench.store.pass({ view: "data" });
-    await this.load(async () => {
+    app.showView("data");
+    return this.load(async () => {
       await this.send(files);
       return this.read("");
     });
   }
 
-  /** Read what was dropped again with a corrected profile: all of it, or what was refused. */
+  /** Read the last upload again with a corrected profile: all files, or those refused. */
   readAgain(toml, refusedOnly = false) {
     return this.load(() => this.read(toml, refusedOnly));
   }
 
-  async load(bring) {
+  async load(request) {
     try {
-      await this.bench.takeData(bring, "Reading the files", { view: "data" });
-      put(this.said);
+      await this.app.loadData(request, "Reading the files", { view: "data" });
+      render(this.message);
     } catch (error) {
-      this.refuse(error);
+      this.showError(error);
     }
   }
 
-  refuse(error) {
-    const { overview } = this.bench;
-    put(this.said, problem(error), overview ? h("p", { class: "small faint" }, `“${overview.name}” stays on the bench.`) : null);
-    if (error.said?.verdicts) document.dispatchEvent(new CustomEvent("bench:refused", { detail: error.said }));
+  showError(error) {
+    const { overview } = this.app;
+    render(this.message, errorMessage(error), overview ? h("p", { class: "small faint" }, `“${overview.name}” is still loaded.`) : null);
+    if (error.details?.verdicts) this.app.emit("refused", error.details);
   }
 
   async send(files) {
-    const limit = this.bench.limits.file_bytes;
+    const limit = this.app.limits.file_bytes;
     const tooLarge = files.find(({ file }) => file.size > limit);
-    if (tooLarge) throw tooLargeError(tooLarge.name, limit);
-    this.drop = (await this.bench.api.post("/drops")).drop;
+    if (tooLarge) {
+      const remedy = "read it with mrdamper import, which has no such limit, and drop the dataset folder";
+      throw new ApiError({ where: tooLarge.name, found: `the file is over ${bytes(limit)}`, remedy, code: "E_UPLOAD_SIZE" });
+    }
+    this.upload = (await this.app.api.post("/uploads")).upload;
     for (const [i, { file, name }] of files.entries()) {
-      put(this.said, h("p", { class: "small faint" }, `Taking file ${i + 1} of ${files.length} …`));
-      await this.bench.api.upload(`/drops/${this.drop}/files?name=${encodeURIComponent(name)}`, file);
+      render(this.message, h("p", { class: "small faint" }, `Sending file ${i + 1} of ${files.length} …`));
+      await this.app.api.upload(`/uploads/${this.upload}/files?name=${encodeURIComponent(name)}`, file);
     }
   }
 
   read(toml, refusedOnly = false) {
-    put(this.said, h("p", { class: "small faint" }, "Checking each file …"));
-    return this.bench.api.post(`/drops/${this.drop}/read`, { toml, refused_only: refusedOnly });
+    render(this.message, h("p", { class: "small faint" }, "Checking each file …"));
+    return this.app.api.post(`/uploads/${this.upload}/read`, { toml, refused_only: refusedOnly });
   }
 
-  /** A bench that was kept: its data, its dampers, and what was shown. */
-  async open(files) {
-    const { bench } = this;
-    let found = null;
-    await bench.takeData(async () => {
+  /** Open a saved project: its data, its dampers, and its state. */
+  async openProject(files) {
+    const { app } = this;
+    let project = null;
+    await app.loadData(async () => {
       await this.send(files);
-      found = await bench.api.post(`/drops/${this.drop}/open`);
-      return found.data ? bench.api.get("/data") : bench.overview;
+      project = await app.api.post(`/uploads/${this.upload}/open`);
+      return project.data ? app.api.get("/data") : app.overview;
     }, "Opening the saved project");
-    put(this.said);
-    bench.logo = found.logo;
-    await bench.refreshDampers();
-    await bench.restore({ ...imported(JSON.parse(found.state)), damper: found.damper });
+    render(this.message);
+    app.logo = project.logo;
+    await app.refreshDampers();
+    await app.restore({ ...parseState(JSON.parse(project.state)), damper: project.damper });
   }
 
-  /** A state or a model brought back; false where the file is something else. */
-  async bring(file) {
+  /** Open a state or a model; false where the file is neither. */
+  async openJson(file) {
     const text = await file.text();
-    if (isState(text)) {
-      await this.bench.restore(imported(JSON.parse(text)));
-      return true;
-    }
-    if (!isModel(text)) return false;
-    const { damper } = await this.bench.api.post("/dampers", { text });
-    await this.bench.refreshDampers();
-    await this.bench.choose(damper, { view: "model" });
+    if (isState(text)) await this.app.restore(parseState(JSON.parse(text)));
+    else if (isModel(text)) this.app.selectDamper(await this.app.addDamper(text), { view: "model" });
+    else return false;
     return true;
   }
-}
-
-function tooLargeError(name, limit) {
-  const error = new Error("too large");
-  error.said = { where: name, found: `the file is over ${bytes(limit)}`, remedy: "read it with mrdamper import, which has no such limit, and drop the dataset folder", code: "E_DROP_SIZE" };
-  return error;
 }

@@ -1,105 +1,94 @@
-// What to identify: the whole study, or one model by one method from some runs.
+// The form of the Identify view: the whole study, or one model by one method from some runs.
 
-import { h, note, put, renew } from "./dom.js";
+import { field, h, note, options, render } from "./dom.js";
 import { condition } from "./format.js";
 import { rigChooser } from "./rig_chooser.js";
 
 export class IdentifyForm {
-  /** `start({whole, body})` is called when the reader begins. */
-  constructor(bench, start) {
-    this.bench = bench;
+  /** `start(study, body)` is called when the user starts; `body` is the request for one model. */
+  constructor(app, start) {
+    this.app = app;
     this.start = start;
     this.choices = null;
-    this.whole = h("input", { type: "radio", name: "what", id: "what-study", checked: true, onchange: () => this.toggle() });
-    this.one = h("input", { type: "radio", name: "what", id: "what-one", onchange: () => this.toggle() });
-    this.model = h("select", { id: "model-name", onchange: () => this.about() });
+    this.study = h("input", { type: "radio", name: "what", id: "what-study", checked: true, onchange: () => this.toggle() });
+    this.single = h("input", { type: "radio", name: "what", id: "what-one", onchange: () => this.toggle() });
+    this.model = h("select", { id: "model-name", onchange: () => this.showModel() });
     this.method = h("select", { id: "method-name" });
     this.runs = h("select", { id: "which-runs" });
-    this.over = h("select", { id: "over" },
-      h("option", { value: "functions" }, "parameter functions fitted to individual fits"), h("option", { value: "joint" }, "global fit"));
+    this.over = h("select", { id: "over" }, options([["functions", "parameter functions fitted to individual fits"], ["joint", "global fit"]]));
     this.parameters = new ParameterChoice();
     this.rig = h("div", {});
     this.source = h("p", { class: "small faint" });
-    this.button = h("button", { class: "primary", onclick: () => this.go() }, "Start");
-    this.details = this.fields();
-    this.element = this.layout();
-  }
-
-  fields() {
-    const field = (name, text, control, ...more) => h("div", { class: "field" }, h("label", { for: name }, text), control, more);
-    return h("div", { class: "group", hidden: true },
-      this.rig, field("model-name", "Model", this.model, this.source), field("method-name", "Method", this.method),
-      field("which-runs", "From", this.runs), field("over", "Over all conditions", this.over), this.parameters.element);
-  }
-
-  layout() {
+    this.button = h("button", { class: "primary", onclick: () => this.submit() }, "Start");
+    this.details = h("div", { class: "group", hidden: true },
+      this.rig, field("Model", this.model, this.source), field("Method", this.method),
+      field("From", this.runs), field("Over all conditions", this.over), this.parameters.element);
     const choice = (radio, title, about) => h("label", { class: "check" }, radio, h("span", {}, title, h("br", {}), h("span", { class: "small faint" }, about)));
-    return h("div", { class: "group" },
+    this.element = h("div", { class: "group" },
       h("h2", {}, "Identify"),
       h("fieldset", { class: "group" },
-        h("legend", { class: "hidden-text" }, "What to identify"),
-        choice(this.whole, "Whole study", "all candidates, cross-validation, report"),
-        choice(this.one, "One model", "individual fits, with residuals")),
+        h("legend", { class: "hidden-text" }, "Scope of the identification"),
+        choice(this.study, "Whole study", "all candidates, cross-validation, report"),
+        choice(this.single, "One model", "individual fits, with residuals")),
       this.details, this.button);
   }
 
-  /** Bring the lists to the data on the bench. */
+  /** Update the lists to the loaded data. */
   async refresh() {
-    this.offer();
-    renew(this.rig, rigChooser(this.bench, "identify"));
+    this.updateButton();
+    render(this.rig, rigChooser(this.app, "identify"));
     if (!this.choices) {
-      this.choices = await this.bench.api.get("/choices");
+      this.choices = await this.app.api.get("/choices");
       const { models, methods, model, method } = this.choices;
-      put(this.model, models.map((m) => h("option", { value: m.name }, m.title)));
-      put(this.method, methods.map((m) => h("option", { value: m.name, title: m.about }, m.name)));
+      render(this.model, options(models.map((m) => [m.name, m.title])));
+      render(this.method, methods.map((m) => h("option", { value: m.name, title: m.about }, m.name)));
       this.model.value = model;
       this.method.value = method;
-      this.about();
+      this.showModel();
     }
-    const found = await this.bench.rigTable();
-    const usable = found?.runs.filter((r) => !r.refused) ?? [];
-    const train = usable.filter((r) => r.split === "train").length;
+    const table = await this.app.rigTable();
+    const usable = table?.runs.filter((r) => !r.refused) ?? [];
+    const count = usable.filter((r) => r.split === "train").length;
     const before = this.runs.value;
-    put(this.runs, h("option", { value: "" }, ["no identification run can be used", "the only identification run"][train] ?? `all ${train} identification runs`),
-      usable.map((r) => h("option", { value: r.key }, `${r.id} (${condition(r.condition)})`)));
+    render(this.runs, options([
+      ["", ["no identification run can be used", "the only identification run"][count] ?? `all ${count} identification runs`],
+      ...usable.map((r) => [r.key, `${r.id} (${condition(r.condition)})`]),
+    ]));
     if (usable.some((r) => r.key === before)) this.runs.value = before;
   }
 
-  /** Whether something is being identified: one thing at a time. */
-  working(on) {
-    this.at = on;
-    this.offer();
+  /** Disable the start while an identification runs. */
+  setBusy(busy) {
+    this.busy = busy;
+    this.updateButton();
   }
 
-  offer() {
-    this.button.disabled = Boolean(this.at) || !this.bench.overview;
+  updateButton() {
+    this.button.disabled = Boolean(this.busy) || !this.app.overview;
   }
 
-  about() {
-    const chosen = this.choices.models.find((m) => m.name === this.model.value);
-    this.source.textContent = `${chosen.source}${chosen.integrated ? ". Stepped in time: takes longer" : ""}`;
-    this.parameters.show(chosen.jointly ? [] : chosen.parameters);
-    this.method.disabled = this.over.disabled = chosen.jointly;
+  showModel() {
+    const model = this.choices.models.find((m) => m.name === this.model.value);
+    this.source.textContent = `${model.source}${model.integrated ? ". Stepped in time: takes longer" : ""}`;
+    this.parameters.show(model.whole_damper ? [] : model.parameters);
+    this.method.disabled = this.over.disabled = model.whole_damper;
   }
 
   toggle() {
-    this.details.hidden = this.whole.checked;
+    this.details.hidden = this.study.checked;
   }
 
-  go() {
-    const missing = this.whole.checked ? [] : this.parameters.missing;
-    if (missing.length) return this.bench.say(note("warn", `Tick ${missing.join(", ")}, or give the value to hold at: there is no preset.`));
-    this.start({
-      whole: this.whole.checked,
-      body: {
-        rig: this.bench.state.rig, model: this.model.value, method: this.method.value, over: this.over.value,
-        runs: this.runs.value ? [this.runs.value] : [], ...this.parameters.chosen,
-      },
+  submit() {
+    const { missing } = this.parameters;
+    if (this.single.checked && missing.length) return this.app.notify(note("warn", `Tick ${missing.join(", ")}, or give the value to hold at: there is no preset.`));
+    return this.start(this.study.checked, {
+      rig: this.app.state.rig, model: this.model.value, method: this.method.value, over: this.over.value,
+      runs: this.runs.value ? [this.runs.value] : [], ...this.parameters.chosen,
     });
   }
 }
 
-/** Which parameters are determined, and at what the others are held. */
+/** Choice of the free parameters, and of the values of the others. */
 class ParameterChoice {
   constructor() {
     this.rows = [];
@@ -109,29 +98,27 @@ class ParameterChoice {
 
   show(parameters) {
     this.element.hidden = !parameters.length;
-    this.rows = parameters.map((p) => this.row(p));
-    put(this.body, h("p", { class: "small faint" }, "A ticked parameter is determined from the tests; another is held at the number beside it, in SI units, or at its preset where there is none."),
+    this.rows = parameters.map((parameter) => this.row(parameter));
+    render(this.body, h("p", { class: "small faint" }, "A ticked parameter is determined from the tests; another is held at the number beside it, in SI units, or at its preset where there is none."),
       this.rows.map((row) => row.element));
   }
 
-  row(parameter) {
-    const value = h("input", { type: "number", step: "any", "aria-label": `${parameter.name} held at, in ${parameter.unit}`, placeholder: parameter.default === null ? "number" : String(parameter.default) });
-    const free = h("input", { type: "checkbox", checked: !parameter.preset, onchange: () => (value.disabled = free.checked) });
-    value.disabled = free.checked;
+  row({ name, unit, meaning, preset, default: value }) {
+    const input = h("input", { type: "number", step: "any", "aria-label": `${name} held at, in ${unit}`, placeholder: value === null ? "number" : String(value), disabled: !preset });
+    const box = h("input", { type: "checkbox", checked: !preset, onchange: () => (input.disabled = box.checked) });
     const element = h("div", { class: "row" },
-      h("label", { class: "check grow", title: parameter.meaning }, free, h("span", {}, parameter.name, h("span", { class: "small faint" }, ` ${parameter.meaning}`))), value);
-    return { parameter, free, value, element };
+      h("label", { class: "check grow", title: meaning }, box, h("span", {}, name, h("span", { class: "small faint" }, ` ${meaning}`))), input);
+    return { name, preset, box, input, element };
   }
 
   get chosen() {
-    const free = this.rows.filter((r) => r.free.checked && r.parameter.preset).map((r) => r.parameter.name);
-    const held = this.rows.filter((r) => !r.free.checked && r.value.value.trim() !== "");
-    return { free, fixed: Object.fromEntries(held.map((r) => [r.parameter.name, Number(r.value.value)])) };
+    const free = this.rows.filter((r) => r.box.checked && r.preset).map((r) => r.name);
+    const held = this.rows.filter((r) => !r.box.checked && r.input.value.trim() !== "");
+    return { free, fixed: Object.fromEntries(held.map((r) => [r.name, Number(r.input.value)])) };
   }
 
-  /** What hinders a start, in words. */
+  /** Names of the parameters that have neither a value nor a preset. */
   get missing() {
-    const rows = this.rows.filter((r) => !r.free.checked && !r.parameter.preset && r.value.value.trim() === "");
-    return rows.map((r) => r.parameter.name);
+    return this.rows.filter((r) => !r.box.checked && !r.preset && r.input.value.trim() === "").map((r) => r.name);
   }
 }

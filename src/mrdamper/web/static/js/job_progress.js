@@ -1,91 +1,90 @@
-// Long work on the page: a start button, progress that streams, and a way to stop it.
+// Progress of a job on the page: a bar, the time it took and may take, and a button to cancel it.
 
-import { h, problem, put, svg } from "./dom.js";
+import { errorMessage, h, note, render, svg } from "./dom.js";
 import { seconds } from "./format.js";
 
-/** A progress box, out of sight until there is something to show. */
-export function workBox(bench) {
-  const bar = svg("rect", { width: "0", height: "100%" });
-  const what = h("span", { class: "what" });
-  const clock = h("span", {});
-  const cancel = h("button", { disabled: true }, "Cancel");
-  const box = h(
-    "div", { class: "group", hidden: true },
-    h("div", { class: "progress", role: "progressbar", "aria-valuemin": "0", "aria-valuemax": "100", "aria-label": "Progress" }, svg("svg", { "aria-hidden": "true" }, bar)),
-    h("div", { class: "progress-text" }, what, clock),
-    h("div", {}, cancel),
-  );
-  const said = h("div", { role: "status" });
-  const element = h("div", { class: "field", hidden: true }, box, said);
-  let [running, quarter, done] = [null, 0, 0];
-  cancel.addEventListener("click", () => bench.api.delete(`/jobs/${running}`).catch((error) => bench.fail(error)));
-
-  function tell(report) {
-    const share = Math.round(100 * report.share);
-    bar.setAttribute("width", `${share}%`);
-    box.firstElementChild.setAttribute("aria-valuenow", share);
-    box.firstElementChild.classList.toggle("waiting", share === 0);
-    if (Math.floor(share / 25) > quarter) bench.speak(`${share} per cent`); // now and then, not at every report
-    quarter = Math.floor(share / 25);
-    what.textContent = report.what;
-    done = report.share;
-    tick(report.seconds);
+/** Progress of one job at a time; hidden until there is something to show. */
+export class JobProgress {
+  constructor(app) {
+    this.app = app;
+    this.rect = svg("rect", { width: "0", height: "100%" });
+    this.bar = h("div", { class: "progress", role: "progressbar", "aria-valuemin": "0", "aria-valuemax": "100", "aria-label": "Progress" }, svg("svg", { "aria-hidden": "true" }, this.rect));
+    this.step = h("span", { class: "step" });
+    this.clock = h("span", {});
+    this.cancel = h("button", { disabled: true, onclick: () => app.run(app.api.delete(`/jobs/${this.job}`)) }, "Cancel");
+    this.box = h("div", { class: "group", hidden: true }, this.bar, h("div", { class: "progress-text" }, this.step, this.clock), h("div", {}, this.cancel));
+    this.message = h("div", { role: "status" });
+    this.element = h("div", { class: "field", hidden: true }, this.box, this.message);
+    this.quarter = 0;
   }
 
-  /** The time it took, and what it will take if it goes on as before. */
-  function tick(took) {
-    const left = took < 2 || done <= 0.02 || done >= 1 ? "" : `, about ${seconds(Math.round((took * (1 - done)) / done))} left`;
-    clock.textContent = seconds(took) + left;
+  get busy() {
+    return !this.box.hidden;
   }
 
-  /** Begin work; its answer, or null if it did not end well. */
-  const run = (path, body) => attend(() => bench.api.post(path, body));
-
-  /** Go on watching work a page began that was loaded again since. */
-  const resume = (job) => attend(() => job);
-
-  /** Say nothing more of the work that ended. */
-  function clear() {
-    put(said);
-    element.hidden = box.hidden;
+  /** Start a job; resolves to its result, or to null where it did not end well. */
+  start(path, body) {
+    return this.follow(() => this.app.api.post(path, body));
   }
 
-  async function attend(begin) {
-    put(said);
+  /** Follow a job that was started before the page was reloaded. */
+  resume(job) {
+    return this.follow(() => job);
+  }
+
+  /** Remove the message of the last job. */
+  clear() {
+    render(this.message);
+    this.element.hidden = this.box.hidden;
+  }
+
+  report({ share, step, seconds: elapsed }) {
+    const percent = Math.round(100 * share);
+    this.rect.setAttribute("width", `${percent}%`);
+    this.bar.setAttribute("aria-valuenow", percent);
+    this.bar.classList.toggle("waiting", percent === 0);
+    if (Math.floor(percent / 25) > this.quarter) this.app.announce(`${percent} per cent`); // not at every report
+    this.quarter = Math.floor(percent / 25);
+    this.step.textContent = step;
+    this.share = share;
+    this.showTime(elapsed);
+  }
+
+  /** Show the elapsed time, and the time left at the same speed. */
+  showTime(elapsed) {
+    const { share } = this;
+    const left = elapsed < 2 || share <= 0.02 || share >= 1 ? "" : `, about ${seconds(Math.round((elapsed * (1 - share)) / share))} left`;
+    this.clock.textContent = seconds(elapsed) + left;
+  }
+
+  async follow(begin) {
+    const { app, box } = this;
+    render(this.message);
     const opener = document.activeElement;
-    element.hidden = box.hidden = false;
-    bench.speak("Working");
-    tell({ share: 0, what: "starting a worker", seconds: 0 });
+    this.element.hidden = box.hidden = false;
+    app.announce("Working");
+    this.report({ share: 0, step: "starting a worker", seconds: 0 });
     let began = performance.now();
-    const ticking = setInterval(() => tick((performance.now() - began) / 1000), 200);
+    const timer = setInterval(() => this.showTime((performance.now() - began) / 1000), 200);
     try {
       const job = await begin();
       began -= 1000 * job.seconds;
-      running = job.key;
-      cancel.disabled = false;
-      const last = await bench.api.follow(job.key, tell);
-      bench.speak(last.state === "done" ? "Done" : "");
-      if (last.state === "done") return last.answer;
-      put(said, last.state === "cancelled" ? h("div", { class: "message" }, "Cancelled. Nothing was changed.") : problem({ said: last.error }));
-      return null;
+      this.job = job.key;
+      this.cancel.disabled = false;
+      const last = await app.api.follow(job.key, (report) => this.report(report));
+      app.announce(last.state === "done" ? "Done" : "");
+      if (last.state === "done") return last.result;
+      render(this.message, last.state === "cancelled" ? note("", "Cancelled. Nothing was changed.") : errorMessage({ details: last.error }));
     } catch (error) {
-      put(said, problem(error));
-      return null;
+      render(this.message, errorMessage(error));
     } finally {
-      clearInterval(ticking);
-      running = null;
-      cancel.disabled = true;
+      clearInterval(timer);
+      this.cancel.disabled = true;
       const inside = box.contains(document.activeElement) || document.activeElement === document.body;
-      if (inside && opener) setTimeout(() => opener.isConnected && opener.focus()); // once it can be pressed again
+      if (inside && opener) setTimeout(() => opener.isConnected && opener.focus()); // once it is enabled again
       box.hidden = true;
-      element.hidden = !said.childElementCount;
+      this.element.hidden = !this.message.childElementCount;
     }
+    return null;
   }
-
-  return {
-    element, run, resume, clear,
-    get busy() {
-      return !box.hidden;
-    },
-  };
 }

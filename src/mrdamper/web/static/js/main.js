@@ -1,131 +1,130 @@
-// The page: opens or finds its session, builds the views, keeps link, undo and theme.
+// The page: opens or continues its session, builds the views, and has the tools of the header.
 
 import { Address } from "./address.js";
-import { BenchError } from "./api.js";
-import { Bench } from "./app.js";
+import { ApiError, openSession } from "./api.js";
+import { App } from "./app.js";
 import { library } from "./chart.js";
-import { capital, h, note, problem, put } from "./dom.js";
-import { openSession } from "./session.js";
-import { packs } from "./state.js";
+import { capitalise, errorMessage, h, note, options, render } from "./dom.js";
+import { canCompress } from "./state.js";
 import { browserStorage, tabStorage } from "./storage.js";
-import { theme } from "./theme.js";
+import { startTheme, themeButton } from "./theme.js";
 import { knownUnits, setUnits, UNITS } from "./units.js";
-import * as data from "./views/data.js";
-import * as identify from "./views/identify.js";
-import * as model from "./views/model.js";
-import * as compare from "./views/compare.js";
-import * as ride from "./views/simulate.js";
-import * as takeaway from "./views/export.js";
+import { CompareView } from "./views/compare.js";
+import { DataView } from "./views/data.js";
+import { ExportView } from "./views/export.js";
+import { IdentifyView } from "./views/identify.js";
+import { ModelView } from "./views/model.js";
+import { SimulateView } from "./views/simulate.js";
 
-const VIEWS = [data, identify, model, compare, ride, takeaway];
-const BEAT = 60_000;
+const VIEWS = [DataView, IdentifyView, ModelView, CompareView, SimulateView, ExportView];
+const KEEP_ALIVE_MS = 60_000;
 const UNITS_KEY = "mrdamper.units";
+const NO_LINKS = "This browser cannot write the state into a link. Save the project on the Export page to keep it.";
 
 async function start() {
-  theme();
-  const { api, limits, there } = await openSession();
-  const bench = new Bench(api, limits);
-  bench.store.settle({ units: savedUnits() });
-  setUnits(bench.state.units);
-  const views = VIEWS.map((v) => Object.assign(v.create(bench), { id: v.id, label: v.label }));
-  const tabs = makeTabs(bench, views);
-  const address = new Address(bench);
-  const tools = makeTools(bench, address);
+  startTheme();
+  const { api, limits, data } = await openSession();
+  const app = new App(api, limits);
+  app.store.amend({ units: savedUnits() });
+  setUnits(app.state.units);
+  const views = VIEWS.map((View) => new View(app));
+  const tabs = makeTabs(app);
+  const address = new Address(app);
+  const updateTools = makeTools(app, address);
   document.querySelector(".skip").addEventListener("click", (event) => {
-    event.preventDefault(); // the address holds the state
+    event.preventDefault(); // the fragment of the address is the state
     document.getElementById("view").focus();
   });
-  bench.store.onChange((state, before) => {
+  app.store.onChange((state, before) => {
     if (state.view !== before.view) show(views, tabs, state.view);
-    tools.update();
+    updateTools();
     if (state.units !== before.units) {
       setUnits(state.units);
       browserStorage.setItem(UNITS_KEY, JSON.stringify(state.units));
-      bench.announce("units");
+      app.emit("units");
     }
     for (const view of views) view.update?.(state, before);
     address.follow();
   });
-  if (there.data) {
-    bench.overview = await api.get("/data");
-    bench.store.settle({ source: bench.overview.source, dataName: bench.overview.name });
-    await bench.refreshDampers();
-    bench.announce("data");
+  if (data) {
+    app.overview = await api.get("/data");
+    app.store.amend({ source: app.overview.source, dataName: app.overview.name });
+    await app.refreshDampers();
+    app.emit("data");
   }
-  show(views, tabs, bench.state.view);
+  show(views, tabs, app.state.view);
   try {
-    const linked = await address.found();
-    if (linked) await bench.restore(linked);
-    bench.store.forget(); // there is nothing before it to go back to
-    const jobs = there.data ? await api.get("/jobs") : []; // of a page that is loaded again
+    const state = await address.initialState();
+    if (state) await app.restore(state);
+    app.store.clearHistory();
+    const jobs = data ? await api.get("/jobs") : []; // of a page that is reloaded
     for (const view of views) view.resume?.(jobs);
   } catch (error) {
-    bench.fail(error instanceof BenchError ? error : new Error(`The link could not be read: ${error.message}`));
+    app.fail(error instanceof ApiError ? error : new Error(`The link could not be read: ${error.message}`));
   }
-  tools.update();
-  if (tabStorage.blocked) bench.say(note("warn", "This browser blocks storage: loading the page again starts a new session. Save the project on the Export page to keep it."), 15000);
-  if (!packs) bench.say(note("warn", NO_LINKS), 15000);
+  updateTools();
+  if (tabStorage.blocked) app.notify(note("warn", "This browser blocks storage: loading the page again starts a new session. Save the project on the Export page to keep it."), 15000);
+  if (!canCompress) app.notify(note("warn", NO_LINKS), 15000);
   document.documentElement.dataset.ready = "yes";
-  setInterval(() => api.get("").catch((error) => bench.fail(error)), BEAT);
-  (window.requestIdleCallback ?? setTimeout)(() => library().catch((error) => bench.fail(error)));
+  setInterval(() => app.run(api.get("")), KEEP_ALIVE_MS);
+  (window.requestIdleCallback ?? setTimeout)(() => app.run(library()));
 }
 
-function makeTabs(bench, views) {
-  const buttons = views.map((view) =>
-    h("button", { role: "tab", id: `tab-${view.id}`, "aria-controls": "view", "aria-selected": "false", onclick: () => bench.store.pass({ view: view.id }) }, view.label),
-  );
-  const bar = put(document.getElementById("tabs"), buttons);
-  bar.addEventListener("keydown", (event) => {
-    const at = buttons.indexOf(document.activeElement);
-    const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: buttons.length - 1 }[event.key];
-    if (to === undefined) return;
+function makeTabs(app) {
+  const tabs = VIEWS.map(({ id, label }) =>
+    h("button", { role: "tab", id: `tab-${id}`, "aria-controls": "view", "aria-selected": "false", onclick: () => app.showView(id) }, label));
+  render(document.getElementById("tabs"), tabs).addEventListener("keydown", (event) => {
+    const current = tabs.indexOf(document.activeElement);
+    const target = { ArrowRight: current + 1, ArrowLeft: current - 1, Home: 0, End: tabs.length - 1 }[event.key];
+    if (target === undefined) return;
     event.preventDefault();
-    const next = buttons[(to + buttons.length) % buttons.length];
-    next.focus();
-    next.click();
+    const tab = tabs[(target + tabs.length) % tabs.length];
+    tab.focus();
+    tab.click();
   });
-  return buttons;
+  return tabs;
 }
 
 function show(views, tabs, id) {
-  const at = views.findIndex((view) => view.id === id);
+  const index = VIEWS.findIndex((View) => View.id === id);
   tabs.forEach((tab, i) => {
-    tab.setAttribute("aria-selected", String(i === at));
-    tab.tabIndex = i === at ? 0 : -1;
+    tab.setAttribute("aria-selected", String(i === index));
+    tab.tabIndex = i === index ? 0 : -1;
   });
-  const panel = put(document.getElementById("view"), views[at].element);
+  const panel = render(document.getElementById("view"), views[index].element);
   panel.setAttribute("role", "tabpanel");
   panel.setAttribute("aria-labelledby", `tab-${id}`);
-  views[at].shown?.();
+  views[index].shown();
 }
 
-function makeTools(bench, address) {
-  const undo = h("button", { class: "quiet", title: "Undo (Ctrl+Z)", "aria-label": "Undo", onclick: () => bench.store.undo() }, "↶", h("span", { class: "word" }, "Undo"));
-  const redo = h("button", { class: "quiet", title: "Redo (Ctrl+Y)", "aria-label": "Redo", onclick: () => bench.store.redo() }, "↷", h("span", { class: "word" }, "Redo"));
-  const link = h("button", { class: "quiet", title: "Copy a link that brings this state back", onclick: () => copyLink(bench, address) }, "Copy link");
+/** Fill the right side of the header; returns a function that brings it up to date. */
+function makeTools(app, address) {
+  const tool = (name, title, onclick, ...content) => h("button", { class: "quiet", title, "aria-label": name, onclick }, ...content);
+  const word = (text) => h("span", { class: "word" }, text);
+  const undo = tool("Undo", "Undo (Ctrl+Z)", () => app.store.undo(), "↶", word("Undo"));
+  const redo = tool("Redo", "Redo (Ctrl+Y)", () => app.store.redo(), "↷", word("Redo"));
+  const link = tool(null, "Copy a link to this state", () => app.run(copyLink(app, address)), "Copy link");
   const name = h("span", { class: "data-name" });
-  const units = unitChooser(bench);
-  put(document.getElementById("tools"), name, undo, redo, units.element, link, theme.button());
+  const units = unitChooser(app);
+  render(document.getElementById("tools"), name, undo, redo, units.element, link, themeButton());
   document.addEventListener("keydown", (event) => {
     if (!(event.ctrlKey || event.metaKey) || event.target.matches("textarea, input[type=text]")) return;
     const key = event.key.toLowerCase();
-    if (key === "z" || key === "y") {
-      event.preventDefault();
-      key === "y" || event.shiftKey ? bench.store.redo() : bench.store.undo();
-    }
+    if (key !== "z" && key !== "y") return;
+    event.preventDefault();
+    if (key === "y" || event.shiftKey) app.store.redo();
+    else app.store.undo();
   });
-  return {
-    update() {
-      undo.disabled = !bench.store.past.length;
-      redo.disabled = !bench.store.future.length;
-      units.update();
-      const text = bench.overview ? bench.overview.name : "no data yet";
-      if (name.textContent !== text) name.textContent = name.title = text;
-    },
+  return () => {
+    undo.disabled = !app.store.past.length;
+    redo.disabled = !app.store.future.length;
+    units.update();
+    const text = app.overview?.name ?? "no data";
+    if (name.textContent !== text) name.textContent = name.title = text;
   };
 }
 
-/** The units chosen in this browser before. */
+/** The units stored in this browser. */
 function savedUnits() {
   try {
     return knownUnits(JSON.parse(browserStorage.getItem(UNITS_KEY)));
@@ -134,31 +133,30 @@ function savedUnits() {
   }
 }
 
-/** The table of the units in which the page shows quantities. */
-function unitChooser(bench) {
+/** Lists of the units of quantities on the page. */
+function unitChooser(app) {
   const lists = Object.entries(UNITS).map(([name, units]) => {
-    const change = () => bench.store.commit({ units: { ...bench.state.units, [name]: list.value } });
-    const list = h("select", { id: `units-${name}`, onchange: change }, Object.keys(units).map((unit) => h("option", { value: unit }, unit)));
+    const onchange = () => app.store.commit({ units: { ...app.state.units, [name]: list.value } });
+    const list = h("select", { id: `units-${name}`, onchange }, options(Object.keys(units).map((unit) => [unit, unit])));
     return [name, list];
   });
-  const rows = lists.map(([name, list]) => h("tr", {}, h("th", { scope: "row" }, h("label", { for: list.id }, capital(name))), h("td", {}, list)));
+  const rows = lists.map(([name, list]) => h("tr", {}, h("th", { scope: "row" }, h("label", { for: list.id }, capitalise(name))), h("td", {}, list)));
   const element = h("details", { class: "units" }, h("summary", {}, "Units"), h("table", {}, h("tbody", {}, rows)));
   element.addEventListener("keydown", (event) => event.key === "Escape" && (element.open = false));
-  return { element, update: () => lists.forEach(([name, list]) => (list.value = bench.state.units[name])) };
+  return { element, update: () => lists.forEach(([name, list]) => (list.value = app.state.units[name])) };
 }
 
-const NO_LINKS = "This browser cannot pack the state into a link. Save the project on the Export page to keep it.";
-
-async function copyLink(bench, kept) {
-  if (!packs) return bench.say(note("warn", NO_LINKS), 5000);
-  const address = `${location.origin}/#${await kept.fragment()}`;
+async function copyLink(app, address) {
+  if (!canCompress) return app.notify(note("warn", NO_LINKS), 5000);
+  const link = `${location.origin}/#${await address.fragment()}`;
   try {
-    await navigator.clipboard.writeText(address);
-    bench.say(note("", "Link copied. It brings back data, model and sliders on a bench at the same address."), 5000);
+    await navigator.clipboard.writeText(link);
+    app.notify(note("", "Link copied. It contains the data set's name, the model and all slider values, for an app at the same address."), 5000);
   } catch {
-    history.replaceState(null, "", address);
-    bench.say(note("", "The link is in the address bar now."), 5000);
+    history.replaceState(null, "", link);
+    app.notify(note("", "The link is in the address bar."), 5000);
   }
+  return undefined;
 }
 
-start().catch((error) => put(document.getElementById("view"), h("div", { class: "empty" }, problem(error))));
+start().catch((error) => render(document.getElementById("view"), h("div", { class: "empty" }, errorMessage(error))));

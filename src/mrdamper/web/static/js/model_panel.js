@@ -1,6 +1,6 @@
-// The panel of the Model view: which damper, its condition, and its parameters under sliders.
+// The panel of the Model view: damper, condition, and parameters as sliders.
 
-import { h, put } from "./dom.js";
+import { field, h, options, render } from "./dom.js";
 import { slider } from "./slider.js";
 import { onScreen } from "./units.js";
 
@@ -13,59 +13,62 @@ const CONDITION = [
 ];
 
 export class ModelPanel {
-  /** `dragging(change, when)` and `settled(change)` hear of the sliders; a change is one of the state. */
-  constructor(bench, { dragging, settled }) {
-    Object.assign(this, { bench, dragging, settled, sliders: {}, damper: null });
+  /** `drag(change, time)` and `settle(change)` receive the changes of the state that the sliders make. */
+  constructor(app, { drag, settle }) {
+    Object.assign(this, { app, drag, settle, sliders: {}, damper: null, tested: new Map() });
     this.element = h("div", { class: "side" });
     this.pending = h("p", { class: "small message", role: "status" });
-    const pending = () => {
-      this.pending.hidden = !bench.studying;
-      this.pending.textContent = bench.studying ? "A study is running. The model it selects will be added to this list." : "";
+    const showPending = () => {
+      this.pending.hidden = !app.studyRunning;
+      this.pending.textContent = app.studyRunning ? "A study is running. The model it selects will be added to this list." : "";
     };
-    pending();
-    document.addEventListener("bench:studying", pending);
-    this.runs = h("select", { id: "tested-run", onchange: () => this.goTo(this.runs.value) });
-    this.family = h("input", { type: "checkbox", id: "family", onchange: () => bench.store.commit({ family: this.family.checked }) });
+    showPending();
+    app.on("study", showPending);
+    this.runs = h("select", { id: "tested-run", onchange: () => this.goToRun(this.runs.value) });
+    this.family = h("input", { type: "checkbox", id: "family", onchange: () => app.store.commit({ family: this.family.checked }) });
   }
 
-  /** Nothing to move. */
+  /** Show that there is no damper. */
   empty() {
-    put(this.element, h("p", { class: "faint" }, "No model yet."));
+    render(this.element, h("p", { class: "faint" }, "No model yet."));
   }
 
-  /** Sliders for a damper as the bench describes it. */
+  /** Build the sliders of a damper. */
   build(damper) {
     this.damper = damper;
     this.sliders = {};
-    put(this.element, this.chooser(), this.conditions(), this.parameters());
+    render(this.element, this.chooser(), this.conditions(), this.parameters());
   }
 
-  /** Bring all sliders to the state, and the parameters that follow to `values`. */
+  /** Set all sliders to the state, and the parameters that follow the condition to `values`. */
   set(values = null) {
-    const { condition, held, family } = this.bench.state;
-    const at = condition ?? this.damper.start;
-    for (const { name } of CONDITION) this.sliders[name].set(at[name]);
+    const { held, family } = this.app.state;
+    for (const { name } of CONDITION) this.sliders[name].set(this.condition[name]);
     for (const { name } of this.damper.parameters) {
       const value = held[name] ?? values?.[name] ?? null;
       if (value !== null) this.sliders[`p.${name}`].set(value, name in held);
     }
     this.family.checked = family;
-    const there = (c) => c.current_A === at.current_A && c.frequency_Hz === at.frequency_Hz && c.amplitude_mm / MM === at.amplitude_m;
-    this.runs.value = [...(this.tested ?? [])].find(([, c]) => there(c))?.[0] ?? "";
+    this.runs.value = [...this.tested].find(([, c]) => CONDITION.every(({ name }) => c[name] === this.condition[name]))?.[0] ?? "";
   }
 
-  /** The dampers to choose from. */
+  /** The condition of the state, or the initial one of the damper. */
+  get condition() {
+    return this.app.state.condition ?? this.damper.start;
+  }
+
+  /** List the dampers. */
   list() {
-    put(this.dampers, this.bench.damperOptions());
+    render(this.dampers, this.app.damperOptions());
     this.dampers.value = this.damper.key;
   }
 
   chooser() {
-    const { title, numbers, origin, rig, note } = this.damper;
-    this.dampers = h("select", { id: "damper", onchange: () => this.bench.choose(this.dampers.value) });
+    const { title, parameter_count: count, origin, rig, note } = this.damper;
+    this.dampers = h("select", { id: "damper", onchange: () => this.app.selectDamper(this.dampers.value) });
     this.list();
-    return h("div", { class: "field" }, h("label", { for: "damper" }, "Damper"), this.dampers,
-      h("p", { class: "small faint" }, `${title}: ${numbers} parameters, ${ORIGIN[origin] ?? origin}${rig ? `, rig ${rig}` : ""}${note ? `; ${note}` : ""}.`), this.pending);
+    return field("Damper", this.dampers,
+      h("p", { class: "small faint" }, `${title}: ${count} parameters, ${ORIGIN[origin] ?? origin}${rig ? `, rig ${rig}` : ""}${note ? `; ${note}` : ""}.`), this.pending);
   }
 
   conditions() {
@@ -74,34 +77,34 @@ export class ModelPanel {
       h("label", { class: "check" }, this.family, "Loops at all tested currents, with those measured"));
   }
 
-  /** Runs of the damper's rig, to lay one under the prediction. */
+  /** A list of the measured runs of the damper's rig; null where they are not loaded. */
   testedRuns() {
-    const rig = this.bench.overview?.rigs.findIndex((r) => r.name === this.damper.rig) ?? -1;
+    const rig = this.app.rigNumber(this.damper.rig);
+    this.tested = new Map();
     if (rig < 0) return null;
-    this.bench.rigTable(rig).then(({ runs }) => {
-      this.tested = new Map(runs.filter((r) => r.peak_N !== null).map((r) => [r.key, r.condition]));
-      put(this.runs, h("option", { value: "" }, "choose one"),
-        runs.filter((r) => this.tested.has(r.key)).map((r) => h("option", { value: r.key }, `${r.id}${r.split === "validate" ? " (validation)" : ""}`)));
-    }).catch((error) => this.bench.fail(error));
-    return h("div", { class: "field" }, h("label", { for: "tested-run" }, "At the condition of a tested run"), this.runs);
+    this.app.run(this.app.rigTable(rig).then(({ runs }) => {
+      const sines = runs.filter((r) => r.peak_N !== null);
+      this.tested = new Map(sines.map(({ key, condition: { amplitude_mm: mm, ...rest } }) => [key, { ...rest, amplitude_m: mm / MM }]));
+      render(this.runs, options([["", "choose one"], ...sines.map((r) => [r.key, `${r.id}${r.split === "validate" ? " (validation)" : ""}`])]));
+    }));
+    return field("At the condition of a tested run", this.runs);
   }
 
-  /** The sliders go to where a run was made: its measured loop is the nearest then. */
-  goTo(key) {
-    const at = this.tested.get(key);
-    if (!at) return;
-    this.bench.store.commit({ condition: { current_A: at.current_A, frequency_Hz: at.frequency_Hz, amplitude_m: at.amplitude_mm / MM } });
+  /** Set the sliders to the condition of a run, whose measured loop is then the nearest. */
+  goToRun(key) {
+    if (this.tested.has(key)) this.app.store.commit({ condition: this.tested.get(key) });
   }
 
   parameters() {
-    const made = this.damper.parameters.map((p) => ({ preset: p.preset, element: this.parameterSlider(p) }));
-    const [main, preset] = [false, true].map((wanted) => made.filter((p) => p.preset === wanted).map((p) => p.element));
+    const { parameters, follows } = this.damper;
+    const [main, preset] = [false, true].map((wanted) => parameters.filter((p) => p.preset === wanted).map((p) => this.parameterSlider(p)));
+    const text = parameters.length
+      ? `${follows ? "They follow the condition" : "One set for every condition"}. A slider that is moved holds its value until released.`
+      : "This model has no parameters to change.";
     return h("div", { class: "group" },
       h("div", { class: "row" }, h("h2", { class: "grow" }, "Parameters"),
-        h("button", { class: "link small", onclick: () => this.bench.store.commit({ held: {}, condition: null }) }, "Reset all")),
-      h("p", { class: "small faint" }, made.length
-        ? `${this.damper.follows ? "They follow the condition" : "One set for every condition"}. A slider that is moved holds its value until released.`
-        : "This model has no parameters to change."),
+        h("button", { class: "link small", onclick: () => this.app.store.commit({ held: {}, condition: null }) }, "Reset all")),
+      h("p", { class: "small faint" }, text),
       main,
       preset.length ? h("details", {}, h("summary", {}, "Held at their presets in the identification"), h("div", { class: "group" }, preset)) : null);
   }
@@ -109,21 +112,21 @@ export class ModelPanel {
   conditionSlider(spec) {
     const [low, high] = this.damper.reach[spec.name];
     const full = { ...spec, ...onScreen(spec.unit), low, high, value: this.damper.start[spec.name], tested: this.damper.envelope[spec.name], bounds: spec.bounds([low, high]) };
-    return this.listen(spec.name, full, (value) => ({ condition: { ...(this.bench.state.condition ?? this.damper.start), [spec.name]: value } }));
+    return this.addSlider(spec.name, full, (value) => ({ condition: { ...this.condition, [spec.name]: value } }));
   }
 
   parameterSlider(p) {
-    const change = (value) => ({ held: { ...this.bench.state.held, [p.name]: value } });
-    return this.listen(`p.${p.name}`, { ...p, symbol: p.name, ...onScreen(p.unit) }, change, () => {
-      const { [p.name]: _gone, ...rest } = this.bench.state.held;
-      this.bench.store.commit({ held: rest });
+    const change = (value) => ({ held: { ...this.app.state.held, [p.name]: value } });
+    return this.addSlider(`p.${p.name}`, { ...p, symbol: p.name, ...onScreen(p.unit) }, change, () => {
+      const { [p.name]: _released, ...held } = this.app.state.held;
+      this.app.store.commit({ held });
     });
   }
 
-  listen(key, spec, change, release) {
+  addSlider(key, spec, change, release) {
     this.sliders[key] = slider(spec, {
-      drag: (value, when) => this.dragging(change(value), when),
-      settle: (value) => this.settled(change(value)),
+      drag: (value, time) => this.drag(change(value), time),
+      settle: (value) => this.settle(change(value)),
       release,
     });
     return this.sliders[key].element;

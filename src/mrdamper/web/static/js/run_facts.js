@@ -1,43 +1,41 @@
-// What is known of a run, and what was found in it.
+// Properties of a run, and the findings of its quality check.
 
-import { capital, h, note, put } from "./dom.js";
+import { capitalise, h, note, render } from "./dom.js";
 import { figures, percent, quantity } from "./format.js";
 
 export class RunFacts {
   constructor() {
     this.title = h("h2", {});
     this.findings = h("div", { class: "findings" });
-    this.facts = h("div", {});
+    this.facts = h("dl", { class: "facts" });
     this.element = h("section", { class: "card" }, h("div", { class: "head" }, this.title), h("div", { class: "body" }, this.findings, this.facts));
   }
 
   show(run) {
-    put(this.title, "Run ", h("span", {}, run.id));
-    put(this.findings, run.refused ? note("", capital(run.refused)) : null);
-    put(this.facts, facts(run));
+    render(this.title, "Run ", h("span", {}, run.id));
+    render(this.findings, run.refused ? note("", capitalise(run.refused)) : null);
+    const { current_A, frequency_Hz, amplitude_mm } = run.condition ?? {};
+    const rows = [
+      ["Set", run.split === "validate" ? "validation" : "identification"],
+      ["Current", current_A, (v) => quantity(v, "A", 3)],
+      ["Frequency", frequency_Hz, (v) => quantity(v, "Hz", 3)],
+      ["Amplitude", amplitude_mm, (v) => quantity(v, "mm", 3)],
+      ["Half peak-to-peak", run.peak_N, (v) => quantity(v, "N")],
+      ["Energy per cycle", run.energy_J, (v) => quantity(v, "J")],
+      ["Equiv. damping", run.damping_Ns_m, (v) => quantity(v, "N s/m")],
+      ["Mean force", run.mean_N, (v) => quantity(v, "N", 3)],
+      ["Cycles", run.cycles, (v) => figures(v, 3)],
+      ["Cycle scatter", run.repeatability, percent],
+      ["Length", run.duration_s, (v) => quantity(v, "s", 3)],
+      ["Samples", run.samples, String],
+    ];
+    render(this.facts, rows.filter(([, value]) => value !== null && value !== undefined)
+      .map(([name, value, print = String]) => h("div", {}, h("dt", {}, name), h("dd", {}, print(value)))));
   }
 
-  /** Findings come a moment after the run. */
-  judge({ verdict, findings }) {
+  /** Show the findings, which arrive after the run. */
+  showFindings({ verdict, findings }) {
     const kind = verdict === "refused" ? "bad" : "warn";
-    if (findings.length) put(this.findings, findings.map((f) => note(kind, h("div", {}, capital(f.text), " ", h("code", {}, f.code)))));
+    if (findings.length) render(this.findings, findings.map((f) => note(kind, h("div", {}, capitalise(f.text), " ", h("code", {}, f.code)))));
   }
-}
-
-function facts(run) {
-  const fact = (name, value) => h("div", {}, h("dt", {}, name), h("dd", {}, value));
-  const c = run.condition;
-  return h("dl", { class: "facts" },
-    fact("Set", run.split === "validate" ? "validation" : "identification"),
-    c ? fact("Current", `${figures(c.current_A, 3)} A`) : null,
-    c ? fact("Frequency", `${figures(c.frequency_Hz, 3)} Hz`) : null,
-    c ? fact("Amplitude", quantity(c.amplitude_mm, "mm", 3)) : null,
-    run.peak_N === null ? null : fact("Half peak-to-peak", quantity(run.peak_N, "N")),
-    run.energy_J === null ? null : fact("Energy per cycle", quantity(run.energy_J, "J")),
-    run.damping_Ns_m === null ? null : fact("Equiv. damping", quantity(run.damping_Ns_m, "N s/m")),
-    run.mean_N === null ? null : fact("Mean force", quantity(run.mean_N, "N", 3)),
-    run.cycles === null ? null : fact("Cycles", figures(run.cycles, 3)),
-    run.repeatability === null ? null : fact("Cycle scatter", percent(run.repeatability)),
-    fact("Length", `${figures(run.duration_s, 3)} s`),
-    fact("Samples", String(run.samples)));
 }

@@ -15,8 +15,8 @@ function storage(name) {
   }
 }
 
-/** Of this tab, until it is closed. */
+/** Storage of this tab, until it is closed. */
 export const tabStorage = storage("sessionStorage");
 
-/** Of this browser. */
+/** Storage of this browser. */
 export const browserStorage = storage("localStorage");

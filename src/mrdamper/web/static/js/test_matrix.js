@@ -1,40 +1,37 @@
-// The test matrix of a rig: one button a run, in a grid the arrow keys walk.
+// The test matrix of a rig: one button a run, in a grid with arrow keys.
 
 import { h } from "./dom.js";
-import { condition, figures, quantity } from "./format.js";
+import { condition, quantity } from "./format.js";
 
-const STEPS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] };
+const DIRECTIONS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] };
 
 export class TestMatrix {
-  /** `pick(key)` hears which run is chosen. */
-  constructor(table, pick) {
-    this.table = table;
-    this.pick = pick;
+  /** `pick(key)` is called with the run that the user chooses. */
+  constructor(table, rig, pick) {
+    Object.assign(this, { table, rig, pick });
     this.runs = new Map(table.runs.map((run) => [run.key, run]));
-    this.element = h("section", { class: "card tests" }, head(), this.grid(), this.others());
-    this.element.addEventListener("keydown", (event) => this.walk(event));
+    this.element = h("section", { class: "card tests" }, head(), this.grid(), this.otherRuns());
+    this.element.addEventListener("keydown", (event) => this.moveFocus(event));
   }
 
-  /** Show which run is chosen; the others are reached by the arrow keys. */
+  /** Mark the chosen run; the arrow keys reach the others. */
   choose(key) {
-    let chosen = null;
     for (const button of this.buttons()) {
-      const here = button.dataset.run === key;
-      button.setAttribute("aria-pressed", String(here));
-      button.tabIndex = here ? 0 : -1;
-      if (here) chosen = button;
+      const chosen = button.dataset.run === key;
+      button.setAttribute("aria-pressed", String(chosen));
+      button.tabIndex = chosen ? 0 : -1;
+      if (chosen) button.scrollIntoView({ block: "nearest" });
     }
-    chosen?.scrollIntoView({ block: "nearest" });
   }
 
   /** Mark the runs that have findings. */
-  judge(quality) {
+  showFindings(quality) {
     for (const button of this.buttons()) {
       const { verdict, findings } = quality[button.dataset.run];
       const run = this.runs.get(button.dataset.run);
       button.classList.toggle("noted", verdict !== "good");
       button.title = [title(run), ...findings.map((f) => f.text)].join("\n");
-      button.setAttribute("aria-label", `${spoken(run)}${verdict === "good" ? "" : `, ${verdict}`}`);
+      button.setAttribute("aria-label", `${description(run)}${verdict === "good" ? "" : `, ${verdict}`}`);
     }
   }
 
@@ -44,51 +41,41 @@ export class TestMatrix {
 
   grid() {
     const { currents_A: currents, motions } = this.table.matrix;
-    const rows = motions.map((m) =>
-      h("tr", {},
-        h("th", { scope: "row" }, `${figures(m.frequency_Hz, 3)} Hz`),
-        h("th", { scope: "row" }, quantity(m.amplitude_mm, "mm", 3)),
-        m.cells.map((keys) => h("td", {}, keys.map((key) => this.cell(key))))),
-    );
-    if (!rows.length) return h("p", { class: "faint small none" }, "No run is a steady sine at one current: there is no matrix to show.");
+    if (!motions.length) return h("p", { class: "faint small none" }, "No run is a steady sine at one current: there is no matrix to show.");
+    const th = (scope, text) => h("th", { scope }, text);
+    const rows = motions.map((m) => h("tr", {},
+      th("row", quantity(m.frequency_Hz, "Hz", 3)), th("row", quantity(m.amplitude_mm, "mm", 3)),
+      m.cells.map((keys) => h("td", {}, keys.map((key) => this.cell(this.runs.get(key)))))));
     return h("div", { class: "flush" },
       h("table", { class: "matrix" },
-        h("caption", { class: "hidden-text" }, "Test matrix: one button a run; the arrow keys walk it"),
-        h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "Frequency"), h("th", { scope: "col" }, "Amplitude"),
-          currents.map((I) => h("th", { scope: "col", class: "num" }, `${figures(I, 3)} A`)))),
+        h("caption", { class: "hidden-text" }, "Test matrix: one button a run; the arrow keys move between them"),
+        h("thead", {}, h("tr", {}, th("col", "Frequency"), th("col", "Amplitude"), currents.map((I) => th("col", quantity(I, "A", 3))))),
         h("tbody", {}, rows)));
   }
 
-  cell(key) {
-    const run = this.runs.get(key);
-    return h(
-      "button",
-      {
-        class: `cell ${run.split}`, "data-run": key,
-        onclick: () => this.pick(key), title: title(run), "aria-label": spoken(run),
-      },
-      quantity(run.peak_N, "N", 3),
-    );
+  cell(run) {
+    return h("button", { class: `cell ${run.split}`, "data-run": run.key, onclick: () => this.pick(run.key), title: title(run), "aria-label": description(run) },
+      quantity(run.peak_N, "N", 3));
   }
 
-  /** Runs that are no steady sine at one current. */
-  others() {
+  /** Buttons of the runs that are no steady sine at one current. */
+  otherRuns() {
     const inMatrix = new Set(this.table.matrix.motions.flatMap((m) => m.cells.flat()));
-    const found = this.table.runs.filter((run) => !inMatrix.has(run.key));
-    if (!found.length) return null;
+    const others = this.table.runs.filter((run) => !inMatrix.has(run.key));
+    if (!others.length) return null;
     return h("div", { class: "chips" }, h("span", { class: "faint small" }, "Other motion:"),
-      found.map((run) => h("button", { "data-run": run.key, title: title(run), onclick: () => this.pick(run.key) }, run.id)));
+      others.map((run) => h("button", { "data-run": run.key, title: title(run), onclick: () => this.pick(run.key) }, run.id)));
   }
 
-  /** The nearest button in the direction of an arrow key takes the focus. */
-  walk(event) {
-    const step = STEPS[event.key];
-    const here = event.target.closest("[data-run]");
-    if (!step || !here) return;
+  /** Move the focus to the nearest button in the direction of an arrow key. */
+  moveFocus(event) {
+    const direction = DIRECTIONS[event.key];
+    const current = event.target.closest("[data-run]");
+    if (!direction || !current) return;
     event.preventDefault();
-    const from = here.getBoundingClientRect();
-    const along = (box) => (box.x + box.width / 2 - from.x - from.width / 2) * step[0] + (box.y + box.height / 2 - from.y - from.height / 2) * step[1];
-    const aside = (box) => Math.abs((box.x - from.x) * step[1]) + Math.abs((box.y - from.y) * step[0]);
+    const from = current.getBoundingClientRect();
+    const along = (box) => (box.x + box.width / 2 - from.x - from.width / 2) * direction[0] + (box.y + box.height / 2 - from.y - from.height / 2) * direction[1];
+    const aside = (box) => Math.abs((box.x - from.x) * direction[1]) + Math.abs((box.y - from.y) * direction[0]);
     let [best, least] = [null, Infinity];
     for (const button of this.buttons()) {
       const box = button.getBoundingClientRect();
@@ -111,7 +98,7 @@ function title(run) {
   return [`${run.id}, ${run.split === "validate" ? "validation" : "identification"}`, run.refused].filter(Boolean).join("\n");
 }
 
-function spoken(run) {
+function description(run) {
   const force = run.peak_N === null ? "" : `, peak force ${quantity(run.peak_N, "N", 3)}`;
   return `${run.id}: ${condition(run.condition)}${force}${run.split === "validate" ? ", validation" : ""}`;
 }

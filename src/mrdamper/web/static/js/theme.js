@@ -1,36 +1,38 @@
-// Light or dark: as the system says, until the reader says otherwise.
+// Light or dark colours: those of the system until the user chooses.
 
-import { h, put } from "./dom.js";
+import { h, render } from "./dom.js";
 import { browserStorage } from "./storage.js";
 
 const KEY = "mrdamper.theme";
 const system = matchMedia("(prefers-color-scheme: dark)");
+const ofSystem = () => (system.matches ? "dark" : "light");
 
-export function theme() {
-  apply(browserStorage.getItem(KEY) ?? wished());
-  system.addEventListener("change", () => browserStorage.getItem(KEY) ?? apply(wished()));
+/** True while the colours are dark. */
+export function isDark() {
+  return document.documentElement.dataset.theme === "dark";
 }
 
-theme.button = () => {
+export function startTheme() {
+  apply(browserStorage.getItem(KEY) ?? ofSystem());
+  system.addEventListener("change", () => browserStorage.getItem(KEY) ?? apply(ofSystem()));
+}
+
+/** A button that changes the colours. */
+export function themeButton() {
   const button = h("button", { class: "quiet", onclick: toggle });
   const label = () => {
-    const dark = document.documentElement.dataset.theme === "dark";
-    put(button, dark ? "☀" : "☾", h("span", { class: "word" }, dark ? "Light" : "Dark"));
-    button.setAttribute("aria-label", dark ? "Use light colours" : "Use dark colours");
+    render(button, isDark() ? "☀" : "☾", h("span", { class: "word" }, isDark() ? "Light" : "Dark"));
+    button.setAttribute("aria-label", isDark() ? "Use light colours" : "Use dark colours");
   };
   document.addEventListener("themechange", label);
   label();
   return button;
-};
-
-function toggle() {
-  const next = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
-  browserStorage.setItem(KEY, next);
-  apply(next);
 }
 
-function wished() {
-  return system.matches ? "dark" : "light";
+function toggle() {
+  const name = isDark() ? "light" : "dark";
+  browserStorage.setItem(KEY, name);
+  apply(name);
 }
 
 function apply(name) {

@@ -1,7 +1,8 @@
-// Data: drop files, see what was taken and refused, the test matrix, and the loops of a run.
+// The Data view: files, quality, test matrix, and the loops of a run.
 
-import { Chart } from "../chart.js";
-import { busy, empty, h, put, renew } from "../dom.js";
+import { View } from "../app.js";
+import { Chart, loopCharts } from "../chart.js";
+import { h, loading, placeholder, render } from "../dom.js";
 import { DropZone } from "../drop_zone.js";
 import { count, quantity } from "../format.js";
 import { fileList, profilePanel } from "../import_panels.js";
@@ -10,140 +11,131 @@ import { RunFacts } from "../run_facts.js";
 import { TestList } from "../test_list.js";
 import { TestMatrix } from "../test_matrix.js";
 
-export const id = "data";
-export const label = "Data";
+const STEPS = [
+  ["Data", "measured runs and their quality"], ["Identify", "one model, or a study of all candidates"],
+  ["Model", "loops at any current, frequency, amplitude and parameter value"],
+  ["Compare", "errors of several models on the validation runs"], ["Simulate", "a vehicle or building with the damper"],
+  ["Export", "report, model, code and tables"],
+];
 
-export function create(bench) {
-  return new DataView(bench);
-}
+export class DataView extends View {
+  static id = "data";
+  static label = "Data";
 
-class DataView {
-  constructor(bench) {
-    this.bench = bench;
-    this.drop = new DropZone(bench);
-    this.tests = new TestList(bench, this.drop);
+  constructor(app) {
+    super(app);
+    this.zone = new DropZone(app);
+    this.tests = new TestList(app, this.zone);
     this.parts = { files: h("div", {}), profile: h("div", {}), rigs: h("div", {}), quality: h("div", {}) };
     this.stage = h("div", { class: "stage fill" });
     this.facts = new RunFacts();
     this.matrix = null; // of the table shown
-    this.turn = 0; // of several refreshes on their way, the newest counts
+    this.turn = 0; // of several refreshes under way, the newest counts
     this.charts = {
-      x: new Chart({ title: "Force over displacement", x: ["Displacement", "mm"], y: ["Force", "N"], name: "force-displacement", keys: true }),
-      v: new Chart({ title: "Force over velocity", x: ["Velocity", "m/s"], y: ["Force", "N"], name: "force-velocity" }),
-      t: new Chart({ title: "Force over time", x: ["Time", "s"], y: ["Force", "N"], name: "force-time" }),
-      d: new Chart({ title: "Displacement over time", x: ["Time", "s"], y: ["Displacement", "mm"], name: "displacement-time" }),
+      ...loopCharts("measured", "x"),
+      t: new Chart({ title: "Force over time", x: ["Time", "s"], y: ["Force", "N"], name: "measured-force-time" }),
+      d: new Chart({ title: "Displacement over time", x: ["Time", "s"], y: ["Displacement", "mm"], name: "measured-displacement-time" }),
     };
     this.figures = h("div", { class: "figures" }, Object.values(this.charts).map((c) => c.element));
-    this.element = h("div", { class: "view" }, h("div", { class: "side" }, this.drop.element, Object.values(this.parts)), this.stage);
-    document.addEventListener("bench:data", () => {
+    this.element = h("div", { class: "view" }, h("div", { class: "side" }, this.zone.element, Object.values(this.parts)), this.stage);
+    app.on("data", () => {
       this.matrix = null;
-      this.showIntake(bench.overview);
+      this.showFiles(app.overview);
       this.shown();
     });
-    document.addEventListener("bench:units", () => {
+    app.on("units", () => {
       this.matrix = null;
       this.shown();
     });
-    document.addEventListener("bench:busy", () => this.shown());
-    document.addEventListener("bench:refused", (event) => this.showIntake(event.detail));
+    app.on("loading", () => this.shown());
+    app.on("refused", (overview) => this.showFiles(overview));
     this.shown();
   }
 
-  shown() {
-    if (this.bench.state.view === id) this.refresh().catch((error) => this.bench.fail(error));
-  }
-
   update(state, before) {
-    if (state.view === id && (state.rig !== before.rig || state.run !== before.run)) this.shown();
+    if (state.rig !== before.rig || state.run !== before.run) this.shown();
   }
 
   async refresh() {
-    const { bench, parts } = this;
+    const { app, parts } = this;
     const turn = (this.turn += 1);
-    renew(parts.rigs, whatIsThere(bench));
-    if (bench.busy || !bench.overview) {
+    render(parts.rigs, dataSummary(app));
+    if (app.loading || !app.overview) {
       this.matrix = null;
-      put(parts.quality);
-      put(this.stage, bench.busy ? busy(`${bench.busy} …`) : [this.tests.element, this.tests.element.hidden ? welcome(bench) : null]);
+      render(parts.quality);
+      render(this.stage, app.loading ? loading(`${app.loading} …`) : [this.tests.element, this.tests.element.hidden ? welcome(app) : null]);
       return;
     }
-    const { rig } = bench.state;
-    if (this.matrix?.rig !== rig) put(this.stage, busy(`Analysing ${count(bench.overview.rigs[rig].runs, "run")} …`));
-    const table = await bench.rigTable(rig);
-    if (turn !== this.turn || rig !== bench.state.rig) return;
-    const run = chosen(table, bench.state.run);
+    const { rig } = app.state;
+    if (this.matrix?.rig !== rig) render(this.stage, loading(`Analysing ${count(app.overview.rigs[rig].runs, "run")} …`));
+    const table = await app.rigTable(rig);
+    const current = () => turn === this.turn && rig === app.state.rig;
+    if (!current()) return;
+    const run = runToShow(table, app.state.run);
     if (this.matrix?.table !== table) this.layOut(table, rig);
     this.matrix.choose(run.key);
     this.facts.show(run);
-    const current = () => turn === this.turn && rig === bench.state.rig;
     await this.drawRun(run, rig, current);
     if (current()) await this.showQuality(run, rig, current);
   }
 
   layOut(table, rig) {
-    this.matrix = new TestMatrix(table, (key) => this.bench.store.commit({ run: key }));
-    this.matrix.rig = rig;
-    put(this.stage, this.tests.element, h("div", { class: "bench-top" }, this.matrix.element, this.facts.element), this.figures);
+    this.matrix = new TestMatrix(table, rig, (run) => this.app.store.commit({ run }));
+    render(this.stage, this.tests.element, h("div", { class: "matrix-and-run" }, this.matrix.element, this.facts.element), this.figures);
   }
 
   async drawRun(run, rig, current) {
-    const [cycle, window] = await Promise.all(["cycle", "window"].map((part) => this.bench.loop(run.key, part, rig)));
+    const [cycle, window] = await Promise.all(["cycle", "window"].map((part) => this.app.loop(run.key, part, rig)));
     if (!current()) return; // another was chosen meanwhile
+    const sine = run.peak_N !== null;
     const all = { color: "line-strong", width: 1, name: "steady window", quiet: true };
-    const last = run.peak_N === null ? { color: "measured", width: 0.8, name: "record" } : { color: "measured", width: 2, name: "last cycle" };
-    const said = run.peak_N === null ? run.refused : `Peak force ${quantity(run.peak_N, "N")}, energy ${quantity(run.energy_J, "J")} per cycle.`;
-    const two = (a, b) => [{ ...all, x: window.arrays[a], y: window.arrays[b] }, { ...last, x: cycle.arrays[a], y: cycle.arrays[b] }];
-    const one = (b) => [{ ...last, width: Math.min(last.width, 1.5), x: window.arrays.t, y: window.arrays[b] }];
+    const last = sine ? { color: "measured", width: 2, name: "last cycle" } : { color: "measured", width: 0.8, name: "record" };
+    const summary = sine ? `Peak force ${quantity(run.peak_N, "N")}, energy ${quantity(run.energy_J, "J")} per cycle.` : run.refused;
+    const loop = (a) => [{ ...all, x: window.arrays[a], y: window.arrays.F }, { ...last, x: cycle.arrays[a], y: cycle.arrays.F }];
+    const history = (b) => [{ ...last, width: Math.min(last.width, 1.5), x: window.arrays.t, y: window.arrays[b] }];
     const { x, v, t, d } = this.charts;
-    for (const chart of Object.values(this.charts)) chart.reset();
-    await Promise.all([x.draw(two("x", "F"), said), v.draw(two("v", "F"), said), t.draw(one("F"), said), d.draw(one("x"), said)]);
+    for (const chart of [x, v, t, d]) chart.reset();
+    await Promise.all([x.draw(loop("x"), summary), v.draw(loop("v"), summary), t.draw(history("F"), summary), d.draw(history("x"), summary)]);
   }
 
-  /** Verdicts come after the loops: judging looks at every sample of every run. */
+  /** Show the quality after the loops: the check examines every sample of every run. */
   async showQuality(run, rig, current) {
-    const group = (text, faint) => put(this.parts.quality, h("div", { class: "group" }, h("h2", {}, "Quality"), h("p", { class: `small ${faint}` }, text)));
-    if (!this.parts.quality.childElementCount) group("Checking the runs …", "faint");
-    const found = await this.bench.quality(rig);
+    const show = (text) => render(this.parts.quality, h("div", { class: "group" }, h("h2", {}, "Quality"), h("p", { class: "small" }, text)));
+    if (!this.parts.quality.childElementCount) show("Checking the runs …");
+    const quality = await this.app.quality(rig);
     if (!current()) return;
-    group(`${Object.entries(tally(Object.values(found).map((q) => q.verdict))).map(([word, n]) => `${n} ${word}`).join(", ")}.`, "");
-    this.matrix.judge(found);
-    this.facts.judge(found[run.key]);
+    const verdicts = Object.values(quality).map((q) => q.verdict);
+    show(`${[...new Set(verdicts)].map((verdict) => `${verdicts.filter((v) => v === verdict).length} ${verdict}`).join(", ")}.`);
+    this.matrix.showFindings(quality);
+    this.facts.showFindings(quality[run.key]);
   }
 
-  showIntake(found) {
-    put(this.parts.files, fileList(found));
-    put(this.parts.profile, profilePanel(found, this.drop));
-    this.tests.show(found);
-    if (!this.bench.overview) this.shown();
+  showFiles(overview) {
+    render(this.parts.files, fileList(overview));
+    render(this.parts.profile, profilePanel(overview, this.zone));
+    this.tests.show(overview);
+    if (!this.app.overview) this.shown();
   }
 }
 
-/** The run asked for; else the first of the matrix; else the first there is. */
-function chosen(table, key) {
-  const first = table.matrix.motions.flatMap((m) => m.cells.flat())[0];
+/** The run of a key; else the first of the matrix; else the first of all. */
+function runToShow(table, key) {
+  const [first] = table.matrix.motions.flatMap((m) => m.cells.flat());
   return [key, first].map((name) => table.runs.find((run) => run.key === name)).find(Boolean) ?? table.runs[0];
 }
 
-function whatIsThere(bench) {
-  if (!bench.overview) return null;
-  const { rigs, name, runs } = bench.overview;
+function dataSummary(app) {
+  if (!app.overview) return null;
+  const { rigs, name, runs } = app.overview;
   return h("div", { class: "group" },
     h("h2", {}, rigs.length > 1 ? "Rig" : "Data"),
-    rigChooser(bench, "data"),
+    rigChooser(app, "data"),
     h("p", { class: "small faint" }, `${count(runs, "run")} in “${name}”.`));
 }
 
-function welcome(bench) {
-  const open = h("button", { class: "primary", onclick: () => bench.openBundled().catch((error) => bench.fail(error)) }, "Open the bundled tests");
+function welcome(app) {
+  const open = h("button", { class: "primary", onclick: () => app.run(app.openBundled()) }, "Open the bundled tests");
   return h("div", { class: "welcome" },
-    empty("See the damper", "Drop the files of a test rig or a dataset folder anywhere on this page. Or begin with the bundled tests of two real dampers: 53 runs, ready to look at.", open),
-    h("ol", { class: "path" },
-      [["Data", "measured runs and their quality"], ["Identify", "one model, or a study of all candidates"], ["Model", "loops at any current, frequency, amplitude and parameter value"], ["Compare", "errors of several models on the validation runs"], ["Export", "report, model, code and tables"]]
-        .map(([what, why]) => h("li", {}, h("b", {}, what), h("span", { class: "faint small" }, why)))));
-}
-
-function tally(words) {
-  const counts = {};
-  for (const word of words) counts[word] = (counts[word] ?? 0) + 1;
-  return counts;
+    placeholder("Open measured data", "Drop the files of a test rig or a dataset folder anywhere on this page, or open the bundled tests of two real dampers: 53 runs.", open),
+    h("ol", { class: "steps" }, STEPS.map(([view, text]) => h("li", {}, h("b", {}, view), h("span", { class: "faint small" }, text)))));
 }
