@@ -1,8 +1,11 @@
 """Names, signs and clocks of the channels: what contradicts is refused, a current counts by its magnitude."""
 
+import re
+
 import numpy as np
 import pytest
 
+from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import import_files
 
 TIME = np.arange(2001) / 200
@@ -119,3 +122,39 @@ def test_nanoseconds_since_1970_need_no_unit_and_smaller_counts_do(tmp_path):
     assert [(refusal.file[-10:], refusal.error.code) for refusal in result.refusals] == [
         ("b_0.5A.csv", "E_UNITS_MISSING")
     ]
+
+
+@pytest.mark.parametrize(
+    ("names", "currents"),
+    [
+        (["MRD-7_0A", "MRD-7_0.75A", "MRD-7_1A"], [0.0, 0.75, 1.0]),  # no decimal has two points
+        (["run9_2A", "run10_1A"], [2.0, 1.0]),
+        (["S2_1A_2Hz", "S2_0A_2Hz", "S2_2A_2Hz"], [1.0, 0.0, 2.0]),
+        (["run1_1A", "run2_1A", "run3_0A", "run4_2A"], [1.0, 1.0, 0.0, 2.0]),  # counts the tests
+        (["MRD-7_0A/a", "MRD-7_1A/a", "MRD-7_500mA/a"], [0.0, 1.0, 0.5]),
+        (["t2_5A", "t0_5A", "t1_0A", "t2_0A"], None),
+        (["I1_0A", "I1_1A", "I1_2A"], None),
+        (["t_1_0A", "t_1_1A", "t_1_2A"], None),
+        (["run1_0A", "run1_5A"], None),
+    ],
+)
+def test_a_digit_before_the_current_is_part_of_a_label_where_the_other_names_show_it(tmp_path, names, currents):
+    for i, name in enumerate(names):
+        path = tmp_path / f"{name}.csv"
+        path.parent.mkdir(exist_ok=True)
+        table = np.column_stack([TIME, (15 + i) * np.sin(PHASE), (1 + 0.1 * i) * force(PHASE)])
+        np.savetxt(path, table, "%.6g", ",", header="time [s],displacement [mm],force [N]", comments="")
+    result = import_files([tmp_path])
+    if currents is not None:
+        found = {
+            str(record.provenance["file"]).removesuffix(".csv"): np.mean(record.current) for record in result.records
+        }
+        assert [found[name] for name in names] == currents
+        return
+    assert not result.records
+    error = result.refusals[0].error
+    written = re.search(r"values = (\{.*?\})", error.remedy)
+    assert re.search(r"can be read as \d A or as \d\.\d A", error.found)
+    assert written
+    answered = import_files([tmp_path], parse_profile(f"[current]\nvalues = {written[1]}"))
+    assert len(answered.records) == 1

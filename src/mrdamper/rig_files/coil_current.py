@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
@@ -13,10 +14,12 @@ from mrdamper.data.arrays import chunks
 from mrdamper.errors import ColumnError, printable
 from mrdamper.rig_files.column_names import names_condition, split_name
 from mrdamper.rig_files.conditions import (
+    BEHIND_DIGIT,
     LARGEST_STATED,
     Statement,
     contradicted,
     contradicts,
+    current_behind_label,
     currents_in,
     stated_by_lines,
     stated_in_titles,
@@ -100,6 +103,51 @@ def with_value_of_name(record: Record, path: Path, profile: Profile) -> Record:
             remedy="correct [current.values] of the profile", code="E_AMBIGUOUS",
         )  # fmt: skip
     return with_stated_current(record, value, "profile", where)
+
+
+def _places(record: Record, path: Path) -> tuple[str, ...]:
+    """Return the names of a test, its file and the folders above that may state its current."""
+    return record.id, *path.parts[: -2 - _FOLDERS : -1]
+
+
+def require_current(record: Record, path: Path = Path()) -> Record:
+    """Return the record of a test of a file; `ColumnError`, E_CURRENT_MISSING, if it has no current."""
+    if record.current is not None:
+        return record
+    places = _places(record, path)
+    match = next(filter(None, map(BEHIND_DIGIT.search, places)), None)
+    found = [f.text for f in record.findings if f.text.startswith(NO_CHANNEL)]
+    value, first = '"test1*" = 0.5', ""
+    if found and "may both" not in found[0]:
+        found[0], given, first = found[0].partition(" if so, ")
+        first = first or 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
+        first = f"{given.lstrip()}{first}; else "
+    elif match and not found:
+        found = [f"{match[0]!r} in its name can be read as {match[2]} A or as {match[1]}.{match[2]} A"]
+        stars = ("*", "*") if match.string in places[:2] else ("*/*", "*/*")
+        value = f'"{stars[0]}{match[0]}{stars[1]}" = {match[2]}'
+    raise ColumnError(
+        (found or ["no coil current in a column, or in the name of the file or of its folder"])[0],
+        where=Path(record.provenance.get("file", record.id)).name,
+        remedy=f"{first}write the currents into tests.csv (--write-tests), or set [current] "
+        f'pattern = "*_{{current}}A_*" and unit = "A", values = {{{value}}}, [channels.current] column = "..." or, '
+        "if all tests have one, [current] value = 0.5 in a profile",
+        code="E_CURRENT_MISSING",
+    )
+
+
+def with_current_behind_label(record: Record, path: Path, names: Collection[str]) -> Record:
+    """Return the record with the current behind a label in one of its names, where the other names show that it is one.
+
+    The first of its names that states a current at all counts.
+    """
+    place = next(filter(BEHIND_DIGIT.search, _places(record, path)), "")
+    current = current_behind_label(place, names)
+    if current is None:
+        return record
+    text = f"{place!r} is read as {current:g} A: by the other names, the digit before it is part of a label"
+    record = with_stated_current(record, current, f"the name {place!r}", place)
+    return replace(record, findings=(*record.findings, Finding("W_CHOSEN", printable(text))))
 
 
 def with_stated_current(record: Record, current: float, whence: str, where: str) -> Record:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from itertools import product
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -18,7 +19,17 @@ import numpy as np
 
 from mrdamper.data.arrays import Floats
 from mrdamper.data.runs import held_current
-from mrdamper.rig_files.column_names import COIL, RATING, Unit, holds, names_condition, parse_unit, split_name, words
+from mrdamper.rig_files.column_names import (
+    COIL,
+    RATING,
+    Unit,
+    holds,
+    names_condition,
+    parse_unit,
+    role_of,
+    split_name,
+    words,
+)
 
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
 _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it
@@ -28,6 +39,11 @@ _IN_NAME = re.compile(
     r"([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(m?)(?:A(?:mp(?:ere)?s?)?|amp(?:ere)?s?|(?<=m)a)"
     r"(?![A-Za-z0-9]|\s?/\s?(?:m?V|%|div|s)\b)"
 )
+BEHIND_DIGIT = re.compile(r"(?<![0-9])([0-9])_([0-9]+)[ _]?A(?![A-Za-z0-9])")  # MRD-7_0A: 0 or 7.0 A
+_BEHIND_LABEL = re.compile(  # MRD-7_0.5A, run12_1A: no decimal is written so
+    r"(?<![0-9])(?:[0-9]+_[0-9]+(?:[.,xp][0-9]+[ _]?m?|[ _]?m)|[0-9]{2,}_[0-9]+[ _]?)A(?![A-Za-z0-9])"
+)
+_LARGEST_STEP = 5  # [A] of tests at whole amperes, from 0 A on
 _NEXT_NUMBER = re.compile(r"_A_[0-9.]+(?:_|\.[a-z]{2,4}$|$)")  # 2_A_20: the name of the next number
 _NEGATIVE = re.compile(r"[=:]\s*[-−]$")  # a dash elsewhere may stand between two parts of a name
 _NUMERIC_CELL = re.compile(r"[,;]\s*\"?[+-]?[0-9.]+\"?\s*(?:[,;]|$)")
@@ -114,7 +130,7 @@ def currents_in(text: str) -> tuple[float, ...]:
     none, nor does what stands beside a fuse, a supply or a limit.
     """
     text = unicodedata.normalize("NFKC", text[:255]).replace("−", "-")
-    if re.search(r"(?<![0-9])[0-9]_[0-9]+[ _]?A(?![A-Za-z0-9])", text) or _LABELLED_RATING.search(text):
+    if BEHIND_DIGIT.search(text) or _LABELLED_RATING.search(text):
         return ()
     # 04A may be four or 0.4 amperes; 0400mA is padded.
     stated = [match for match in _IN_NAME.finditer(text) if match[2] or not re.fullmatch("0[1-9]+", match[1])]
@@ -125,6 +141,32 @@ def currents_in(text: str) -> tuple[float, ...]:
     listed = _LISTED.search(text)
     currents += [amperes(number, listed[5]) for number in (listed[1] or listed[3], listed[4])] if listed else []
     return tuple(dict.fromkeys(currents))
+
+
+def current_behind_label(name: str, names: Collection[str]) -> float | None:
+    """Return the current [A] behind a digit of a label by the other names: MRD-7_0A; None where it may not.
+
+    Another name has a number with a point behind such a label, or a label of two digits; or whole amperes from 0 A on
+    stand behind every label, or behind labels that count the tests.
+    """
+    match = BEHIND_DIGIT.search(name)
+    stated = () if match is None else currents_in(f"{name[: match.end(1)]} {name[match.start(2) :]}")
+    if match is None or len(stated) != 1 or stated[0] > LARGEST_STATED:
+        return None
+
+    def alike(pattern: re.Pattern[str]) -> list[re.Match[str]]:
+        """Return what names have in the place of the label and the number."""
+        form, found = re.sub("[0-9]+", "0", name[: match.start()]), map(pattern.search, {*names})
+        return [m for m in found if m and re.sub("[0-9]+", "0", m.string[: m.start()]) == form]
+
+    if alike(_BEHIND_LABEL):
+        return stated[0]
+    both, letters = {(m[1], m[2]) for m in alike(BEHIND_DIGIT)}, re.search("([A-Za-z]+)-?$", name[: match.start()])
+    labels, numbers = ({*of} for of in zip(*both, strict=True))
+    whole = numbers == {*map(str, range(len(numbers)))} and 3 <= len(numbers) <= _LARGEST_STEP + 1 and "0" not in labels
+    counted = len(labels) == len(both) and labels == {*map(str, range(1, len(labels) + 1))}
+    known = whole and (counted or both == {*product(labels, numbers)})
+    return stated[0] if known and letters and role_of(letters[1]) != "current" else None
 
 
 def currents_in_cells(line: str) -> list[float]:

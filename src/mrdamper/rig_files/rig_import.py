@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from mrdamper.data import Dataset
 from mrdamper.data.displayable import Displayable
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
-from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, with_stated_current
+from mrdamper.rig_files.coil_current import as_data, require_current, with_current_behind_label, with_stated_current
 from mrdamper.rig_files.file_records import files_in, records_of_file, unpacked
 from mrdamper.rig_files.mapping.companions import (
     TEXTS,
@@ -246,7 +246,7 @@ class _Intake:
         from mrdamper.rig_files.quality import check_long_record
 
         checked = record
-        for step in (_with_current, check_long_record):
+        for step in (partial(require_current, path=path), check_long_record):
             try:
                 with np.errstate(all="ignore"):
                     checked = step(checked)
@@ -264,7 +264,9 @@ class _Intake:
         others = [path for path in dict.fromkeys(others) if path.is_file()]
         used = self._join_channels(others, texts)
         counts = Counter(path for path, _ in self._pending)
+        names = {name for path, run in self.met for name in (*path.parts, run)}
         for path, record in self._pending:
+            record = with_current_behind_label(record, path, names)
             self._check(path, record, [], several=counts[path] > 1)
         self._refuse_names_without_point()
         for path in [path for path in (*others, *texts) if path not in used and (self._found or _is_short(path))]:
@@ -415,28 +417,11 @@ def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
     """
     from mrdamper.rig_files.quality import to_run
 
-    return Dataset(tuple(to_run(_with_current(record)) for record in records), name)
+    return Dataset(tuple(to_run(require_current(record)) for record in records), name)
 
 
 def _is_short(path: Path) -> bool:
     return path.stat().st_size <= _LARGEST_LIST
-
-
-def _with_current(record: Record) -> Record:
-    """Return the record, if it has a current."""
-    if record.current is not None:
-        return record
-    why = [f.text for f in record.findings if f.text.startswith(NO_CHANNEL)]
-    calibrated = 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile; else '
-    raise ColumnError(
-        why[0] if why else "no coil current in a column or in the file name",
-        where=Path(record.provenance.get("file", record.id)).name,
-        remedy=(calibrated if why and "may both" not in why[0] else "")
-        + "write the currents into tests.csv (--write-tests), or set [current] "
-        'pattern = "*_{current}A_*" and unit = "A", values = {"test1*" = 0.5}, [channels.current] column = "..." or, '
-        "if all tests have one, [current] value = 0.5 in a profile",
-        code="E_CURRENT_MISSING",
-    )
 
 
 def with_unique_ids(records: Iterable[Record]) -> tuple[Record, ...]:
