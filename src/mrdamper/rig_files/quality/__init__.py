@@ -283,24 +283,24 @@ def _quality(record: Record) -> Quality:
         result = record if record.segments else checked(view)
     except QualityError as refusal:
         return Quality(record, refusal=refusal)
-    motion, scatter = view.motion, loop.repeatability(view)
+    analysis, scatter = view.motion, loop.repeatability(view)
     current, change = motion.held_in(result, motion.steady_window(view))
     steady = view.steady
     whole = slice(None)
-    if motion is not None:
-        count = max(1, int(motion.cycles + 0.02))
-        whole = steady.time >= steady.time[-1] - count / motion.condition.frequency_Hz
+    if analysis is not None:
+        count = max(1, int(analysis.cycles + 0.02))
+        whole = steady.time >= steady.time[-1] - count / analysis.condition.frequency_Hz
     figures = {
         "current_A": np.nan if change else abs(current),
-        "frequency_Hz": np.nan if motion is None else motion.condition.frequency_Hz,
-        "amplitude_mm": np.nan if motion is None else 1e3 * motion.condition.amplitude_m,
+        "frequency_Hz": np.nan if analysis is None else analysis.condition.frequency_Hz,
+        "amplitude_mm": np.nan if analysis is None else 1e3 * analysis.condition.amplitude_m,
         "cycles": motion.cycles_of(view),
         "sample_rate_Hz": 1 / view.step,
         "repeatability_percent": np.nan if scatter is None else 100 * scatter[0],
         "offset_force_N": float(np.mean(steady.force[whole])),
         "centre_mm": 1e3 * float(np.mean(steady.displacement[whole])),
         "drift_mm": 1e3 * motion.drift_of(view)[0],
-        "distortion_percent": np.nan if motion is None else 100 * motion.distortion,
+        "distortion_percent": np.nan if analysis is None else 100 * analysis.distortion,
     }
     return Quality(result, figures)
 
