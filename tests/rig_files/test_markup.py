@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.readers.markup import numbers_in
+from mrdamper.rig_files.readers.workbook import numbers_in
 from mrdamper.rig_files.rig_import import import_files, read_run
 
 T = np.arange(0, 6, 0.005)

@@ -31,7 +31,7 @@ from mrdamper.rig_files.mapping.scales import (
 )
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.readers.markup import Elements, numbers_in
+from mrdamper.rig_files.readers.workbook import Elements, numbers_in
 from mrdamper.rig_files.record import REQUIRED, Finding
 from mrdamper.rig_files.text.stream import decoded
 

@@ -22,7 +22,7 @@ from mrdamper.data import Run, once_per_run
 from mrdamper.data.arrays import chunks, drop_pages
 from mrdamper.discovery import modules_with
 from mrdamper.errors import ColumnError, InputError, QualityError, RunError
-from mrdamper.rig_files.quality import converter, disturbance, flat, lag, loop, motion, presence, sentinel
+from mrdamper.rig_files.quality import disturbance, flat, lag, loop, motion, samples, sentinel
 from mrdamper.rig_files.quality.view import SHORTEST, View
 from mrdamper.rig_files.record import FURTHER, Finding, Record, part_of_record
 
@@ -34,12 +34,12 @@ _OF_THE_WHOLE = ("W_SHORT", "W_DRIFT")
 _ONCE = ("W_CURRENT_VARIES",)  # judged over the whole record: parts may each hold another current
 _Verdict = tuple[tuple[Finding, ...], tuple[tuple[int, int], ...], InputError | None]
 CHECKS: tuple[Check, ...] = (
-    presence.long_enough,
-    presence.finite,
+    samples.long_enough,
+    samples.finite,
     sentinel.missing_value_codes,
-    presence.missing,
-    presence.order_of_time,
-    presence.gaps_in_time,
+    samples.missing,
+    samples.order_of_time,
+    samples.gaps_in_time,
     motion.moves,
     motion.exchanged_or_out_of_range,
     sentinel.spikes,
@@ -56,16 +56,16 @@ CHECKS: tuple[Check, ...] = (
     motion.is_a_sine,
     motion.drifts,
     motion.agrees_with_its_name,
-    converter.changes_at_every_sample,
-    converter.is_not_stored_on_change,
+    samples.changes_at_every_sample,
+    samples.is_not_stored_on_change,
     disturbance.motion_is_one,
     disturbance.force_lines,
     disturbance.force_is_fine,
-    converter.no_bit_is_stuck,
+    samples.no_bit_is_stuck,
     flat.cut_off_before_noise,
     flat.rests_at_its_ends,
-    converter.lost_or_doubled,
-    converter.copied,
+    samples.lost_or_doubled,
+    samples.copied,
     loop.stroke_steps,
     loop.motion_is_steady,
     loop.force_is_steady,
@@ -337,7 +337,7 @@ def to_run(record: Record) -> Run:
     codes = " ".join(dict.fromkeys(finding.code for finding in record.findings))
     further = {f"{name}_{unit}": getattr(record, name) for name, unit in FURTHER.items()} | dict(record.further)
     own: dict[str, Any] = {name: getattr(record, name) for name in ("id", "rig", "excitation", "split")}
-    own |= {name: values[keep] for name, values in record.channels.items() if name in presence.USED}
+    own |= {name: values[keep] for name, values in record.channels.items() if name in samples.USED}
     run = Run(
         **own,
         further={name: values[keep] for name, values in further.items() if values is not None},

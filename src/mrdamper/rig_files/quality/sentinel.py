@@ -8,7 +8,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.rig_files.column_names import SI
-from mrdamper.rig_files.quality.presence import USED
+from mrdamper.rig_files.quality.samples import USED
 from mrdamper.rig_files.quality.view import View, runs_of
 from mrdamper.rig_files.record import Finding
 

@@ -19,8 +19,7 @@ from typing import Literal
 from mrdamper.rig_files.column_names import holds, is_unit, parse_unit, split_name, words
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RigFileError, Source
-from mrdamper.rig_files.text.notes import with_notes_beside
-from mrdamper.rig_files.text.tokens import FORTRAN, MISSING, looks_numeric, stamp
+from mrdamper.rig_files.text.tokens import FORTRAN, MISSING, looks_numeric, stamp, with_notes_beside
 
 Kind = Literal["number", "stamp", "text"]
 SPACES = " "  # stands for any run of spaces

@@ -1,4 +1,4 @@
-"""One cell of text: a number, a missing value, a time stamp, or none of them.
+"""Cells of text: numbers, missing values, time stamps, or none of them; and notes in those that rows leave free.
 
 Strict on purpose: what only some programs take for a number (1_000.5, 0x1F, other
 scripts' digits) is refused, so that no two programs read different values from one file.
@@ -11,10 +11,12 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
+from collections import Counter
+from collections.abc import Sequence
 from datetime import date
 from functools import lru_cache
 
-from mrdamper.rig_files.column_names import TABLES, words
+from mrdamper.rig_files.column_names import TABLES, is_unit, words
 
 NUMBER = {
     mark: re.compile(rf"[+-]?(?:[0-9]+(?:{re.escape(mark)}[0-9]*)?|{re.escape(mark)}[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -42,6 +44,7 @@ _STAMP = re.compile(
 )
 _MONTHS = {name: i for names in TABLES["months"]["names"] for i, name in enumerate(names.split(), 1)}
 FORTRAN = re.compile(r"[+-]?[0-9]*[.,]?[0-9]+[dD][+-]?[0-9]{1,3}")  # 1.25D-03; taken where a file writes so throughout
+_ROWS = 60  # looked at
 
 
 def number(token: str, mark: str) -> float | None:
@@ -131,3 +134,33 @@ def _day(year: str, month: str, day: str) -> int | None:
         return date(int(year), int(month), int(day)).toordinal()
     except ValueError:
         return None
+
+
+def with_notes_beside(
+    rows: Sequence[Sequence[str]], names: tuple[str, ...], units: tuple[str, ...]
+) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Return names and units of columns, and the notes beside the rows as lines: names with a number or a text.
+
+    The notes of an oscilloscope state names and units of the two full columns beside them; texts count only there.
+    """
+    notes = _notes(rows, texts=not any(names))
+    says = {key.casefold(): text for key, _, text in (note.partition(": ") for note in notes)}
+    headings = [("time", says.get("horizontal units", "")), (says.get("source", ""), says.get("vertical units", ""))]
+    full = [i for i in range(len(names)) if all(len(row) > i and row[i] for row in rows)]
+    if any(names) or len(full) != len(headings) or not all(is_unit(unit) for _, unit in headings):
+        return names, units, notes
+    own = dict(zip(full, headings, strict=True))
+    names, units = zip(*(own.get(i, ("", unit)) for i, unit in enumerate(units)), strict=True)
+    return names, units, notes
+
+
+def _notes(rows: Sequence[Sequence[str]], *, texts: bool) -> tuple[str, ...]:
+    filled = Counter(i for row in rows for i, cell in enumerate(row) if cell)
+    columns = {i for i, count in filled.items() if 2 * count > len(rows) > _ROWS}  # channels and labels, no notes
+    stated = [
+        (key, number, unit if is_unit(unit) else "")
+        for row in rows[:_ROWS]
+        for i, (key, number, unit) in enumerate(zip(row, row[1:], [*row[2:], ""], strict=False))
+        if key and number and not {i, i + 1} & columns and not looks_numeric(key) and (texts or looks_numeric(number))
+    ]
+    return tuple(f"{key}: {number} {unit}".rstrip() for key, number, unit in stated)[:_ROWS]
