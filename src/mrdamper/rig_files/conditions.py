@@ -169,11 +169,6 @@ def current_behind_label(name: str, names: Collection[str]) -> float | None:
     return stated[0] if known and letters and role_of(letters[1]) != "current" else None
 
 
-def currents_in_cells(line: str) -> list[float]:
-    """Coil currents [A] in the cells of a line, one after the other."""
-    return [value for cell in re.split(r"[\t;,|]", line) for value in currents_in(cell)]
-
-
 def motions_in(text: str, unit: str) -> set[float]:
     """Frequencies in Hz or lengths in mm that a title or a name states: 0p5Hz, 500 mHz, 10mm."""
     return {

@@ -10,12 +10,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from mrdamper.data.arrays import chunks
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import DIMENSION, is_unit, role_of, split_name, words, words_of
 from mrdamper.rig_files.columns import column_called
-from mrdamper.rig_files.conditions import currents_in, currents_in_cells
+from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.profile import FileForm
+from mrdamper.rig_files.quality.samples import odd_steps
 from mrdamper.rig_files.readers.base import Content, RawTable, Words
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 
@@ -143,7 +143,8 @@ def _part(
             own[:] = own if np.isfinite(own[1:]).any() else own[0]
         return Content(values, None if content.lines is None else content.lines[inside], content.findings)
 
-    several = tuple(line for line in table.remarks if len(set(currents_in_cells(line))) > 1)
+    cells = {line: re.split(r"[\t;,|]", line) for line in table.remarks}
+    several = tuple(line for line, own in cells.items() if len({value for c in own for value in currents_in(c)}) > 1)
     name = "_".join(part for part in (table.label, label) if part)
     return replace(table.picked(columns, part), titles=several, label=name)
 
@@ -246,7 +247,7 @@ def stretches_of_time(time: np.ndarray) -> list[slice]:
     a count's end.
     """
     whole = [slice(0, time.size)]
-    if not _turns_back(time):
+    if next(odd_steps(time, lambda steps: steps < 0), None) is None:
         return whole
     finite = np.flatnonzero(np.isfinite(time))
     if finite.size < 2 * _FEWEST_ROWS:
@@ -267,16 +268,6 @@ def stretches_of_time(time: np.ndarray) -> list[slice]:
         return whole
     at = [0, *(int(finite[i + 1]) for i in back), time.size]
     return [slice(a, b) for a, b in pairwise(at)]
-
-
-def _turns_back(time: np.ndarray) -> bool:
-    last = -np.inf
-    for _, piece in chunks(time):
-        stamps = piece[np.isfinite(piece)]
-        if stamps.size and (stamps[0] < last or np.any(np.diff(stamps) < 0)):
-            return True
-        last = stamps[-1] if stamps.size else last
-    return False
 
 
 def _wraps(end: float, step: float) -> bool:

@@ -12,6 +12,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, InputError
+from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.columns import candidates_of, column_called
 from mrdamper.rig_files.conditions import BARE_RATE, motions_in, stated_rate
@@ -111,7 +112,7 @@ def damping_share(time: Floats, displacement: Floats, force: Floats) -> float:
     there = there[:: max(1, there.size // _MOST_SAMPLES)]
     time, x, force = time[there], displacement[there], force[there] - np.mean(force[there])
     x = x - np.mean(x)
-    velocity = _smooth_slope(time, x)
+    velocity = smooth(time, x)[1]
     if not np.ptp(x) or not np.std(velocity) or not np.std(force):
         return 0.0
     if float(np.sum(force * velocity)) <= 0:
@@ -123,14 +124,6 @@ def damping_share(time: Floats, displacement: Floats, force: Floats) -> float:
     if without < 0.01 * np.sum(force**2):  # nothing but a spring, or another displacement
         return 0.0
     return float(1 - rest / without)
-
-
-def _smooth_slope(time: Floats, x: Floats) -> Floats:
-    """Velocity by differences over about a hundredth of the record's motion."""
-    half = max(1, min(x.size // 400, 5))
-    slope = np.zeros_like(x)
-    slope[half:-half] = (x[2 * half :] - x[: -2 * half]) / (time[2 * half :] - time[: -2 * half])
-    return slope
 
 
 def stated_frequencies(table: RawTable) -> Iterator[float]:

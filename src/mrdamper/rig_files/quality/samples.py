@@ -285,7 +285,7 @@ def longest_run(mask: np.ndarray) -> tuple[int, int]:
 
 def order_of_time(view: View) -> None:
     """Refuse time stamps that repeat or run backwards."""
-    wrong = list(_steps(view, lambda steps: steps <= 0))
+    wrong = list(odd_steps(view.record.time, lambda steps: steps <= 0))
     if not wrong:
         return
     sample, before, after = wrong[0]
@@ -312,7 +312,7 @@ def _turning_back(seconds: float) -> str:
 
 def gaps_in_time(view: View) -> Iterator[Finding]:
     """Cut the record where time leaps: nothing is differentiated across a gap."""
-    gaps = list(_steps(view, lambda steps: steps > GAP * view.step))
+    gaps = list(odd_steps(view.record.time, lambda steps: steps > GAP * view.step))
     if not gaps:
         return
     bounds = [0, *(sample for sample, _, _ in gaps), view.record.time.size]
@@ -325,9 +325,8 @@ def gaps_in_time(view: View) -> Iterator[Finding]:
     )
 
 
-def _steps(view: View, odd: Callable[[Floats], np.ndarray]) -> Iterator[tuple[int, float, float]]:
+def odd_steps(time: Floats, odd: Callable[[Floats], np.ndarray]) -> Iterator[tuple[int, float, float]]:
     """Yield steps of time that a test finds odd: sample after the step, time before and after it."""
-    time = view.record.time
     last = None  # sample of the last time stamp that was there
     for start in range(0, time.size, _CHUNK):
         index = start + np.flatnonzero(np.isfinite(time[start : start + _CHUNK]))

@@ -36,7 +36,9 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
     """Return the blocks between two places of a text; one where the header is not repeated."""
     if not layout.header.strip():
         return _cut_at_currents(stream, layout, Block(start, stop, layout.data_line))
-    header = layout.header.strip(" \t\r").encode(stream.encoding, "ignore")
+    repeated = re.compile(
+        rb"(?m)^[ \t]*" + re.escape(layout.header.strip().encode(stream.encoding, "ignore")) + rb"\s*?$"
+    )
     blocks: list[Block] = []
     begin, begin_line = start, layout.data_line
     tail, worded = b"", False
@@ -44,21 +46,16 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
     for chunk, at, line in stream.numbered(start, stop, layout.data_line):
         stream.check(chunk, line)
         worded |= b"A" in chunk or b"amp" in chunk
-        position = chunk.find(header)
-        while position >= 0:
-            line_start = chunk.rfind(b"\n", 0, position) + 1
-            line_end = chunk.find(b"\n", position)
-            line_end = len(chunk) if line_end < 0 else line_end + 1
-            if chunk[line_start:line_end].strip() == header.strip():
-                before = (tail + chunk[:line_start])[-_LOOK_BACK:]
-                above = _remarks(before, stream, layout)
-                blocks.append(Block(begin, at + line_start - above, begin_line, remarks))
-                text = stream.decode(before[len(before) - above :]).replace("\r", "")
-                remarks = tuple(line for line in text.split("\n") if line.strip())
-                header_line = line + chunk.count(b"\n", 0, line_start)
-                size, skipped = _units_below(stream, layout, at + line_end, header_line)
-                begin, begin_line = at + line_end + size, header_line + 1 + skipped
-            position = chunk.find(header, line_end)
+        for match in repeated.finditer(chunk):
+            line_start, line_end = match.start(), min(match.end() + 1, len(chunk))
+            before = (tail + chunk[:line_start])[-_LOOK_BACK:]
+            above = _remarks(before, stream, layout)
+            blocks.append(Block(begin, at + line_start - above, begin_line, remarks))
+            text = stream.decode(before[len(before) - above :]).replace("\r", "")
+            remarks = tuple(line for line in text.split("\n") if line.strip())
+            header_line = line + chunk.count(b"\n", 0, line_start)
+            size, skipped = _units_below(stream, layout, at + line_end, header_line)
+            begin, begin_line = at + line_end + size, header_line + 1 + skipped
         tail = chunk[-_LOOK_BACK:]
     blocks.append(Block(begin, stop, begin_line, remarks))
     blocks = [_with_head(block, layout) for block in blocks if block.stop > block.start]
