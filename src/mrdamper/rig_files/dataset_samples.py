@@ -86,7 +86,11 @@ def _of_text(source: Source, path: Path) -> dict[str, Channels]:
     import polars as pl
 
     try:
-        names = next(csv.reader(io.StringIO(_first_line_of(source).decode("utf-8-sig"))), [])
+        head = source.head(_HEADER)
+        if len(head) == _HEADER and b"\n" not in head:
+            problem = "no end of the first line"
+            raise source.refuse("E_TOO_MANY_COLUMNS", problem, remedy="begin with a line of names")
+        names = next(csv.reader(io.StringIO(head.split(b"\n", 1)[0].decode("utf-8-sig"))), [])
         if len(names) > MOST_COLUMNS:
             raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(names)} columns", remedy="keep only the channels needed")
         _require(names, path)
@@ -101,13 +105,6 @@ def _of_text(source: Source, path: Path) -> dict[str, Channels]:
         if table.schema[name].is_numeric() or refuse_text(name, path)
     }
     return _by_run(ids.codes, ids.labels, channels)
-
-
-def _first_line_of(source: Source) -> bytes:
-    head = source.head(_HEADER)
-    if len(head) == _HEADER and b"\n" not in head:
-        raise source.refuse("E_TOO_MANY_COLUMNS", "no end of the first line", remedy="begin with a line of names")
-    return head.split(b"\n", 1)[0]
 
 
 def _require(names: list[str], path: Path) -> None:

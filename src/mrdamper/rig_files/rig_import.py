@@ -209,7 +209,7 @@ class _Intake:
         split = profile.file.blocks == "split" or (self._table and self._table.of_file(path))
         if refusals or split or not goes_on(records):
             self._take_parts()
-            self._take_all(path, records)
+            self._take(path, records)
             return
         if not (self._parts and follows(*self._parts[-1], path, records)):
             self._take_parts()
@@ -222,25 +222,22 @@ class _Intake:
             self.met += [(path, record.id) for path, records in parts for record in records]
             parts = [(parts[0][0], tests_of_files(parts))]
         for path, records in parts:
-            self._take_all(path, records)
+            self._take(path, records)
 
-    def _take_all(self, path: Path, records: list[Record]) -> None:
+    def _take(self, path: Path, records: list[Record]) -> None:
+        """Check tests with what the table of tests says of them, or keep them until another file states the current."""
         for record in records:
-            self._take(path, record, several=len(records) > 1)
-
-    def _take(self, path: Path, record: Record, *, several: bool) -> None:
-        """Check a test with what the table of tests says of it, or keep it until another file states its current."""
-        self.met.append((path, record.id))
-        problems: list[InputError] = []
-        if self._table is not None:
-            try:
-                record = applied(record, self._table.of(path, record.id), self._table)
-            except InputError as error:
-                problems.append(error)
-        if record.current is None and not problems:
-            self._pending.append((path, record))
-        else:
-            self._check(path, record, problems, several=several)
+            self.met.append((path, record.id))
+            problems: list[InputError] = []
+            if self._table is not None:
+                try:
+                    record = applied(record, self._table.of(path, record.id), self._table)
+                except InputError as error:
+                    problems.append(error)
+            if record.current is None and not problems:
+                self._pending.append((path, record))
+            else:
+                self._check(path, record, problems, several=len(records) > 1)
 
     def _check(self, path: Path, record: Record, problems: list[InputError], *, several: bool) -> None:
         from mrdamper.rig_files.quality import check_long_record
@@ -269,7 +266,8 @@ class _Intake:
             record = with_current_behind_label(record, path, names)
             self._check(path, record, [], several=counts[path] > 1)
         self._refuse_names_without_point()
-        for path in [path for path in (*others, *texts) if path not in used and (self._found or _is_short(path))]:
+        unused = [path for path in (*others, *texts) if path not in used]
+        for path in [path for path in unused if self._found or path.stat().st_size <= _LARGEST_LIST]:
             stated = currents_beside(path, self._results(path), self.tests())
             if stated:
                 self._refuse_contradicted(stated)
@@ -322,7 +320,7 @@ class _Intake:
             if isinstance(records, InputError):
                 self.refusals.append(Refusal(str(group[0].path), records))
             else:
-                self._take_all(group[0].path, records)
+                self._take(group[0].path, records)
         for path in [path for path in self._shares if path not in used]:
             problem = f"no other file of test {self._shares[path][0]!r} has the rest of its channels on the same clock"
             error = ColumnError(problem, where=path.name, remedy="correct file = ... of the channels in the profile")
@@ -418,10 +416,6 @@ def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
     from mrdamper.rig_files.quality import to_run
 
     return Dataset(tuple(to_run(require_current(record)) for record in records), name)
-
-
-def _is_short(path: Path) -> bool:
-    return path.stat().st_size <= _LARGEST_LIST
 
 
 def with_unique_ids(records: Iterable[Record]) -> tuple[Record, ...]:

@@ -14,6 +14,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -56,53 +57,37 @@ def guarded_tables(source: Source, reader: Reader, form: FileForm) -> Iterator[l
             "seconds": _SECONDS + reader.seconds_per_byte * source.size,
             "bytes": _BYTES + _BYTES_PER_BYTE * source.size,
         }
-        asked = _Asked(sandbox, source, reader.title, limits["seconds"] * _PATIENCE + 30)
-        answer = asked({**request, **limits, "form": form.model_dump()})
-        yield [asked.table(i, table) for i, table in enumerate(answer["tables"])]
+        patience = limits["seconds"] * _PATIENCE + 30
 
-
-class _Asked:
-    """One file in the sandbox."""
-
-    def __init__(self, sandbox: _Sandbox, source: Source, title: str, patience: float):
-        self._sandbox, self._source, self._title, self._patience = sandbox, source, title, patience
-
-    def __call__(self, request: dict[str, Any]) -> dict[str, Any]:
-        answer = self._sandbox.read(request, self._patience)
-        if answer is None and self._sandbox.slain:
-            problem = "the process that reads it was killed from outside, or by a system short of memory"
-            raise self._source.refuse("E_READER_KILLED", problem, "run the same command again")
-        if answer is None:
-            raise self._source.refuse(
-                "E_FORMAT",
-                f"damaged {self._title}: reading it crashes, or takes far more time or memory than its size warrants",
-                "copy or export the file again",
+        def ask(request: dict[str, Any]) -> dict[str, Any]:
+            answer = sandbox.read(request, patience)
+            if answer is None and sandbox.slain:
+                problem = "the process that reads it was killed from outside, or by a system short of memory"
+                raise source.refuse("E_READER_KILLED", problem, "run the same command again")
+            if answer is None:
+                problem = "reading it crashes, or takes far more time or memory than its size warrants"
+                raise source.refuse("E_FORMAT", f"damaged {reader.title}: {problem}", "copy or export the file again")
+            if "missing" in answer:
+                raise MissingExtraError(answer["missing"], where=source.name, remedy=answer["remedy"])
+            CombinedError.raise_from(
+                (NoTableError if wrong.pop("no_table") else RigFileError)(file=source.name, **wrong)
+                for wrong in answer.get("wrong", ())
             )
-        if "missing" in answer:
-            raise MissingExtraError(answer["missing"], where=self._source.name, remedy=answer["remedy"])
-        CombinedError.raise_from(
-            (NoTableError if wrong.pop("no_table") else RigFileError)(file=self._source.name, **wrong)
-            for wrong in answer.get("wrong", ())
-        )
-        return answer
+            return answer
 
-    def table(self, index: int, table: dict[str, Any]) -> RawTable:
-        """Return a table whose columns are asked for when they are needed."""
-
-        def read(columns: Sequence[int]) -> Content:
-            answer = self({"table": index, "columns": list(columns)})
-            values = {c: self._sandbox.receive(n) for c, n in zip(columns, answer["sizes"], strict=True)}
-            lines = self._sandbox.receive(answer["lines"]) if answer["lines"] else None
+        def read(index: int, columns: Sequence[int]) -> Content:
+            answer = ask({"table": index, "columns": list(columns)})
+            values = {c: sandbox.receive(n) for c, n in zip(columns, answer["sizes"], strict=True)}
+            lines = sandbox.receive(answer["lines"]) if answer["lines"] else None
             return Content(values, lines, tuple(Finding(*finding) for finding in answer["findings"]))
 
-        def words(column: int) -> Words:
-            answer = self({"table": index, "words": column})
-            return Words(self._sandbox.receive(answer["size"]).astype(np.int32), tuple(answer["labels"]))
+        def words(index: int, column: int) -> Words:
+            answer = ask({"table": index, "words": column})
+            return Words(sandbox.receive(answer["size"]).astype(np.int32), tuple(answer["labels"]))
 
-        says: dict[str, Any] = {
-            name: tuple(value) if isinstance(value, list) else value for name, value in table.items()
-        }
-        return RawTable(self._source, read=read, words=words, **says)
+        tables = ask({**request, **limits, "form": form.model_dump()})["tables"]
+        says = [{name: tuple(of) if isinstance(of, list) else of for name, of in table.items()} for table in tables]
+        yield [RawTable(source, read=partial(read, i), words=partial(words, i), **own) for i, own in enumerate(says)]
 
 
 class _Sandbox(Child):
