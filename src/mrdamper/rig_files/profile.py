@@ -31,45 +31,31 @@ class ProfileError(InputError):
 class Table(BaseModel):
     """A table of a profile: no other keys, and never changed."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
 
 
 class FileForm(Table):
-    """[file]: the form of the files.
-
-    Attributes
-    ----------
-    separator, decimal, encoding : str, optional
-        Of delimited text; a separator of one space stands for any run of spaces.
-    header_line, units_line, data_line : int, optional
-        Counted from one; a header_line of 0 says that there is none.
-    names : tuple of str
-        Names of all columns in order, where the files have none.
-    sheet : str, optional
-        Of workbooks.
-    run_column : str or int, optional
-        Column that says which test a row belongs to: its name, or its number counted from one.
-    blocks : "join" or "split", optional
-        Whether what looks like several tests (repeated headers, groups of columns beside each
-        other, a column of runs, a time that starts again) is one test or several.
-    leave_out : tuple of str
-        Patterns with * of files and of tables within them that are no tests: `warmup*`, `*/calibration`.
-    sample_rate_Hz : float, optional
-        Of files without time stamps.
-    """
+    """[file]: the form of the files: what readers take for granted instead of sniffing it; lines count from one."""
 
     separator: Literal[",", ";", "\t", "|", " "] | None = None
+    """Of delimited text; one space stands for any run of spaces."""
     decimal: Literal[".", ","] | None = None
     encoding: NAME | None = None
     header_line: int | None = Field(default=None, ge=0, le=10_000)
+    """0 says that there is none."""
     units_line: int | None = Field(default=None, ge=1, le=10_000)
     data_line: int | None = Field(default=None, ge=1, le=10_000)
     names: tuple[str, ...] = Field(default=(), max_length=1000, strict=False)
+    """Names of all columns in order, where the files have none."""
     sheet: NAME | None = None
     run_column: NAME | Annotated[int, Field(ge=1, le=1000)] | None = None
+    """Column that says which test a row belongs to: its name, or its number counted from one."""
     blocks: Literal["join", "split"] | None = None
+    """If what looks like several tests (repeated headers, groups of columns, a time that starts again) is one."""
     leave_out: tuple[NAME, ...] = Field(default=(), max_length=100, strict=False)
+    """Patterns with * of files and of tables within them that are no tests: `warmup*`, `*/calibration`."""
     sample_rate_Hz: float | None = Field(default=None, gt=0, allow_inf_nan=False)
+    """Of files without time stamps."""
 
     @model_validator(mode="after")
     def _separator_is_not_the_mark(self) -> FileForm:
@@ -79,37 +65,24 @@ class FileForm(Table):
 
 
 class Channel(Table):
-    """[channels.NAME]: where a channel is and what its numbers mean.
-
-    Attributes
-    ----------
-    column : str or int, optional
-        Name of the column, or its number counted from one.
-    unit : str, optional
-        Of the numbers, or of the numbers times `scale`.
-    sign : 1 or -1
-        -1 where the file counts compression positive; that of the displacement holds for a velocity and an
-        acceleration without one of their own.
-    scale, offset : float
-        A calibration: value in `unit` = scale * number + offset. Not for zeroing: the zero
-        of force and displacement is data.
-    delay_ms : float
-        How late the channel is, where it is known [ms].
-    file : str, optional
-        Name of the files that hold the channel, where each file holds other channels of a test, with
-        {run} where the test's name or number stands and * for anything: `C1--*--{run}.csv`, `{run}/force.csv`.
-    integrate : bool
-        The displacement's column holds the velocity, of which the displacement is the integral, from zero on.
-    """
+    """[channels.NAME]: where a channel is and what its numbers mean."""
 
     column: NAME | Annotated[int, Field(ge=1, le=1000)] | None = None
+    """Name of the column, or its number counted from one."""
     unit: NAME | None = None
+    """Of the numbers, or of the numbers times `scale`."""
     sign: Literal[1, -1] = 1
+    """-1 where the file counts compression positive; the displacement's holds for velocity and acceleration, too."""
     scale: float | None = Field(default=None, allow_inf_nan=False)
+    """With `offset` a calibration: value in `unit` = scale * number + offset."""
     offset: float = Field(default=0.0, allow_inf_nan=False)
+    """Not for zeroing: the zero of force and displacement is data."""
     delay_ms: float = Field(default=0.0, ge=-1e4, le=1e4, allow_inf_nan=False)
+    """How late the channel is, where it is known [ms]."""
     file: NAME | None = None
+    """Files that hold it, {run} for what names the test, * for anything: `C1--*--{run}.csv`, `{run}/force.csv`."""
     integrate: bool = False
+    """The displacement's column holds the velocity, of which the displacement is the integral, from zero on."""
 
     @field_validator("file")
     @classmethod
@@ -135,28 +108,21 @@ class Channel(Table):
 
 
 class CurrentSource(Table):
-    """[current]: the coil current where no column holds it.
-
-    Attributes
-    ----------
-    value : float, optional
-        [A], for every file.
-    pattern : str, optional
-        Name of the file, of the table within it, or of both with their folders, with {current} where
-        the number stands and * for anything: `*_{current}A_*`, `*/I_{current}A/*`. {run}, {frequency}
-        and {amplitude} stand for what tells the tests apart otherwise.
-    values : mapping of str to float
-        [A], by patterns with * of file or test names, with their folders where the pattern has a slash.
-    unit : "A" or "mA"
-        Of the number in the file name.
-    """
+    """[current]: the coil current where no column holds it."""
 
     value: float | None = Field(default=None, allow_inf_nan=False, ge=-1000, le=1000)
+    """[A], for every file."""
     pattern: NAME | None = None
+    """Name of the file, of the table within it, or of both with their folders: `*_{current}A_*`, `*/I_{current}A/*`.
+
+    * stands for anything; {run}, {frequency} and {amplitude} for what tells the tests apart otherwise.
+    """
     values: dict[NAME, Annotated[float, Field(allow_inf_nan=False, ge=-1000, le=1000)]] = Field(
         default_factory=dict, max_length=1000
     )
+    """[A], by patterns with * of file or test names, with their folders where the pattern has a slash."""
     unit: Literal["A", "mA"] = "A"
+    """Of the number in the file name."""
 
     @model_validator(mode="after")
     def _says_one_thing(self) -> CurrentSource:
@@ -177,41 +143,23 @@ class CurrentSource(Table):
 
 
 class Correction(Table):
-    """[correction]: what the load cell measures beside the damper's force; the raw force is kept beside the corrected.
-
-    Attributes
-    ----------
-    moving_mass_kg : float
-        Mass between load cell and damper, whose inertia is taken off: by the accelerometer
-        where there is one, else by the displacement's curvature.
-    gas_force_N : float
-        Force with which gas or a spring pushes the rod out, added so that it no longer counts.
-    """
+    """[correction]: what the load cell measures beside the damper's force; the raw force is kept, too."""
 
     moving_mass_kg: float = Field(default=0.0, ge=0, le=1e4, allow_inf_nan=False)
+    """Between load cell and damper; its inertia, by an accelerometer or the displacement's curvature, is subtracted."""
     gas_force_N: float = Field(default=0.0, ge=-1e6, le=1e6, allow_inf_nan=False)
+    """Force with which gas or a spring pushes the rod out, added so that it no longer counts."""
 
 
 class Profile(Table):
-    """Information that the files of a rig do not contain.
-
-    Attributes
-    ----------
-    rig, excitation, split : str
-        As for `Run`.
-    file : FileForm
-    channels : mapping of str to Channel
-        By "time", "displacement", "force", "velocity", "acceleration", "current", "voltage",
-        "temperature", "pressure".
-    current : CurrentSource, optional
-    correction : Correction, optional
-    """
+    """Information that the files of a rig do not contain; rig, excitation and split as for `Run`."""
 
     rig: str = Field(default="", max_length=200)
     excitation: NAME = "sine"
     split: Literal["train", "validate"] = "train"
     file: FileForm = FileForm()
     channels: dict[str, Channel] = Field(default_factory=dict)
+    """By time, displacement, force, velocity, acceleration, current, voltage, temperature and pressure."""
     current: CurrentSource | None = None
     correction: Correction | None = None
 
