@@ -167,17 +167,12 @@ def first_line(error: Exception) -> str:
 
 
 def load_motion(path: str | Path, current: float | None = None) -> Run:
-    """Read a motion as a run without force.
+    """Read a motion as a run without force: CSV with the columns time_s, displacement_m, optionally current_A.
+
+    A coil current [A] that is given for the whole motion wins over the column.
 
     Raises `DatasetError` or `ColumnError` or `UnitError` or `RunError` if the file cannot be read, lacks a column, or
     its samples do not make a motion.
-
-    Parameters
-    ----------
-    path : path
-        CSV with the columns time_s [s], displacement_m [m], optionally current_A [A].
-    current : float, optional
-        Coil current [A] for the whole motion; wins over the column.
     """
     path = Path(path)
     table = read_table(path, "give a CSV with time_s and displacement_m")

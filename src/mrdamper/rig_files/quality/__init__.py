@@ -97,20 +97,9 @@ def _dropped_in() -> tuple[Check, ...]:
 
 
 def check_record(record: Record, without: Collection[Check] = ()) -> Record:
-    """Run every check on a record.
+    """Run every check but some on a record as a reader left it: SI units, NaN where a sample is missing.
 
-    Parameters
-    ----------
-    record : Record
-        As a reader left it: SI units, NaN where a sample is missing.
-    without : collection of checks
-        That are left out.
-
-    Returns
-    -------
-    Record
-        With the findings of the checks and its segments (sample ranges without a gap in
-        time). The channels are not changed.
+    Returns it with the findings of the checks and its segments (sample ranges without a gap in time).
 
     Raises `QualityError` if the record cannot be used; the code says why: E_NO_DATA, E_NONFINITE, E_SENTINEL,
     E_MISSING, E_TIME_ORDER, E_TIME_DUPLICATE, E_RANGE, E_NO_EXCITATION, E_SPIKE, E_LEAP, E_NOISE, E_UNRESOLVED,
@@ -306,17 +295,12 @@ def _quality(record: Record) -> Quality:
 
 
 def to_run(record: Record) -> Run:
-    """Return the run a record holds.
+    """Return the run a record holds; one that was not judged is judged first.
 
     Missing samples are left out, as are segments of under five samples. Where the motion is
     periodic, the steady window is the largest whole number of its last steady cycles. The
     codes of the findings stand in the notes under "findings", separated by spaces. Nothing
     is zeroed, filtered or resampled.
-
-    Parameters
-    ----------
-    record : Record
-        Judged; a record that was not is judged first.
 
     Raises `QualityError` if the record cannot be used; `ColumnError` if it has no current; `RunError` if under three
     samples are left.

@@ -15,21 +15,14 @@ _STATED = re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\s*")
 class ColumnList(DelimitedText):
     """A format of text whose columns are listed; what the list leaves open is found as in any text.
 
-    Attributes
-    ----------
-    mark : str
-        Regular expression that the first 4 KiB of such a file match, and no other file's.
-    columns : tuple of (str, str)
-        Channel and heading, in every version there is. The asterisk in "Force (*)" is the unit that the
-        file states; "Force (N)" states it here. A heading may end a path: Model/Load cell.
-    form : FileForm
-        Separator, decimal mark, sampling rate, ... that the files always have; a profile overrules it.
+    The asterisk in "Force (*)" is the unit that the file states; "Force (N)" states it here. A heading may end a
+    path: Model/Load cell.
     """
 
     suffixes = ()
-    mark: ClassVar[str]
-    columns: ClassVar[tuple[tuple[str, str], ...]] = ()
-    form: ClassVar[FileForm] = FileForm()
+    mark: ClassVar[str]  # regular expression that the first 4 KiB of such a file match, and no other file's
+    columns: ClassVar[tuple[tuple[str, str], ...]] = ()  # channel and heading, in every version there is
+    form: ClassVar[FileForm] = FileForm()  # that the files always have; a profile overrules it
 
     def recognises(self, source: Source) -> bool:
         """By the mark in the first lines."""
