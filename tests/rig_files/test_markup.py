@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.readers.workbook import numbers_in
 from mrdamper.rig_files.rig_import import import_files, read_run
+from mrdamper.rig_files.text.elements import numbers_in
 
 T = np.arange(0, 6, 0.005)
 X = 0.01 * np.sin(2 * np.pi * T)

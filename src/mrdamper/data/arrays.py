@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import mmap
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Literal, TypeVar
 
 import numpy as np
@@ -49,3 +49,29 @@ def drop_pages(values: NDArray[np.generic]) -> None:
             inner.madvise(mmap.MADV_DONTNEED)
             return
         held = getattr(held, "base", None)
+
+
+def rescale(values: Floats, factor: float, offset: float = 0.0) -> Floats:
+    """Values times a factor, plus an offset; a memory-mapped array is changed in place, piece by piece."""
+    if factor == 1.0 and offset == 0.0:
+        return values
+    if not isinstance(values, np.memmap):
+        return factor * values + offset if offset else factor * values
+    for _, piece in chunks(values):
+        piece[:] = factor * piece + offset
+    return values
+
+
+def odd_steps(time: Floats, odd: Callable[[Floats], np.ndarray]) -> Iterator[tuple[int, float, float]]:
+    """Yield steps of time that a test finds odd: sample after the step, time before and after it."""
+    last = None  # sample of the last time stamp that was there
+    for start, piece in chunks(time):
+        index = start + np.flatnonzero(np.isfinite(piece))
+        if last is not None:
+            index = np.concatenate([[last], index])
+        if not index.size:
+            continue
+        stamps = time[index]
+        for i in np.flatnonzero(odd(np.diff(stamps))):
+            yield int(index[i + 1]), float(stamps[i]), float(stamps[i + 1])
+        last = int(index[-1])

@@ -17,7 +17,6 @@ from mrdamper.rig_files.conditions import (
     BEHIND_DIGIT,
     LARGEST_STATED,
     Statement,
-    contradicted,
     contradicts,
     current_behind_label,
     currents_in,
@@ -278,3 +277,10 @@ def without_gaps(current: Floats) -> tuple[Floats, tuple[Finding, ...]]:
 def constant(value: float, like: Floats) -> Floats:
     """One number as a channel that takes no memory."""
     return np.broadcast_to(np.float64(value), like.shape)
+
+
+def contradicted(channel: Floats, stated: float) -> float | None:
+    """Return the mean of a constant current channel that contradicts what is stated [A]; None where it does not."""
+    finite = channel[np.isfinite(channel)]
+    mean, change = held_current(finite) if finite.size >= 3 else (stated, "")
+    return mean if not change and contradicts(mean, stated) else None

@@ -15,10 +15,6 @@ from itertools import product
 from types import MappingProxyType
 from typing import NamedTuple
 
-import numpy as np
-
-from mrdamper.data.arrays import Floats
-from mrdamper.data.runs import held_current
 from mrdamper.rig_files.column_names import (
     COIL,
     RATING,
@@ -361,13 +357,6 @@ def _value(number: str, decimal: str | None) -> float | None:
     if grouped and decimal is not None and decimal not in number:
         return float(re.sub("[.,]", "", number))
     return float(number.replace(",", "."))
-
-
-def contradicted(channel: Floats, stated: float) -> float | None:
-    """Return the mean of a constant current channel that contradicts what is stated [A]; None where it does not."""
-    finite = channel[np.isfinite(channel)]
-    mean, change = held_current(finite) if finite.size >= 3 else (stated, "")
-    return mean if not change and contradicts(mean, stated) else None
 
 
 def contradicts(one: float, other: float) -> bool:

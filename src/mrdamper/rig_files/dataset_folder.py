@@ -19,7 +19,7 @@ from mrdamper.data.arrays import chunks, drop_pages
 from mrdamper.data.atomic import path_of, write_file, write_folder
 from mrdamper.data.encoding import csv_text, csv_value
 from mrdamper.errors import ColumnError, DatasetError, OutputError, shown, validate_arguments
-from mrdamper.rig_files.conditions import contradicted
+from mrdamper.rig_files.coil_current import contradicted
 from mrdamper.rig_files.dataset_samples import OPTIONAL, REQUIRED, SAMPLE_FILES, Channels, missing_column, read_samples
 from mrdamper.rig_files.readers.base import MOST_COLUMNS
 

@@ -10,12 +10,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from mrdamper.data.arrays import odd_steps
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import DIMENSION, is_unit, role_of, split_name, words, words_of
 from mrdamper.rig_files.columns import column_called
 from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.quality.samples import odd_steps
 from mrdamper.rig_files.readers.base import Content, RawTable, Words
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
 

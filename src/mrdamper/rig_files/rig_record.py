@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.data.arrays import chunks
+from mrdamper.data.arrays import chunks, rescale
 from mrdamper.errors import ColumnError, InputError, listed, printable
 from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, constant, current_of, without_gaps
@@ -31,7 +31,6 @@ from mrdamper.rig_files.readers import suffixes
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import FURTHER, OPTIONAL, Finding, Record
 from mrdamper.rig_files.sequences import stretches_of_session
-from mrdamper.rig_files.text.cells import rescale
 
 _KEPT = {**FURTHER, "length": "m", "force": "N"}
 _SCALES = words("scale")

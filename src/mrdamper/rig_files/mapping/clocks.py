@@ -14,9 +14,8 @@ from mrdamper.rig_files.column_names import is_unit, parse_unit, split_name, wor
 from mrdamper.rig_files.conditions import stated_rate, stated_speed
 from mrdamper.rig_files.mapping.proposals import frequency_of, stated_frequencies
 from mrdamper.rig_files.profile import Profile
-from mrdamper.rig_files.quality.samples import COARSE_CLOCK
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.record import COARSE_CLOCK, Finding
 from mrdamper.rig_files.text.tokens import stamp
 
 _FRACTIONS = {"millisekunden": "ms", "millitm": "ms"}

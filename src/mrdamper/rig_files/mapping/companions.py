@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data import Floats, held_current
-from mrdamper.data.arrays import take
+from mrdamper.data.arrays import rescale, take
 from mrdamper.errors import InputError, QualityError
 from mrdamper.rig_files.coil_current import as_data, current_of, with_value_of_name
 from mrdamper.rig_files.column_names import RATING, SI, role_of, split_name, words_of
@@ -29,7 +29,6 @@ from mrdamper.rig_files.readers.arrays import array_table
 from mrdamper.rig_files.readers.base import RawTable, Source
 from mrdamper.rig_files.record import Finding, Record, part_of_record
 from mrdamper.rig_files.rig_record import records_of
-from mrdamper.rig_files.text.cells import rescale
 
 _FEWEST_ROWS = 50  # of a record
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")  # short ones

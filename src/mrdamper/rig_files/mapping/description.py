@@ -31,8 +31,8 @@ from mrdamper.rig_files.mapping.scales import (
 )
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.readers.workbook import Elements, numbers_in
 from mrdamper.rig_files.record import REQUIRED, Finding
+from mrdamper.rig_files.text.elements import Elements, numbers_in
 from mrdamper.rig_files.text.stream import decoded
 
 _MOST = 200  # lines

@@ -10,6 +10,7 @@ from itertools import product
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.arrays import rescale
 from mrdamper.rig_files.column_names import (
     DIMENSION,
     Header,
@@ -25,7 +26,6 @@ from mrdamper.rig_files.column_names import (
 from mrdamper.rig_files.conditions import FULL_SCALES, LONGEST_LINE, stated_by_lines, stated_in_titles
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED, Finding
-from mrdamper.rig_files.text.cells import rescale
 
 _MONITOR = words("monitor")
 SCALE = re.compile(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.arrays import odd_steps
 from mrdamper.rig_files.quality.cycles import REFUSED, percent, steady_cycles
 from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
-from mrdamper.rig_files.record import Finding
+from mrdamper.rig_files.record import COARSE_CLOCK, Finding
 
 _HELD = 3  # samples; held for as long all the time, a channel was recorded at a slower rate
 _HELD_LATE = 0.005  # of the period
@@ -38,8 +39,6 @@ USED = ("time", "displacement", "force", "current", "velocity")  # what a run is
 _IN_TURN = 0.3  # share of missing samples of a channel that is logged in turn with others
 GAP = 5.5  # steps this many times the usual one are a gap: up to 4 samples lost are none
 _DAY, _HOUR, _NEAR = 86_400.0, 3600.0, 60.0  # [s]
-COARSE_CLOCK = 0.1  # share of the samples whose stamp is that of the one before
-_CHUNK = 1_000_000  # samples looked at together, to keep memory small
 
 
 def changes_at_every_sample(view: View) -> Iterator[Finding]:
@@ -323,18 +322,3 @@ def gaps_in_time(view: View) -> Iterator[Finding]:
         f"{len(gaps)} gap{'s' * (len(gaps) > 1)} in time, the widest {after - before:.4g} s after {before:.6g} s "
         f"(usual step {view.step:.4g} s): split into {len(gaps) + 1} segments",
     )
-
-
-def odd_steps(time: Floats, odd: Callable[[Floats], np.ndarray]) -> Iterator[tuple[int, float, float]]:
-    """Yield steps of time that a test finds odd: sample after the step, time before and after it."""
-    last = None  # sample of the last time stamp that was there
-    for start in range(0, time.size, _CHUNK):
-        index = start + np.flatnonzero(np.isfinite(time[start : start + _CHUNK]))
-        if last is not None:
-            index = np.concatenate([[last], index])
-        if not index.size:
-            continue
-        stamps = time[index]
-        for i in np.flatnonzero(odd(np.diff(stamps))):
-            yield int(index[i + 1]), float(stamps[i]), float(stamps[i + 1])
-        last = int(index[-1])

@@ -14,7 +14,6 @@ from typing import IO
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.data.arrays import chunks
 from mrdamper.errors import CombinedError
 from mrdamper.rig_files.column_names import parse_unit
 from mrdamper.rig_files.readers.base import RigFileError
@@ -303,14 +302,3 @@ class Spool:
             for piece in waiting:
                 files[column].write(np.ascontiguousarray(piece).data)
             waiting.clear()
-
-
-def rescale(values: Floats, factor: float, offset: float = 0.0) -> Floats:
-    """Values times a factor, plus an offset; a memory-mapped array is changed in place, piece by piece."""
-    if factor == 1.0 and offset == 0.0:
-        return values
-    if not isinstance(values, np.memmap):
-        return factor * values + offset if offset else factor * values
-    for _, piece in chunks(values):
-        piece[:] = factor * piece + offset
-    return values
