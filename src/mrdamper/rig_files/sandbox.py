@@ -86,7 +86,10 @@ def guarded_tables(source: Source, reader: Reader, form: FileForm) -> Iterator[l
             return Words(sandbox.receive(answer["size"]).astype(np.int32), tuple(answer["labels"]))
 
         tables = ask({**request, **limits, "form": form.model_dump()})["tables"]
-        says = [{name: tuple(of) if isinstance(of, list) else of for name, of in table.items()} for table in tables]
+        says: list[dict[str, Any]] = [
+            {name: tuple(value) if isinstance(value, list) else value for name, value in table.items()}
+            for table in tables
+        ]
         yield [RawTable(source, read=partial(read, i), words=partial(words, i), **own) for i, own in enumerate(says)]
 
 
