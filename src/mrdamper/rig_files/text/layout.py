@@ -383,10 +383,11 @@ def _first_of(
     """
     worded: tuple[int, list[str]] | None = None
     first: tuple[int, list[str]] | None = None
-    rows = [(i, cells_of(line, separator)) for i, line in content]
-    keys = Counter(cells[0].strip('"').casefold() for _, cells in rows if len(cells) == width and _is_row(cells))
+    rows = [cells_of(line, separator) for _, line in content] if labelled else []
+    keys = Counter(cells[0].strip('"').casefold() for cells in rows if len(cells) == width and _is_row(cells))
     label = next((key for key, count in keys.most_common(1) if count > 1), "-")  # of most rows; - if each has its own
-    for i, cells in rows:
+    for i, line in content:
+        cells = cells_of(line, separator)
         if not _is_row(cells):
             first, worded = None, worded or (i, cells)
         elif len(cells) == width and not _is_key(cells[0].strip('"')):
