@@ -202,9 +202,10 @@ def currents_beside(
     matches, ratings = [], False
     for line in lines:
         parts = re.split(r"\s*[;|]\s*|,\s+|[.:]\s+(?=\w+ ?=)", line)
-        codes, rating = [match for part in parts if (match := _CODE.match(part))], RATING.search(line) is not None
+        codes, heading = [match for part in parts if (match := _CODE.match(part))], line.rstrip().endswith(":")
+        rating = bool(codes or heading) and RATING.search(line) is not None
         matches += [] if rating or ratings else codes
-        ratings = bool(ratings and codes) or (rating and not codes and line.rstrip().endswith(":"))  # Fuses: and a list
+        ratings = bool(ratings and codes) or (rating and not codes and heading)  # Fuses: and a list
     stated = {
         (f"{match[1].casefold()}{number}", amperes(match[4], match[5]))
         for match in matches

@@ -7,6 +7,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
@@ -40,7 +41,7 @@ _FEWEST_ROWS = 50  # of a record
 _FEW_FILES = 10  # that describe a folder, not a test each
 _STRUCTURES = (".json", ".yaml", ".yml")
 _NAMED = (*_STRUCTURES, ".xml")  # structures that describe the record of their name
-_READ = ("", ".txt", ".md", ".rst", ".csv", ".tsv", *_STRUCTURES)
+_READ = (".txt", ".md", ".rst", ".csv", ".tsv", *_STRUCTURES)
 _LARGEST_LIST = 4096  # bytes of a list of channels
 _TEXTS = (".csv", ".txt", ".tsv", ".ini", ".cfg", ".par", ".set")
 _RATE = re.compile(  # all channels were sampled at 512 Hz; of "samples", which may be specimens, 100 or more
@@ -104,10 +105,14 @@ def _texts_in(folder: Path) -> tuple[list[Path], list[Path], list[Path]]:
 
 @lru_cache(maxsize=64)  # every file of a folder asks
 def _texts_as_of(folder: Path, changed_ns: int) -> tuple[list[Path], list[Path], list[Path]]:
-    files = [p for p in folder.glob("*") if p.suffix.lower() in _READ]  # nothing of a folder that may not be read
-    stems = Counter(p.stem for p in files)
-    structures = [p for p in files if p.suffix.lower() in _STRUCTURES and stems[p.stem] == 1]  # else of one test
-    return [p for p in files if is_readme(p)], structures, [p for p in files if p.suffix.lower() in _TEXTS]
+    names: list[str] = []
+    with suppress(PermissionError), os.scandir(folder) as entries:  # nothing of a folder that may not be read
+        names = [e.name for e in entries if "." not in e.name or e.name.lower().endswith(_READ)]
+    stems = Counter(name.rpartition(".")[0] or name for name in names)
+    structures = [name for name in names if name.lower().endswith(_STRUCTURES)]
+    structures = [folder / name for name in structures if stems[name.rpartition(".")[0]] == 1]  # else of one test
+    listing = [folder / name for name in names if name.lower().endswith(_TEXTS)]
+    return [folder / name for name in names if _README.fullmatch(name)], structures, listing
 
 
 def is_readme(path: Path) -> bool:
