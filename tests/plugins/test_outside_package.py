@@ -30,27 +30,25 @@ build-backend = "hatchling.build"
 [project]
 name = "{name}"
 version = "1.0"
-dependencies = [{requires}]
 [tool.hatch.build.targets.wheel]
 packages = ["{module}"]
 """
 
 
-def describe(source, name, entry_points, requires=""):
-    """Make a package of a source folder; return the folder."""
+def describe(source, name, entry_points):
+    """Make a package of a source folder."""
     module = name.replace("-", "_")
     (source / module / "__init__.py").touch()
-    text = PROJECT.format(name=name, module=module, requires=requires)
+    text = PROJECT.format(name=name, module=module)
     for group, target in entry_points:
         text += f'[project.entry-points."mrdamper.{group}"]\n{module} = "{target}"\n'
     (source / "pyproject.toml").write_text(text)
-    return source
 
 
-def install(site, sources):
-    """Build packages and install them into a folder, by one command: starting pip takes longer than either."""
+def install(site, source):
+    """Build a package and install it into a folder."""
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation"]
-    command += ["--disable-pip-version-check", "--target", str(site), *map(str, sources)]
+    command += ["--disable-pip-version-check", "--target", str(site), str(source)]
     subprocess.run(command, check=True, capture_output=True, env={**os.environ, "PIP_NO_CACHE_DIR": "1"})
 
 
@@ -64,19 +62,22 @@ def site(tmp_path_factory):
             PARTS / folder, whole / group, ignore=shutil.ignore_patterns("__pycache__", "methods", "readers")
         )
         (whole / group / "__init__.py").touch()
-    sources = [describe(place / "whole", "rig-parts", [(group, f"rig_parts.{group}") for group in GROUPS])]
+    describe(place / "whole", "rig-parts", [(group, f"rig_parts.{group}") for group in GROUPS])
     broken = {
         "raises": ("raise RuntimeError('no licence')", ""),
         "takes": ("from mrdamper.models.bingham import Bingham\nclass Again(Bingham):\n    name = 'bingham'\n", ""),
-        "newer": ("", '"mrdamper>=99"'),
+        "newer": ("", "Requires-Dist: mrdamper>=99\n"),
         "lacks": ("Lacking = 3\n", ""),
     }
-    for name, (code, requires) in broken.items():
-        (place / name / name).mkdir(parents=True)
-        (place / name / name / "part.py").write_text(code)
+    install(site, place / "whole")
+    for name, (code, requires) in broken.items():  # as a package manager leaves them
+        (site / name).mkdir()
+        (site / name / "part.py").write_text(code)
         target = "lacks.part:Lacking" if name == "lacks" else f"{name}.part"
-        sources.append(describe(place / name, name, [("models", target)], requires))
-    install(site, sources)
+        facts = site / f"{name}-1.0.dist-info"
+        facts.mkdir()
+        (facts / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n{requires}")
+        (facts / "entry_points.txt").write_text(f"[mrdamper.models]\n{name} = {target}\n")
     return site
 
 
