@@ -25,8 +25,9 @@ def prefixes(tree):
 
 def codes_of(path):
     text = path.read_text(encoding="utf-8")
-    if path.suffix != ".py":
-        return set(CODE.findall(text))
+    codes = set(CODE.findall(text))
+    if path.suffix != ".py" or not codes:
+        return codes
     tree = ast.parse(text)
     words = [node for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
     known = prefixes(tree)

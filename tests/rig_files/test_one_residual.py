@@ -171,11 +171,12 @@ def leaking(leak, stiffness, power):
 
         flows = np.linspace(-1, 1, 2001)
         forces = dashpot(flows)
+        forces = dashpot(flows)
+        total = forces + stiffness * flows * (0.1 / 200)  # after a step in time
         state, states = 0.0, []
         fine = np.interp(np.arange(0, x.size - 1, 0.1), np.arange(x.size), x)
         for step in np.diff(fine, prepend=fine[0]):  # implicit: the spring's force changes by k (dx - w dt)
-            time = 0.1 / 200
-            w = np.interp(state + stiffness * step, forces + stiffness * flows * time, flows)
+            w = np.interp(state + stiffness * step, total, flows)
             state = np.interp(w, flows, forces)
             states.append(state)
         return np.append(states[::10], states[-1]) + 45 * np.tanh(v / 0.002)
