@@ -19,7 +19,7 @@ from mrdamper.physics.motion import sine
 
 DAMPERS = all_dampers()
 # Of each kind of generated code one: without memory, hysteresis, inner equations, functions of the condition.
-SELF_TESTED = ("bingham", "bouc-wen", "spencer", "play-bypass", "joint", "modified", "conditioned")
+KINDS = ("bingham", "bouc-wen", "spencer", "play-bypass", "joint", "modified", "conditioned")
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler on this machine")
 pytestmark = needs_compiler
 
@@ -50,9 +50,9 @@ def expected(damper, rows):
     return np.array(force)
 
 
-@pytest.mark.parametrize("name", DAMPERS)
 @pytest.mark.parametrize(
-    ("conditions", "steps"), [(4, 1000), pytest.param(20, 4000, marks=pytest.mark.slow)], ids=["some", "many"]
+    ("name", "conditions", "steps"),
+    [*((name, 4, 1000) for name in KINDS), *(pytest.param(name, 20, 4000, marks=pytest.mark.slow) for name in DAMPERS)],
 )
 def test_c_equals_python_to_the_last_bit(name, conditions, steps, tmp_path):
     rows = many_conditions(conditions, steps)
@@ -73,7 +73,7 @@ def test_optimised_c_stays_within_rounding(name, compiler, tmp_path):
     assert np.max(np.abs(fast - force)) <= 4 * np.finfo(float).eps * np.max(np.abs(force))
 
 
-@pytest.mark.parametrize("name", [n if n in SELF_TESTED else pytest.param(n, marks=pytest.mark.slow) for n in DAMPERS])
+@pytest.mark.parametrize("name", [n if n in KINDS else pytest.param(n, marks=pytest.mark.slow) for n in DAMPERS])
 def test_the_self_test_passes_in_both_precisions(name, tmp_path):
     written = CExporter().export(DAMPERS[name], "damper")
     for file, content in written.files.items():

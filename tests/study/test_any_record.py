@@ -24,6 +24,7 @@ from mrdamper.study.workflow import run_study
 VIRTUAL = next(virtual for virtual in DAMPERS if virtual.name == "switched current")
 
 
+@pytest.mark.slow
 def test_a_third_damper_from_the_command_line(tmp_path):
     runs = [*VIRTUAL.runs(), replace(VIRTUAL.unseen(), split="validate")]
     save_dataset(Dataset(tuple(replace(run, rig="third") for run in runs)), tmp_path / "tests")

@@ -82,13 +82,13 @@ def test_a_reversed_coil_is_no_contradiction(sound):
     ("name", "value"),
     [
         ("one run in lbf", 4.448),
-        ("N under lbf", 1 / 4.448),
         ("one run in inches", 25.4),
         ("current in mA", 1.0),
         ("open coil", 0.0),
-        ("two half-open coils", 0.75),
         ("both channels inverted", -1.0),
-        ("a random record in lbf", 4.448),
+        pytest.param("N under lbf", 1 / 4.448, marks=pytest.mark.slow),
+        pytest.param("two half-open coils", 0.75, marks=pytest.mark.slow),
+        pytest.param("a random record in lbf", 4.448, marks=pytest.mark.slow),
         pytest.param("one run in kgf", 9.807, marks=pytest.mark.slow),
         pytest.param("three runs in lbf", 4.448, marks=pytest.mark.slow),
         pytest.param("one run in cm", 10.0, marks=pytest.mark.slow),
@@ -123,7 +123,7 @@ def test_a_stated_current_is_corrected_in_the_dataset_and_a_measured_one_by_anot
         ("force", 1 / 9.80665, 'unit = "kN" and scale = 9.8'),  # kilonewtons in thousands of kgf
         pytest.param("displacement", 1 / 25.4, 'unit = "inch"', marks=pytest.mark.slow),
         pytest.param("time", 5.0, 'unit = "s" and scale = 0.2', marks=pytest.mark.slow),
-        ("rate", 0.2, "[file] sample_rate_Hz = "),
+        pytest.param("rate", 0.2, "[file] sample_rate_Hz = ", marks=pytest.mark.slow),
     ],
 )
 def test_the_remedy_of_a_wrong_scale_obeyed_literally_corrects_the_test(sound, tmp_path, channel, factor, stated):
@@ -183,7 +183,9 @@ def test_a_loop_that_widens_with_the_current_accuses_no_run():
     assert find_contradictions(runs) == []
 
 
-@pytest.mark.parametrize("name", ["half-open coil", "rows shifted from the seventh on"])
+@pytest.mark.parametrize(
+    "name", ["half-open coil", pytest.param("rows shifted from the seventh on", marks=pytest.mark.slow)]
+)
 def test_a_saturating_coil_hides_no_current(name):
     """The force of a smooth damper changes by a third only, but its course over the current is known."""
     folder = next(f for f in first_set(DAMPERS[2]) if f.name == name)
@@ -222,7 +224,9 @@ def test_the_second_set_is_found(kind, name):
     assert {one.cause for one in found} <= set(folder.causes)
 
 
-@pytest.mark.parametrize("name", ["stroke for amplitude in three runs", "a worn damper in a random record"])
+@pytest.mark.parametrize("name", [
+    "stroke for amplitude in three runs", pytest.param("a worn damper in a random record", marks=pytest.mark.slow),
+])  # fmt: skip
 def test_runs_that_are_not_the_first_suspects_are_found(name):
     """Two of three alike raise the error assumed of the third; a record of many currents is improbable in any case."""
     folder = next(f for f in second_set(SECOND[0]) if f.name == name)

@@ -158,15 +158,8 @@ def numbers(rig):
     return [c.damper.fitted_parameters for c in rig.candidates], [r.scores for r in rig.chosen.cross_validated.runs]
 
 
-def test_a_study_is_the_same_in_another_process(small, few):
-    with several(2) as processes:
-        again = processes.pool.submit(run_study, few).result()
-    assert numbers(again.rigs[0]) == numbers(small.rigs[0])
-    assert dump_model(again.model) == dump_model(small.model)
-
-
 @pytest.mark.slow
-def test_rigs_are_studied_and_drawn_in_several_processes(small, few, tmp_path):
+def test_rigs_are_studied_and_drawn_in_several_processes_as_in_one(small, few, tmp_path):
     beside = tuple(replace(run, id=f"other {run.id}", rig="other") for run in few)
     with several(2) as processes:
         again = run_study(Dataset((*beside, *few.runs), "both"), processes=processes)

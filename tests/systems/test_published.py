@@ -20,7 +20,7 @@ PRINTED = {
 }
 
 
-@pytest.mark.parametrize("volts", PRINTED)
+@pytest.mark.parametrize("volts", ["uncontrolled", pytest.param(0.0, marks=pytest.mark.slow), 2.25])
 def test_the_printed_table(volts):
     file = load_system("dyke1996")
     dampers = {} if volts == "uncontrolled" else file.dampers
