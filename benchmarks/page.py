@@ -118,8 +118,8 @@ def page(results: Results) -> str:
 def _study(rows: Sequence) -> list[str]:
     return [
         "## A study of the bundled rigs, part by part",
-        "Processor seconds, the parts in sequence in one process. `mrdamper study` uses one process per rig, so that the "
-        "slower rig determines the time.",
+        "Processor seconds, the parts in sequence in one process. `mrdamper study` uses one process per rig, so that "
+        "the slower rig determines the time.",
         _table(
             ("part", "s", "rig by rig"),
             (
