@@ -1,1 +1,1 @@
-"""The same study over thousands of dampers, on one machine or on a cluster: `line.run_fleet`."""
+"""Identification of thousands of dampers, on one machine or on a cluster: `run.run_fleet`."""

@@ -1,9 +1,9 @@
-"""Control charts, capability and gauge study: the standard formulas, in a few lines each.
+"""Standard formulas of control charts, capability and gauge studies.
 
 References
 ----------
 NIST/SEMATECH e-Handbook of Statistical Methods, 6.1.6 (capability), 6.3.2.2 (individuals), 6.3.2.4
-(EWMA); ISO 22514-2 (percentiles of what is not normal); Bissell 1990, Applied Statistics 39, 331
+(EWMA); ISO 22514-2 (percentiles of other distributions); Bissell 1990, Applied Statistics 39, 331
 (interval of a capability index); Efron and Tibshirani 1993, An Introduction to the Bootstrap, chapter 13.
 """
 
@@ -18,7 +18,7 @@ from mrdamper.data import Floats
 
 _D2, _D4 = 1.128, 3.267  # of moving ranges of two, as printed in the tables
 _FEWEST_NORMALITY, _MOST_NORMALITY = 8, 5000
-_NOT_NORMAL = 0.005  # significance at which a distribution is taken for not normal
+_NOT_NORMAL = 0.005  # significance at which a distribution counts as not normal
 _TAIL = 0.00135  # share beyond three standard deviations of a normal distribution
 FEWEST_PERCENTILES = math.ceil(10 / _TAIL)  # values, ten of which are expected beyond each percentile
 _PERCENTILES = (_TAIL, 0.5, 1 - _TAIL)
@@ -29,7 +29,7 @@ _RESAMPLES, _SEED = 1000, 20240813  # of the bootstrap
 class ControlChart:
     """A control chart."""
 
-    values: Floats  # (N,) what is charted
+    values: Floats  # (N,) charted values
     lower: Floats  # (N,) its limits
     upper: Floats
     centre: float
@@ -53,7 +53,7 @@ def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, w
     """Exponentially weighted moving average, limits for each point's own age [NIST 6.3.2.4].
 
     Target and deviation are the mean and standard deviation of the process in control, `weight` is λ of the newest
-    value, and the limits lie `width` standard deviations of the average away.
+    value, and the limits are `width` standard deviations of the average.
     """
     from scipy.signal import lfilter
 
@@ -65,7 +65,7 @@ def ewma(values: Floats, target: float, deviation: float, weight: float = 0.2, w
 
 @dataclass(frozen=True)
 class Capability:
-    """Capability of a process: how its distribution lies between the limits."""
+    """Capability of a process: its distribution relative to the limits."""
 
     ppk: float  # NaN where the values are too few for percentiles
     low: float  # ends of its 95 % interval
@@ -76,7 +76,7 @@ class Capability:
 
 
 def is_normal(values: Floats) -> bool:
-    """Tell if Shapiro and Wilk's test accepts a normal distribution; of many values, an even choice is tested."""
+    """Tell if Shapiro and Wilk's test accepts a normal distribution; of many values, a regular subset is tested."""
     from scipy.stats import shapiro
 
     if values.size < _FEWEST_NORMALITY or np.ptp(values) == 0:
@@ -88,9 +88,9 @@ def is_normal(values: Floats) -> bool:
 def capability(values: Floats, lower: float | None, upper: float | None) -> Capability | None:
     """Ppk from the overall mean and deviation, or from percentiles where the values are not normal.
 
-    Percentiles of 0.135 and 99.865 % ask for 7408 values, so that ten are expected beyond each; their
-    interval is that of the bootstrap. None for under two values, or no spread.
-    [NIST 6.1.6; interval: Bissell 1990; ISO 22514-2; Efron and Tibshirani 1993]
+    Percentiles of 0.135 and 99.865 % require 7408 values, so that ten are expected beyond each; their interval is that
+    of the bootstrap. None for under two values, or no spread. [NIST 6.1.6; interval: Bissell 1990; ISO 22514-2; Efron
+    and Tibshirani 1993]
     """
     if values.size < 2 or np.ptp(values) == 0:
         return None
@@ -139,9 +139,9 @@ def _nearest(percentiles: Floats, lower: float | None, upper: float | None) -> F
 class Gauge:
     """Sources of the variation of master dampers, as standard deviations."""
 
-    repeatability: float  # what is left when dampers and sessions are accounted for
+    repeatability: float  # remainder after dampers and sessions
     reproducibility: float  # from session to session
-    parts: float  # from damper to damper of the line
+    parts: float  # from damper to damper of the population
 
     @property
     def gauge(self) -> float:
@@ -150,22 +150,22 @@ class Gauge:
 
     @property
     def share(self) -> float:
-        """Of the rig in everything that varies (%GRR as a fraction)."""
+        """Share of the rig in the total variation (%GRR as a fraction)."""
         return self.gauge / float(np.hypot(self.gauge, self.parts)) if self.parts or self.gauge else np.nan
 
 
 def gauge_study(table: Floats, line: Floats) -> Gauge | None:
     """Two-way analysis of variance without replication; None for under two sessions.
 
-    `table` (G, S) holds golden dampers by sessions, complete; `line` (N,) the values of the line's dampers, whose
-    variation holds the rig's too, which is taken off.
+    `table` (G, S) contains the master dampers by sessions, without gaps; `line` (N,) the values of the population,
+    whose variation includes that of the rig, which is subtracted.
     """
     dampers, sessions = table.shape
     if sessions < 2 or dampers < 1:
         return None
     mean, by_damper, by_session = table.mean(), table.mean(axis=1), table.mean(axis=0)
     between = dampers * float(np.sum((by_session - mean) ** 2)) / (sessions - 1)
-    if dampers == 1:  # sessions and repeats cannot be told apart: all of it is the rig's
+    if dampers == 1:  # sessions and repeats cannot be separated: the rig's variation is the sum
         repeat, session = 0.0, between
     else:
         left = table - by_damper[:, None] - by_session[None, :] + mean

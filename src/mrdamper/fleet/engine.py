@@ -29,7 +29,7 @@ class ClusterError(InputError):
 
 @contextmanager
 def local_engine(workers: int, limits: JobLimits) -> Iterator[tuple[Submit, int]]:
-    """Jobs on this machine, each worker a process that can be killed; no socket listens.
+    """Run jobs on this machine in worker processes that can be killed, without a socket.
 
     Yields a function from the argument of a job to the future of its row, and how many run at once.
     """
@@ -51,7 +51,7 @@ def local_engine(workers: int, limits: JobLimits) -> Iterator[tuple[Submit, int]
 
 
 def outcome(future: Future[Row]) -> Row:
-    """Return the row of a finished job; a job whose cluster workers died one after the other failed.
+    """Return the row of a finished job; a job whose cluster workers died repeatedly has failed.
 
     Raises `ClusterError` if the scheduler is lost.
     """
@@ -83,10 +83,10 @@ def guarded(guard: KillableWorker, job: Row) -> Row:
 def cluster_engine(
     address: str, limits: JobLimits, tls: str | Path | None = None, patience: float = 10.0
 ) -> Iterator[tuple[Submit, int]]:
-    """Jobs on a Dask cluster, each in a process that can be killed beside its worker; yields as `local_engine`.
+    """Run jobs on a Dask cluster, each in a child process of its worker; yields as `local_engine`.
 
-    Raises `MissingExtraError` if Dask is not installed. Raises `ClusterError` if no scheduler answers there, or it
-    has no worker.
+    Raises `MissingExtraError` if Dask is not installed. Raises `ClusterError` if no scheduler responds or it has no
+    worker.
     """
     try:
         import distributed
@@ -105,7 +105,7 @@ def cluster_engine(
             f"no scheduler answers: {_first_line(error)}", where=address,
             remedy="mrdamper cluster shows how to start one",
         ) from error  # fmt: skip
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it would say comes as an error of ours
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # its messages are raised as errors of this package
     try:
         workers = client.scheduler_info(n_workers=-1)["workers"]
         slots = sum(worker["nthreads"] for worker in workers.values())
@@ -123,7 +123,7 @@ _HELD = threading.local()
 
 
 def on_cluster(job: Row, limits: dict[str, Any]) -> Row:
-    """Run a job on a worker of the cluster; each of its threads keeps a process of its own."""
+    """Run a job on a worker of the cluster; each of its threads has its own child process."""
     guard: KillableWorker | None = getattr(_HELD, "guard", None)
     if guard is None or _HELD.limits != limits:
         if guard is not None:

@@ -1,7 +1,7 @@
 """Jobs in a process that can be killed: the child limits its own processor time and memory, the parent its wall time.
 
-The parent also limits the memory of everything the child started. A child that is left with
-memory or processes of a job makes way for a fresh one.
+The parent also limits the memory of everything the child started. A child with memory or processes left by a job is
+replaced.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from mrdamper.data.child import Answer, Child, descendants
 from mrdamper.errors import InputError
 
 _MEMORY_CHECK_S = 0.25  # seconds between looks at the memory of a job that takes long
-_KILLED_TRIES, _CRASHED_TRIES = 8, 2  # of a job whose process somebody killed, or that died by itself
-_GRACE_S = 5  # in which a process that said its last word has to end
+_KILLED_TRIES, _CRASHED_TRIES = 8, 2  # of a job whose process was killed or died
+_GRACE_S = 5  # in which a process has to end after its last answer
 
 
 class JobError(InputError):
-    """A job crashed, or went over its limits; the code says which."""
+    """A job that crashed or exceeded its limits; the code states which."""
 
     code = "E_JOB_CRASH"
 
@@ -37,7 +37,7 @@ class JobLimits:
 
 
 class KillableWorker:
-    """Runs jobs one after the other in a process of its own."""
+    """Runs jobs in sequence in a child process."""
 
     def __init__(self, limits: JobLimits | None = None):
         self._limits = limits or JobLimits()
@@ -47,8 +47,8 @@ class KillableWorker:
     def call(self, function: str, argument: Any) -> Any:
         """Return the result of `module:function` of an argument, both as JSON.
 
-        A process that somebody killed is no fault of the job: it is done again. Raises `JobError`: E_JOB_CRASH,
-        E_JOB_TIME or E_JOB_MEMORY. Raises `InputError`: what the function raised.
+        A job whose process was killed from outside is repeated. Raises `JobError`: E_JOB_CRASH, E_JOB_TIME or
+        E_JOB_MEMORY. Raises `InputError`: what the function raised.
         """
         killed = crashed = 0
         while True:
@@ -68,7 +68,7 @@ class KillableWorker:
         self._kill()
 
     def _ask(self, request: Answer) -> tuple[Answer | None, int]:
-        """Return the child's answer; or None, and the signal or exit status it died by."""
+        """Return the child's answer; or None, and its signal or exit status."""
         if self._child is None or not self._child.alive:
             self._kill()
             self._child = Child("mrdamper.fleet.guarded", polars_threads=1, session=True)
@@ -79,7 +79,7 @@ class KillableWorker:
         return answer, child.died
 
     def _over(self, child: Child) -> Answer | None:
-        """Wait for an answer; the limit that is broken, and how, if one is."""
+        """Wait for an answer; return the limit that is exceeded, if any, and how."""
         begin = time.monotonic()
         while child.is_silent(_MEMORY_CHECK_S):
             if time.monotonic() - begin > self._limits.wall_s:

@@ -1,4 +1,4 @@
-"""The child of `guard`: runs jobs that may not survive it."""
+"""Child process of `guard`, which runs jobs that may crash it."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from typing import Any
 from mrdamper.data.child import descendants, send, standard_output, writable_memory
 from mrdamper.errors import InputError
 
-_MAX_LEFTOVER_BYTES = 256 * 2**20  # bytes that jobs may leave behind before a fresh process takes over
-_TRACEBACK_LINES = 12  # of a traceback that an answer carries
+_MAX_LEFTOVER_BYTES = 256 * 2**20  # bytes that jobs may leave allocated before the process is replaced
+_TRACEBACK_LINES = 12  # of a traceback in an answer
 
 
 def serve() -> None:
-    """Answer requests until the parent hangs up or dies."""
+    """Answer requests until the parent closes the pipe or ends."""
     replies = standard_output()
     _adopt_orphans()
     requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
@@ -33,7 +33,7 @@ def serve() -> None:
         request = json.loads(requests.get())
         answer = _answer(request)
         if os.getpid() != own:
-            os._exit(0)  # a fork of a job that came back: it has no say here
+            os._exit(0)  # a forked process of a job that returned: it must not answer
         held = writable_memory()
         first = held if first is None else first
         answer["spent"] = held - first > _MAX_LEFTOVER_BYTES or bool(_strangers())
@@ -72,7 +72,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
 def _limit(seconds: float | None, size: int | None) -> None:
     """From here on, this much processor time and memory that is written to; None lifts the limits.
 
-    Over its processor time the system ends the process, whatever library it is in.
+    Beyond its processor time the system ends the process, also inside a library.
     """
     if sys.platform == "win32":
         return
@@ -96,7 +96,7 @@ def _strangers() -> list[int]:
 
 
 def _adopt_orphans() -> None:
-    """Have processes whose parent ended reported as children here, on Linux."""
+    """Make processes whose parent ended children of this process, on Linux."""
     if sys.platform == "linux":
         import ctypes
 

@@ -17,7 +17,7 @@ Kind = Literal["dataset", "rig files", "lake"]
 
 
 class FleetError(InputError):
-    """A fleet cannot be read, or a damper of it cannot be used; the code says why."""
+    """A fleet that cannot be read, or a damper that cannot be used; the code states why."""
 
     code = "E_FLEET"
 
@@ -26,21 +26,21 @@ class FleetError(InputError):
 class Item:
     """One damper in one session, and where its records are stored."""
 
-    serial: str  # with the session its name: a golden damper comes again in other sessions
+    serial: str  # its name together with the session: a master damper is tested in several sessions
     session: str = ""
     batch: str = ""  # these two: empty where nothing states them
     date: str = ""
-    golden: bool = False  # tested again and again to watch the rig
+    golden: bool = False  # master damper, tested in every session to monitor the rig
     kind: Kind = "dataset"
-    paths: tuple[str, ...] = ()  # the dataset folder, the rig files, or the lake's files
-    rows: tuple[tuple[int, int], ...] = ()  # of a lake: first row and number of rows in each file
-    # column and cell of the rows that are its own, where one table holds several dampers
+    paths: tuple[str, ...] = ()  # the dataset folder, the rig files, or the Parquet files
+    rows: tuple[tuple[int, int], ...] = ()  # of Parquet files: first row and number of rows in each file
+    # column and cell that identify its rows, where one table contains several dampers
     picks: tuple[tuple[str, str], ...] = ()
-    error: InputError | None = None  # why it cannot be used, known before it is read
+    error: InputError | None = None  # why it cannot be used, where this is known before reading
 
     @property
     def name(self) -> str:
-        """Serial number, and the session where one is stated, as a terminal may show them."""
+        """Serial number, and the session if stated, printable on a terminal."""
         return printable(f"{self.serial}, session {self.session}" if self.session else self.serial)
 
     @property
@@ -50,7 +50,7 @@ class Item:
 
 
 def make_item(facts: dict[str, str], profile: FleetProfile, **where: Any) -> Item:
-    """Make an item from the facts that names or columns state; without a session, its date is one."""
+    """Make an item from the facts that names or columns state; without a session, the date is the session."""
     facts = {k: v for k, v in facts.items() if v is not None}
     date = facts.get("date", "")
     return Item(
@@ -64,20 +64,20 @@ def make_item(facts: dict[str, str], profile: FleetProfile, **where: Any) -> Ite
 
 
 def digest_of(item: Item) -> str:
-    """Hash of the bytes of an item's files, and of what names the damper in them."""
+    """Hash of the bytes of an item's files, and of the key of the damper in them."""
     states = [(path, path.stat()) for path in _files(item)]
     contents = [(path.name, _content(path, about.st_size, about.st_mtime_ns)) for path, about in states]
     return hash_of(contents, sorted(item.facts.items()), item.rows, item.picks)
 
 
-@lru_cache  # a file of a lake holds many dampers
+@lru_cache  # a Parquet file contains many dampers
 def _content(path: Path, size: int, changed_ns: int) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=20)).hexdigest()
 
 
 def hash_of(*parts: Any) -> str:
-    """Return the hash of anything that JSON can hold."""
+    """Return the hash of a JSON value."""
     return hashlib.blake2b(json.dumps(parts, sort_keys=True).encode(), digest_size=20).hexdigest()
 
 

@@ -17,9 +17,9 @@ from mrdamper.rig_files.dataset_samples import SAMPLE_FILES
 def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
     """Find the dampers of a source, sorted by serial number and session.
 
-    A source is a folder of dataset folders, of folders of rig files or of rig files, a dataset folder, or
-    a Parquet lake (a file, or a folder of such files) with a column for the serial number. Raises
-    `FleetError` (E_FLEET_EMPTY) if there is no damper in it.
+    A source is a folder of dataset folders, of folders of rig files or of rig files, a dataset folder, or a Parquet
+    file or a folder of such files with a column for the serial number. Raises `FleetError` (E_FLEET_EMPTY) if it
+    contains no damper.
     """
     source = Path(source)
     if not source.exists():
@@ -59,19 +59,19 @@ def _in_folder(folder: Path, profile: FleetProfile) -> Iterator[Item]:
     loose: list[Path] = []
     for path in sorted(folder.iterdir()):
         if path.name.startswith(".") or folder.resolve().is_relative_to(path.resolve()) or _holds_results(path):
-            continue  # hidden, a link to where it lies, or our own results
+            continue  # hidden, a link to a folder above, or results of this command
         if path.is_dir() and (path / "runs.csv").is_file():
             yield from _of_dataset(path, profile)
         elif path.is_dir():
             inside = [p for p in sorted(path.rglob("*")) if p.is_file() and p.suffix.lower() in endings]
             yield _named(path.name, profile, "rig files", tuple(map(str, inside)), path)
-        elif path.suffix.lower() in endings and path.is_file():  # a pipe would be waited for
+        elif path.suffix.lower() in endings and path.is_file():  # reading a pipe would wait
             loose.append(path)
     yield from _of_loose_files(loose, profile)
 
 
 def _of_loose_files(paths: Sequence[Path], profile: FleetProfile) -> Iterator[Item]:
-    """Files whose names state the same serial number and session are one damper's."""
+    """Group files whose names state the same serial number and session."""
     groups: dict[Item, list[str]] = {}
     for path in paths:
         stem = path.name.split(".")[0]
@@ -105,7 +105,7 @@ def _of_dataset(folder: Path, profile: FleetProfile) -> Iterator[Item]:
     try:
         table = runs_table(folder)
     except InputError:
-        table = []  # the job of this damper says what is wrong with it
+        table = []  # the job of this damper reports its error
     groups: dict[tuple[str, str], dict[str, str]] = {}
     for row in map(profile.of_columns, table):
         key = row.get("serial", ""), row.get("session", "")
@@ -121,7 +121,7 @@ def _of_dataset(folder: Path, profile: FleetProfile) -> Iterator[Item]:
 
 
 def _without_twins(items: Sequence[Item]) -> list[Item]:
-    """Two records of one serial number in one session: which is right nobody knows, so neither is used."""
+    """Refuse both of two records of one serial number in one session, which contradict each other."""
     items_by_key: dict[tuple[str, str], list[Item]] = {}
     for item in items:
         items_by_key.setdefault((item.serial, item.session), []).append(item)

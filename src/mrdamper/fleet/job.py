@@ -1,6 +1,6 @@
 """Job of one damper: a pure function of its records, the settings and the plan of the population.
 
-It speaks JSON on both sides, so that it runs here, in a process that can be killed, or on a cluster.
+Its argument and result are JSON, so that it runs in this process, in a child process or on a cluster.
 """
 
 from __future__ import annotations
@@ -34,23 +34,23 @@ from mrdamper.study.usable_runs import accepted_runs, runs_for_global_fit, witho
 from mrdamper.study.workflow import study_rig
 
 VERSION = version("mrdamper")  # asked once: the answer takes a millisecond
-OTHER_RIG = "W_OTHER_RIG"  # tested on another rig than most of the line: compared with them all the same
-_KILLED, _READER_TRIES = "E_READER_KILLED", 8  # of a job whose reading process somebody killed
+OTHER_RIG = "W_OTHER_RIG"  # tested on another rig than most of the population: compared regardless
+_KILLED, _READER_TRIES = "E_READER_KILLED", 8  # of a job whose reading process was killed
 _PASSING = ("E_EXTRA", "E_FLEET_CHANGED", "E_CLUSTER_VERSION", _KILLED)
 # One least squares without reweighting, searched to its end: the optimum is the same to 1e-6 from any near start.
 _ROUNDS, _MAX_STEPS, _COST_TOLERANCE = 1, 40, 1e-8
 _AVERAGED_SAMPLES = 4  # samples that are averaged for the standard errors
 _DIFFERENCE_STEP = 1e-4  # of a search axis's coordinate, for slopes of parameters
-_OUTLIER_DEVIATIONS = 6.0  # robust standard deviations from the line at which a damper is studied in full
+_OUTLIER_DEVIATIONS = 6.0  # robust standard deviations from the population at which a damper is studied in full
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings that change a result, and so belong to the key it is stored under."""
+    """Settings that change a result and are part of its key."""
 
     model: str = "play-bypass"  # identified jointly from all runs of a damper
     rig_profile: str = ""  # of rig files, as TOML text
-    cold: bool = False  # begin every search from the model's own start, not from the line
+    cold: bool = False  # start every search from the model's start values, not from the plan
 
 
 def measure(job: dict[str, Any]) -> dict[str, Any]:
@@ -83,7 +83,7 @@ def measure(job: dict[str, Any]) -> dict[str, Any]:
 
 
 def attempt(job: dict[str, Any]) -> dict[str, Any]:
-    """`measure`, with what is wrong with the records as a row too; if the process that reads is killed, once more."""
+    """`measure`, with errors of the records as a row; repeated once if the reading process is killed."""
     row: dict[str, Any] = {}
     for _ in range(_READER_TRIES):
         try:
@@ -97,13 +97,13 @@ def attempt(job: dict[str, Any]) -> dict[str, Any]:
 
 def refused(error: InputError) -> dict[str, Any]:
     """Write the row of a damper that cannot be used, or whose job failed."""
-    # Neither says anything about the records that would be true the next time.
+    # Neither is a property of the records.
     passing = error.code.startswith("E_JOB") or error.code in _PASSING
     return {"status": "failed" if passing else "refused", "code": error.code, "reason": str(error)}
 
 
 def read(item: Item, settings: Settings) -> tuple[Dataset, tuple[str, ...]]:
-    """Read the records of one damper; return them and the codes of what was found in them.
+    """Read the records of one damper; return them and the codes of their findings.
 
     Raises `InputError` if they cannot be read, or come from several rigs.
     """
@@ -147,7 +147,7 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
     loops = np.array([measured_loop(run) for run in train])
     more: dict[str, Any] = {}
     if plan is not None:
-        # The measured loop of each of the line's tests; None where the damper missed it.
+        # The measured loop of each test of the plan; None where the damper has no such test.
         own = [None if not like else np.mean(loops[like], axis=0) for like in by_test(tests, plan.matrix)]
         pairs = [(a, np.array(b)) for a, b in zip(own, plan.loops, strict=True) if a is not None]
         more["loop_deviation"] = max((deviation(*pair) for pair in pairs), default=0.0)
@@ -160,7 +160,7 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
         if plan.draft:
             more |= {
                 "axes": [axis.name for axis in problem.axes],
-                # a change of each search axis that would matter to an engineer
+                # a relevant change of each search axis
                 "changes": [0.2 if axis.log else 0.05 * (axis.upper - axis.lower) for axis in problem.axes],
                 "stands_for": [_stands_for(fit.damper.model, axis.name) for axis in problem.axes],
                 "curvature": _curvature(problem, fit),
@@ -216,7 +216,7 @@ def _curvature(problem: JointProblem, fit: JointFit) -> list[list[float]]:
 
 
 def _standard_errors(problem: JointProblem, fit: JointFit) -> dict[str, float]:
-    """Of the parameters that this damper's own records determined, those held at the line's value being right."""
+    """Estimate standard errors of the parameters that the records of this damper determine, given the held ones."""
     linearised = problem.linearised(fit)
     residual, jacobian = linearised.residual, linearised.jacobian
     model, held = fit.damper.model, set(fit.at_bounds)
@@ -231,7 +231,7 @@ def _standard_errors(problem: JointProblem, fit: JointFit) -> dict[str, float]:
             slopes[:, i] = [(moved[name] - values[name]) / step for name in values]
     for i, info in enumerate(problem.linear):
         slopes[list(values).index(info.name), len(problem.axes) + i] = 1.0
-    # What is slower than a few samples is what makes errors large.
+    # Errors that are correlated over several samples dominate the standard errors.
     kept = residual.size // _AVERAGED_SAMPLES * _AVERAGED_SAMPLES
     means = (a[:kept].reshape(-1, _AVERAGED_SAMPLES, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))
     covariance = spread(*means).covariance
@@ -254,7 +254,7 @@ def _stands_for(model: Model, axis: str) -> list[str]:
 
 
 def _study(dataset: Dataset) -> dict[str, Any]:
-    """Run the full study of a damper that stands out, and summarise it; the study chooses its candidates."""
+    """Run the full study of an outlier, and summarise it."""
     try:
         chosen = study_rig(dataset).chosen
     except InputError as error:
@@ -263,7 +263,7 @@ def _study(dataset: Dataset) -> dict[str, Any]:
 
 
 def _usable(dataset: Dataset) -> list[Run]:
-    """Return the identification runs that are accepted, agree and move; a damper with none raises the first cause."""
+    """Return the identification runs that are accepted, agree and move; raise the first cause if there is none."""
     agreed, contradictions = without_contradictions(dataset.only(dataset.split("train")))
     kept, refused = accepted_runs(agreed)
     refused |= {one.run_id: str(one) for one in contradictions}
@@ -275,7 +275,7 @@ def _usable(dataset: Dataset) -> list[Run]:
 
 
 def _stands_out(fit: JointFit, away: float, plan: Plan) -> bool:
-    """Tell if a damper lies so far from the population that it needs a full study."""
+    """Tell if a damper is so far from the population that it needs a full study."""
     if plan.draft:
         return False
     poor = float(np.median(fit.nrmse_pp)) > plan.error + _OUTLIER_DEVIATIONS * max(plan.error_spread, 0.1 * plan.error)

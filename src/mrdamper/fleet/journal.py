@@ -1,7 +1,7 @@
-"""The journal of a fleet: every finished damper durable before it counts.
+"""Journal of a fleet: results are durable before they count.
 
-SQLite, write-ahead log, synchronous FULL: after kill −9, or a power cut on a disk that keeps its
-promises, what was committed is there. One writer holds a lock that ends with its process.
+SQLite, write-ahead log, synchronous FULL: committed rows survive SIGKILL and a power failure, if the disk honours sync.
+One writer holds a lock that ends with its process.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ CREATE TABLE IF NOT EXISTS plans (key TEXT PRIMARY KEY, plan TEXT NOT NULL) WITH
 
 
 class JournalError(InputError):
-    """A journal cannot be used: of a newer version, damaged, taken, or where locks cannot be trusted."""
+    """A journal that cannot be used: newer version, damaged, in use, or on a disk without reliable locks."""
 
     code = "E_JOURNAL"
 
@@ -81,7 +81,7 @@ class Journal:
         self._write("INSERT OR REPLACE INTO plans VALUES (?, ?)", [(key, _text(plan))])
 
     def close(self) -> None:
-        """Give up the lock; idempotent."""
+        """Release the lock; idempotent."""
         if self._base is not None:
             self._base.close()
             self._base = None
@@ -180,7 +180,7 @@ def _locked(path: Path) -> int:
 
 def _refuse_network(folder: Path) -> None:
     kind = file_system(folder)
-    if kind.startswith(_NETWORK) and kind != "9p":  # a 9p disk may be this machine's own: its locks are tried
+    if kind.startswith(_NETWORK) and kind != "9p":  # a 9p disk may be local: its locks are tested
         raise _untrusted(folder, f"a network file system ({kind})")
 
 
@@ -192,7 +192,7 @@ def _untrusted(folder: Path, why: str) -> JournalError:
 
 
 def file_system(folder: Path, mounts: Path = Path("/proc/self/mountinfo")) -> str:
-    """Type of the file system a folder lies on, as the system names it; empty where it does not tell."""
+    """Type of the file system of a folder, as the system names it; empty if unknown."""
     try:
         lines = mounts.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""Loops and forces that dampers of a line are compared by, whatever model describes them."""
+"""Loops and forces by which dampers of a population are compared, independent of the model."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from mrdamper.physics.motion import equivalent_sine, measured_motion, sine
 from mrdamper.physics.simulation import simulate
 
 PHASES = 64  # points of a loop
-_SAME_CURRENT, _SAME_MOTION = 0.02, 0.08  # [A] and relative: a test of the line's matrix, though the rig missed it
-_PER_CYCLE = 200  # samples of a made cycle
+_SAME_CURRENT, _SAME_MOTION = 0.02, 0.08  # [A] and relative tolerance within which a test belongs to the test matrix
+_PER_CYCLE = 200  # samples of a synthetic cycle
 Test = tuple[float, float, float]  # current [A], frequency [Hz], amplitude [m]
 
 
@@ -33,7 +33,7 @@ def measured_loop(run: Run) -> Floats:
 
 
 def by_test(tests: Sequence[Test], matrix: Sequence[Test]) -> list[list[int]]:
-    """For each test of the line's matrix, the indices of the tests of a damper that are it."""
+    """Return the indices of the tests of a damper for each test of the population's matrix."""
     return [[i for i, test in enumerate(tests) if _is_same(test, wanted)] for wanted in matrix]
 
 
@@ -49,7 +49,7 @@ def deviation(loop: Floats, reference: Floats) -> float:
 
 
 def shape_deviation(loop: Floats, reference: Floats) -> float:
-    """Calculate the deviation of the loop scaled and shifted onto the reference: of its shape alone."""
+    """Calculate the deviation of the shape: of the loop scaled and shifted onto the reference."""
     columns = np.column_stack([loop, np.ones(loop.size)])
     return deviation(columns @ np.linalg.lstsq(columns, reference, rcond=None)[0], reference)
 
@@ -69,7 +69,7 @@ def velocity_ladder(
 def gas_and_friction(
     ladder: dict[tuple[float, float], tuple[float, float]], speeds: Sequence[float]
 ) -> tuple[float, float]:
-    """Gas force and friction [N] at the lowest current, where both speeds go to zero along the ladder.
+    """Gas force and friction [N] at the lowest current, extrapolated to zero velocity.
 
     The gas force is the mean of rebound and compression, friction half their difference.
     """

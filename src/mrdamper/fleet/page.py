@@ -1,4 +1,4 @@
-"""The report of a line: one page from its table."""
+"""Report of a population: one page from its table."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from mrdamper.report.plots.style import PALETTE, Picture
 if TYPE_CHECKING:
     import polars as pl
 
-_MAX_CHART_POINTS = 500  # of a chart; more dampers are charted by medians of a few
+_MAX_CHART_POINTS = 500  # of a chart; with more dampers each point is the median of several
 _WORST = 10
 _MAX_LISTED = 50  # refused or failed dampers, and suspects, that the page lists
 
 
 def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits], path: Path) -> list[str]:
-    """Write the page of a line; gives what a terminal should say: suspects, drift, limits.
+    """Write the page of a population; return the lines for the terminal: suspects, drift, limits.
 
-    Without limits (by column of the table) nothing passes or fails. Raises `ColumnError` if a limit is for no column of
-    numbers, `OutputError` if the page cannot be written.
+    Pass and fail are stated only with limits (by column of the table). Raises `ColumnError` if a limit is for no column
+    of numbers, `OutputError` if the page cannot be written.
     """
     import polars as pl
 

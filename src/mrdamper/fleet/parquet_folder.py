@@ -1,4 +1,4 @@
-"""A Parquet lake: many dampers in one file or a folder of files, one row a sample."""
+"""Parquet files with many dampers, one row per sample."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def is_parquet_folder(paths: Sequence[Path], profile: FleetProfile) -> bool:
 def parquet_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
     """Find the dampers of a folder of Parquet files, each with the rows it occupies in every file.
 
-    A file that cannot be read, or lacks a column, becomes an item with the error; the others go on.
+    A file that cannot be read, or lacks a column, becomes an item with the error; the others are used.
     """
     import polars as pl
 
@@ -104,7 +104,7 @@ def _run(rows: pl.DataFrame, path: Path) -> Run:
 
 @contextmanager
 def _refusing_damage(path: Path) -> Iterator[None]:
-    """Turn whatever the library raises on a damaged file into a refusal; its panics are no `Exception`."""
+    """Convert any exception of the library on a damaged file to a refusal; its panics are no `Exception`."""
     try:
         yield
     except (InputError, KeyboardInterrupt, SystemExit, MemoryError):

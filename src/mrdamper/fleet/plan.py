@@ -1,4 +1,4 @@
-"""The plan of a line: where its searches start, what its tests do not determine, what its dampers are compared with."""
+"""Plan of a population: start values, parameters that the tests do not determine, and reference loops."""
 
 from __future__ import annotations
 
@@ -13,34 +13,34 @@ from mrdamper.data import Condition, Floats, same_condition
 from mrdamper.fleet.item import hash_of
 from mrdamper.fleet.loops import Test, by_test
 
-_SPEED_STEPS = (0.25, 0.5, 0.75, 1.0)  # of the velocity ladder, over the line's highest test speed
-_CANDIDATES = 2  # of the line's start
+_SPEED_STEPS = (0.25, 0.5, 0.75, 1.0)  # of the velocities, over the highest test speed
+_CANDIDATES = 2  # start values that are tried
 _MIN_COST_RISE = 0.02  # relative rise of the squared error by which a parameter counts as determined
-_RIDGE = 1e-12  # keeps the curvature of what changes nothing invertible
+_RIDGE = 1e-12  # keeps the curvature invertible along directions without effect
 
 
 @dataclass(frozen=True)
 class Plan:
     """Start values and reference values from the first dampers of a population.
 
-    Made once from dampers that depend on the serial numbers alone and kept in the journal, so
-    that no result depends on the order in which dampers are finished.
+    Made once from dampers that are selected by their serial numbers and kept in the journal, so that no result depends
+    on the order in which dampers are finished.
     """
 
     start: tuple[float, ...]  # median of the free search axes
-    held: dict[str, float]  # parameters that the line's tests do not determine, at the line's value
+    held: dict[str, float]  # parameters that the tests do not determine, at the population's value
     matrix: tuple[Test, ...]  # the line's tests
     loops: tuple[tuple[float, ...], ...]  # median measured loop of each [N]
     speeds: tuple[float, ...]  # velocity ladder [m/s]
     # median, and 1.48 times the median deviation from it, of the median nrmse_pp and of the distance of the measured
-    # loops from the line's
+    # loops from the median loops
     error: float = 0.0
     error_spread: float = 0.0
     deviation: float = 0.0
     deviation_spread: float = 0.0
     rig: str = ""  # that most reference dampers were tested on; empty if there is none
     references: tuple[str, ...] = ()  # names of the dampers it was made from
-    draft: bool = False  # made to try a start: nothing stands out yet
+    draft: bool = False  # a trial of start values: no damper is an outlier
 
     @cached_property
     def document(self) -> dict[str, Any]:
@@ -49,7 +49,7 @@ class Plan:
 
     @cached_property
     def digest(self) -> str:
-        """Hash of everything it says."""
+        """Hash of the document."""
         return hash_of(self.document)
 
     @property
@@ -59,15 +59,15 @@ class Plan:
 
     @property
     def amplitude(self) -> float:
-        """Of the ladder's sines [m]."""
+        """Amplitude of the sines of the velocities [m]."""
         return float(np.median([test[2] for test in self.matrix]))
 
 
 def drafts(rows: dict[str, dict[str, Any]]) -> list[Plan]:
-    """Plans from the rows of the reference dampers by name, one for each start worth a try.
+    """Make plans from the rows of the reference dampers by name, one for each candidate of the start values.
 
-    A search finds the minimum next to its start, and there may be several: the line starts where
-    most of its dampers end lowest, and the points of those best described are tried.
+    A search finds a local minimum near its start. The results of the dampers with the smallest errors are tried as
+    starts, and the one with which most dampers have the lowest error is used.
     """
     tests = [[_as_test(t) for t in row["tests"]] for row in rows.values()]
     matrix = _matrix([test for some in tests for test in some], len(rows))
@@ -97,12 +97,11 @@ def drafts(rows: dict[str, dict[str, Any]]) -> list[Plan]:
 def holding(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
     """Fix, at the median of the population, the parameters that its tests do not determine.
 
-    A few records cannot tell all parameters of a model from each other. One that could change by a
-    fifth (on an axis that is no logarithm, by a twentieth of its width) while the others make up for
-    it and the squared error rises by less than a fiftieth is held, the least determined first.
-    A ratio of which a part is held is held too: of lost motion that no test determines, none
-    determines which share the seat takes. What is left has one minimum, the same from any start,
-    and can be compared.
+    A few records do not determine all parameters of a model. A parameter that could change by a fifth (on an axis that
+    is no logarithm, by a twentieth of its width) with the others refitted while the squared error rises by less than a
+    fiftieth is held, the least determined first. A ratio of which a part is held is held, too: without tests of the
+    free play, the share of the series spring in it is not determined. The other parameters have one minimum,
+    independent of the start, and can be compared.
     """
     curvature = np.array([row["curvature"] for row in rows])
     names, parts = rows[0]["axes"], rows[0]["stands_for"]
@@ -141,13 +140,13 @@ def settled(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
 
 
 def _middle(values: Floats) -> tuple[Floats, Floats]:
-    """Median, and 1.48 times the median deviation from it: what robust statistics take for mean and deviation."""
+    """Median, and 1.48 times the median deviation from it: robust estimates of mean and standard deviation."""
     middle = np.median(values, axis=0)
     return middle, 1.4826 * np.median(np.abs(values - middle), axis=0)
 
 
 def _matrix(tests: list[Test], dampers: int) -> tuple[Test, ...]:
-    """List the tests of at least half the dampers, each the median of its like."""
+    """List the tests of at least half the dampers, with their median conditions."""
     groups = same_condition([Condition(*test) for test in tests])
     common = [g for g in groups if 2 * len(g) >= dampers] or groups
     return tuple(sorted(_as_test(np.median([tests[i] for i in g], axis=0).tolist()) for g in common))

@@ -35,8 +35,8 @@ class FleetProfile(_ProfileTable):
     # pattern of the names of folders or files: {serial}, {session}, {batch}, {date}, and * for anything:
     # "{batch}_{serial}_*"
     names: str | None = None
-    columns: dict[str, str] = Field(default_factory=dict)  # column of `runs.csv` or of the lake by fact: serial = "SN"
-    golden: tuple[str, ...] = ()  # serial numbers of the dampers that are tested again and again to watch the rig
+    columns: dict[str, str] = Field(default_factory=dict)  # column of the table by fact: serial = "SN"
+    golden: tuple[str, ...] = ()  # serial numbers of the master dampers, tested in every session to monitor the rig
     rig: str | None = None  # rig profile for rig files, relative to this file
 
     @field_validator("columns")
@@ -84,7 +84,7 @@ class FleetProfile(_ProfileTable):
         return next((name for name in wanted if name in columns), None)
 
     def is_golden(self, facts: dict[str, str]) -> bool:
-        """Tell if a damper is a master damper, which watches the rig."""
+        """Tell if a damper is a master damper."""
         return facts["serial"] in self.golden or facts.get("golden", "").lower() in _TRUE
 
 
@@ -104,7 +104,7 @@ class ColumnLimits(_ProfileTable):
 
 
 def load_fleet_profile(path: str | Path | None) -> FleetProfile:
-    """Read a fleet profile; without a path, the one that says nothing.
+    """Read a fleet profile; without a path, the default.
 
     Raises `ProfileError` if it is no TOML, or a key or value is not known.
     """

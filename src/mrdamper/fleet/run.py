@@ -1,4 +1,4 @@
-"""A fleet from its records to its table: find the dampers, make the plan, measure what is not yet in the journal."""
+"""Identification of a fleet: find the dampers, make the plan, measure dampers that the journal does not contain."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from mrdamper.rig_files.profile import load_profile
 
 Progress = Callable[[str, float], None]
 REFERENCES = 11  # dampers that make the plan
-_QUEUED_PER_WORKER = 2  # jobs that wait for each that runs
+_QUEUED_PER_WORKER = 2  # queued jobs per running job
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,8 @@ def run_fleet(
 ) -> Fleet:
     """Identify every damper of a source that is not yet in the journal of `out`, and write the table.
 
-    The table holds the same bits for any number of workers, here or on a cluster, in one go or
-    after any interruption, apart from columns whose names say that they hold times or a host.
+    The table has the same bits for any number of workers, on one machine or on a cluster, with or without
+    interruptions, except for the columns with times and hosts.
 
     Parameters
     ----------
@@ -71,15 +71,15 @@ def run_fleet(
     model : str
         Identified jointly from all runs of a damper.
     cold : bool
-        Begin every search from the model's own start instead of the line's.
+        Start every search from the model's start values instead of the plan's.
     workers : int
         Processes on this machine.
     scheduler : str, optional
-        Address of a Dask scheduler; its workers have to see `source` under the same path.
+        Address of a Dask scheduler, whose workers have `source` under the same path.
     tls : path, optional
         Folder with ca.pem, cert.pem and key.pem, for a tls:// scheduler.
     patience : float
-        Time in which a scheduler has to answer [s].
+        Time limit for an answer of the scheduler [s].
     limits : JobLimits, optional
         Of one damper's job.
     progress : callable
@@ -123,13 +123,13 @@ def run_fleet(
 
 
 class _Line:
-    """The dampers of one run, their keys, and what is still to do."""
+    """The dampers of one run, their keys, and the remaining jobs."""
 
     def __init__(self, items: Sequence[Item], settings: Settings, journal: Journal, progress: Progress):
         self._items, self._settings, self._journal, self._progress = items, settings, journal, progress
         self.plan: Plan | None = None
         self._digests: dict[int, str] = {}
-        self._failed: dict[int, dict[str, Any]] = {}  # of this run: done again by the next
+        self._failed: dict[int, dict[str, Any]] = {}  # failed in this run: repeated by the next
         self._already = 0
 
     def run(self, submit: Submit, slots: int) -> None:
@@ -147,7 +147,7 @@ class _Line:
             self._measure(list(self._digests), self.plan, submit, slots, count=True)
 
     def written(self, table: Path, parameters: Sequence[str]) -> Fleet:
-        """Write the table: one row a damper, in the order of serial numbers and sessions."""
+        """Write the table: one row per damper, in the order of serial numbers and sessions."""
         troubled: list[tuple[str, str, str]] = []
 
         def rows() -> Iterator[dict[str, Any]]:
@@ -174,7 +174,7 @@ class _Line:
         raise AssertionError(f"no row for {self._items[number].name}")
 
     def _make_plan(self, submit: Submit, slots: int) -> None:
-        """From the first dampers that can be identified, in an order that their names alone decide."""
+        """Make the plan from the first dampers that can be identified, in an order by the hash of their names."""
         key = hash_of("plan", vars(self._for(None)), VERSION, FORMAT)
         kept = self._journal.plan(key)
         if kept is not None:
@@ -200,7 +200,7 @@ class _Line:
     def _under(
         self, plan: Plan, order: Sequence[int], references: dict[str, dict[str, Any]], submit: Submit, slots: int
     ) -> list[dict[str, Any]]:
-        """Rows of the reference dampers under a draft of the plan."""
+        """Return the rows of the reference dampers under a draft of the plan."""
         numbers = [n for n in order if self._items[n].name in references]
         self._measure(numbers, plan, submit, slots)
         rows = [self._journal.result(self._key(n, plan)) for n in numbers]
@@ -209,7 +209,7 @@ class _Line:
     def _measure(
         self, numbers: Sequence[int], plan: Plan | None, submit: Submit, slots: int, count: bool = False
     ) -> None:
-        """Run the jobs whose rows are not in the journal; what is finished together is kept together."""
+        """Run the jobs whose rows are not in the journal; rows that finish together are stored together."""
         waiting = [n for n in numbers if n not in self._failed and not self._is_kept(n, plan)]
         if count:
             self._already = sum(self._journal.status(self._key(n, plan)) == "done" for n in numbers)

@@ -1,4 +1,4 @@
-"""The roll-up: rows of the journal as one Parquet file, one row a damper, memory flat."""
+"""Table of a fleet: rows of the journal as one Parquet file, one row per damper, in constant memory."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _NUMBERS = (
 
 
 def write_table(rows: Iterable[dict[str, Any]], parameters: Iterable[str], plan: Plan | None, path: Path) -> None:
-    """Write rows as Parquet, whole or not at all.
+    """Write rows as Parquet, atomically.
 
-    Each of the model's parameters becomes a column `p_NAME`, its standard error `se_NAME`; the plan's velocity ladder
-    becomes columns `rebound_N_0.1m_s_1A` and `compression_N_...`. Raises `OutputError` or `ResourceError`
-    (E_DISK_FULL) if the file cannot be written.
+    Each of the model's parameters becomes a column `p_NAME`, its standard error `se_NAME`; the plan's velocities become
+    columns `rebound_N_0.1m_s_1A` and `compression_N_...`. Raises `OutputError` or `ResourceError` (E_DISK_FULL) if the
+    file cannot be written.
     """
     import polars as pl
 

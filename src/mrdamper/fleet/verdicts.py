@@ -1,4 +1,4 @@
-"""Dampers that stand out and why, and drift of the rig or of production, from the table of a population."""
+"""Outliers and their causes, and drift of the rig or of production, from the table of a population."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from mrdamper.data import Floats
 if TYPE_CHECKING:
     import polars as pl
 
-FEATURES = {  # by column: what it is called, its unit
+FEATURES = {  # title and unit by column
     "force_off_N": ("damping force at the lowest current", "N"),
     "force_rise_N": ("rise of the damping force with current", "N"),
     "gas_force_N": ("gas force", "N"),
     "friction_N": ("friction", "N"),
 }
 _SHAPE = "shape_deviation"
-_MIN_DAMPERS = 8  # dampers of a line below which nothing stands out, and of a session below which it is no reference
+_MIN_DAMPERS = 8  # smallest number of dampers of a population for outliers, and of a session as a reference
 _OUTLIER_DEVIATIONS = 4.0  # robust standard deviations
 _SIGNIFICANCE = 0.01  # significance of a drift
 _MIN_DRIFT = 0.005  # relative drift over the whole time below which none is reported
@@ -53,16 +53,16 @@ def with_features(frame: pl.DataFrame) -> pl.DataFrame:
 
 @dataclass(frozen=True)
 class Suspect:
-    """A damper that stands out from its line."""
+    """An outlier of the population."""
 
     serial: str
     session: str
-    cause: str  # what such a damper most often has
-    findings: tuple[str, ...]  # what lies how far away, the farthest first
+    cause: str  # most common cause
+    findings: tuple[str, ...]  # quantities with their distances, the largest first
 
 
 def suspects(frame: pl.DataFrame) -> list[Suspect]:
-    """Dampers more than four robust standard deviations from the line, the rig's sessions taken off."""
+    """Return dampers more than four robust standard deviations from the population, sessions of the rig subtracted."""
     if frame.height < _MIN_DAMPERS:
         return []
     names = [name for name in (*FEATURES, _SHAPE) if frame[name].null_count() < frame.height]
@@ -101,15 +101,15 @@ class Drift:
     """Drift from the first session to the last."""
 
     verdict: str  # "rig", "line", "both", "none" or "cannot tell"
-    rig: float  # relative change of the rig; NaN where nothing tells
-    line: float  # and of the line beside the rig
+    rig: float  # relative change of the rig; NaN if unknown
+    line: float  # relative change of production, that of the rig subtracted
     text: str
 
 
 def drift(values: Floats, sessions: Sequence[str], serials: Sequence[str], golden: Sequence[bool]) -> Drift:
-    """Tell the drift of the rig, seen on golden dampers, from the line's, seen on the others beside them.
+    """Separate the drift of the rig, measured with master dampers, from that of production.
 
-    `values` (N,): positive, a force say; `sessions`: in the order of time when sorted.
+    `values` (N,): positive, for example a force; `sessions`: in the order of time when sorted.
     """
     order = sorted(set(sessions))
     if len(order) < 3:
@@ -138,7 +138,7 @@ def drift(values: Floats, sessions: Sequence[str], serials: Sequence[str], golde
 
 
 def _by_session(logs: Floats, at: np.ndarray, chosen: np.ndarray, count: int) -> Floats:
-    """Mean of each session, the highest and the lowest tenth left out: a faulty damper moves it little."""
+    """Mean of each session without the highest and the lowest tenth, robust against faulty dampers."""
     from scipy.stats import trim_mean
 
     inside = [logs[chosen & (at == i)] for i in range(count)]
@@ -146,7 +146,7 @@ def _by_session(logs: Floats, at: np.ndarray, chosen: np.ndarray, count: int) ->
 
 
 def _trend(share: Floats, means: Floats) -> tuple[float, bool]:
-    """Change over the whole time, and whether it is certain."""
+    """Change over the whole time, and whether it is significant."""
     from scipy.stats import linregress
 
     finite = np.isfinite(means)

@@ -1,4 +1,4 @@
-"""The gas spring held in every identification, the paper's range of tests, and the functions that tests allow."""
+"""The gas spring held in every identification, the paper's range of tests, and the functions that tests determine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Claims of the paper on its damper and its method: measurements, limits and verdicts, a row each.
+"""Claims of the paper on its damper and its method: one row with measurements, limits and verdict per claim.
 
 A claim agrees where each of its values meets its limit, agrees in part where some do or come within the wider limit,
 and differs where none comes near. The quality of a fit must be good enough for a claim to agree, but is no support by
@@ -21,7 +21,7 @@ from mrdamper.paper import claims_on_fits, claims_on_tests
 from mrdamper.paper.results import Measured, Reproduction
 
 Verdict = Literal["agrees", "agrees in part", "differs", "not checked", "cannot be checked"]
-Kind = Literal["method", "damper", "built in"]  # claim on the method, on the authors' damper, on what the virtual has
+Kind = Literal["method", "damper", "built in"]  # claim on the method, on a damper, on a property of the virtual one
 _RECOVERED = {"agrees": "recovered", "agrees in part": "recovered in part", "differs": "not recovered"}
 
 
@@ -31,9 +31,9 @@ class ClaimLimit:
 
     value: str  # description of the value
     sense: Literal["below", "above"]
-    holds: float  # the value must be on this side of it, the limit itself included
-    near: float  # wider limit, within which the claim agrees in part; the same where there is none
-    alone: bool = True  # the value supports the claim even where no other one does
+    holds: float  # limit, which the value may reach
+    near: float  # wider limit for partial agreement; equal to the limit if there is none
+    alone: bool = True  # the value supports the claim by itself
 
     def grade(self, value: float) -> int:
         """Return 2 within the limit, 1 within the wider one, 0 beyond both."""
@@ -171,7 +171,7 @@ class Claim:
 
 
 def check_claims(study: Reproduction) -> tuple[Claim, ...]:
-    """Measure and check every claim; one that the data do not allow states why."""
+    """Measure and check every claim; state the reason where the data do not allow it."""
     return tuple(_checked(study, key, row, row.measure(study)) for key, row in ROWS.items())
 
 
@@ -207,7 +207,7 @@ def verdict_on(key: str, values: Sequence[float]) -> Verdict:
 
 
 def in_words(verdict: Verdict, kind: Kind, *, virtual: bool) -> str:
-    """Word a verdict for the reader, with the damper it rests on."""
+    """Word a verdict for the reader, with its damper."""
     if verdict not in _RECOVERED:
         return verdict
     if virtual and kind == "damper":

@@ -15,7 +15,7 @@ _SEARCHED = 2  # parameters that the paper's method searches per run
 
 
 def viscosity(study: Reproduction) -> Measured:
-    """Compare the closed form of c with the balance that counts the hysteretic force once."""
+    """Compare the closed form of c with the consistent balance."""
     literal, consistent = values(study, LITERAL, "c"), values(study, CONSISTENT, "c")
     if not literal.size or literal.size != consistent.size:
         return unknown("one of the two balances could not be followed on every run")
@@ -72,7 +72,7 @@ def presets(study: Reproduction) -> Measured:
 
 
 def search(study: Reproduction) -> Measured:
-    """Return the factors by which the genetic searches miss the optimum."""
+    """Return the ratios of the results of the genetic searches to the optimum."""
     if not study.ended:
         return unknown("no genetic search was made")
     factors = np.array([(miss_factor(end.alpha), miss_factor(end.beta)) for end in study.ended])
@@ -86,7 +86,7 @@ def search(study: Reproduction) -> Measured:
 
 
 def accuracy(study: Reproduction) -> Measured:
-    """Compare the validation errors, ours and Eq. 44, with those of the traditional Bouc–Wen model."""
+    """Compare the validation errors, nrmse_pp and Eq. 44, with those of the traditional Bouc–Wen model."""
     if not (pair := _validated(study, LITERAL, TRADITIONAL)):
         return unknown("no validation run to predict by both methods")
     (own, relative), (other, other_relative) = (
@@ -114,7 +114,7 @@ def few_parameters(study: Reproduction) -> Measured:
 
 
 def fast(study: Reproduction) -> Measured:
-    """Compare the forces computed until the searches settle."""
+    """Compare the numbers of forces computed until the searches converge."""
     if not study.direct or not study.ended:
         return unknown("no genetic searches to count")
     own, other = float(np.median([end.to_settle for end in study.ended])), float(np.median(list(study.direct.values())))
@@ -136,7 +136,7 @@ def generalisation(study: Reproduction) -> Measured:
 
 
 def _validated(study: Reproduction, *titles: str) -> list[RecipeResult]:
-    """Return the methods of these titles, or none if one of them predicts no validation run."""
+    """Return the methods of these titles; empty if one of them predicts no validation run."""
     methods = [method for title in titles if (method := study.contender(title)) and method.validation.runs]
     return methods if len(methods) == len(titles) else []
 
@@ -160,5 +160,5 @@ def scatter_over_motions(conditions: Sequence[Condition], values: Floats) -> tup
 
 
 def miss_factor(ratio: float) -> float:
-    """Return the factor by which a ratio misses one, on either side."""
+    """Return the larger of a ratio and its inverse."""
     return float(np.exp(np.abs(np.log(max(ratio, 1e-12)))))

@@ -1,4 +1,4 @@
-"""Measurements on the tests, before any model: friction, bulge, energy, stroke ends, F0 and its phase."""
+"""Measurements on the tests, without a model: friction, bulge, energy, stroke ends, F0 and its phase."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mrdamper.paper.results import SAME, Measured, Reproduction, motions, unknow
 from mrdamper.physics.motion import equivalent_sine, measured_motion
 from mrdamper.statistics.functions.fitting import fit_function
 
-_FULL = 0.9  # share of the mid-stroke force that counts as back after a reversal
+_FULL = 0.9  # share of the mid-stroke force at which it counts as restored after a reversal
 
 
 def gas_series(study: Reproduction) -> Measured:
@@ -28,7 +28,7 @@ def gas_series(study: Reproduction) -> Measured:
 
 
 def friction(study: Reproduction) -> Measured:
-    """Measure the friction of the slow test, beside the smallest peak force."""
+    """Measure the friction of the slow test, and its ratio to the smallest peak force."""
     if study.friction is None:
         return unknown("the data hold no friction test")
     _, forces = friction_along(study.friction)
@@ -121,7 +121,7 @@ def saturation(study: Reproduction) -> Measured:
 def friction_along(run: Run) -> tuple[Floats, Floats]:
     """Return positions [m] and friction [N] of a slow test: half the force between out-stroke and in-stroke.
 
-    At one position the gas spring is the same in both strokes and drops out.
+    At one position the gas force is equal in both strokes and cancels.
     """
     path, sweeps = measured_motion(run).path, []
     for stroke in np.argsort(np.bincount(path.stroke))[-2:]:
@@ -138,7 +138,7 @@ def friction_along(run: Run) -> tuple[Floats, Floats]:
 
 
 def lost_length(run: Run, damping: float, stiffness: float = 0.0) -> float:
-    """Return the distance [m] after a reversal within which 90 % of the mid-stroke force is back; median.
+    """Return the median distance [m] after a reversal at which 90 % of the mid-stroke force is restored.
 
     The viscous and the in-phase force, of a damping [N s/m] and a stiffness less mass [N/m], are subtracted: they
     differ between motions for other reasons.

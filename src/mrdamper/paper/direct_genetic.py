@@ -1,8 +1,8 @@
-"""Every parameter at once by the genetic algorithm: the method that the paper compares its own with.
+"""All parameters by the genetic algorithm: the method that the paper compares with its own.
 
-[Qian et al. 2024, section 6] The box is derived from the run itself, in yield force and yield displacement: on [0, 1e8]
-for alpha and beta, with c, k and f0 free beside them, the search ends anywhere. A = 1: with alpha, beta and gamma free
-it changes no force.
+[Qian et al. 2024, section 6] The box is derived from the run, in yield force and yield displacement: on [0, 1e8] for
+alpha and beta, with c, k and f0 free, the result is arbitrary. A = 1 is no restriction, because alpha, beta and gamma
+compensate for it.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class DirectGenetic(Method):
         return Solution(model, 0.0, at_bounds, {}, shape, minimum.evaluations, minimum.ending, seed)
 
     def _box(self, problem: Problem) -> dict[str, tuple[float, float]]:
-        """Allow every parameter up to twice what the largest force would take."""
+        """Allow every parameter up to twice the value for the largest force."""
         record = _thinned(problem)
         peak, X = 2 * float(np.max(np.abs(record.force))), record.condition.amplitude_m
         speed = X * record.omega
@@ -102,7 +102,7 @@ def _thinned(problem: Problem) -> SineRecord:
 class _Errors:
     """RMSE of the force of many points at once.
 
-    The error is quadratic in everything but the shape of the loop, so each shape is followed once and leaves a few
+    The error is quadratic in everything but the shape of the loop, so each shape is evaluated once and reduced to a few
     sums; children inherit most shapes unchanged.
     """
 

@@ -40,7 +40,7 @@ Drawing = Figure | str  # or why there is none
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure: what it shows, where the paper has it, its axes, and the function that makes it."""
+    """A figure: caption, place in the paper, axes, and the function that draws it."""
 
     title: str
     source: str  # section or equation of Qian et al. 2024; empty for figures of this study
@@ -58,7 +58,7 @@ def caption(name: str) -> str:
 def pictures(
     study: Reproduction, also: tuple[str, ...], names: tuple[str, ...], progress: Progress
 ) -> dict[str, Picture | str]:
-    """Draw figures by name, or say why they cannot be drawn."""
+    """Draw figures by name, or state why they cannot be drawn."""
     drawn: dict[str, Picture | str] = {}
     for number, name in enumerate(names):
         progress(f"figure {name}", number / len(names))
@@ -158,7 +158,7 @@ def _predicted(title: str, study: Reproduction, axes: Texts) -> Drawing:
 
 
 def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]) -> Figure:
-    """Draw force over displacement and over velocity, a column a frequency, a colour a current; the model dashed."""
+    """Draw force over displacement and velocity, one column per frequency, one colour per current; the model dashed."""
     conditions = [equivalent_sine(run).condition for run in runs]
     columns: dict[float, list[int]] = {}
     for i in sorted(range(len(runs)), key=lambda i: conditions[i].frequency_Hz):
@@ -191,7 +191,7 @@ def _plot_loop(panels: Sequence[Axes], run: Run, force: Floats, **look: Any) -> 
 
 
 def _methods_at_currents(study: Reproduction, axes: Texts) -> Drawing:
-    """Draw validation runs over the currents, as tested and as three methods predict them."""
+    """Draw validation runs over the currents, measured and predicted by three methods."""
     runs = sorted(study.held_out, key=lambda run: float(np.mean(run.current)))
     dampers = {c.recipe.title: c.damper for c in study.named(LITERAL, CONSISTENT, TRADITIONAL)}
     if not runs or not dampers:
@@ -199,18 +199,18 @@ def _methods_at_currents(study: Reproduction, axes: Texts) -> Drawing:
     return overlaid_loops([runs[i] for i in sorted({0, len(runs) // 2, len(runs) - 1})], dampers)
 
 
-# Parameters over the current, motion by motion, and their functions.
+# Parameters over the current for each motion, and their functions.
 
 
 def _parameter(study: Reproduction, name: str) -> Floats:
-    """Return F0, phi or f0 of the tests, or a literal parameter as it reads with the preset A."""
+    """Return F0, phi or f0 of the tests, or a literal parameter scaled to the preset A."""
     if name in ("phase", "offset"):
         return np.array([getattr(reading, name) for reading in study.readings])
     return study.options.scaled(name, 1.0) * values(study, LITERAL, name)
 
 
 def _over_current(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
-    """Draw a quantity over the current, a colour a motion; with a function of each motion, or the one of all runs."""
+    """Draw a quantity over the current, one colour per motion, with a function of each motion or of all runs."""
     values, log, whole = _parameter(study, name), name == "beta", function_of(study, name)
     if not values.size:
         return "the literal method could not be followed"
@@ -243,7 +243,7 @@ def _over_current(name: str, form: str, study: Reproduction, axes: Texts) -> Dra
 def _function_at(
     study: Reproduction, name: str, form: str, conditions: Sequence[Condition], values: Floats
 ) -> tuple[ParameterFunction | None, str]:
-    """Return the function drawn through the values of a motion, and a word on its fit."""
+    """Return the function drawn through the values of a motion, and a note on its fit."""
     log = name == "beta"
     if form == "whole" and (whole := function_of(study, name)):
         curve = study.options.scaled(name, 1.0) * whole.function(*features(conditions))
@@ -255,7 +255,7 @@ def _function_at(
         fit = fit_function(form, conditions, values, log=log)
     except IdentificationError:
         return None, "too few currents"
-    if form == "constant":  # a mean explains nothing: its value says more than an R² of zero
+    if form == "constant":  # R² of a mean is zero: state its value instead
         return fit.function, f"{fit.function.coefficients[0]:.4g}"
     exact = len(fit.function.coefficients) + len(fit.function.rates) >= len(conditions)
     return fit.function, "through its points" if exact else f"R² {fit.r2:.3f}"
@@ -282,7 +282,7 @@ def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> 
 
 
 def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
-    """Draw the remainder of a quantity beside its current law, a point a motion, over frequency or f · A."""
+    """Draw a quantity less its function of current, one point per motion, over frequency or f · A."""
     values = _parameter(study, name)
     if values.size != len(study.conditions):
         return f"{name} was not identified on every run"
@@ -317,7 +317,7 @@ def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Dr
 
 
 def beside_current_law(function: ParameterFunction, conditions: Sequence[Condition], values: Floats) -> Floats:
-    """Return values less what the function gives to the current alone [Qian et al. 2024, Eq. 24, 28, 33, 37]."""
+    """Return values less the function of the current alone [Qian et al. 2024, Eq. 24, 28, 33, 37]."""
     I, f, A = features(conditions)
     return values - (function(I, f, A) - function(np.zeros(I.size), f, A))
 
@@ -352,7 +352,7 @@ def _errors(study: Reproduction, axes: Texts) -> Drawing:
     figure = _figure(axes, 3.4, right=2.6)
     (panel,) = figure.axes
     for number, method in enumerate(study.contenders):
-        again, place = divmod(number, 7)  # yellow is lost on white
+        again, place = divmod(number, 7)  # yellow is hardly visible on white
         runs = sorted(method.validation.runs, key=lambda r: r.condition.current_A)
         errors = [100 * r.scores.nrmse_pp for r in runs]
         look = {"color": PALETTE[place], "ls": ("-", "--", ":")[min(again, 2)], **_POINTS}
@@ -368,7 +368,7 @@ def _genetic(study: Reproduction, axes: Texts) -> Drawing:
     figure = _figure(axes, 2.8, top=0.5)
     (panel,) = figure.axes
     for check, colour in zip(study.genetic, PALETTE[1:], strict=False):
-        # The search sees a part of the samples; its error is carried over to all of them.
+        # The search uses a part of the samples; its error is converted to that of all samples.
         carried = check.minimum.history * check.reached / check.minimum.cost
         excess = np.maximum(carried / check.optimum - 1, 1e-6)
         panel.plot(np.arange(1, excess.size + 1), excess, label=str(check.condition), color=colour, lw=_LINE)

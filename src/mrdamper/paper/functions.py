@@ -34,8 +34,8 @@ def paper_functions(
     """Fit the paper's functions by plain least squares.
 
     Shorter ones replace those that the tests do not determine. c is fitted through the viscous part of F0, as in the
-    paper [Eq. 24–26]. beta spans decades and must stay positive: its function gives the logarithm. `mass_law` is the
-    reading of Eq. 29, which the text leaves open.
+    paper [Eq. 24–26]. beta spans decades and must stay positive: its function is that of the logarithm. `mass_law` is
+    the interpretation of Eq. 29, which the text leaves open.
     """
     forms = {**PAPER_FORMS, "m": f"mass-{mass_law}"}
     conditions = tuple(i.condition for i in identifications)
@@ -58,7 +58,7 @@ def fit_paper_functions(
     }
     fit = paper_functions(identifications, mass_law, about)
 
-    @cache  # folds that differ only in runs without identification are one
+    @cache  # folds that differ only in runs without identification count once
     def fitted(kept: tuple[int, ...]) -> Damper:
         return paper_functions([identifications[i] for i in kept], mass_law).damper
 
@@ -82,7 +82,7 @@ def _fit(form: str, conditions: Sequence[Condition], values: Floats, log: bool) 
 
 
 def _fit_viscous(conditions: Sequence[Condition], c: Floats) -> FunctionFit:
-    """Fit F0 sin φ = 2π f A c over current and f A, and read it as the function of c [Eq. 24–26]."""
+    """Fit F0 sin φ = 2π f A c over current and f A, and convert it to the function of c [Eq. 24–26]."""
     speed = 2 * math.pi * np.array([condition.frequency_Hz * condition.amplitude_m for condition in conditions])
     fit = fit_function("quadratic-current-speed", conditions, speed * c)
     coefficients = tuple(value / (2 * math.pi) for value in fit.function.coefficients)

@@ -17,7 +17,7 @@ from mrdamper.errors import ParameterError
 from mrdamper.statistics.linear import Floats
 from mrdamper.statistics.stop_reason import StopReason
 
-GENERATIONS_OF_MANY = 60  # generations of a search that is one of dozens
+GENERATIONS_OF_MANY = 60  # generations of a search in a study of many runs
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class GeneticMinimum:
 def genetic(
     cost: Callable[[Floats], Floats], lower: ArrayLike, upper: ArrayLike, settings: GeneticSettings | None = None
 ) -> GeneticMinimum:
-    """Minimise a cost inside a box, then inside ever narrower ones about the best point.
+    """Minimise a cost inside a box, then inside successively narrower ones about the best point.
 
     The cost takes a whole generation of (P, D) points and gives (P,) values; the bounds (D,) are searched on a linear
     scale, as in the paper. Raises `ParameterError` if a lower bound is not below its upper bound.

@@ -82,12 +82,12 @@ class PaperOptions(StudyMethod):
 
     @property
     def bounds(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """The boxes as the method takes them, for A = 1."""
+        """The boxes of the search, for A = 1."""
         a, b = self.A, self.A ** (self.n - 1)
         return (a * self.alpha_box[0], a * self.alpha_box[1]), (b * self.beta_box[0], b * self.beta_box[1])
 
     def scaled(self, name: str, value: float) -> float:
-        """Return a parameter identified with A = 1 as it reads with the preset A."""
+        """Scale a parameter identified with A = 1 to the preset A."""
         powers = {"alpha": -1.0, "beta": 1 - self.n, "gamma": 1 - self.n}
         return value * self.A ** powers.get(name, 0.0)
 
@@ -124,11 +124,11 @@ class PaperOptions(StudyMethod):
         )
 
     def beside_others(self) -> PaperOptions:
-        """Return the method with the optimum that its genetic search approaches, and shorter functions if need be."""
+        """Return the method with the optimum that its genetic search approaches, and shorter functions if necessary."""
         return replace(self, search="optimum", functions="shorter")
 
     def compared(self) -> Sequence[Recipe]:
-        """Return the method itself, and Bouc–Wen by the genetic searches with functions as of other models."""
+        """Return the method, and Bouc–Wen by the genetic searches with the functions of other models."""
         searches = [replace(modified("bouc-wen", method), on_request=True) for method in ("paper", "direct-genetic")]
         heading = Recipe("paper", None, fit_paper_functions, _WAY, source=_SOURCE, limits=_LIMITS)
         return [replace(heading, complete=self._recipe_beside_others), *searches]

@@ -1,4 +1,4 @@
-"""The study as files: reproduction.html, tables and figures, whole or not at all."""
+"""The study as files, written atomically: reproduction.html, tables and figures."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from mrdamper.study.parallel import IN_PROCESS, Processes
 from mrdamper.study.recipe import Progress
 
 Rows = list[dict[str, Any]]
-_GROUPS = {"paper": "paper (literal)"}  # how tables name the groups of methods, where not by their own names
+_GROUPS = {"paper": "paper (literal)"}  # names of groups of methods in tables
 
 
 def write_reproduction(
@@ -88,7 +88,7 @@ def write_reproduction(
 
 
 def summary(study: Reproduction) -> dict[str, Any]:
-    """Return methods, claims, notes and times, for a program."""
+    """Return methods, claims, notes and times for JSON."""
     names = {"claim": "text"} | {n: n for n in ("verdict", "said", "evidence", "threshold", "seeds")}
     return {
         "synthetic": study.rig is not None,
@@ -100,7 +100,7 @@ def summary(study: Reproduction) -> dict[str, Any]:
 
 
 def all_tables(study: Reproduction, claims: Sequence[Claim]) -> tuple[dict[str, Rows], dict[str, str]]:
-    """Return the tables by name, those of the paper by its numbers; and why others are not made."""
+    """Return the tables by name, those of the paper by its numbers, and why others are missing."""
     tables = {name: rows(study) for name, rows in _TABLES.items()}
     tables["claims"] = [dict(vars(claim)) for claim in claims]
     reasons = _REASONS if study.held_out else {**_REASONS, **_NEED_VALIDATION}
@@ -109,7 +109,7 @@ def all_tables(study: Reproduction, claims: Sequence[Claim]) -> tuple[dict[str, 
 
 
 def method_rows(study: Reproduction) -> Rows:
-    """List accuracy on the validation runs and cost, a row a method."""
+    """List accuracy on the validation runs and cost, one row per method."""
     rows = []
     for method in study.contenders:
         validation, title = method.validation, method.recipe.title
@@ -187,8 +187,7 @@ def _model_rows(study: Reproduction) -> Rows:
 def parameter_rows(study: Reproduction) -> Rows:
     """List parameter values at every validation condition (80 mm, 1 Hz on the virtual rig), method by method.
 
-    "By the functions" are predicted; "identified there" come from the validation run itself and serve to compare,
-    never to fit.
+    "By the functions" are predicted; "identified there" are identified from the validation run for comparison only.
     """
     rows: Rows = []
 
@@ -213,7 +212,7 @@ def parameter_rows(study: Reproduction) -> Rows:
 
 
 def _parameters(study: Reproduction, model: Model) -> dict[str, float]:
-    """Return parameters by name and unit, as they read with the preset A."""
+    """Return parameters by name and unit, scaled to the preset A."""
     values = {
         f"{info.name} [{info.unit}]": study.options.scaled(info.name, float(getattr(model, info.name)))
         for info in model.parameters()

@@ -1,8 +1,8 @@
 """Identification of the paper, literally: c and m in closed form, alpha and beta by a search.
 
 [Qian et al. 2024, Eq. 16–22] Every point that the text leaves open is a named option. The method counts the hysteretic
-force twice, inside c and m and once more as alpha z; each result states how much of its c is hysteretic. `Balance` is
-the consistent counterpart.
+force twice, in c and m and as alpha z; each result states how much of its c is hysteretic. `Balance` is the consistent
+counterpart.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Paper(Method):
     search: Literal["genetic", "optimum"] = "genetic"
     genetic: GeneticSettings = field(default_factory=GeneticSettings)
     bounds: tuple[Box, Box] = ((0.0, 1e8), (0.0, 1e8))  # of alpha [N/m] and beta [m^-n], the paper's [0, 1e8]
-    explain: bool = True  # note how much of c is hysteretic; takes a consistent balance besides
+    explain: bool = True  # note how much of c is hysteretic, by an additional consistent balance
 
     def for_many_runs(self) -> Method:
         """Return the method with a short genetic search, where the paper takes 500 generations."""
@@ -117,7 +117,7 @@ class Paper(Method):
 
 @dataclass(frozen=True, eq=False)
 class _Remainder:
-    """Force that the closed forms leave for alpha z to explain [Qian et al. 2024, Eq. 21–22]."""
+    """Remainder of the force after the closed forms, to be described by alpha z [Qian et al. 2024, Eq. 21–22]."""
 
     problem: Problem
     record: SineRecord
@@ -163,7 +163,7 @@ class _Remainder:
 
     @property
     def longest(self) -> float:
-        """Yield displacement [m] at which a gamma that is held leaves nothing for beta."""
+        """Yield displacement [m] at which beta is zero for the given gamma."""
         gamma = self.problem.fixed.get("gamma", 0.0)
         return 0.999 * gamma ** (-1 / self.problem.fixed["n"]) if gamma > 0 else np.inf
 

@@ -50,9 +50,9 @@ def recipes_of_paper(
     *,
     explain: bool = True,
 ) -> Steps:
-    """Return the recipes that are compared, but for the costly ones, and the identification runs of each.
+    """Return the compared recipes, except for the expensive ones, and the identification runs of each.
 
-    With `explain` the literal method states for every run how much of its c is hysteretic.
+    With `explain` the literal method states the hysteretic part of c for every run.
     """
     literal = replace(options.method("optimum"), explain=explain)
     half = replace(literal, force_amplitude="half-peak-to-peak", explain=False)
@@ -74,9 +74,9 @@ def recipes_of_paper(
 
 
 def comparators(train: Sequence[Run], held_out: Sequence[Run], assumptions: PaperAssumptions) -> Steps:
-    """Return the paper's comparators: every parameter by the genetic algorithm, one run a current; Ali's model.
+    """Return the paper's comparators: all parameters by the genetic algorithm, one run per current; Ali's model.
 
-    Ali's, whose every run is integrated thousands of times, is identified at every other current of a large matrix.
+    Ali's model, which integrates every run thousands of times, is identified at every other current of a large matrix.
     """
     basis = assumptions.basis(DirectGenetic.name)
     direct = Recipe("bouc-wen:direct-genetic", basis, one_per_current, "traditional", DIRECT)

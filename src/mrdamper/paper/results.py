@@ -27,11 +27,11 @@ SAME = 0.08  # relative tolerance within which two runs have one motion
 
 @dataclass(frozen=True)
 class GeneticCheck:
-    """Genetic search with the paper's settings on one run, beside the optimum of the same error."""
+    """Genetic search with the paper's settings on one run, and the optimum of the same error."""
 
     condition: Condition
     minimum: GeneticMinimum
-    # reached and optimum: RMSE where it ended and the lowest there is [N]
+    # reached and optimum: RMSE at the end of the search and its minimum [N]
     reached: float
     optimum: float
     seconds: float
@@ -66,16 +66,16 @@ class Reproduction:
     loops: tuple[LoopAnalysis, ...]
     readings: tuple[ForceReading, ...]  # F0, phi, f0 of the identification runs
     options: PaperOptions
-    contenders: tuple[RecipeResult, ...] = ()  # methods compared; their `recipe.title` tells them apart
+    contenders: tuple[RecipeResult, ...] = ()  # compared methods, with different `recipe.title`
     # validation runs identified by the literal and the consistent method, by title and run id, or why not
     there: Mapping[tuple[str, str], Identification | str] = field(default_factory=dict)
     genetic: tuple[GeneticCheck, ...] = ()
-    ended: tuple[GeneticEnd, ...] = ()  # one for each identification run, a seed each
+    ended: tuple[GeneticEnd, ...] = ()  # one for each identification run, with its own seed
     # forces computed until the direct genetic search settled, by run id
     direct: Mapping[str, int] = field(default_factory=dict)
-    # median validation nrmse_pp by method, one a noise seed
+    # median validation nrmse_pp by method, one per noise seed
     seed_errors: Mapping[str, Floats] = field(default_factory=dict)
-    # verdicts by the key of the claim, one a noise seed
+    # verdicts by the key of the claim, one per noise seed
     seed_verdicts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     sensitivity: tuple[OneAtATime, ...] = ()
     sobol: Sobol | None = None
@@ -170,7 +170,7 @@ def cost_per_run(study: Reproduction, method: RecipeResult) -> tuple[float, floa
 
 @dataclass(frozen=True)
 class Measured:
-    """Values that a claim rests on, in the order of its limits; none where it could not be measured."""
+    """Values of a claim in the order of its limits; empty where it could not be measured."""
 
     values: tuple[float, ...] = ()
     evidence: str = ""  # further values, or why there are none

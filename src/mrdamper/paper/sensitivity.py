@@ -1,9 +1,9 @@
 """Sensitivity of the force to each parameter at a condition, and the cost of presetting one.
 
-The loop is varied in coordinates that no unit of length changes: yield force, yield displacement, exponent n and
-asymmetry (gamma − beta)/(gamma + beta). A change of n with beta and gamma held would move the yield displacement by a
-power of the unit chosen. A parameter may be preset if changing it hardly changes the force, or if the others make up
-for it when they are identified anew: the second is why A = 1 costs nothing at all.
+The loop is varied in coordinates that do not depend on the unit of length: yield force, yield displacement, exponent n
+and asymmetry (gamma − beta)/(gamma + beta). A change of n with beta and gamma held would move the yield displacement by
+a power of the unit chosen. A parameter may be preset if it hardly changes the force, or if the others compensate for it
+when they are identified again, as they do for A = 1.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class OneAtATime:
     name: str
     change: float  # relative change made
     effect: float  # RMS change of the force over its standard deviation, the other parameters held
-    # the same, once the free parameters were identified anew with this one preset wrongly; NaN if they were not
+    # the same after identification of the free parameters with this one preset wrongly; NaN without it
     left: float
 
 
@@ -59,10 +59,10 @@ def one_at_a_time(
     change: float = 0.1,
     refit: Sequence[str] = ("asymmetry", "A", "n"),
 ) -> tuple[OneAtATime, ...]:
-    """Change one parameter after the other, and identify the others anew for those that may be preset.
+    """Change single parameters, and identify the others again for those that may be preset.
 
     `names` are coordinates, and "A", the factor of v that the model keeps at 1. The change is relative; of the
-    asymmetry, which runs from -1 to 1, it is a difference. The others may make up for a change of those in `refit`.
+    asymmetry, which lies between -1 and 1, it is a difference. For those in `refit` the others are identified again.
     Raises `UnknownNameError` if there is no such parameter.
     """
     base = _loop(model, condition)

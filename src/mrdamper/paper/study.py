@@ -40,7 +40,7 @@ from mrdamper.study.recipe import IdentificationCache, Progress, RecipeResult, f
 from mrdamper.study.usable_runs import usable_sines
 
 SOBOL_SAMPLES = 512
-SEED_CURRENTS, _SEED_CYCLES = (0.0, 0.5, 1.0, 1.5, 2.0), 2  # [A], cycles a run: tests of each noise seed
+SEED_CURRENTS, _SEED_CYCLES = (0.0, 0.5, 1.0, 1.5, 2.0), 2  # [A], cycles per run: tests of each noise seed
 _MAX_SLOW_SPEED = 1e-4  # mean speed below which a test is quasi-static [m/s]
 _NO_CURRENT = 0.02  # largest current of a test without current [A]
 _SENSITIVITY, _CHECK, _SEED, _RUN = 3.0, 1.5, 1.2, 0.5  # relative durations of the tasks, for the time left
@@ -72,7 +72,7 @@ def reproduce(
     seeds : int
         Noise seeds of the virtual rig over which validation errors and verdicts are repeated.
     processes : Processes
-        Where independent tasks are done; any number gives the same bits.
+        Processes for independent tasks; any number gives the same bits.
     progress : callable
         Called with the name of the step and the share done.
 
@@ -140,7 +140,7 @@ def reproduce(
 def _identified_there(
     bases: Mapping[str, Basis | None], held_out: Sequence[Run], cache: _Identified
 ) -> dict[tuple[str, str], Identification | str]:
-    """Return the identifications of the runs held out, by title of the recipe and id of the run."""
+    """Return the identifications of the validation runs, by title of the recipe and id of the run."""
     by_title = [(title, basis) for title, basis in bases.items() if basis]
     return {(title, run.id): cache.runs[basis, run.id][0] for title, basis in by_title for run in held_out}
 
@@ -197,7 +197,7 @@ def _slow_test(dataset: Dataset) -> Run | None:
 
 
 def _range_notes(train: Sequence[Run]) -> tuple[str, ...]:
-    """Name what leaves the paper's range, and its functions that these tests do not determine."""
+    """List conditions outside the paper's range, and its functions that these tests do not determine."""
     missing = missing_functions([SineRecord.of(run).condition for run in train])
     return (
         *outside_paper_range(train),
@@ -264,7 +264,7 @@ def _identify_all(run: Run, bases: Sequence[Basis], progress: Progress) -> _Iden
 def _fit_all(
     steps: Steps, held_out: Sequence[Run], cache: IdentificationCache, processes: Processes, progress: Progress
 ) -> tuple[list[RecipeResult], dict[str, str]]:
-    """Fit over conditions and score, a recipe a task; the joint fit takes longest."""
+    """Fit over conditions and score, one recipe per task; the joint fit takes longest."""
     tasks = [(*step, held_out) for step in sorted(steps, key=lambda step: step[0].title != JOINT)]
     done = follow_each(tasks, cache, processes, progress, leave_out=False)
     scored = {one.recipe.title: one for one in done if isinstance(one, RecipeResult)}
@@ -273,7 +273,7 @@ def _fit_all(
 
 
 def _genetic_ends(searches: Mapping[str, Basis], optimum: Basis | None, cache: _Identified) -> tuple[GeneticEnd, ...]:
-    """Compare where the searches ended with the optimum of the same runs."""
+    """Compare the results of the searches with the optimum of the same runs."""
     ends = []
     for run_id, basis in searches.items():
         (one, seconds), (best, _) = cache.runs[basis, run_id], cache.runs.get((optimum, run_id), ("", 0.0))  # type: ignore[arg-type]
@@ -313,7 +313,7 @@ def _genetic_check(
 def _sensitivities(
     assumptions: PaperAssumptions, train: Sequence[Run], progress: Progress
 ) -> tuple[tuple[OneAtATime, ...], Sobol | None, tuple[str, ...]]:
-    """Compute sensitivities at the middle identification run by the consistent method, or say why there are none."""
+    """Compute sensitivities at the middle identification run by the consistent method, or state why there are none."""
     progress("sensitivity", 0.0)
     conditions = {run.id: SineRecord.of(run).condition for run in train}
     middle = sorted(train, key=lambda r: conditions[r.id].current_A * conditions[r.id].peak_velocity)[len(train) // 2]
@@ -334,9 +334,10 @@ class _Seed:
 
 
 def _one_seed(rig: VirtualRig, options: PaperOptions, seed: int, progress: Progress) -> _Seed:
-    """Follow the quick methods with one seed of noise, on every other current and two cycles a run.
+    """Run the fast methods with one seed of noise, on every other current and two cycles per run.
 
-    The joint fit takes as long as all the rest, and noise moves both readings of F0 alike: they are left out.
+    The joint fit, which takes as long as the others together, and the second definition of F0, which noise changes
+    equally, are omitted.
     """
     progress(f"noise seed {seed}", 0.0)
     study = _tests(virtual_dataset(rig, SEED_CURRENTS, seed, _SEED_CYCLES), rig, rig.gas, options, seed)

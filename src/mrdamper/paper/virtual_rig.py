@@ -1,8 +1,7 @@
 """A synthetic damper on a synthetic rig, more complex than any model identified here.
 
-It stands in for test data that are not public, so that a method can be followed from the first loop to the last table
-against known parameters: every one is a field. The test matrix is that of Qian et al. 2024, section 2; the parameters
-of the damper are ours, of the size such dampers have.
+It replaces test data that are not public, so that methods can be checked against known parameters, which are its
+fields. The test matrix is that of Qian et al. 2024, section 2; the parameters of the damper are typical values.
 """
 
 from __future__ import annotations
@@ -33,10 +32,9 @@ SYNTHETIC = {"licence": "CC0-1.0", "provenance": "synthetic: mrdamper.paper.virt
 class VirtualRig:
     """The damper, its sensors and its recorder. Displacement and force are positive in extension.
 
-    The force is the exact gas spring, a shear-thinning viscous force, a hysteretic force whose
-    yield saturates with current, whose knee lags with rate and which is partly missing after
-    each reversal until a vacuum cavity has closed, seal friction that varies along the stroke,
-    inertia and an offset.
+    The force is the sum of the exact gas spring, a shear-thinning viscous force, a hysteretic force, seal friction that
+    varies along the stroke, inertia and an offset. The yield force saturates with current, the yield point lags with
+    rate, and after each reversal the hysteretic force is partly missing until a vacuum cavity has closed.
     """
 
     gas_pressure: float = param("Pa", "absolute gas pressure at mid-stroke", bounds=(0, np.inf), default=1.5e6)
@@ -83,7 +81,7 @@ class VirtualRig:
 
     @cached_property
     def gas(self) -> GasSpring:
-        """The gas spring, as the identification may know it."""
+        """The gas spring, for the identification."""
         return GasSpring(self.gas_pressure, self.gas_volume, np.pi * self.rod_diameter**2 / 4)
 
     def magnetisation(self, current: Any) -> Floats:
@@ -96,7 +94,7 @@ class VirtualRig:
         return self.yield_off + self.yield_per_ampere * self.magnetisation(current)
 
     def force(self, motion: Excitation) -> Floats:
-        """Return the true force [N] along a motion from rest, before any sensor."""
+        """Return the true force [N] along a motion from rest, without sensor effects."""
         x, v, a, path = motion.displacement, motion.velocity, motion.acceleration, motion.path
         viscosity = self.viscosity + self.viscosity_per_ampere * self.magnetisation(motion.current)
         viscous = viscosity * v * (1 + (v / self.thinning_speed) ** 2) ** (-self.thinning / 2)
@@ -189,7 +187,7 @@ def true_runs(
 def friction_test(rig: VirtualRig, seed: int = 0, *, filled: bool = False) -> Run:
     """Test one cycle of 20 mm at 0.01 mm/s without current [Qian et al. 2024, section 2]; synthetic.
 
-    The paper's test is without fluid: no yield and no viscous force is in it. With `filled` the fluid is in the damper.
+    The paper's test is without fluid: it contains no yield and no viscous force. With `filled` it has the fluid.
     """
     if not filled:
         rig = replace(rig, yield_off=0.0, yield_per_ampere=0.0, viscosity=0.0, viscosity_per_ampere=0.0)

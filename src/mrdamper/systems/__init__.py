@@ -1,1 +1,1 @@
-"""Dampers at work: vehicles and buildings, what shakes them, and the laws that set the current."""
+"""Simulation of dampers in vehicles and buildings: structures, inputs and controllers."""

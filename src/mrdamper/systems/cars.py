@@ -25,9 +25,9 @@ class SystemPart(BaseModel):
 
 @dataclass(frozen=True)
 class _Axle:
-    """A wheel with what is above and below it; `load` of the body on it [kg], other units SI."""
+    """A wheel with its suspension and tyre; `load` of the body on it [kg], other units SI."""
 
-    suffix: str  # of the names of its links and spans
+    suffix: str  # suffix of the names of its links and spans
     above: str
     wheel: str
     road: str
@@ -44,7 +44,7 @@ class Car(SystemPart):
 
     body_kg: Positive
     tyre_damping_N_s_m: NotNegative = 0.0
-    stop_gap_m: Positive | None = None  # free travel of the bump stops either way
+    stop_gap_m: Positive | None = None  # free travel of the bump stops in each direction
     stop_N_m: NotNegative = 0.0
 
     def _system(
@@ -72,7 +72,7 @@ class Car(SystemPart):
 
 
 class QuarterCar(Car):
-    """A quarter of a car; its damping is that of a passive damper beside the controlled one."""
+    """A quarter of a car; its damping is that of a passive damper parallel to the controlled one."""
 
     wheel_kg: Positive
     spring_N_m: Positive
@@ -102,7 +102,7 @@ class HalfCar(Car):
         corners = {"body_front": np.array([1.0, -front, 0, 0]), "body_rear": np.array([1.0, rear, 0, 0])}
         masses = {"body": self.body_kg, "pitch": self.pitch_inertia_kg_m2}
         axles = []
-        for i, (end, arm) in enumerate((("front", rear), ("rear", front))):  # the other arm carries more
+        for i, (end, arm) in enumerate((("front", rear), ("rear", front))):  # the load is larger on the shorter arm
             masses[f"wheel_{end}"] = self.wheel_kg[i]
             parts = (self.wheel_kg[i], self.spring_N_m[i], self.tyre_N_m[i])
             load = arm / (front + rear) * self.body_kg

@@ -1,4 +1,4 @@
-"""Controllers side by side on one system and one input, between doing nothing and the preview bound."""
+"""Comparison of controllers on one system and one input, from no current to the non-causal optimum."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from mrdamper.systems.structure import System
 class ControllerComparison:
     """Runs of one system at one step."""
 
-    runs: Mapping[str, Simulation]  # by title; no current and the highest current first, the preview last
+    runs: Mapping[str, Simulation]  # by title; no current and the highest current first, the non-causal optimum last
 
     def share(self, title: str) -> float:
-        """Calculate how far a run has come from no current (0) to the non-causal optimum (1), in mean square."""
+        """Calculate the mean square of a run between no current (0) and the non-causal optimum (1)."""
         costs = {name: cost(run) for name, run in self.runs.items()}
         worst, best = next(iter(costs.values())), list(costs.values())[-1]
         return (worst - costs[title]) / (worst - best) if worst > best else 1.0
@@ -38,10 +38,10 @@ def compare_controllers(
     highest: float | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> ControllerComparison:
-    """Run controllers one after the other, all at the step that the first one settles at.
+    """Run controllers at one step, at which the first one has converged.
 
-    `system`, `source`, `dampers`, `step`, `highest`: as `simulate_system`; `controllers`: beside no current, the
-    highest current, and the preview; `progress`: told what is being done and the share done, 0...1.
+    `system`, `source`, `dampers`, `step`, `highest`: as `simulate_system`; `controllers`: compared with no current, the
+    highest current and the non-causal optimum; `progress`: called with the step and the share done, 0...1.
     """
     if highest is None:
         highest = max(damper.envelope.current_A[1] for damper in dampers.values())

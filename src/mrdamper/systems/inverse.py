@@ -1,9 +1,8 @@
-"""From a wanted force to a current: the damper's own program, turned round.
+"""Inverse model: the current for a required force, from the program of the damper.
 
-The inverse carries the damper's memory with it. At each sample it asks what the damper would
-answer to the lowest and the highest current (the reachable interval), searches between them,
-and commands the coil ahead of its lag. Where the force hardly depends on the current, as at a
-reversal, it keeps the current it had: there is nothing to be gained, and a search would jump.
+The inverse contains the memory of the damper. At each sample it evaluates the damper at the lowest and the highest
+current (the reachable interval), searches between them, and compensates for the lag of the coil. Where the force hardly
+depends on the current, as at a reversal, it keeps the current, because the result of a search would jump.
 """
 
 from __future__ import annotations
@@ -24,12 +23,12 @@ from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.graft import ProgramCopy
 from mrdamper.tracing.python import python_functions
 
-_ROUNDS = 2  # of the search after the two ends
+_ROUNDS = 2  # evaluations of the search after the two ends
 _BLUNT = 0.01  # of the widest reachable interval: below, the current is kept
-_FIELD_TIME_RATIO = 0.1  # of the coil's lag in which the field is brought to where it should be
-_TURNS_BACK = 5e-3  # of the interval that a force may fall back with more current
-_GRID, _MOTION = 6, 960  # currents, samples of the motion they are tried on
-_MAX_FORCE_N = 1e150  # force whose square is still a number [N]
+_FIELD_TIME_RATIO = 0.1  # share of the coil's lag in which the field reaches its command
+_TURNS_BACK = 5e-3  # share of the interval by which a force may decrease with current
+_GRID, _MOTION = 6, 960  # numbers of currents, and of samples of the motion on which they are tried
+_MAX_FORCE_N = 1e150  # largest force whose square is finite [N]
 
 
 @dataclass(frozen=True)
@@ -37,15 +36,15 @@ class Demand:
     """Current, force and reachable interval of an inverse; expressions on a tape, or numbers."""
 
     current: Any  # to command [A]
-    force: Any  # at the field that is there now [N]
+    force: Any  # at the present field [N]
     lowest: Any  # end of the reachable interval [N]
     highest: Any  # its other end [N]
 
 
 def check_monotone(damper: Damper, highest: float | None = None) -> float:
-    """Widest reachable interval [N] along a tested sine; the force must not turn back with current.
+    """Widest reachable interval [N] along a tested sine; the force must not decrease with current.
 
-    Raises `ParameterError` (E_NOT_MONOTONE) with the current from which more gives less.
+    Raises `ParameterError` (E_NOT_MONOTONE) with the current above which it decreases.
     """
     low, high = 0.0, damper.envelope.current_A[1] if highest is None else highest
     if not high > low:
@@ -64,7 +63,7 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
             remedy="identify it from tests at several currents", code="E_NOT_MONOTONE",
         )  # fmt: skip
     wide = width > 0.2 * width.max()
-    rises = np.where(table[wide, -1] < table[wide, 0], -1.0, 1.0)  # also of a force that comes back whole
+    rises = np.where(table[wide, -1] < table[wide, 0], -1.0, 1.0)  # also if the force increases again
     back = np.diff(table[wide], axis=1) * -rises[:, None] / width[wide][:, None]
     if back.max() > _TURNS_BACK:
         at = grid[back.max(axis=0).argmax()]
@@ -99,8 +98,8 @@ def invert_on(
 ) -> Demand:
     """Write the inverse of a damper on a tape.
 
-    The names of its memory begin with `prefix`; the motion holds displacement, velocity, acceleration and dt; the
-    wanted force and the width from `check_monotone` are in N, the highest current in A.
+    The names of its memory begin with `prefix`; the motion contains displacement, velocity, acceleration and dt; the
+    required force and the width from `check_monotone` are in N, the highest current in A.
     """
     bare = stream(replace(damper, coil=None)).step
     copy = ProgramCopy(bare, tape, prefix, "current", **motion)
@@ -118,7 +117,7 @@ def invert_on(
         return Demand(steady, copy.settle(steady)["force"], lowest, most)
     field = tape.remember(f"{prefix}field")
     lag = tape.select(steady > field, coil.rise_s, coil.fall_s)
-    before = tape.select(tape.first, steady, field)  # a coil starts settled at its first command
+    before = tape.select(tape.first, steady, field)  # a coil starts in the steady state of its first command
     ahead = steady + (steady - before) * lag / np.maximum(_FIELD_TIME_RATIO * lag, 2 * motion["dt"])
     command = np.minimum(np.maximum(ahead, 0.0), highest)
     field_current = field_step(tape, motion["dt"], command, coil.rise_s, coil.fall_s)
@@ -146,10 +145,10 @@ def _searched(tape: Tape, copy: ProgramCopy, ends: list[tuple[Any, Any]], target
 
 
 class Inverse:
-    """A damper asked for a force, sample by sample; made by `invert`.
+    """Inverse model of a damper, sample by sample; made by `invert`.
 
-    Its program goes from displacement [m], velocity [m/s], acceleration [m/s²], wanted force [N] and dt [s] to current
-    [A], force [N] and the reachable interval [N].
+    Its program computes current [A], force [N] and the reachable interval [N] from displacement [m], velocity [m/s],
+    acceleration [m/s²], required force [N] and dt [s].
     """
 
     units: ClassVar[Mapping[str, str]] = {
@@ -164,13 +163,13 @@ class Inverse:
         self.reset()
 
     def reset(self) -> None:
-        """Back to rest."""
+        """Return to the state at rest."""
         self._memory = tuple(self.program.tape.starts.values())
 
     def step(self, displacement: float, velocity: float, acceleration: float, wanted: float, dt: float) -> Demand:
-        """Calculate the current for a wanted force at the next sample of a motion.
+        """Calculate the current for a required force at the next sample of a motion.
 
-        Raises `ParameterError` if a value is not finite, dt is not positive, or the damper has no answer there.
+        Raises `ParameterError` if a value is not finite, dt is not positive, or the damper has no solution there.
         """
         sample = numbers(displacement, velocity, acceleration, wanted, dt)
         if not (all(map(math.isfinite, sample)) and sample[-1] > 0):
@@ -199,7 +198,7 @@ class Inverse:
 
 @validate_arguments()
 def invert(damper: Damper, highest: float | None = None) -> Inverse:
-    """Prepare the calculation of the current for a wanted force.
+    """Prepare the calculation of the current for a required force.
 
     Parameters
     ----------

@@ -1,9 +1,8 @@
-"""The loop in time: a linear structure and the elements between its points, step by step.
+"""Time integration of a linear structure and the elements between its points.
 
-Trapezoidal rule (Newmark, average acceleration) for the structure, solved together with the
-force of every element at the end of the step: unconditionally stable for the structure, and
-for elements as stiff as they come. The discrete energy balance holds to rounding, so a gap in
-it means a wrong sign or a search that was not finished, never the step.
+Trapezoidal rule (Newmark, average acceleration) for the structure, solved together with the force of every element at
+the end of the step: unconditionally stable for the structure and for elements of any stiffness. The discrete energy
+balance holds to rounding for any step, so a gap indicates a wrong sign or a search that did not converge.
 
 `mrdamper.systems.machine` runs the same loop compiled, for many steps or many runs.
 """
@@ -31,21 +30,21 @@ Step = Callable[..., Any]
 
 @dataclass(frozen=True, eq=False)
 class LoopElement:
-    """A function for one sample, with its numbers: (p, derived, memory, inputs) → (status, outputs, memory)."""
+    """A function for one sample, with its parameters: (p, derived, memory, inputs) → (status, outputs, memory)."""
 
     step: Step
     given: tuple[float, ...]  # its parameters
-    derived: tuple[float, ...]  # what follows from them
+    derived: tuple[float, ...]  # derived constants
     start: tuple[float, ...]  # the memory before the first sample
-    program: Program  # what `step` was made of
-    lines: int  # of the program: what a step costs in the interpreter
+    program: Program  # source of `step`
+    lines: int  # lines of the program, the cost of a step in the interpreter
     prepare: Callable[..., Any]  # from other parameters to (status, derived)
     names: tuple[str, ...] = ()  # of its parameters
-    scale: tuple[float, float] = (1.0, 0.0)  # gain and offset of what it gives first
+    scale: tuple[float, float] = (1.0, 0.0)  # gain and offset of its first output
 
     @property
     def scaled_given(self) -> tuple[float, ...]:
-        """Gain, offset, parameters: as they are concatenated."""
+        """Gain, offset and parameters, concatenated."""
         return (*self.scale, *self.given)
 
     def scaled(self, gain: float, offset: float) -> LoopElement:
@@ -54,7 +53,7 @@ class LoopElement:
 
     @property
     def sizes(self) -> tuple[int, int, int]:
-        """Numbers of parameters, of what follows from them, and of what is remembered."""
+        """Numbers of parameters, derived constants and memory values."""
         return len(self.given), len(self.derived), len(self.start)
 
     def at(self, given: tuple[float, ...]) -> LoopElement:
@@ -70,7 +69,7 @@ class LoopElement:
 
 @dataclass(frozen=True, eq=False)
 class ElementParameters:
-    """All numbers of stages, end to end, and where each one's begin."""
+    """Concatenated parameters of all elements, and where those of each begin."""
 
     given: Floats
     derived: Floats
@@ -87,8 +86,8 @@ class ElementParameters:
 def interpreted_loop(elements: Sequence[LoopElement], control: LoopElement | None) -> Callable[..., int]:
     """Return the loop for these stages in the interpreter: `walk` without its first two arguments.
 
-    Elements go from displacement [m], velocity [m/s], acceleration [m/s²], command [A] and dt [s] to force [N] and
-    flags, the control from signals and dt to one command [A] an element.
+    Elements compute force [N] and flags from displacement [m], velocity [m/s], acceleration [m/s²], command [A] and dt
+    [s]; the control computes one command [A] per element from signals and dt.
     """
     ends = np.cumsum([[0, 0, 0], *([2 + p, d, m] for p, d, m in (e.sizes for e in elements))], axis=0).tolist()
 
@@ -112,21 +111,21 @@ def _numbers(values: Floats) -> tuple[float, ...]:
 
 
 def slope_and_scale(count: int) -> tuple[Floats, Floats]:
-    """Slopes of the elements' forces [N s/m] and their largest forces [N], as a search begins with them."""
+    """Slopes of the elements' forces [N s/m] and their largest forces [N], as start values of a search."""
     return np.zeros(count), np.full(count, 1e-6)
 
 
 def search(evaluate, j, p, d, memory, later, state, free, compliance, current, dt, slope, scale):
-    """End velocity and force of one element: where its force meets the structure's line.
+    """Solve for the end velocity and force of one element.
 
-    The structure moves by `u = free − compliance f`; the element answers D(u). Their gap
-    grows with u, so that a secant inside a bracket ends, at a jump of D too.
+    The structure moves by `u = free − compliance f`, and the force of the element is D(u). Their difference increases
+    with u, so that a secant method within a bracket converges, also at a jump of D.
     """
     x0, u0, f0, drift = state
     low, high = -math.inf, math.inf
     gap_low, gap_high = 0.0, 0.0
     stiff = 1.0 / compliance
-    u = (free * stiff + slope * u0 - f0) / (slope + stiff)  # as if the force went on along its slope
+    u = (free * stiff + slope * u0 - f0) / (slope + stiff)  # extrapolated along the slope
     last_u, last_gap = u, 0.0
     f, flags = f0, 0.0
     for k in range(_MAX_EVALUATIONS):
@@ -154,7 +153,7 @@ def search(evaluate, j, p, d, memory, later, state, free, compliance, current, d
                 u = low - 2.0 * gap_low * compliance
             else:
                 u = 0.5 * (low + high)
-    if not (math.isinf(low) or math.isinf(high)):  # a jump: the structure decides on the force
+    if not (math.isinf(low) or math.isinf(high)):  # a jump: the structure determines the force
         return 0, u, (free - u) * stiff, flags, slope
     return 1, u, f, flags, slope
 
@@ -165,12 +164,12 @@ def walk(
     ):  # fmt: skip
     """Fill x, v (N, n), f, currents, flags (N, E) from their first rows on; the step that failed, or −1.
 
-    A record may be walked in parts: `memory`, `cm`, `slope` and `scale` (E,) are left as the next part begins with
-    them, and the last row of one part is the first of the next.
+    A record may be computed in parts: `memory`, `cm`, `slope` and `scale` (E,) are updated for the next part, and the
+    last row of one part is the first of the next.
 
-    End velocity of the points is 2 (P v + Q x + load − R f_mean) − v. `loads` (N, n) is the
-    response to the mean load of the step that ends there, `road` and `road_rate` (N, E) what
-    the input adds to an element's stroke and its rate, `seen` (N, S) to a signal.
+    End velocity of the points is 2 (P v + Q x + load − R f_mean) − v. `loads` (N, n) is the response to the mean load
+    of the step that ends there, `road` and `road_rate` (N, E) the contribution of the input to an element's stroke and
+    its rate, `seen` (N, S) to a signal.
     """
     samples, n = x.shape
     count = f.shape[1]

@@ -1,4 +1,4 @@
-"""The structure without what is nonlinear in it, as linear control sees it, and what good control is."""
+"""Linear structure for the design of controllers, and the objectives of control."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.systems.structure import GRAVITY, Link, System
 
-_TRAVEL, _TYRE = 0.5, 0.5  # weight of a car's travel and tyre deflection beside its acceleration
+_TRAVEL, _TYRE = 0.5, 0.5  # weight of a car's travel and tyre deflection relative to its acceleration
 
 
 @dataclass(frozen=True)
 class Aim:
-    """One thing control keeps small: an acceleration, or a span times a frequency squared."""
+    """An objective: an acceleration, or a relative displacement times a frequency squared."""
 
     kind: str  # "acceleration" or "span"
     name: str  # of a point, or of a span
@@ -24,7 +24,7 @@ class Aim:
 
 
 def aims(system: System) -> tuple[Aim, ...]:
-    """List the quantities that control keeps small, all in m/s².
+    """List the objectives of control, all in m/s².
 
     In a building: absolute accelerations of the floors, and storey drifts times the square of the
     lowest frequency. In a car: accelerations above the dampers, travel times half of that square,
@@ -50,9 +50,9 @@ class LinearSystem:
     E: Floats  # (2n, q)
     # ((S, 2n), (S, E)) accelerations of the coordinates, then strokes of the dampers, from z and f
     seen: tuple[Floats, Floats]
-    # ((P, 2n), (P, E)) `aims`, weighted, from z and f; what the input itself adds is left out
+    # ((P, 2n), (P, E)) `aims`, weighted, from z and f, without the contribution of the input
     aim: tuple[Floats, Floats]
-    mass: float  # of everything that translates [kg]
+    mass: float  # of all translating masses [kg]
 
 
 def linear_system(system: System, dampers: Sequence[Link]) -> LinearSystem:

@@ -1,4 +1,4 @@
-"""The links of a system as stages of the loop: dampers, bump stops, tyres that lift off."""
+"""Links of a system as elements of the time integration: dampers, bump stops, tyres that lift off."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def stage_of(program: Program) -> LoopElement:
     )
 
 
-@lru_cache(maxsize=32)  # a loop is made again for every law
+@lru_cache(maxsize=32)  # a loop is prepared for every law
 def damper_stage(damper: Damper, free: bool = False) -> LoopElement:
-    """Return a damper as a stage, its own parameters free to change if asked for; raises as `stream`."""
+    """Return a damper as a stage, with variable parameters on request; raises as `stream`."""
     return stage_of(trace(damper, free))
 
 
@@ -52,6 +52,6 @@ def _stop(tape: Tape, x: Any, v: Any, stiffness: Any, damping: Any, gap: Any) ->
 
 
 def _tyre(tape: Tape, x: Any, v: Any, stiffness: Any, damping: Any, gap: Any) -> tuple[Any, Any]:
-    """Calculate the force to give back: the structure holds the tyre as a spring that also pulls."""
+    """Calculate the correction of the force: in the structure the tyre is a spring that also transmits tension."""
     pull = stiffness * (x - gap) + damping * v
     return tape.select(pull > 0, -pull, 0.0), pull > 0

@@ -1,4 +1,4 @@
-"""The loop compiled: `loop.c`, with what the elements and the control law answer as the C of their programs."""
+"""Compiled time integration: `loop.c` with the C programs of the elements and the control law."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def _alike(
                 law.derived, law.start.copy(), *slope_and_scale(count), currents, x, v, f, flags,
             )  # fmt: skip
         except (ValueError, ArithmeticError):
-            return True  # of the interpreter, where compiled code goes on with what is not finite
+            return True  # of the interpreter, where compiled code continues with values that are not finite
         results.append((failed, np.column_stack([x, v, f, currents])))
     (failed, motion), (expected, reference) = results
     size = np.abs(reference).max(axis=0) + 1e-30

@@ -36,7 +36,7 @@ def comfort(acceleration: Floats, step: float, weighting: str = "Wk") -> dict[st
 
 
 def measures(done: Simulation) -> dict[str, float]:
-    """Every measure of a run by name, with its unit in the name."""
+    """Return every measure of a run by name, with its unit in the name."""
     values: dict[str, float] = {}
     for name, column in zip(done.system.coordinates, done.a.T, strict=True):
         values[f"{name}.peak_acceleration_m_s2"] = float(np.abs(column).max())
@@ -63,7 +63,7 @@ def measures(done: Simulation) -> dict[str, float]:
 
 
 def cost(done: Simulation) -> float:
-    """Mean square of everything that is aimed at [m²/s⁴]: what optimal control minimises; see `linear.aims`."""
+    """Mean square of all objectives [m²/s⁴], which optimal control minimises; see `linear.aims`."""
     total = 0.0
     for aim in aims(done.system):
         series = done.acceleration_of(aim.name) if aim.kind == "acceleration" else done.span(aim.name)

@@ -1,4 +1,4 @@
-"""Uncertainty through the loop: many dampers in one system, bands on what comes out."""
+"""Monte Carlo simulation of a system with sampled dampers, and bands of its results."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from mrdamper.systems.simulate import SystemLoop, changed
 
 LEVELS = (0.05, 0.5, 0.95)
 _MAX_DRAWS = 100_000
-_MOST_LOST = 0.1  # share of draws without a solution, from which bands say nothing
-_LEAST_DOF = 3.0  # below, a Student spread has no variance
+_MOST_LOST = 0.1  # share of draws without a solution, from which there are no bands
+_LEAST_DOF = 3.0  # below, Student's distribution has no variance
 
 
 @dataclass(frozen=True)
 class Draw:
-    """One damper out of those the tests leave open."""
+    """A sample of the parameters of a damper."""
 
     numbers: Mapping[str, float] = field(default_factory=dict)  # fitted parameters that differ from the damper's
     gain: float = 0.0  # of its session: the force becomes (1 + gain) F + offset [N]
@@ -37,13 +37,13 @@ class Bands:
 
     peaks: Mapping[str, Floats]  # (S, ·) each: as `Simulation.peaks`, one row a draw
     measures: Mapping[str, Floats]  # (S,) each: as `measures.measures`
-    lost: int  # draws that had no solution, left out
+    lost: int  # draws without a solution, omitted
     step: float  # of all draws [s]
     step_change: float  # largest relative change of a peak between that step and the one the mean was run at
 
     @property
     def count(self) -> int:
-        """Draws that were run to their end."""
+        """Number of draws with a solution."""
         return len(next(iter(self.peaks.values())))
 
     def quantiles(self, levels: Sequence[float] = LEVELS) -> dict[str, Floats]:
@@ -52,11 +52,11 @@ class Bands:
 
 
 def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[str, Draw]]:
-    """Draws from what the dampers know of themselves: their numbers, and the session each is in.
+    """Sample dampers from their uncertainty: parameters, and the gain and offset of a session.
 
-    Links that share a damper share its numbers; each has a session of its own. Spreads are Student's, by the degrees
-    of freedom behind them. What the form itself is wrong by (`Uncertainty.force`) is no number and is not drawn. Raises
-    `InputError` (E_CERTAINTY) if a damper was saved without, E_DRAWS if the count is out of range.
+    Links that share a damper share its parameters; each has its own session. Distributions are Student's, with the
+    degrees of freedom of the estimates. The model error (`Uncertainty.force`) is not sampled. Raises `InputError`
+    (E_CERTAINTY) if a damper has no uncertainty, E_DRAWS if the count is out of range.
 
     `dampers`: by link, with `uncertainty`.
     """
@@ -89,7 +89,7 @@ def _numbers_drawn(damper: Damper, count: int, rng: np.random.Generator) -> list
     assert uncertainty is not None
     if not uncertainty.names:
         return [{} for _ in range(count)]
-    # Of correlations, not covariances: an offset in N beside a stiffness in N/m³ is lost in the rounding of the latter.
+    # Correlations instead of covariances: the units differ by many orders of magnitude.
     scale = np.sqrt(np.diag(uncertainty.covariance))
     size = np.where(scale > 0, scale, 1.0)
     values, vectors = np.linalg.eigh(uncertainty.covariance / np.outer(size, size))
@@ -103,7 +103,7 @@ def _numbers_drawn(damper: Damper, count: int, rng: np.random.Generator) -> list
 
 
 def _student(rng: np.random.Generator, dof: float, count: int) -> Floats:
-    """(S, 1) factors that make normal draws Student's."""
+    """(S, 1) factors that convert normal draws to Student's distribution."""
     dof = max(dof, _LEAST_DOF)
     return np.sqrt(dof / rng.chisquare(dof, (count, 1)))
 
@@ -116,9 +116,9 @@ def monte_carlo(
 ) -> Bands:
     """Run a loop made with `free` again with other parameters of its dampers; it is traced and compiled once.
 
-    Draws come by link from `draw`; `mean` is the simulation of the dampers themselves. Draws take twice its step, or
-    half the loop's first one if that is longer: the last halvings for a peak after a switch are worth less than more
-    draws. Raises `StepError` (E_STEP_LOST) if over a tenth of the draws have no solution.
+    Draws come by link from `draw`; `mean` is the simulation of the dampers themselves. Draws use twice its step, or
+    half the first step of the loop if that is longer, because more draws improve the bands more than a smaller step.
+    Raises `StepError` (E_STEP_LOST) if over a tenth of the draws have no solution.
     """
     machine = len(draws) > 5 or None
     step = max(2 * mean.step, loop.first_step / 2)
@@ -127,7 +127,7 @@ def monte_carlo(
         progress(f"draw {number + 1} of {len(draws)}", number / len(draws))
         try:
             done = loop.run(step, machine=machine, numbers=_numbers(loop, one))
-        except (StepError, InputError):  # numbers that make no damper, or a motion nobody can follow
+        except (StepError, InputError):  # parameters without a damper, or a motion without a solution
             lost += 1
             continue
         peaks.append(done.peaks)

@@ -1,12 +1,11 @@
-"""A mass on a spring, a dashpot and a hysteretic element, driven by a force: simulated, and identified.
+"""Simulation and identification of a mass on a spring, a viscous damper and a hysteretic element, driven by a force.
 
 m y'' + c y' + k y + z = u, dz/dt = alpha v − beta (gamma |v| |z|^(n−1) z + delta v |z|^n), v = y'.
 
-The force goes in and the displacement comes out, as in the benchmark of the field [Noël and
-Schoukens 2016, "Hysteretic benchmark with a dynamic nonlinearity"; recalled]. Here z is a force
-and may grow without bound while it is loaded (beta (gamma + delta) < 0, a spring that stiffens);
-energy is dissipated as long as beta gamma >= 0. The dampers of `mrdamper.models` are driven by
-their motion instead and need a bounded z.
+The input is the force and the output the displacement, as in the benchmark of [Noël and Schoukens 2016, "Hysteretic
+benchmark with a dynamic nonlinearity"; recalled]. Here z is a force without bound if beta (gamma + delta) < 0 (a
+stiffening spring); energy is dissipated if beta gamma >= 0. The dampers of `mrdamper.models` are driven by their motion
+instead and need a bounded z.
 """
 
 from __future__ import annotations
@@ -24,18 +23,17 @@ from mrdamper.tracing import Tape, program
 from mrdamper.tracing.compiled import RecordProgram
 
 _STEPS = 20  # steps between two samples, by Runge and Kutta's fourth order
-_SEARCH_STEPS = 5  # the same while the search is far from its end
-_LEAD = 0.5  # of a period, run before the one that counts: what the oscillator has to forget
-_WIDENED = 3  # times that a bound of the search is widened
-_FARTHEST = 1e6  # times the static deflection: a state beyond runs away
+_SEARCH_STEPS = 5  # the same in the first part of a search
+_LEAD = 0.5  # share of a period that is simulated before for the transient
+_WIDENED = 3  # number of times that a bound of the search is widened
+_FARTHEST = 1e6  # times the static deflection, beyond which the state diverges
 
 
 @dataclass(frozen=True)
 class Oscillator:
     """A force-driven mass with a Bouc–Wen element.
 
-    Raises `ParameterError` if the mass is not positive, the element feeds energy in (beta gamma < 0), or n is below
-    1.
+    Raises `ParameterError` if the mass is not positive, the element generates energy (beta gamma < 0), or n is below 1.
     """
 
     # m, c, k: mass [kg], damping [N s/m], stiffness [N/m]
@@ -60,10 +58,10 @@ class Oscillator:
                 raise ParameterError(f"{name} = {getattr(self, name):g}", where="oscillator", remedy=remedy)
 
     def response(self, force: Floats, sample_rate: float, *, periodic: bool = False) -> Floats:
-        """Return the displacement [m] under a force (N,) [N], from rest; of a periodic force, over one settled period.
+        """Return the displacement [m] under a force (N,) [N], from rest; of a periodic force, over one steady period.
 
         The force is sampled at `sample_rate` [Hz], band-limited between samples where it is periodic, else smooth.
-        Raises `RecordError` if it is no record of numbers, and `StepError` (E_RUNAWAY) if the state runs away.
+        Raises `RecordError` if it is no record of numbers, and `StepError` (E_RUNAWAY) if the state diverges.
         """
         return self._response(force, sample_rate, periodic, _STEPS)
 
@@ -107,7 +105,7 @@ class OscillatorFit:
     delay_s: float  # time by which the displacement channel lags behind the force channel [s]
     rmse_m: float  # of the displacement it was identified from [m]
     evaluations: int
-    at_bounds: tuple[str, ...] = ()  # parameters that ended at a bound; their values are no estimates
+    at_bounds: tuple[str, ...] = ()  # parameters that ended at a bound, whose values are no estimates
 
 
 def identify_oscillator(
@@ -115,9 +113,9 @@ def identify_oscillator(
 ) -> OscillatorFit:
     """Identify an oscillator and the delay between the channels from one period of force and displacement.
 
-    The linear part comes from the spectra, the rest from the least squares of the simulated displacement. A delay
-    left out would be taken for negative damping: at one sample of delay the damping of a lightly damped mass ends at
-    zero. Raises `RecordError` if the records do not fit together or nothing moves, or the largest delay is negative.
+    The linear part comes from the spectra, the rest from the least squares of the simulated displacement. An unmodelled
+    delay acts as negative damping: with one sample of delay the damping of a lightly damped mass ends at zero. Raises
+    `RecordError` if the records do not fit together or nothing moves, or the largest delay is negative.
 
     Parameters
     ----------
@@ -128,8 +126,7 @@ def identify_oscillator(
     n : float
         Sharpness of the yield, held.
     most_delay : float
-        Largest delay between the channels, either way [samples]; zero for channels known to be
-        sampled at once.
+        Largest delay between the channels in either direction [samples]; zero for simultaneous sampling.
 
     Warns
     -----

@@ -1,4 +1,4 @@
-"""Result of a system simulation: histories, peaks, energies, and how far a damper left its tested range."""
+"""Result of a system simulation: histories, peaks, energies, and the time of each damper outside its tested range."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from mrdamper.errors import UnknownNameError, validate_arguments
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.structure import Link, System
 
-PART = 4096  # steps that are worked on at a time: their arrays stay in the processor's cache
-HALVING = 5e-3  # change of a peak when the step is halved that is still called settled
+PART = 4096  # steps per block, whose arrays fit the processor's cache
+HALVING = 5e-3  # change of a peak on halving the step up to which it has converged
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Simulation:
     x: Floats  # (N, n) coordinates [m]
     v: Floats  # (N, n) their rates [m/s]
     a: Floats  # (N, n) absolute accelerations [m/s²]
-    links: tuple[Link, ...]  # that were there: without dampers where they were taken out
+    links: tuple[Link, ...]  # as simulated: without dampers that were removed
     force: Floats  # (N, E) of each link [N]
     current: Floats  # (N, E) commanded to each link [A]; zero for stops and tyres
     # (N, E) of dampers: bits of `streaming.FLAGS`; of stops: contact; of tyres: lift-off
@@ -41,8 +41,8 @@ class Simulation:
     road_rate: Floats  # (N, q) [m/s]
     load: Floats  # (N, n) force of the input on each coordinate [N]
     controller: Controller
-    limits: Mapping[str, float]  # largest current [A] of dampers that are asked for a force
-    halving: float = math.nan  # largest relative change of a peak against steps twice as long; NaN where not asked
+    limits: Mapping[str, float]  # largest current [A] of dampers with a force command
+    halving: float = math.nan  # largest relative change of a peak against steps twice as long; NaN where not checked
 
     @property
     def step(self) -> float:
@@ -51,12 +51,12 @@ class Simulation:
 
     @property
     def settled(self) -> bool:
-        """True if halving the step changed no peak by more than 0.5 %; False too where this was not checked."""
+        """True if halving the step changed no peak by more than 0.5 %; False where this was not checked."""
         return self.halving <= HALVING
 
     @property
     def dampers(self) -> tuple[Link, ...]:
-        """The dampers that were there."""
+        """The dampers of the simulation."""
         return tuple(link for link in self.links if link.role == "damper")
 
     @cached_property
@@ -81,7 +81,7 @@ class Simulation:
 
     @property
     def outside(self) -> dict[str, dict[str, float]]:
-        """Share of the time each damper spent outside its tests, by quantity; contact of stops, lift-off of wheels."""
+        """Share of the time of each damper outside its tested range, by quantity; bump-stop contact, wheel lift-off."""
         shares_by_link: dict[str, dict[str, float]] = {}
         for i, link in enumerate(self.links):
             words = {"damper": FLAGS, "stop": ("bump-stop contact",), "tyre": ("wheel lift-off",)}[link.role]
@@ -117,7 +117,7 @@ class Simulation:
 
     @property
     def unreachable(self) -> dict[str, float]:
-        """Share of the time the force asked of a damper was out of its reach: its current at an end."""
+        """Share of the time in which the force command of a damper was not reachable: its current at an end."""
         shares = {}
         for i, link in enumerate(self.links):
             if link.name in self.limits:
@@ -127,10 +127,10 @@ class Simulation:
 
     @property
     def timing(self) -> dict[str, float]:
-        """Correlation of each damper's current with the power it takes from the mass that is to be calmed.
+        """Correlation of each damper's current with the power that it takes from the controlled mass.
 
-        Negative: firm just when it shakes that mass, as with a sign exchanged. Left out where the
-        current does not change.
+        A negative value shows a wrong sign: the force is high when the damper excites that mass. Dampers with a
+        constant current are omitted.
         """
         times = {}
         for i, link in enumerate(self.links):
@@ -145,9 +145,9 @@ class Simulation:
 
     @cached_property
     def energy(self) -> dict[str, Floats]:
-        """(N,) energies since the start [J]: put in, stored, spent by the structure, taken by each link.
+        """(N,) energies since the start [J]: of the input, stored, dissipated by the structure, absorbed by each link.
 
-        By the trapezoidal rule that the loop itself steps with.
+        By the trapezoidal rule, as in the time integration.
         """
         system, names = self.system, [link.name for link in self.links]
         (B, D), series = self._ways, np.zeros((3 + len(names), self.time.size))
@@ -168,7 +168,7 @@ class Simulation:
 
     @property
     def energy_gap(self) -> float:
-        """Largest imbalance of energy over the most that was put in, stored or spent."""
+        """Largest imbalance of energy over the largest of these energies."""
         spent = sum(series for name, series in self.energy.items() if name != "input")
         most = max(max(float(np.abs(series).max()) for series in self.energy.values()), np.finfo(float).tiny)
         return float(np.abs(self.energy["input"] - spent).max()) / most
@@ -180,5 +180,5 @@ def _largest(series: Iterable[Floats]) -> Floats:
 
 
 def _mean(series: Floats) -> Floats:
-    """Mean of every two rows that follow each other."""
+    """Mean of every two successive rows."""
     return 0.5 * (series[1:] + series[:-1])

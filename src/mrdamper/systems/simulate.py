@@ -1,4 +1,4 @@
-"""A system, an input, dampers and a controller together: what moves, and how well it was computed."""
+"""Simulation of a system with an input, dampers and a controller, and its accuracy."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from mrdamper.systems.machine import compiled_loop
 from mrdamper.systems.result import HALVING, PART, Simulation
 from mrdamper.systems.structure import System
 
-PERIOD = 1e-3  # s between two looks of a control law, as usual on a real-time target
+PERIOD = 1e-3  # s between two evaluations of a control law, as usual on a real-time target
 _MAX_STEP_S, _MIN_STEP_S = 1e-3, 1e-5  # s
-_MAX_CHANGE_RATIO = 0.7  # of the change before, to which a change has to fall from the third halving on
+_MAX_CHANGE_RATIO = 0.7  # ratio of successive changes of a peak, from the third halving on
 _MAX_HALVED_SAMPLES = 1_000_000  # samples, beyond which a step is not halved again
-_STEPS_PER_PERIOD = 40  # of the highest natural frequency, to begin with
-_MAX_INTERPRETED_LINES = 1_000_000  # that the interpreter may walk; more is worth compiling
+_STEPS_PER_PERIOD = 40  # initial step relative to the period of the highest natural frequency
+_MAX_INTERPRETED_LINES = 1_000_000  # up to which the interpreter is used; more are compiled
 _LINES_PER_STEP = 60  # of the loop itself
 _MAX_STEPS = 20_000_000
 
@@ -56,14 +56,14 @@ def simulate_system(
     controller : Controller, optional
         Default: no current.
     step : float, optional
-        Time step [s]; refused where halving it moves a peak by more than 0.5 %.
+        Time step [s]; refused if halving it changes a peak by more than 0.5 %.
     highest : float, optional
-        Largest current a controller may ask for [A]. Default: the largest tested.
+        Largest current of the controller [A]. Default: the largest tested.
 
     Returns
     -------
     Simulation
-        At the finer of the two steps compared; `settled` says whether they agree.
+        At the finer of the two steps compared; `settled` states whether they agree.
 
     Raises
     ------
@@ -88,12 +88,12 @@ def simulate_system(
         fine = loop.run(dt / 2)
         change = changed(peaks, fine.peaks)
         first = change if first is None else first
-        # Sensitive to the smallest change: no step will do.
+        # Sensitive to any change: no step suffices.
         lost = dt <= first_step / 4 and change > _MAX_CHANGE_RATIO * last
         if change <= HALVING or dt / 2 <= _MIN_STEP_S or fine.time.size > _MAX_HALVED_SAMPLES or lost:
             break
         peaks, dt, last = fine.peaks, dt / 2, change
-        del fine  # its histories, before those of the next are made
+        del fine  # releases its histories before the next run
     if step is not None and dt < step:
         raise StepError(
             f"halving the step of {step:g} s changes a peak by {100 * first:.2g} %",
@@ -105,10 +105,10 @@ def simulate_system(
 
 
 class SystemLoop:
-    """A system with its links and controller made ready; `run` may be called again and again.
+    """A system with its links and controller, prepared; `run` may be called repeatedly.
 
-    `system`, `source`, `dampers`, `controller`, `highest`: as `simulate_system`; `period`: time between two looks of
-    the control law [s]; `free`: keep the dampers' own numbers free to change from run to run.
+    `system`, `source`, `dampers`, `controller`, `highest`: as `simulate_system`; `period`: time between two evaluations
+    of the control law [s]; `free`: allow other parameters of the dampers in each run.
     """
 
     def __init__(
@@ -138,7 +138,7 @@ class SystemLoop:
 
     @property
     def first_step(self) -> float:
-        """The step to begin with: the input's, the highest mode's share, or a millisecond."""
+        """Initial step: that of the input, a share of the period of the highest mode, or a millisecond."""
         highest = float(self.system.frequencies_Hz().max())
         step = min(_MAX_STEP_S, self.source.step, 1 / (_STEPS_PER_PERIOD * highest) if highest else _MAX_STEP_S)
         whole = self.period if self.control.program else self.source.step
@@ -147,8 +147,8 @@ class SystemLoop:
     def run(self, dt: float, machine: bool | None = None, numbers: ElementParameters | None = None) -> Simulation:
         """Simulate the whole input at one step dt [s].
 
-        `machine`: compiled, where there is a compiler; by default where steps are many. `numbers` are other parameters
-        of the links than the dampers' own. Raises `StepError` if there are too many steps, or one has no solution.
+        `machine`: compiled, where there is a compiler; by default for many steps. `numbers` are other parameters of the
+        links than those of the dampers. Raises `StepError` if there are too many steps, or one has no solution.
         """
         system = self.system
         samples = int(min(self.source.duration / dt, 2.0 * _MAX_STEPS) + 1e-6) + 1 if 0 < dt < math.inf else 0
@@ -160,21 +160,21 @@ class SystemLoop:
             )
         if machine is None:
             lines = _LINES_PER_STEP + 3 * sum(stage.lines for stage in (*self.stages, *self._controllers))
-            machine = 3 * samples * lines > _MAX_INTERPRETED_LINES  # this run, and one at half
+            machine = 3 * samples * lines > _MAX_INTERPRETED_LINES  # this run and that at half the step
         done = self._at_rest(dt * np.arange(samples, dtype=np.float64))
         S: Any = np.linalg.inv(2 / dt * system.M + system.C + dt / 2 * system.K)
         numbers, control = numbers or self.numbers, ElementParameters.of(self._controllers)
         memory = (numbers.given, numbers.derived, numbers.start.copy(), control.given, control.derived, control.start)
         memory = (*memory, *slope_and_scale(len(self.links)))
         every = max(1, round(self.period / dt))
-        # In parts that stay in the processor's cache, each of whole looks of the control law.
+        # In blocks that fit the processor's cache, each of whole periods of the control law.
         size = samples if isinstance(self.controller, NonCausalOptimum) else every * max(1, PART // every)
         for begin in range(0, samples - 1, size):
             self._fill(done, slice(begin, begin + size + 1), S, every, memory, machine)
         return done
 
     def _at_rest(self, time: Floats) -> Simulation:
-        """Return a simulation in which nothing has moved yet."""
+        """Return a simulation at rest."""
         shapes = [(time.size, width) for width in (len(self.system.coordinates), len(self.links))]
         x, v, a, load = (np.zeros(shapes[0]) for _ in range(4))
         force, current = (np.zeros(shapes[1]) for _ in range(2))
@@ -188,7 +188,7 @@ class SystemLoop:
     def _fill(
         self, done: Simulation, part: slice, S: Floats, every: int, memory: tuple[Floats, ...], machine: bool
     ) -> None:
-        """Go through the samples of a part, from its first on, which is known."""
+        """Compute the samples of a block from the first, which is known."""
         system, dt, failed = self.system, done.step, -1
         ground, done.road[part], done.road_rate[part] = self._driven(done.time[part])
         road, rate = done.road[part], done.road_rate[part]
@@ -205,7 +205,7 @@ class SystemLoop:
             written = (done.current[part], x, v, force, flags)
             try:
                 failed = self._walk(machine)(dt, every, *map(np.ascontiguousarray, rows), *memory, *written)
-            except ArithmeticError:  # of the interpreter, where machine code goes on with what is not finite
+            except ArithmeticError:  # of the interpreter, where machine code continues with values that are not finite
                 failed = int(np.flatnonzero(x.any(axis=1))[-1]) + 1 if x.any() else 1
             done.flags[part] = flags
         if failed >= 0 or not np.isfinite(x).all():
@@ -221,7 +221,7 @@ class SystemLoop:
     def _previewed(
         self, dt: float, S: Floats, mean_load: Floats, load: Floats, road: Floats, x: Floats, v: Floats, force: Floats
     ) -> None:
-        """Fill x, v and force with the optimum for the whole input; stops and tyres push nothing."""
+        """Fill x, v and force with the optimum for the whole input; bump stops and tyres have no force."""
         system, n = self.system, len(self.system.coordinates)
         at = [i for i, link in enumerate(self.links) if link.role == "damper"]
         # End velocity 2 m − v and displacement x + dt m, m the mean velocity of the step.

@@ -1,7 +1,7 @@
-"""Structures around dampers: masses, dashpots and springs as matrices, and links between points.
+"""Structures with dampers: masses, viscous dampers and springs as matrices, and links between points.
 
-Everything is relative to static equilibrium. The input enters through channels: the
-acceleration of the ground, or the height of the road under each wheel and its rate.
+All quantities are relative to static equilibrium. The input enters through channels: the acceleration of the ground, or
+the height of the road under each wheel and its rate.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import StructureError, UnknownNameError, check_fields, validate_arguments
 
-_MAX_FREQUENCY_HZ = 2e3  # natural frequency [Hz]: beyond, a unit is wrong, and a second takes over 80,000 steps
+_MAX_FREQUENCY_HZ = 2e3  # natural frequency [Hz]: beyond, a unit is wrong, and a second requires over 80,000 steps
 GRAVITY = 9.81  # acceleration of gravity [m/s²]
 _SYMMETRY = 1e-9  # relative difference of K and K' that rounding may leave
 
@@ -28,9 +28,9 @@ class Link:
     above: str  # a point
     below: str  # the other; extension is positive
     role: Literal["damper", "stop", "tyre"] = "damper"
-    stiffness: float = 0.0  # of a stop beyond its gap; of a tyre while it touches [N/m]
+    stiffness: float = 0.0  # of a bump stop beyond its gap; of a tyre in contact [N/m]
     damping: float = 0.0  # the same [N s/m]
-    gap: float = 0.0  # free travel either way of a stop; static deflection of a tyre [m]
+    gap: float = 0.0  # free travel of a bump stop in each direction; static deflection of a tyre [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,10 +44,10 @@ class System:
     C: Floats  # (n, n) [N s/m]
     K: Floats  # (n, n) [N/m]
     channels: tuple[str, ...] = ("ground",)  # of the input: the ground, or the road under each wheel
-    ground: Floats | None = None  # (n,) share a coordinate takes in the ground's acceleration; None for a road
+    ground: Floats | None = None  # (n,) participation of a coordinate in the ground's acceleration; None for a road
     # ((n, q), (n, q)) forces on the coordinates per metre of road height and per m/s of its rate
     push: tuple[Floats, Floats] | None = None
-    behind: tuple[float, ...] = (0.0,)  # (q,) how far each channel follows the first along the road [m]
+    behind: tuple[float, ...] = (0.0,)  # (q,) distance of each channel behind the first along the road [m]
     links: tuple[Link, ...] = ()
     # further points as (n,) combinations of coordinates, such as the corners of a body
     points: Mapping[str, Floats] = field(default_factory=dict)
@@ -88,7 +88,7 @@ class System:
 
     @property
     def known(self) -> tuple[str, ...]:
-        """Every point a link can hang on."""
+        """Points that a link can be attached to."""
         return (*self.coordinates, *self.points, *self.channels)
 
     @property
@@ -153,6 +153,6 @@ def building(
 
 
 def _chain(values: Sequence[float]) -> Floats:
-    """Springs in series from the ground up, as a matrix."""
+    """Matrix of springs in series from the ground up."""
     k = np.array([*values, 0.0], dtype=float)
     return np.diag(k[:-1] + k[1:]) - np.diag(k[1:-1], 1) - np.diag(k[1:-1], -1)

@@ -1,4 +1,4 @@
-"""Systems from TOML files: those that ship with the package by name, others by path."""
+"""Systems from TOML files: bundled ones by name, others by path."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class _DamperEntry(SystemPart):
 
 
 class SystemDocument(SystemPart):
-    """A vehicle or building as a file states it."""
+    """A vehicle or building in a file."""
 
     title: str = ""
     source: str = ""
@@ -63,7 +63,7 @@ class SystemFile:
     """A system, and the saved dampers its file names."""
 
     system: System
-    dampers: Mapping[str, Damper]  # by link; links whose damper the file leaves open are missing
+    dampers: Mapping[str, Damper]  # by link; links without a damper in the file are missing
 
 
 def bundled_systems() -> dict[str, Path]:

@@ -11,7 +11,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import UnknownNameError
 
-_MEMORY = 4.0  # periods of the lowest corner after which the filter has forgotten
+_MEMORY = 4.0  # periods of the lowest corner after which the response of the filter has decayed
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ WEIGHTINGS = {
 def frequency_weighted(acceleration: Floats, step: float, weighting: str) -> Floats:
     """Weight an acceleration by its effect on a person.
 
-    The gain is applied in the spectrum, with as much silence appended as the filter remembers: no sampling rate bends
-    it, as the bilinear transform would towards half the rate. Raises `UnknownNameError` if there is no such
+    The gain is applied to the spectrum, with zeros appended for the decay of the filter, so that the gain does not
+    depend on the sampling rate, as that of the bilinear transform does. Raises `UnknownNameError` if there is no such
     weighting.
 
     `acceleration` (N,) [m/s²]; `step` [s]; `weighting`: "Wk", "Wd", "Wf".

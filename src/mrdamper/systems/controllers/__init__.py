@@ -1,4 +1,4 @@
-"""Laws that set the current from what sensors see, one file each, found by discovery."""
+"""Control laws, which calculate the current from sensor signals; one file each, found by discovery."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Acceleration-driven dampers: best for comfort above the body's resonance, mixed with skyhook for below."""
+"""Acceleration-driven dampers: comfort control above the body's resonance, mixed with skyhook below."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class AccelerationDriven(Controller):
 
 @dataclass(frozen=True)
 class MixedSkyhookADD(Controller):
-    """Skyhook's rule where a² < α² v² of what stands on the damper, ADD's elsewhere; α = 2π f.
+    """Skyhook where a² < α² v² of the point above the damper, ADD elsewhere; α = 2π f.
 
     References
     ----------

@@ -1,7 +1,6 @@
 """Base class of controllers: a law from sensor signals to a current.
 
-The law runs on a tape, so that the loop steps it, machine code does, and C comes out of the
-same lines.
+The law runs on a tape, so that interpreted, compiled and exported programs come from the same code.
 """
 
 from __future__ import annotations
@@ -29,12 +28,12 @@ class Sensors:
     """Sensor signals and currents of one damper, as its control law uses them."""
 
     tape: Tape  # for memory: `remember`, `update`, `select`
-    link: Link  # the damper's place
+    link: Link  # index of the damper
     damper: Damper
     low: float  # lowest current it may be given [A]
     high: float  # highest [A]
     period: float  # between two samples [s]
-    shared: dict[str, Any]  # what the laws of several dampers have in common
+    shared: dict[str, Any]  # shared data of the laws of several dampers
 
     def __call__(self, point: str, quantity: str) -> Any:
         """Return a signal: "position", "velocity" or "acceleration" (absolute) of a point.
@@ -70,7 +69,7 @@ class Sensors:
         return self.tape.select(on, high, self.low)
 
     def current_for(self, force: Any) -> Any:
-        """Calculate the current for a wanted force [N], positive against extension: see `invert`."""
+        """Calculate the current for a required force [N], positive against extension: see `invert`."""
         rate, place = self.stroke_rate, identifier(self.link.name) + "_"
         motion = {
             "displacement": self.stroke,
@@ -91,7 +90,7 @@ class Sensors:
 
 
 def identifier(name: str, taken: Container[str] = ()) -> str:
-    """Write a signal's or damper's name as one that every language takes."""
+    """Convert the name of a signal or damper to an identifier of every language."""
     word = re.sub(r"\W", "_", name, flags=re.ASCII)
     word = word if word[:1].isalpha() else f"s_{word}"
     return word if word not in taken else next(f"{word}_{i}" for i in range(2, 1000) if f"{word}_{i}" not in taken)
@@ -99,12 +98,12 @@ def identifier(name: str, taken: Container[str] = ()) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """A controller made ready for a system."""
+    """A controller prepared for a system."""
 
     program: Program | None  # from signals and dt to one current a link; None where currents never change
     signals: tuple[str, ...]  # its inputs but dt
     start: tuple[float, ...]  # current of each link before the first sample [A]
-    # largest current [A] by damper that is asked for a force: at either end, the force is out of reach
+    # largest current [A] by damper with a force command: at either end, the force is not reachable
     limits: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -123,7 +122,7 @@ class Controller(ABC):
     name: ClassVar[str]
     title: ClassVar[str]
     source: ClassVar[str]
-    calms: ClassVar[str] = ""  # "above" or "below", where it is made to calm one end of the damper
+    calms: ClassVar[str] = ""  # "above" or "below", where it controls the motion of one end of the damper
 
     @classmethod
     def parameters(cls) -> tuple[ParameterInfo, ...]:
@@ -169,5 +168,5 @@ class Controller(ABC):
 
 
 def current_range(damper: Damper, highest: float | None) -> tuple[float, float]:
-    """Currents a damper may be given [A]: none, to the highest asked for or tested."""
+    """Currents a damper may be given [A]: from none to the highest requested or tested."""
     return 0.0, damper.envelope.current_A[1] if highest is None else highest

@@ -1,7 +1,7 @@
-"""Clipped-optimal: the force of a linear optimal controller, switched on where the damper can give it.
+"""Clipped-optimal control: the force of a linear optimal controller, switched on where the damper can provide it.
 
-LQG on the structure alone: a Kalman filter sees the accelerations of the coordinates and the
-strokes of the dampers, and takes their measured forces as known.
+LQG on the structure alone: a Kalman filter uses the accelerations of the coordinates, the strokes of the dampers and
+their measured forces.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class Design:
     D: Floats
     L: Floats  # of its observer
     G: Floats  # of its feedback
-    size: Floats  # (S,) by which what is seen is weighted
-    coordinates: tuple[str, ...]  # whose accelerations are seen
-    dampers: tuple[str, ...]  # whose strokes are seen
+    size: Floats  # (S,) weights of the sensor signals
+    coordinates: tuple[str, ...]  # of measured accelerations
+    dampers: tuple[str, ...]  # of measured strokes
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class ClippedOptimal(Controller):
         P = solve_discrete_are(A, B, z.T @ z, R, s=z.T @ f)
         G = np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A + f.T @ z)
         C, D = linear.seen
-        # A stroke counts beside an acceleration by the square of the lowest frequency, as in the aims.
+        # A stroke is scaled to an acceleration by the square of the lowest frequency, as in the objectives.
         lowest = 2 * math.pi * system.frequencies_Hz()[0]
         size = np.append(np.ones(len(system.coordinates)), np.full(count, lowest**2))
         C, D = C * size[:, None], D * size[:, None]

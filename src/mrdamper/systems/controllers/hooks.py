@@ -1,4 +1,4 @@
-"""Hooks: what stands on the damper hangs from the sky, the wheel from the ground, or both in shares."""
+"""Skyhook, groundhook and hybrid control."""
 
 from __future__ import annotations
 

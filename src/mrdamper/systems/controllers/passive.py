@@ -1,4 +1,4 @@
-"""A current that never changes."""
+"""Constant current."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Preview: the optimum with the whole record known, a bound that no controller can beat.
+"""Non-causal optimum with the whole record known, a lower bound of the cost of any controller.
 
-Whatever a damper does is some history of force. The best history for the linear structure, of
-all there are and whether a damper could give it or not, costs at most as much.
+Any damper gives some history of force. The optimum over all histories, whether or not a damper can provide them, has at
+most the same cost for the linear structure.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ _RICCATI_TOLERANCE = 1e-13  # relative change at which the Riccati recursion has
 class NonCausalOptimum(Controller):
     """Minimises the mean square of the aims (`linear.aims`) over all force histories.
 
-    A linear-quadratic problem with a known disturbance, solved backwards in the very steps that
-    the loop takes: the bound holds to rounding, as long as no stop is touched and no tyre lifts.
+    A linear-quadratic problem with a known disturbance, solved backwards in the time steps of the simulation: the bound
+    holds to rounding, without bump-stop contact and wheel lift-off.
 
     References
     ----------
@@ -40,10 +40,11 @@ class NonCausalOptimum(Controller):
     def forces(self, A: Floats, B: Floats, driven: Floats, C: Floats, D: Floats, aimed: Floats) -> Floats:
         """(N, E) forces of least cost for z⁺ = A z + B (f + f⁺)/2 + driven⁺, y = C z + D f + aimed.
 
-        `driven` (N, 2n), `aimed` (N, P): what the input adds to the state in the step that ends there, and to the aims.
+        `driven` (N, 2n), `aimed` (N, P): contribution of the input to the state in the step that ends there, and to the
+        objectives.
         """
         n, count = B.shape
-        # The state takes the last force along; the next force is what is decided on.
+        # The state contains the last force; the next force is the decision variable.
         F = np.block([[A, B / 2], [np.zeros((count, n + count))]])
         G = np.vstack([B / 2, np.eye(count)])
         Y = np.hstack([C, D])

@@ -26,7 +26,7 @@ def bundled_records() -> dict[str, Path]:
 
 
 def made_inputs() -> dict[str, tuple[type[Input], Mapping[str, float]]]:
-    """List the synthetic inputs by every name they go by, with the parameters the name stands for."""
+    """List the synthetic inputs by all of their names, with the parameters of each name."""
     inputs: dict[str, tuple[type[Input], Mapping[str, float]]] = {}
     for name, kind in input_types().items():
         if parameters_of(kind):
@@ -42,9 +42,9 @@ def load_input(name: str | Path, values: Mapping[str, float] | None = None, time
     ----------
     name : str or path
     values : mapping of str to float, optional
-        Parameters of a made input.
+        Parameters of a synthetic input.
     time_scale : float
-        How many times faster than recorded a record is played.
+        Factor by which a record is played faster than recorded.
 
     Raises
     ------

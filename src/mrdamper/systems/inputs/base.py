@@ -18,23 +18,23 @@ class Input(ABC):
     title: ClassVar[str]
     # "ground" or "road"; the value is the acceleration of the ground [m/s²], or the height of the road [m]
     kind: Literal["ground", "road"]
-    speed_m_s: float = np.inf  # of travel along a road; without one every wheel meets it at once
-    length_s: float  # of a made input; a record has a `duration` of its own
+    speed_m_s: float = np.inf  # of travel along a road; without it all wheels have the same road at once
+    length_s: float  # of a synthetic input; a record has its own `duration`
 
     @classmethod
     def variants(cls) -> Mapping[str, Mapping[str, float]]:
-        """Further names it goes by, each with its parameters."""
+        """Further names, each with its parameters."""
         return {}
 
     @property
     def duration(self) -> float:
-        """Seconds it lasts."""
+        """Duration [s]."""
         return self.length_s
 
     @property
     @abstractmethod
     def step(self) -> float:
-        """Longest time step that follows it [s]."""
+        """Longest time step that resolves it [s]."""
 
     @abstractmethod
     def value(self, time: Floats) -> Floats:

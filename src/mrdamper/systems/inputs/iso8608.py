@@ -25,8 +25,8 @@ _FADE_IN = 0.5  # s
 class Road(Input):
     """A sum of waves of random phase, amplitude by G_d(n) = G_d(n0) (n/n0)^−2.
 
-    Waves are spaced so that the road repeats after it is driven once. The first half second
-    fades in, so that a car at rest is not thrown onto it.
+    The wave numbers are multiples of one over the length of the road. The first half second fades in, because the car
+    begins at rest.
 
     References
     ----------

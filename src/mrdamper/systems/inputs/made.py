@@ -1,4 +1,4 @@
-"""Roads made from a few numbers: a bump, kerbs, a swept sine."""
+"""Synthetic roads of few parameters: a bump, steps, a swept sine."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Bump(Input):
 
 @dataclass(frozen=True)
 class Steps(Input):
-    """Ramps of half a cosine, up and down in turn, one every period."""
+    """Ramps of half a cosine, alternately up and down, one per period."""
 
     name: ClassVar[str] = "steps"
     title: ClassVar[str] = "steps"
@@ -81,8 +81,7 @@ class Steps(Input):
 class Sweep(Input):
     """A sin φ(t), the frequency rising in proportion to its logarithm; amplitude falls as 1/f above the first.
 
-    So the speed of the road stays below that at the lowest frequency, as on a test rig with
-    limited oil flow.
+    The velocity of the road is at most that at the lowest frequency, as on a test rig with limited oil flow.
     """
 
     name: ClassVar[str] = "sweep"
@@ -110,7 +109,7 @@ class Sweep(Input):
 
     @property
     def _growth(self) -> float:
-        """D ln f / dt [1/s]; a hair above zero for one frequency."""
+        """D ln f / dt [1/s]; slightly above zero for a single frequency."""
         return (math.log(self.highest_Hz / self.lowest_Hz) or 1e-9) / self.length_s
 
     def _at(self, time: Floats) -> tuple[Floats, Floats]:

@@ -13,15 +13,15 @@ from mrdamper.errors import ColumnError, RecordError, UnitError
 from mrdamper.rig_files.dataset_samples import read_table
 from mrdamper.systems.inputs.base import Input
 
-STANDARD_GRAVITY = 9.81  # m/s² in a g of the records that come with the package; the figure published tables used
+STANDARD_GRAVITY = 9.81  # m/s² per g in the bundled records, as in published tables
 _COLUMNS = {"acceleration_m_s2": 1.0, "acceleration_g": STANDARD_GRAVITY, "height_m": 1.0}
-_JITTER = 0.02  # share of a step that rounding of time stamps may move a sample
-_STRONGEST = 50.0  # m/s²: five times the strongest ground motion ever recorded is a mistake of units
+_JITTER = 0.02  # share of a step by which rounding may shift a time stamp
+_STRONGEST = 50.0  # m/s²: five times the strongest recorded ground motion; beyond, the unit is wrong
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedInput(Input):
-    """Samples at equal steps, straight lines between them."""
+    """Samples at equal steps, linearly interpolated."""
 
     name: ClassVar[str] = "record"
     title: ClassVar[str] = "a record"
@@ -50,11 +50,12 @@ class RecordedInput(Input):
 def load_record(path: str | Path, time_scale: float = 1.0) -> RecordedInput:
     """Read a record.
 
-    Raises `DatasetError` or `ColumnError` or `UnitError` or `RecordError` if the file cannot be read, says no unit,
-    or has steps that differ.
+    Raises `DatasetError` or `ColumnError` or `UnitError` or `RecordError` if the file cannot be read, states no unit,
+    or has unequal steps.
 
     `path`: CSV with time_s and one of acceleration_m_s2, acceleration_g (1 g = 9.81 m/s²), height_m; `time_scale`:
-    how many times faster than recorded it is played.
+    factor by which
+    it is played faster than recorded.
     """
     path = Path(path)
     table = read_table(path, "give a CSV with time_s and acceleration_m_s2")
