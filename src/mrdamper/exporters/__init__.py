@@ -19,7 +19,7 @@ exporter = _registry.type_named
 
 @validate_arguments()
 def export(damper: Damper, to: str, out: str | Path, name: str = "") -> list[Path]:
-    """Write a damper in an export format, whole or not at all.
+    """Write a damper in an export format, atomically.
 
     Parameters
     ----------
@@ -28,14 +28,14 @@ def export(damper: Damper, to: str, out: str | Path, name: str = "") -> list[Pat
         Format: "c", "fmu", "page", "latex", "markdown", "table", "adams",
         "tydex", "dyna4", or one of a plug-in.
     out : path
-        Folder; a file where the format makes one.
+        Folder, or file for formats of one file.
     name : str
-        Begins the names of files and symbols; the rig's name where empty.
+        Prefix of the names of files and symbols; the rig's name if empty.
 
     Returns
     -------
     list of Path
-        What was written.
+            Written files.
 
     Raises
     ------

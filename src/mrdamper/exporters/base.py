@@ -1,4 +1,4 @@
-"""Base class of export formats: files by name, written whole or not at all."""
+"""Base class of export formats: files by name, written atomically."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ class Written:
     """Files of an export."""
 
     files: Mapping[str, bytes]  # contents by file name
-    notes: tuple[str, ...] = field(default=())  # what the user should know: limits, platforms left out
+    notes: tuple[str, ...] = field(default=())  # notes for the user: limits, missing platforms
 
 
 class Exporter(ABC):
-    """An export format. Subclasses are final and found by their file."""
+    """An export format. Subclasses are final and found by discovery."""
 
     name: ClassVar[str]
     title: ClassVar[str]
-    suffix: ClassVar[str] = ""  # of the one file it makes; empty: a folder of files
+    suffix: ClassVar[str] = ""  # suffix of its one file; empty: a folder of files
 
     @abstractmethod
     def export(self, damper: Damper | Model, name: str) -> Written:
@@ -42,7 +42,7 @@ class Exporter(ABC):
 
 
 def write_export(written: Written, out: str | Path, suffix: str) -> list[Path]:
-    """Write what an export made, whole or not at all: one file at `out`, or several into the folder `out`.
+    """Write the files of an export atomically: one file at `out`, or several into the folder `out`.
 
     Raises `OutputError` if it cannot be written.
     """
@@ -58,7 +58,7 @@ def write_export(written: Written, out: str | Path, suffix: str) -> list[Path]:
 
 
 def identifier(text: str) -> str:
-    """Make a name for files and symbols of any text; raises `InputError` (E_EXPORT_NAME) if nothing is left."""
+    """Convert any text to a name for files and symbols; raises `InputError` (E_EXPORT_NAME) if it is empty then."""
     word = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()
     if word and word[0].isdigit():
         word = f"damper_{word}"

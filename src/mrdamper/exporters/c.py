@@ -23,9 +23,9 @@ from mrdamper.tracing import Expression, Program
 from mrdamper.tracing.c_writer import CWriter
 from mrdamper.tracing.tape import LookupTable
 
-TOLERANCE = 1e-9  # of the largest force: the self-test forgives other compilers and libraries this much
+TOLERANCE = 1e-9  # share of the largest force: tolerance of the self-test for other compilers and libraries
 _TEST_SAMPLES = 400
-_SINGLE_STRIDE = 4  # points of a table per point kept for single precision: still within its rounding
+_SINGLE_STRIDE = 4  # table points per point in single precision, still within its rounding
 
 
 class CExporter(Exporter):
@@ -56,7 +56,7 @@ class _ConstantsWriter(CWriter):
 def program_sources(traced: Program, name: str, title: str) -> dict[str, str]:
     """Header and source of any program of one sample, by file name: a control law, an inverse.
 
-    dt is among its inputs; its parameters are written as constants. The title is for the comment at the top.
+    dt is one of its inputs; its parameters are written as constants. The title is for the comment at the top.
     """
     word, writer = identifier(name), _ConstantsWriter(traced)
     arguments = [(f"const {word}_derived *d", "d")] if traced.derived else []
@@ -67,13 +67,13 @@ def program_sources(traced: Program, name: str, title: str) -> dict[str, str]:
 
 
 def write_program(traced: Program, name: str, title: str, folder: str | Path) -> list[Path]:
-    """Write what `program_sources` gives into a folder, whole or not at all; raises `OutputError`."""
+    """Write the files of `program_sources` into a folder, atomically; raises `OutputError`."""
     files = {file: text.encode() for file, text in program_sources(traced, name, title).items()}
     return write_export(Written(files), folder, "")
 
 
 def self_test(stepping: Stream, name: str) -> str:
-    """Write a program that steps the model through a motion and compares with forces computed here."""
+    """Write a program that steps the model along a motion and compares the forces with a reference."""
     x, current, dt = reference_motion(stepping)
     steps = Stepper(stepping)
     force = [steps.step(*sample, dt) for sample in zip(x.tolist(), current.tolist(), strict=True)]
@@ -129,7 +129,7 @@ def c_facts(stepping: Stream, name: str, rig: str, language: type[CWriter] = CWr
 def _facts(
     name: str, title: str, writer: CWriter, described: list[dict[str, Any]], starts: list[tuple[str, str]]
 ) -> dict[str, Any]:
-    """Collect the template values of any program, from the descriptions of it and of what goes with it."""
+    """Collect the template values of any program, from its description and those of its context."""
     setup, program = writer.setup(), writer.program
     text = setup + "".join(part["body"] + part["results"] for part in described)
     return {

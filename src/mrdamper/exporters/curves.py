@@ -1,8 +1,8 @@
 """Force over velocity, one curve for each current: as CSV tables, and in the layouts of vehicle tools.
 
-No vehicle tool was tried. The blocks of Adams are recalled from public examples. The layout of TYDEX is that of
-release 1.3 (Unrau and Zamow, 1997), which defines channels of tyres only, so that the names of these channels are this
-program's. DYNA4 takes vectors and matrices of MATLAB, under names that differ from model to model.
+The files were not tested in vehicle tools. The blocks of Adams are recalled from public examples. The layout of TYDEX
+is that of release 1.3 (Unrau and Zamow, 1997), which defines channels of tyres only; the names of these channels are
+defined here. DYNA4 takes vectors and matrices of MATLAB, under names that differ from model to model.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _MIN_VELOCITY_SHARE = 0.02  # of the highest tested velocity
 
 
 class TableExporter(Exporter):
-    """One CSV of all currents, and one grid with a row a velocity and a column a current."""
+    """One CSV of all currents, and one grid with a row per velocity and a column per current."""
 
     name: ClassVar[str] = "table"
     title: ClassVar[str] = "force–velocity tables (CSV)"
@@ -115,10 +115,10 @@ class ForceVelocity:
 
 
 def force_velocity(given: Damper | Model) -> list[ForceVelocity]:
-    """Force over velocity at mid-stroke, as a damper dynamometer gives it.
+    """Force over velocity at mid-stroke, as measured by a damper dynamometer.
 
-    Six currents over the tested range; twelve peak velocities up to the highest tested, from a fiftieth of it,
-    evenly in the logarithm. Raises `InputError` (E_EXPORT) if the damper does not know where it was tested.
+    Six currents over the tested range; twelve peak velocities up to the highest tested, from a fiftieth of it, evenly
+    in the logarithm. Raises `InputError` (E_EXPORT) if the damper has no tested ranges.
     """
     damper = damper_of(given)
     if not damper.envelope.tested:

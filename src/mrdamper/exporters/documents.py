@@ -1,4 +1,4 @@
-"""Equations and parameter table: LaTeX for a paper, which needs amsmath only, and Markdown for a wiki or a readme."""
+"""Equations and parameter table: LaTeX, which requires amsmath only, and Markdown."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The equations of a damper as LaTeX: those its model is written with, then its parameter functions."""
+"""The equations of a damper as LaTeX: those of its model, then its parameter functions."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ NOWHERE = Condition(0.0, 1.0, 0.01)  # any condition: a damper without ranges ha
 
 
 def equations(damper: Damper) -> list[str]:
-    """One line of LaTeX an equation: force first, then the state, then what parameters follow.
+    """One line of LaTeX per equation: the force, the state, then the parameter functions.
 
-    Raises `ParameterError` if there is no equation behind the damper that anybody could read.
+    Raises `ParameterError` if the damper has no readable equation.
     """
     if not damper.equation:
         raise ParameterError(
@@ -39,7 +39,7 @@ def equations(damper: Damper) -> list[str]:
 
 
 def function_text(function: ParameterFunction) -> str:
-    """Write a parameter function of I, f and A as LaTeX, its numbers in it."""
+    """Write a parameter function of I, f and A as LaTeX, with its numbers."""
     parts = []
     for value, term in zip(function.coefficients, form_named(function.form).terms, strict=True):
         powers = {"I": term.current, "f": term.frequency, "A": term.amplitude}

@@ -1,4 +1,4 @@
-"""FMI 2.0 and 3.0: a co-simulation FMU with sources, binaries, and a reference to check it by."""
+"""FMI 2.0 and 3.0: a co-simulation FMU with sources, binaries, and a reference for checks."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from mrdamper.exporters.toolchain import PLATFORMS, build_library
 from mrdamper.models import Model
 
 _SAMPLES_PER_CYCLE = 200
-_INTERNAL_STEP = 2.0**-9  # s; two milliseconds, so that the usual communication step of one is taken whole
+_INTERNAL_STEP = 2.0**-9  # s; two milliseconds, so that the usual communication step of 1 ms is one internal step
 MOST_STEPS = 1_000_000  # internal ones, in a communication step
-_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip file knows: the same FMU has the same bytes
+_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest date of a zip file: the same FMU has the same bytes
 _TESTED = (
     ("current", "current_A", 1.0, "A"),
     ("frequency", "frequency_Hz", 1.0, "Hz"),
@@ -42,8 +42,8 @@ _TESTED = (
 class FMUExporter(Exporter):
     """An FMU for co-simulation of FMI 2 or 3.
 
-    Binaries are compiled for `platforms`, named as FMI 3.0 does; default: all that a compiler on this machine can make.
-    None gives sources alone.
+    Binaries are compiled for `platforms`, named as FMI 3.0 does; default: all that the compilers of this machine
+    support. None gives sources alone.
     """
 
     name: ClassVar[str] = "fmu"
@@ -90,19 +90,19 @@ class FMUExporter(Exporter):
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """A motion and what the model answers, sample by sample."""
+    """A motion and the force of the model, sample by sample."""
 
     step: float  # communication step [s], a power of two: times and their differences are exact
     internal_step: float  # [s], a power of two
     displacement: Floats  # (N,) input set at the samples [m]
     velocity: Floats  # (N,) the same [m/s]
     current: Floats  # (N,) the same [A]
-    force: Floats  # (N,) output read at the samples [N]: at rest, then of the inputs set one sample before
+    force: Floats  # (N,) output read at the samples [N]: at rest, then for the inputs set one sample before
     flags: np.ndarray  # (N,) bits in the order of `FLAGS`
 
 
 def reference(stepping: Stream) -> Reference:
-    """Two growing cycles inside the tested ranges, stepped here; the displacement drives."""
+    """Compute two growing cycles inside the tested ranges, driven by the displacement."""
     _, _, dt = reference_motion(stepping)
     turn = dt * 399 / 2  # of that motion's 400 samples
     step = 2.0 ** math.floor(math.log2(turn / _SAMPLES_PER_CYCLE))
@@ -116,7 +116,7 @@ def reference(stepping: Stream) -> Reference:
 
 
 def _walk(steps: Stepper, samples: list[tuple[float, float]], step: float, count: int) -> list[tuple[float, int]]:
-    """Force and flags after each sample, reached in equal internal steps on a straight line."""
+    """Compute force and flags after each sample, in equal internal steps with linear inputs."""
     last, answers = samples[0], []
     for sample in samples:
         force, flags = 0.0, 0
@@ -130,7 +130,7 @@ def _walk(steps: Stepper, samples: list[tuple[float, float]], step: float, count
 
 
 def fmu_texts(damper: Damper | Model, name: str, fmi: int) -> dict[str, bytes]:
-    """All of an FMU but its binaries, by path. The token is a hash of the rest."""
+    """Return the texts of an FMU by path. The token is a hash of the others."""
     stepping = stream(damper)
     expected = reference(stepping)
     rig = damper_of(damper).rig
@@ -139,12 +139,12 @@ def fmu_texts(damper: Damper | Model, name: str, fmi: int) -> dict[str, bytes]:
 
 
 def with_token(texts: Callable[[str], dict[str, bytes]]) -> dict[str, bytes]:
-    """Texts that hold the token made of them without it."""
+    """Return the texts with the token, which is computed without it."""
     return texts(token_of(texts("")))
 
 
 def token_of(files: Mapping[str, bytes]) -> str:
-    """Calculate the GUID of an FMU from its texts, which hold none yet."""
+    """Calculate the GUID of an FMU from its texts without a GUID."""
     digest = hashlib.sha256()
     for path in sorted(files):
         for part in (path.encode(), files[path]):
@@ -153,7 +153,7 @@ def token_of(files: Mapping[str, bytes]) -> str:
 
 
 def zipped(files: Mapping[str, bytes]) -> bytes:
-    """Write a zip archive whose bytes depend on nothing but the files."""
+    """Write a zip archive whose bytes depend on the files only."""
     archive_bytes = io.BytesIO()
     with zipfile.ZipFile(archive_bytes, "w") as archive:
         for path in sorted(files, key=lambda p: (p != "modelDescription.xml", p)):
@@ -207,8 +207,8 @@ def all_texts(
 ) -> dict[str, bytes]:
     """Collect the texts of an FMU by path: C sources and those of an instance, its description, its reference.
 
-    `facts` are for the templates, `instance` and `page` the templates of what FMI asks around the sources, and of its
-    documentation. `time` [s], `given` and `outputs` are the reference, (N,) each.
+    `facts` are for the templates, `instance` and `page` the templates of the FMI functions and of the documentation.
+    `time` [s], `given` and `outputs` are the reference, (N,) each.
     """
     name, fmi = facts["name"], facts["fmi"]
     sources = {
@@ -231,6 +231,6 @@ def all_texts(
 
 
 def _csv_table(columns: Mapping[str, np.ndarray]) -> str:
-    """Rows of numbers under their names, all digits."""
+    """Return rows of numbers under their names, with all digits."""
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     return csv_text([dict(zip(columns, row, strict=True)) for row in rows])

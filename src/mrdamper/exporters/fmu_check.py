@@ -1,8 +1,7 @@
-"""An FMU of ours held against what it says: its texts, its token, its binary, its reference.
+"""Check of an exported FMU: texts, token, binary, reference.
 
-FMPy validates the description and simulates; a process of its own does both, so that a binary
-that crashes or hangs takes nobody along. What FMPy does not look at is added: a binary that is
-absent, a token that is wrong or not asked for, refusals, and states that do not lead on.
+FMPy validates the description and simulates in a separate process, which isolates crashes. Further checks: a missing
+binary, a wrong token or one that is not checked, refusals of inputs, and stored states.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ _TOKEN = re.compile(rb'(?:guid|instantiationToken)="([^"]*)"')
 
 @dataclass(frozen=True)
 class FmuFinding:
-    """Something about an FMU its user should know; a note says what could not be looked at."""
+    """Finding of the check of an FMU; a note states what could not be checked."""
 
     code: str
     text: str
@@ -45,10 +44,10 @@ class FmuFinding:
 
 
 def check_fmu(path: str | Path) -> list[FmuFinding]:
-    """Look at everything an FMU made by `FMUExporter` promises; no findings if all is well.
+    """Check an FMU of `FMUExporter`; no findings if it is correct.
 
-    The binary runs on this machine with this user's rights: check only FMUs you would run. Raises `MissingExtraError`
-    without FMPy.
+    The binary runs on this machine with this user's rights: check trusted FMUs only. Raises `MissingExtraError` without
+    FMPy.
     """
     if importlib.util.find_spec("fmpy") is None:
         raise MissingExtraError("FMPy is not installed", remedy="pip install 'mrdamper[fmu]'")
@@ -85,7 +84,7 @@ def _token(files: Mapping[str, bytes]) -> list[FmuFinding]:
 
 
 def _binary_for_here(files: Mapping[str, bytes]) -> tuple[dict[str, bytes], list[FmuFinding]]:
-    """Nothing where the binary for this machine is there; one made of the sources where it is not."""
+    """Compile the binary for this machine from the sources if it is missing."""
     platform, described = here(), files["modelDescription.xml"]
     if platform is None:
         return {}, [FmuFinding("N_FMU_PLATFORM", "binaries cannot be run on this machine", "note")]
@@ -104,7 +103,7 @@ def _binary_for_here(files: Mapping[str, bytes]) -> tuple[dict[str, bytes], list
 
 
 def _probed(files: Mapping[str, bytes], loadable: bool) -> list[FmuFinding]:
-    """Validate and simulate the unpacked FMU in a process of its own; return its findings and how it ended."""
+    """Validate and simulate the unpacked FMU in a separate process; return its findings and exit status."""
     with temporary_folder() as folder:
         unpacked, report = folder / "fmu", folder / "report"
         for name, content in files.items():

@@ -29,7 +29,7 @@ STATUSES = (  # the numbers of the C source's status
 )
 SHORTEST = 1e-6  # s; the least an internal step may be set to
 _DISPLAY = {"m": (("mm", "1000"),), "m/s": (("mm/s", "1000"),), "N": (("kN", "0.001"),), "s": (("ms", "1000"),)}
-_SHOWN = {"m": "mm", "m/s": "mm/s"}  # N stays N: loops are read in newtons
+_SHOWN = {"m": "mm", "m/s": "mm/s"}  # N is shown as N
 _BASE = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[current]": "A"}
 
 
@@ -41,7 +41,7 @@ class Variable:
     description: str
     symbol: str  # of its value reference in the C source
     reference: int  # of its value
-    index: int  # its place among the variables, from one
+    index: int  # index among the variables, from one
     causality: str  # as the standard names them
     variability: str
     initial: str  # may be empty
@@ -59,7 +59,7 @@ class Variable:
 
 
 def description_facts(stepping: Stream, fmi: int, internal_step: float, current: float) -> dict[str, Any]:
-    """Collect the template values of an FMU that the C source's facts do not hold."""
+    """Collect the template values of an FMU beyond those of the C source."""
     variables = _variables(stepping, fmi, internal_step, current)
     return {
         "variables": variables,
@@ -78,7 +78,7 @@ def description_facts(stepping: Stream, fmi: int, internal_step: float, current:
 
 
 def _variables(stepping: Stream, fmi: int, internal_step: float, current: float) -> list[Variable]:
-    """All variables, in the order of their value references; time exists in FMI 3 only."""
+    """Return all variables in the order of their value references; time exists in FMI 3 only."""
     named: list[dict[str, Any]] = []
 
     def add(name: str, description: str, kind: str, causality: str, variability: str, **more: Any) -> None:
@@ -107,7 +107,7 @@ def _variables(stepping: Stream, fmi: int, internal_step: float, current: float)
 
 
 def variable(v: dict[str, Any], reference: int, index: int) -> Variable:
-    """One variable from what is known of it by name."""
+    """Return a variable by its name."""
     attributes = []
     if "type" in v:
         attributes.append(("declaredType", v["type"]))
@@ -129,7 +129,7 @@ def variable(v: dict[str, Any], reference: int, index: int) -> Variable:
 
 
 def parameters_of_stream(stepping: Stream) -> list[tuple[ParameterInfo, bool]]:
-    """List the model's parameters, and if each may change: tracing may have frozen a branch on it."""
+    """List the parameters of the model, and whether each may change, which a guard of the trace may exclude."""
     if stepping.model is None:
         return []
     return [(info, _is_free(stepping, info.name)) for info in stepping.model.parameters()]
@@ -147,7 +147,7 @@ def _is_free(stepping: Stream, name: str) -> bool:
 
 
 def unit_name(info: ParameterInfo, stepping: Stream) -> str:
-    """Write the unit of a parameter; an exponent that is itself a parameter is filled in where it is whole."""
+    """Write the unit of a parameter; an exponent that is a parameter is replaced by its value if it is an integer."""
     if info.unit == "-":
         return "1"
     if info.unit.endswith("^-n"):
@@ -157,14 +157,14 @@ def unit_name(info: ParameterInfo, stepping: Stream) -> str:
 
 
 def units_of(names: Iterable[str]) -> list[Mapping[str, Any]]:
-    """Units by name, their powers of SI base units, and what they are shown in."""
+    """Return units by name, their powers of SI base units, and display units."""
     return [
         {"name": name, "base": base_powers(name), "displays": _DISPLAY.get(name, ())} for name in dict.fromkeys(names)
     ]
 
 
 def base_powers(unit: str) -> list[tuple[str, int]] | None:
-    """Powers of the SI base units that make a unit up; None where they are not whole numbers."""
+    """Return the powers of the SI base units of a unit; None if they are no integers."""
     from pint.errors import PintError
 
     if re.search(r"\^-?[a-z]", unit):  # the power is itself a parameter
@@ -184,7 +184,7 @@ def _registry() -> Any:
 
 
 def serial_fields(members: Sequence[str], parameters: Sequence[str]) -> dict[str, Any]:
-    """List the serialized state: how each number is read from the state and written into it."""
+    """List the serialized state: how each number is read from the state and written to it."""
     fields: list[tuple[str, str, str]] = []  # get, set to, kept when
     inputs = [f"{group}.{name}" for group in ("set", "last") for name in ("displacement", "velocity", "current")]
     fields += [(f"s->{name}", f"s.{name} = #", "") for name in (*inputs, "time")]
@@ -214,7 +214,7 @@ def serial_fields(members: Sequence[str], parameters: Sequence[str]) -> dict[str
 
 
 def c_bounds(info: ParameterInfo) -> str:
-    """Write the condition a value has to meet, in C; empty without bounds."""
+    """Write the bounds of a value as a condition in C; empty without bounds."""
     low, high = info.bounds
     checks = [f"value >= {float(low)!r}"] if math.isfinite(low) else []
     return " && ".join(checks + ([f"value <= {float(high)!r}"] if math.isfinite(high) else []))

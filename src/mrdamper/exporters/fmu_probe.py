@@ -1,6 +1,6 @@
-"""Check of an unpacked FMU with FMPy: a program of its own, started by its path.
+"""Check of an unpacked FMU with FMPy: a separate program, started by its path.
 
-Writes a line a finding or stage, [code, text] as JSON, so that a crash leaves its place.
+Writes one line per finding or stage, [code, text] as JSON, so that the stage of a crash is known.
 """
 
 import contextlib
@@ -51,7 +51,7 @@ class _Probe:
 
     def read(self) -> None:
         """Validate the XML; read the description and the reference."""
-        # Here, because finding the exporters imports this module, and FMPy is an extra.
+        # Imported here, because discovery imports this module, and FMPy is an extra.
         from fmpy import read_model_description
         from fmpy.validation import validate_fmu
 
@@ -60,7 +60,7 @@ class _Probe:
         try:
             self.described = read_model_description(self._folder, validate=False)
             references = {v.name: v.valueReference for v in self.described.modelVariables}
-        except Exception as error:  # whatever FMPy's parser meets
+        except Exception as error:  # any error of FMPy's parser
             self.fail("E_FMU_DESCRIPTION", f"modelDescription.xml: {error!r}")
         if self.described.fmiVersion not in ("2.0", "3.0") or self.described.coSimulation is None:
             self.fail("E_FMU_VERSION", f"FMI {self.described.fmiVersion}; co-simulation of 2.0 or 3.0 is checked")

@@ -1,4 +1,4 @@
-"""FMUs of programs that are no dampers: control laws, inverses. They share the damper's FMI functions."""
+"""FMUs of control laws and inverse models, with the FMI functions of dampers."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from mrdamper.exporters.fmu_description import units_of, variable
 from mrdamper.tracing import Program
 from mrdamper.tracing.python import python_functions
 
-_REFERENCE_STEP_S = 2.0**-10  # s, of the reference where the program has no clock of its own
+_REFERENCE_STEP_S = 2.0**-10  # s, of the reference if the program has no period
 _REFERENCE_ROWS = 401
-_USUAL = {"m": 0.01, "m/s": 0.1, "m/s2": 1.0, "N": 500.0}  # amplitudes of the reference's inputs
+_USUAL = {"m": 0.01, "m/s": 0.1, "m/s2": 1.0, "N": 500.0}  # amplitudes of the inputs of the reference
 
 
 def write_program_fmu(
@@ -34,7 +34,7 @@ def write_program_fmu(
     start: Sequence[float] = (),
     exporter: FMUExporter | None = None,
 ) -> tuple[list[Path], tuple[str, ...]]:
-    """Write a program as an FMU, whole or not at all; gives the files, and notes, such as platforms left out.
+    """Write a program as an FMU, atomically; return the files, and notes, such as missing platforms.
 
     dt is the program's last input; its parameters are written as constants. `units` are those of every input but dt,
     and every output; `period` the time between two samples [s], 0 for a sample every communication step; `start` the
@@ -106,7 +106,7 @@ def _facts(
 
 
 def _reference(traced: Program, facts: dict[str, Any]) -> tuple[Floats, dict[str, Floats], dict[str, Floats]]:
-    """Growing sines, and what the program answers: each row to the inputs of the row before."""
+    """Compute growing sines and the outputs of the program, each row for the inputs of the row before."""
     step = facts["sampled"] or _REFERENCE_STEP_S
     time = step * np.arange(_REFERENCE_ROWS, dtype=np.float64)
     given = {

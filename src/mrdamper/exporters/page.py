@@ -1,4 +1,4 @@
-"""One HTML file that answers sliders without a network: the damper's C as WebAssembly, and as JavaScript."""
+"""One HTML file with sliders and without a network: the damper as WebAssembly from C, and as JavaScript."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from mrdamper.tracing.c_writer import JavaScriptWriter
 
 _VECTORS = 240  # samples of the self-test
 _SLIDER_STEPS = 100  # of a slider from the lowest to the highest tested value
-# Field of the envelope, name, unit, factor to it, and how far sliders leave the tests below and above.
+# Field of the envelope, name, unit, its factor, and limits of the slider relative to the tested range.
 _KNOBS = (
     ("current", "current_A", "Current", "A", 1.0, 0.0, 1.5),
     ("frequency", "frequency_Hz", "Frequency", "Hz", 1.0, 0.5, 1.5),
     ("amplitude", "amplitude_m", "Amplitude", "mm", 1e3, 0.5, 1.5),
 )
-_UNTESTED = Envelope((0.0, 1.0), (0.5, 4.0), (2e-3, 2e-2), (6e-3, 0.5))  # where a bare model's sliders go
+_UNTESTED = Envelope((0.0, 1.0), (0.5, 4.0), (2e-3, 2e-2), (6e-3, 0.5))  # slider ranges of a model without tests
 _SIGNS = (
     "Displacement is counted from mid-stroke; displacement, velocity and force are positive in extension, "
     "so the damper resists."
@@ -43,7 +43,7 @@ _FUNCTIONS = (
 
 
 class PageExporter(Exporter):
-    """A page for a colleague: sliders, loops, a motion of one's own, and a self-test."""
+    """A web page with sliders, loops, motions from a file, and a self-test."""
 
     name: ClassVar[str] = "page"
     title: ClassVar[str] = "web page in one file"
@@ -86,7 +86,7 @@ def _facts(damper: Damper | Model, stepping: Stream, name: str, library: bytes |
             | {"value": f"{getattr(stepping.model, info.name):.6g}"}
             for info in (stepping.model.parameters() if stepping.model else ())
         ],
-        "facts": json.dumps(computed).replace("<", "\\u003c"),  # no text can end the element it stands in
+        "facts": json.dumps(computed).replace("<", "\\u003c"),  # no text can end its element
         "damper": render("damper.js.j2", **c_facts(stepping, name, "", JavaScriptWriter)),
         "css": (folder / "page.css").read_text(encoding="utf-8"),
         "script": (folder / "page.js").read_text(encoding="utf-8"),
@@ -94,7 +94,7 @@ def _facts(damper: Damper | Model, stepping: Stream, name: str, library: bytes |
 
 
 def _vectors(stepping: Stream) -> dict[str, Any]:
-    """Calculate a motion and the forces of the stepper here, all digits, for the page to repeat."""
+    """Calculate a motion and the forces of the stepper with all digits, for the self-test of the page."""
     x, current, step = reference_motion(stepping, _VECTORS)
     stepper = Stepper(stepping)
     force = [stepper.step(*sample, step) for sample in zip(x.tolist(), current.tolist(), strict=True)]
@@ -113,7 +113,7 @@ def _curve(points: np.ndarray, library: bytes | None) -> dict[str, Any]:
 
 
 def _tested(envelope: Envelope) -> list[dict[str, Any]]:
-    """Describe the tested ranges, and what holds outside them."""
+    """Describe the tested ranges and the extrapolation."""
     named = [(field, label.lower(), unit, factor) for _, field, label, unit, factor, *_ in _KNOBS]
     named.append(("peak_velocity_m_s", "peak velocity", "mm/s", 1e3))
     return [
@@ -126,7 +126,7 @@ def _tested(envelope: Envelope) -> list[dict[str, Any]]:
 def _words(damper: Damper | Model, stepping: Stream) -> list[str]:
     """Describe the origin of the damper and its range of validity, in sentences."""
     sentence = f"{stepping.title[:1].upper()}{stepping.title[1:]}, exported by mrdamper {version('mrdamper')}"
-    if count := getattr(damper, "parameter_count", 0):  # a bare model was determined from nothing
+    if count := getattr(damper, "parameter_count", 0):  # a model without tests
         facts = "; ".join(f"{key}: {value}" for key, value in getattr(damper, "provenance", {}).items())
         sentence += f" from a model with {count} parameters identified from tests"
         sentence += f" ({facts})" if facts else ""
@@ -151,7 +151,7 @@ def _words(damper: Damper | Model, stepping: Stream) -> list[str]:
 
 
 def _knobs(envelope: Envelope | None) -> list[dict[str, Any]]:
-    """Sliders that leave the tests by half on either side, and start in their middle."""
+    """Return sliders that exceed the tested range by half on either side and start in its middle."""
     ranges = envelope or _UNTESTED
     knobs = []
     for key, field, label, unit, factor, below, above in _KNOBS:

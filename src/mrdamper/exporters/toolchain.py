@@ -1,4 +1,4 @@
-"""Compilers on this machine, and shared libraries made with them."""
+"""Compilers of this machine, and shared libraries from them."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from mrdamper.tracing.compiled.compilers import Built, compiled_file
 _EXACT = ("-std=c99", "-O2", "-ffp-contract=off")
 FLAGS = (*_EXACT, "-fvisibility=hidden", "-fPIC", "-shared")
 _WEB = (*_EXACT, "-target", "wasm32-wasi", "-mexec-model=reactor", "-Wl,--no-entry", "-s")
-_BUILD_TIMEOUT_S = 600  # s; a cross compiler builds its C library the first time
+_BUILD_TIMEOUT_S = 600  # s; a cross compiler builds its C library at the first use
 
 
 @dataclass(frozen=True)
 class Platform:
-    """A platform an FMU can carry a binary for."""
+    """A platform of a binary in an FMU."""
 
-    name: str  # as FMI 3.0 calls it
-    fmi2: str  # as FMI 2.0 calls it; empty where it has no name for it
+    name: str  # name in FMI 3.0
+    fmi2: str  # name in FMI 2.0; empty if it has none
     suffix: str  # of its shared libraries
-    target: str  # as zig calls it
+    target: str  # name in zig
 
 
 PLATFORMS = (
@@ -39,7 +39,7 @@ PLATFORMS = (
 
 
 def here() -> Platform | None:
-    """Return the platform this runs on, where FMUs have a name for it."""
+    """Return the platform of this machine, if FMI names it."""
     machine = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
     name = f"{machine.get(platform.machine().lower(), '')}-{platform.system().lower()}"
     return next((p for p in PLATFORMS if p.name == name), None)
@@ -48,8 +48,7 @@ def here() -> Platform | None:
 def compiler_for(wanted: Platform) -> tuple[str, ...]:
     """Return the command that compiles for a platform; empty if there is none.
 
-    The system's own compiler comes first where it fits, then zig (`pip install ziglang`), which
-    compiles for all of them.
+    The compiler of the system is preferred, then zig (`pip install ziglang`), which compiles for all platforms.
     """
     if wanted == here() and wanted.suffix != ".dll":
         for name in ("cc", "gcc", "clang"):
@@ -73,7 +72,7 @@ def build_library(sources: Mapping[str, bytes], wanted: Platform, compiler: Sequ
 
 
 def build_webassembly(sources: Mapping[str, bytes]) -> Built:
-    """Compile C sources into a WebAssembly module that imports nothing; zig alone brings a C library for it."""
+    """Compile C sources to a WebAssembly module without imports, with zig, which has a C library for it."""
     if not importlib.util.find_spec("ziglang"):
         return Built(None, "no compiler for it; pip install ziglang")
     return _built(sources, [sys.executable, "-m", "ziglang", "cc", *_WEB], ())

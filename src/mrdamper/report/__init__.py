@@ -1,1 +1,1 @@
-"""Results for readers: tables, figures, and pages that hold both."""
+"""Reports of results: tables, figures and pages."""

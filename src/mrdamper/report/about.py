@@ -1,6 +1,6 @@
 """Head of a report and limits: specimen, rig, customer, force limits.
 
-Both come from small TOML files a user writes. Nothing is required and nothing is invented.
+Both are read from TOML files of the user. No field is required.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from mrdamper.errors import InputError
 from mrdamper.rig_files.strict_toml import FORCE_LIMITS, checked_table, load_part, load_toml
 
 _HELP = "mrdamper init about shows the fields"
-_LARGEST_LOGO = 500_000  # bytes; it stands in every page
-_LONGEST = 5_000  # letters of a field
-_LONGEST_SIDE = 5_000  # points of a logo
+_LARGEST_LOGO = 500_000  # bytes of the logo, which is part of every page
+_LONGEST = 5_000  # characters of a field
+_LONGEST_SIDE = 5_000  # pixels of a logo
 _PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 
 
@@ -32,7 +32,7 @@ class AboutError(InputError):
 
 
 def _as_text(value: Any) -> Any:
-    """Numbers and dates of a file are text as they stand."""
+    """Convert numbers and dates of a file to text as written."""
     return value if isinstance(value, (dict, list, bool)) else str(value)
 
 
@@ -42,7 +42,7 @@ _Number = Annotated[float, Field(strict=True, ge=0, allow_inf_nan=False)]
 
 
 class About(BaseModel, extra="forbid", frozen=True, str_strip_whitespace=True):
-    """The head of a report; what was not given is empty."""
+    """The head of a report; missing fields are empty."""
 
     title: _Text = ""
     customer: _Text = ""
@@ -66,12 +66,12 @@ class About(BaseModel, extra="forbid", frozen=True, str_strip_whitespace=True):
 
 
 class Limit(BaseModel, extra="forbid", frozen=True):
-    """A band the damping force must lie in."""
+    """A range for the damping force."""
 
     current_A: _Number
     velocity_m_s: _Number
     side: Literal["rebound", "compression"]
-    # lower_N and upper_N: of the force with the gas force taken away, positive
+    # lower_N and upper_N: of the force with the gas force subtracted, positive
     lower_N: _Number
     upper_N: _Number
 
@@ -106,7 +106,7 @@ def about_of(table: Mapping[str, Any], where: str) -> About:
 
 
 def logo_of(text: str) -> str:
-    """Return a picture, given as base64, as the data address a page holds.
+    """Convert a picture in base64 to a data address for a page.
 
     Raises `AboutError` if it is no base64, no PNG or JPEG, or too large.
     """
@@ -120,15 +120,15 @@ def logo_of(text: str) -> str:
 def load_limits(path: str | Path) -> tuple[Limit, ...]:
     """Read the force limits of a limits file: one `[[limit]]` table per limit.
 
-    Raises `AboutError` if it cannot be read, a key is unknown, a limit is incomplete, no number, of no side, or its
-    lower force above the upper, or two limits at one point exclude each other.
+    Raises `AboutError` if it cannot be read, a key is unknown, two limits at one point exclude each other, or a limit
+    is incomplete, no number, without a side, or has its lower force above the upper one.
     """
     kind = Annotated[tuple[Limit, ...], AfterValidator(_without_exclusion)]
     return load_part(path, {FORCE_LIMITS: (kind, ...)}, AboutError)[FORCE_LIMITS]
 
 
 def _without_exclusion(limits: tuple[Limit, ...]) -> tuple[Limit, ...]:
-    """Refuse two limits at the same point that no force meets, and a table of none."""
+    """Refuse two limits at the same point that exclude each other, and an empty table."""
     if not limits:
         raise ValueError("no [[limit]] tables")
     points: dict[tuple[float, float, str], list[tuple[int, Limit]]] = {}

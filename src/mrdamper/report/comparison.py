@@ -28,7 +28,7 @@ _LOOPS, _OVERLAID = 3, 5
 def write_comparison(
     comparison: Comparison, folder: str | Path, progress: Progress = lambda what, share: None, *, png: bool = False
 ) -> list[Path]:
-    """Write the comparison, whole or not at all, and return the files, the page first.
+    """Write the comparison atomically, and return the files, the page first.
 
     The folder is made if missing; files of the same names are replaced together at the end. With `png` every figure is
     written as PNG beside the SVG. Raises `OutputError` if the folder cannot be written to.
@@ -61,12 +61,12 @@ def write_comparison(
 
 
 def summary_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """One row a rig and model, best first: scores as fractions, counts, seconds, reason."""
+    """One row per rig and model, best first: scores as fractions, counts, seconds, reason."""
     return [row for rig in comparison.rigs for row in _rows(rig)]
 
 
 def run_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """One row a model, set and run, scores as fractions; "per run" rows are identified from that run."""
+    """One row per model, set and run, scores as fractions; "per run" rows are individual fits."""
     rows = []
     for rig in comparison.rigs:
         for entry in rig.entries:
@@ -109,7 +109,7 @@ def _rows(rig: RigComparison) -> list[dict[str, Any]]:
 
 
 def _evaluations(entry: RecipeResult) -> int | None:
-    """Return the budget of an identification: forces computed, median over runs."""
+    """Return the number of forces computed by an identification, median over runs."""
     counts = [i.evaluations for i in entry.identifications]
     return int(np.median(counts)) if counts else None
 

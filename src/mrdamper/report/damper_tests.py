@@ -40,7 +40,7 @@ def write_test_report(
     `specimens` are the tests of one damper each, by the name in the report. Pass or fail is stated only against
     `limits` of the damping force. `ladder` holds the velocities of the force table [m/s]; default: round values within
     the tests of the first specimen. Pages of report.pdf have the size `paper`, "a4" or "letter". Raises
-    `IdentificationError` if a specimen holds no steady cycle, or the tests of several dampers, and `OutputError` if the
+    `IdentificationError` if a specimen has no steady cycle, or the tests of several dampers, and `OutputError` if the
     folder cannot be written to.
     """
     from mrdamper.report.pdf import pdf_of
@@ -98,7 +98,7 @@ def _bar(limit: Limit) -> tuple[float, float, float, float]:
 def facts_of_tests(
     specimens: Mapping[str, Characteristics], ladder: Sequence[float] = (), limits: Sequence[Limit] = ()
 ) -> dict[str, Any]:
-    """Collect what the template prints: summary, set velocities, forces, currents, results against limits."""
+    """Collect the values of the template: summary, set velocities, forces, currents, results against limits."""
     steps = tuple(ladder) or next(iter(specimens.values())).ladder()
     forces = [
         {

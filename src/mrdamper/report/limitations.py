@@ -1,4 +1,4 @@
-"""Limitations of an identified damper and of its tests, as grouped sentences in the order of harm."""
+"""Limitations of an identified damper and of its tests, as grouped sentences, the most serious first."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Limitation:
 
 
 def limitations(scored: RecipeResult, loops: Sequence[LoopAnalysis], runs: Iterable[Run] = ()) -> list[Limitation]:
-    """List the limitations of a model and of the tests it was identified from, the most harmful first."""
+    """List the limitations of a model and of the tests it was identified from, the most serious first."""
     entries = {
         PREDICTION: [
             *_design(loops, [run.run_id for run in scored.train.runs]),
@@ -99,7 +99,7 @@ def _explained(entries: Sequence[Limitation], damper: Damper) -> list[Limitation
 
 
 def _design(loops: Sequence[LoopAnalysis], identified: Sequence[str]) -> list[str]:
-    """List what the design of the tests cannot show."""
+    """List effects that the design of the tests cannot determine."""
     sentences = []
     if 0 < len(identified) < MIN_RUNS:
         sentences.append(

@@ -1,6 +1,6 @@
 """Pages as single HTML files without scripts or network access.
 
-Templates are in `templates/`; each extends `base.html.j2`, which holds layout and style.
+Templates are in `templates/`; each extends `base.html.j2` with layout and style.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ PAPERS = ("a4", "letter")  # sizes of the pages of a PDF
 
 
 def render_page(template: str, title: str, footer: str, **facts: object) -> str:
-    """Render a template of `templates/`; the footer states how the page was made."""
+    """Render a template of `templates/`; the footer states the origin of the page."""
     return _ENVIRONMENT.get_template(template).render(title=title, footer=footer, **facts)
 
 
@@ -40,7 +40,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 def plain(value: float) -> str:
-    """Format a condition as a test plan would: three significant digits, zero without a sign.
+    """Format a condition as in a test plan: three significant digits, zero without a sign.
 
     Examples
     --------

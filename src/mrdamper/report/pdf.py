@@ -27,11 +27,11 @@ _MARGIN = 18.0  # mm
 _INK, _FAINT, _RULE = (27, 31, 36), (91, 101, 112), (217, 222, 227)
 _SIZES = {"h1": 18.0, "h2": 14.0, "h3": 11.0, "p": 9.5, "table": 8.0, "caption": 8.0}  # pt
 _SMALLEST = 6.0  # type size [pt] below which a table is split by columns
-_MIN_SCALE = 0.7  # of a figure that is made smaller to fit the rest of a page [-]
+_MIN_SCALE = 0.7  # smallest scale of a figure that is reduced to fit the rest of a page [-]
 _PADDING = 3.0  # mm beside a cell's text
 _NARROWEST = 28.0  # mm of a column whose text runs over lines
-_LOGO = (50.0, 14.0)  # mm, the room of a logo
-_KEEP = 42.0  # mm a heading wants below itself, so that it never ends a page
+_LOGO = (50.0, 14.0)  # mm, largest size of a logo
+_KEEP = 42.0  # mm required below a heading, so that it does not end a page
 _VOID = frozenset({"br", "img", "meta", "link", "hr", "input"})
 _INLINE = frozenset({"b", "strong", "code", "a", "span", "br", "em", "i", "sup", "sub"})
 
@@ -43,7 +43,7 @@ class _Element:
     children: list[_Element | str] = field(default_factory=list)
 
     def elements(self, *tags: str) -> Iterator[_Element]:
-        """Every element below of one of some kinds, in the order of the page."""
+        """Return the elements below of some kinds, in the order of the page."""
         for child in self.children:
             if isinstance(child, _Element):
                 if child.tag in tags:
@@ -53,7 +53,7 @@ class _Element:
 
     @property
     def text(self) -> str:
-        """The text inside; a line break stays one."""
+        """Return the text inside, with line breaks."""
         parts = [c if isinstance(c, str) else "\n" if c.tag == "br" else c.text for c in self.children]
         lines = "".join(p if p == "\n" else " ".join(p.split(" ")).replace("\n", " ") for p in parts).split("\n")
         return "\n".join(" ".join(line.split()) for line in lines).strip()
@@ -118,7 +118,7 @@ def pdf_of(page: str, figures: Mapping[str, bytes], paper: str = "a4") -> bytes:
         raise UnknownNameError.of("paper size", paper, PAPERS)
     tree = _Tree()
     tree.feed(page)
-    logging.getLogger("fpdf").setLevel(logging.ERROR)  # a character that no font holds is drawn as a box
+    logging.getLogger("fpdf").setLevel(logging.ERROR)  # a character without a font is drawn as a box
     logging.getLogger("fontTools").setLevel(logging.ERROR)
     title = next(tree.root.elements("h1")).text
     fallback = fallback_fonts(tree.root.text, str(_fonts() / "DejaVuSans.ttf"))
@@ -140,12 +140,12 @@ def pdf_of(page: str, figures: Mapping[str, bytes], paper: str = "a4") -> bytes:
 class _Writer:
     def __init__(self, paper: _Paper, figures: Mapping[str, bytes]) -> None:
         self.paper, self.figures = paper, figures
-        self.kept = 0.0  # mm that a heading wants below itself for what follows it
+        self.kept = 0.0  # mm required below a heading for the element that follows
         self.waiting: list[_Element] = []  # figures that did not fit the rest of their page
         self.places: list[tuple[str, int, float, float, float]] = []  # figure, page, left, bottom [mm], width
 
     def block(self, element: _Element) -> None:
-        """Set an element; what is no block of its own is set child by child."""
+        """Set an element; children of an element that is no block are set separately."""
         if element.tag in ("style", "script", "nav"):
             return
         writers = {"h1": self.heading, "h2": self.heading, "h3": self.heading, "table": self.table}
@@ -167,7 +167,7 @@ class _Writer:
                     self.place_waiting()
 
     def place_waiting(self, *, all_of_them: bool = False) -> None:
-        """Set the figures that wait, where they fit by now; all of them on further pages before a chapter ends."""
+        """Set waiting figures that fit; before a chapter ends, set all of them on further pages."""
         waiting, self.waiting = self.waiting, []
         for number, element in enumerate(waiting):
             if not all_of_them and not self._scale(element):
@@ -178,26 +178,26 @@ class _Writer:
             self.figure(element)
 
     def reserve(self, height: float) -> None:
-        """Begin a page, with the figures that wait at its top, where the rest of this one is lower [mm]."""
+        """Begin a page, with waiting figures at its top, if the rest of this one is lower [mm]."""
         while self.paper.will_page_break(height):
             self.paper.add_page()
             self.place_waiting()
 
     def _scale(self, element: _Element) -> float:
-        """Scale at which a figure fits the rest of the page; 0 where that is too small to be read."""
+        """Return the scale at which a figure fits the rest of the page; 0 if that is too small to read."""
         room = self.paper.page_break_trigger - self.paper.get_y() - self._height(element, caption_only=True)
         scale = min(1.0, room / (self._height(element) - self._height(element, caption_only=True)))
         return scale if scale >= _MIN_SCALE else 0.0
 
     def logo(self, element: _Element) -> None:
-        """Draw a picture that stands in the page itself, at the right margin."""
+        """Draw a picture embedded in the page, at the right margin."""
         picture = b64decode((element.attributes.get("src") or "").partition("base64,")[2])
         top = self.paper.get_y()
         self.paper.image(picture, Align.R, top, _LOGO[0], _LOGO[1], keep_aspect_ratio=True, alt_text="logo")
         self.paper.set_y(top + _LOGO[1] + 2)
 
     def heading(self, element: _Element) -> None:
-        """Draw a heading, with room below it for what it heads."""
+        """Draw a heading, with space below it for the next element."""
         paper, size = self.paper, _SIZES[element.tag]
         if element.tag == "h2":
             self.place_waiting(all_of_them=True)
@@ -255,13 +255,13 @@ class _Writer:
         self.paragraph(_Element("p", element.attributes, ["•  ", *element.children]), indent=3.0)
 
     def numbers(self, element: _Element) -> None:
-        """Draw the large figures of a summary, one a line."""
+        """Draw the key figures of a summary, one per line."""
         for box in element.elements("div"):
             value = next(box.elements("b")).text
             self.paragraph(_Element("p", {}, [_Element("b", {}, [value]), f"  {next(box.elements('span')).text}"]))
 
     def figure(self, element: _Element) -> None:
-        """Draw a figure and its caption, on one page: smaller where it nearly fits, later where it does not."""
+        """Draw a figure and its caption, on one page: reduced if it nearly fits, otherwise later."""
         name = element.attributes.get("id") or ""
         paper = self.paper
         scale = self._scale(element) if name in self.figures else 1.0
@@ -280,7 +280,7 @@ class _Writer:
             self.paragraph(_Element("p", {"class": "caption"}, caption.children), _SIZES["caption"])
 
     def table(self, element: _Element) -> None:
-        """Draw a table whose headings stand on every page it runs over."""
+        """Draw a table with its headings on every page."""
         caption = next(element.elements("caption"), None)
         rows = _cells(element)
         if not rows:
@@ -293,7 +293,7 @@ class _Writer:
             self._part(part)
 
     def _parts(self, rows: list[list[_Element]]) -> list[list[list[_Element]]]:
-        """Split the columns of a table that is too wide for the page; the first column stands in every part."""
+        """Split the columns of a table that is too wide for the page; every part has the first column."""
         columns = len(rows[0])
         texts = [[cell.text for cell in row] for row in rows]
         if columns < 4 or any(len(row) != columns for row in rows) or self._fitted(texts, rows)[0] >= _SMALLEST:
@@ -347,12 +347,12 @@ class _Writer:
                 return size, widths
             least = {i: max(_NARROWEST, words[i]) for i, wrap in enumerate(wraps) if wrap}
             spare = room - sum(least.values())
-            if least and spare >= 0:  # it goes to the columns by what they lack
+            if least and spare >= 0:  # distributed over the columns by the width they lack
                 lack = {i: max(0.0, widths[i] - least[i]) for i in least}
                 share = spare / (sum(lack.values()) or 1.0)
                 return size, [least[i] + share * lack[i] if i in least else w for i, w in enumerate(widths)]
             if size <= _SMALLEST:
-                fair = [min(width, paper.epw / columns) for width in widths]  # one long word leaves room for the others
+                fair = [min(width, paper.epw / columns) for width in widths]  # a long word leaves space for others
                 more = sum(widths) - sum(fair) or 1.0
                 share = (paper.epw - sum(fair)) / more
                 return _SMALLEST - 0.1, [f + share * (w - f) for f, w in zip(fair, widths, strict=True)]
@@ -377,7 +377,7 @@ def _size_of(figure: bytes) -> tuple[float, float]:
 
 
 def _with_figures(text: bytes, places: list[Any], figures: Mapping[str, bytes]) -> bytes:
-    """Lay figures into their places, each as one object: their drawing is not taken apart, which takes seconds."""
+    """Place figures, each as one object, because parsing their drawing takes seconds."""
     from pypdf import PdfReader, PdfWriter
     from pypdf.generic import ArrayObject, DecodedStreamObject, DictionaryObject, NameObject
 
@@ -398,7 +398,7 @@ def _with_figures(text: bytes, places: list[Any], figures: Mapping[str, bytes]) 
     for page, objects in drawn.items():
         sheet = whole.pages[page]
         shared: Any = sheet["/Resources"].get_object()
-        resources = DictionaryObject(shared)  # a page's own: pages share theirs
+        resources = DictionaryObject(shared)  # resources of this page: pages share theirs
         registered = resources.get("/XObject", DictionaryObject()).get_object()
         resources[NameObject("/XObject")] = DictionaryObject(
             {**registered, **{NameObject(name): reference for name, reference, _ in objects}}

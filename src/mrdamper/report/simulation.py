@@ -24,9 +24,9 @@ _ROWS = 20_000  # of histories.csv
 def write_simulation(
     done: Simulation, folder: str | Path, beside: ControllerComparison | None = None, bands: Bands | None = None
 ) -> list[Path]:
-    """Write a simulation, whole or not at all, and return the files, the page first.
+    """Write a simulation atomically, and return the files, the page first.
 
-    `beside` holds controllers to show beside it, `bands` the ranges over draws of its dampers. The folder is made if
+    `beside` contains controllers for comparison, `bands` the ranges over draws of its dampers. The folder is made if
     missing. Raises `OutputError` if it cannot be written to.
     """
     runs: dict[str, Simulation] = {type(done.controller).title: done}
@@ -67,7 +67,7 @@ def write_simulation(
 
 
 def history_rows(done: Simulation) -> list[dict[str, float]]:
-    """Time histories in SI units, every sample or as many as make twenty thousand rows."""
+    """Time histories in SI units, with at most twenty thousand rows."""
     table = {"time_s": done.time}
     for i, name in enumerate(done.system.coordinates):
         table |= {f"{name}.x": done.x[:, i], f"{name}.v": done.v[:, i], f"{name}.a": done.a[:, i]}

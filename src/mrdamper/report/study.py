@@ -1,4 +1,4 @@
-"""A study as files: report.html, models, tables and figures; all of them or none."""
+"""A study as files, written atomically: report.html, models, tables and figures."""
 
 from __future__ import annotations
 
@@ -68,11 +68,11 @@ def write_study(
         Limits of the measured damping force, or a TOML file (`mrdamper init limits`); pass or fail is stated only
         against these.
     also : sequence of str
-        "png" and "pdf": every figure in that format too; with "pdf" comes report.pdf.
+        "png" and "pdf": every figure in that format, too; "pdf" adds report.pdf.
     paper : str
         Size of the pages of report.pdf: "a4" or "letter".
     processes : Processes
-        Where the figures are drawn.
+        Processes that draw the figures.
 
     Returns
     -------
@@ -206,7 +206,7 @@ def _shown(rig: RigStudy) -> list[Any]:
 
 @once_per_run
 def _measured(rig: RigStudy) -> dict[str, Characteristics]:
-    """Characterise the tests without a model; empty where no run holds a steady cycle."""
+    """Characterise the tests without a model; empty if no run has a steady cycle."""
     try:
         return {rig.dataset.name: characterise(rig.dataset.runs)}
     except IdentificationError:

@@ -68,7 +68,7 @@ def error_sentence(rig: RigStudy) -> str:
 
 
 def omission_lines(results: Sequence[RecipeResult], reasons: Mapping[str, str], most: int) -> list[str]:
-    """List the runs that are not fitted on their own, and those that are not used at all; a line per reason."""
+    """List the runs without an individual fit, and those that are not used; one line per reason."""
     used = {score.run_id for r in results for v in (r.train, r.cross_validated, r.validation) for score in v.runs}
     groups: dict[tuple[str, str], list[str]] = {}
     for run, why in reasons.items():
@@ -130,7 +130,7 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
 
 
 def _why_not(rig: RigStudy, other: RecipeResult) -> str:
-    """Reason why a model with a smaller cross-validation error over conditions is not the chosen one."""
+    """State why a model with a smaller cross-validation error over conditions is not the selected one."""
     chosen = rig.chosen
     if rig.asked_for or not other.cross_validated.median() < chosen.cross_validated.median():
         return ""

@@ -1,7 +1,4 @@
-"""Results as rows: what the command line and the pages print.
-
-Nothing here draws: a command that writes a table loads no plotting library.
-"""
+"""Results as rows of tables for the command line and the pages, without a plotting library."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from mrdamper.study.validation import SCORES, RunScore
 
 
 def identification_rows(identifications: Sequence[Identification], dataset: str = "") -> list[dict[str, Any]]:
-    """One row an identification: condition, parameters, scores, message; `dataset` where a run names no rig."""
+    """One row per identification: condition, parameters, scores, message; `dataset` if a run names no rig."""
     rows = []
     for identification in identifications:
         row: dict[str, Any] = {
@@ -44,7 +41,7 @@ def identification_rows(identifications: Sequence[Identification], dataset: str 
 
 
 def prediction_rows(prediction: Prediction, band: Band | None = None) -> list[dict[str, Any]]:
-    """One row a sample, in the columns of the command-line contract; the band where there is one; the flags."""
+    """One row per sample, in the columns of the command-line contract, with prediction interval, if any, and flags."""
     columns = dict(prediction.table)
     if band is not None:
         columns |= {"force_low_N": band.low, "force_high_N": band.high}

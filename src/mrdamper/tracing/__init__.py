@@ -1,7 +1,7 @@
-"""One definition of a model for arrays, streams and source code: its array code runs on symbols.
+"""Programs for one sample and source code from array code that runs on symbols.
 
-`Tape` is what is written on, `Expression` what the model's arithmetic sees in place of arrays,
-`streamed` the form of a function with memory for one sample, `program` the result in order.
+`Tape` records the operations, `Expression` replaces arrays in the model's arithmetic, `streamed` gives a function with
+memory its form for one sample, `program` orders the result.
 """
 
 from mrdamper.tracing.expression import Expression, Traced, TraceError, choose, plain, settled

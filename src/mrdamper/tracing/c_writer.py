@@ -1,6 +1,6 @@
-"""A traced program as C99: structures for parameters, derived numbers and memory, functions on them.
+"""A traced program as C99: structures for parameters, derived constants and memory, and functions on them.
 
-JavaScript is C's grammar with other words, so it computes in C's order.
+JavaScript is written with the grammar of C and other keywords, and computes in the same order.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from mrdamper.tracing.program import FUNCTIONS, Branch, Repeat, Statement, Write
 
 
 class CWriter(Writer):
-    """C's words. Library functions and constants go through macros, so that one source serves both precisions.
+    """Writer of C. Library functions and constants are macros, so that one source serves both precisions.
 
     Names of memory in the common state begin with `memory_prefix`.
     """
@@ -23,7 +23,7 @@ class CWriter(Writer):
         super().__init__(program)
         self.memory_prefix = memory_prefix
 
-    member: ClassVar[str] = "->"  # between a structure and what is in it
+    member: ClassVar[str] = "->"  # between a structure and its member
     constant: ClassVar[str] = "const real"
     answer: ClassVar[str] = "const int"  # yes or no
     variable: ClassVar[str] = "real"
@@ -105,7 +105,7 @@ class CWriter(Writer):
 
 
 class JavaScriptWriter(CWriter):
-    """JavaScript's words; its numbers are C's doubles."""
+    """Writer of JavaScript; its numbers are the doubles of C."""
 
     member: ClassVar[str] = "."
     constant: ClassVar[str] = "const"

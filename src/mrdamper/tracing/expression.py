@@ -1,11 +1,10 @@
-"""Expressions: what a model's arithmetic leaves behind when it runs on symbols instead of arrays.
+"""Expressions, by which array code runs on symbols instead of arrays.
 
-An `Expression` stands for one number at one sample. Python's operators and NumPy's functions
-work on it and write down what they did. Where it is known, an expression carries the value it
-has for the model at hand, so that a question about parameters ("is this width positive?") can
-be answered while tracing; the answer is kept as a guard, because the program that comes out
-holds for that answer only. A question about the motion has no answer while tracing and is
-refused: it must be written as a choice (`choose`, `numpy.where`).
+An `Expression` represents one number at one sample; Python's operators and NumPy's functions record their operations on
+it. Where its value for the present model is known, an expression contains it, so that conditions on parameters ("is
+this width positive?") can be evaluated while tracing; the result is kept as a guard, because the program is valid for
+that result only. A condition on the motion has no value while tracing and is refused: it must be written as a choice
+(`choose`, `numpy.where`).
 """
 
 from __future__ import annotations
@@ -18,38 +17,38 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-CONSTANT, PARAMETER, SAMPLE = 0, 1, 2  # when a value is known: always, once the parameters are, at each sample
+CONSTANT, PARAMETER, SAMPLE = 0, 1, 2  # stage at which a value is known: always, with the parameters, at each sample
 
 
 class TraceError(TypeError):
-    """A model's code cannot be turned into a program; our fault, not the user's."""
+    """Code of a model that cannot be converted to a program: an internal error."""
 
 
 class Recorder(Protocol):
-    """The recorder on which the operators of expressions write what they did."""
+    """Recorder of the operations on expressions."""
 
     def settle(self, question: Expression, /) -> bool:
-        """Answer a question about parameters while tracing."""
+        """Evaluate a condition on parameters while tracing."""
         ...
 
     def apply(self, op: str, /, *args: Any) -> Any:
-        """Write down an operation and return its result."""
+        """Record an operation and return its result."""
         ...
 
     def select(self, condition: Any, then: Any, otherwise: Any, /) -> Any:
-        """Write down a choice and return its result."""
+        """Record a choice and return its result."""
         ...
 
 
 class Traced:
-    """The objects that a traced function is given in place of arrays."""
+    """Objects that replace arrays in a traced function."""
 
     tape: Any  # the `Recorder` that made it
 
 
 @dataclass(frozen=True)
 class Operation:
-    """An operation on numbers: its plain value, and whether it answers yes or no."""
+    """An operation on numbers: its value for floats, and whether it is logical."""
 
     value: Callable[[Any], Any] | Callable[[Any, Any], Any]
     logical: bool = False
@@ -96,7 +95,7 @@ _ALIASES = {"true_divide": "divide", "bitwise_and": "logical_and", "bitwise_or":
 
 
 class Expression(NDArrayOperatorsMixin, Traced):
-    """One number at one sample; made by a `Tape`, never by hand. Its operators are NumPy's functions.
+    """One number at one sample, made by a `Tape`. Its operators are NumPy's functions.
 
     Attributes
     ----------
@@ -105,9 +104,9 @@ class Expression(NDArrayOperatorsMixin, Traced):
     args : tuple
         Expressions and floats.
     stage : int
-        When it is known: CONSTANT, PARAMETER or SAMPLE.
+        Stage at which it is known: CONSTANT, PARAMETER or SAMPLE.
     value : float or bool, optional
-        What it is for the model at hand, where that is known while tracing.
+        Its value for the present model, where it is known while tracing.
     """
 
     __slots__ = ("args", "name", "op", "stage", "tape", "value")
@@ -140,7 +139,7 @@ class Expression(NDArrayOperatorsMixin, Traced):
         name = _ALIASES.get(ufunc.__name__, ufunc.__name__)
         if name == "clip":
             return _clip(*inputs)
-        written = options.pop("out", inputs)[0]  # a *= b writes into a, and binds a to the answer
+        written = options.pop("out", inputs)[0]  # a *= b writes into a, and binds a to the result
         if method != "__call__" or options or written is not inputs[0] or name not in OPERATIONS:
             raise TraceError(f"numpy.{ufunc.__name__} has no scalar form here; add it to OPERATIONS")
         return self.tape.apply(name, *(plain(value) for value in inputs))
@@ -170,7 +169,7 @@ def choose(condition: Any, then: Callable[[], Any], otherwise: Callable[[], Any]
 
 
 def settled(value: Any) -> Any:
-    """Return the present number: the program that comes out holds for this value only."""
+    """Return the present number: the program is valid for this value only."""
     if not isinstance(value, Expression):
         return value
     if value.value is None:

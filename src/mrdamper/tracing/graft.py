@@ -1,7 +1,7 @@
-"""A program written again on another tape, as often as one likes, with other inputs.
+"""Copies of a program on another tape with other inputs.
 
-So a law can ask what a damper would answer to a current without giving it that current: the
-answers share all that does not depend on what differs, and memory moves on once.
+A control law can thus evaluate the force of a damper at several currents: the evaluations share operations that do not
+depend on the current, and the memory is updated once.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from mrdamper.tracing.tape import Tape, TracedLoop
 class ProgramCopy:
     """A program on another tape, its parameters as they were traced.
 
-    The names of its memory there begin with `prefix`; the input `varying` differs from answer to answer, all others are
+    The names of its memory there begin with `prefix`; the input `varying` differs between evaluations, all others are
     given as expressions.
     """
 
@@ -31,11 +31,11 @@ class ProgramCopy:
         self.still: dict[int, Any] = {}
 
     def answer(self, value: Any) -> dict[str, Any]:
-        """Evaluate the outputs for this varying input; nothing is remembered."""
+        """Evaluate the outputs for this varying input without updating the memory."""
         return self._outputs(self._copied(value))
 
     def settle(self, value: Any) -> dict[str, Any]:
-        """Evaluate and remember the outputs for the present varying input; conditions of a sample are checked again."""
+        """Evaluate the outputs for the present varying input, update the memory and check its conditions."""
         copies = self._copied(value)
         for name, memory in self.memory.items():
             if name in self.source.tape.updates:

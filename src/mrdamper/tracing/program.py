@@ -1,8 +1,7 @@
 """A traced model in the order in which it is computed: blocks, branches and loops; and the base class of its writers.
 
-Every operation lands in the innermost block that all its users share, so a branch that is not
-taken costs nothing and cannot fail. What depends on parameters alone is computed once, before
-the first sample.
+Every operation is placed in the innermost block that all its users share, so a branch that is not taken is not
+computed. Operations on parameters alone are computed once, before the first sample.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ class Branch:
 
 @dataclass
 class Repeat:
-    """Do a block until it says that it is enough."""
+    """Repeat a block until its condition fails."""
 
     loop: TracedLoop
     body: list[Statement]
@@ -55,17 +54,17 @@ class Program:
     outputs: Mapping[str, Any]
     setup: list[Statement] = field(default_factory=list[Statement])
     step: list[Statement] = field(default_factory=list[Statement])
-    derived: list[Expression] = field(default_factory=list[Expression])  # what `setup` hands to `step`
-    # name of an expression, by its id; expressions without one are written where they are used
+    derived: list[Expression] = field(default_factory=list[Expression])  # values from `setup` for `step`
+    # name of an expression by its id; expressions without a name are written where they are used
     names: dict[int, str] = field(default_factory=dict[int, str])
 
     def guards(self, stage: int) -> list[tuple[Expression, bool]]:
-        """Settled questions that can be asked again at a stage."""
+        """Guards that can be evaluated at a stage."""
         return [(question, answer) for question, answer in self.tape.guards if question.stage == stage]
 
 
 def program(tape: Tape, outputs: Mapping[str, Any]) -> Program:
-    """Order what a tape holds into a program with these outputs."""
+    """Order the operations of a tape into a program with these outputs."""
     result = Program(tape, outputs)
     roots = [(value, False) for value in (*outputs.values(), *tape.updates.values())]
     roots += [(question, question.stage <= PARAMETER) for question, _ in tape.guards]
@@ -99,7 +98,7 @@ def dependencies(node: Expression | TracedLoop) -> Iterator[tuple[Any, int | Non
 
 
 def postorder(roots: list[Any]) -> list[Any]:
-    """Nodes, each after what it is computed from."""
+    """Return nodes in topological order."""
     visited: set[int] = set()
     order: list[Any] = []
     stack: list[tuple[Any, bool]] = [(root, False) for root in reversed(roots)]
@@ -150,8 +149,8 @@ def _early(node: Any) -> bool:
 def _name(result: Program, order: list[Any], scopes: dict[int, Scope], uses: dict[int, list[_Use]]) -> None:
     """Name leaves, branches, loops, and what is used more than once or in another block.
 
-    What is computed early and used late is derived from the parameters; what is used once, in
-    the block it is computed in, is written where it is used.
+    Expressions computed before the first sample and used later are derived constants; an expression used once, in its
+    own block, is written where it is used.
     """
     stored = {id(value) for value in result.tape.updates.values()}
     for node in order:
@@ -170,10 +169,10 @@ def _name(result: Program, order: list[Any], scopes: dict[int, Scope], uses: dic
 
 
 def _fill(result: Program, order: list[Any], scopes: dict[int, Scope]) -> None:
-    """Put what is named into blocks."""
+    """Put named expressions into blocks."""
     blocks: dict[tuple[Scope, bool], list[Statement]] = defaultdict(list)
     early_blocks: set[int] = set()
-    for node in reversed(order):  # outer before inner: an inner block is early if the branch around it is
+    for node in reversed(order):  # outer before inner: an inner block is computed early if its branch is
         scope = scopes[id(node)]
         if scope[0][0] in early_blocks if scope else _early(node):
             early_blocks.add(id(node))
@@ -197,9 +196,9 @@ _MARKS = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"} | {
 
 
 class Writer(ABC):
-    """Writes expressions of a program; a language says how operations and numbers look."""
+    """Writer of the expressions of a program; subclasses define the operations and numbers of a language."""
 
-    formats: ClassVar[Mapping[str, str]] = {  # what C, JavaScript and Python write alike
+    formats: ClassVar[Mapping[str, str]] = {  # common to C, JavaScript and Python
         **{op: f"({{}} {mark} {{}})" for op, mark in _MARKS.items()},
         "negative": "(-{})",
     }
@@ -210,17 +209,17 @@ class Writer(ABC):
 
     @abstractmethod
     def number(self, value: float) -> str:
-        """Write a number, all its digits."""
+        """Write a number with all its digits."""
 
     def name(self, expression: Expression) -> str:
-        """Name of an expression that has one."""
+        """Return the name of an expression."""
         if expression.op in ("carry", "result"):
             loop, index = expression.args
             return self.carry(loop, index)
         return self.program.names[id(expression)]
 
     def carry(self, loop: TracedLoop, index: int) -> str:
-        """Name of a value that a loop carries."""
+        """Return the name of a loop variable."""
         return f"loop{self._loops.setdefault(id(loop), len(self._loops))}_{index}"
 
     def lines(self, block: list[Statement], indent: int) -> list[str]:
@@ -235,7 +234,7 @@ class Writer(ABC):
 
     @abstractmethod
     def let(self, expression: Expression) -> str:
-        """Give an expression its name."""
+        """Assign an expression to its name."""
 
     @abstractmethod
     def branch(self, statement: Branch) -> list[str]:

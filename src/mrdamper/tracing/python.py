@@ -1,4 +1,4 @@
-"""A program as Python source: what streams in the interpreter."""
+"""A program as Python source, for streaming in the interpreter."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 from mrdamper.tracing.expression import PARAMETER, SAMPLE, Expression, sign
 from mrdamper.tracing.program import FUNCTIONS, Branch, Program, Repeat, Writer
 
-DONE, OUTSIDE = 0, 1  # outside: a question the trace settled has another answer here
+DONE, OUTSIDE = 0, 1  # not valid: a guard has another value
 
 
 class PythonWriter(Writer):
-    """Python's words."""
+    """Writer of Python."""
 
     formats: ClassVar[Mapping[str, str]] = {
         **Writer.formats,
@@ -76,7 +76,7 @@ def python_functions(program: Program) -> tuple[Callable[..., Any], Callable[...
     """`prepare` and `step` as functions of the interpreter."""
     room: dict[str, Any] = {"math": math, "sign": sign}
     room |= {f"lookup{i}": table.at_float for i, table in enumerate(program.tape.tables)}
-    exec(compile(python_source(program), "<traced model>", "exec"), room)  # our own words and numbers only
+    exec(compile(python_source(program), "<traced model>", "exec"), room)  # generated text only
     return room["prepare"], room["step"]
 
 

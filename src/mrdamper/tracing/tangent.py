@@ -1,9 +1,9 @@
 """Forward tangents: derivatives of a traced program along some of its parameters, in the same pass.
 
-Every operation on the tape is followed by its derivative, and every memory that depends on a parameter has a
-derivative that is remembered beside it; so has what a loop carries, but for what its steps are measured by. Where a
-function has a corner the derivative is that of the branch taken. An expression that moves through one earlier
-expression alone has the derivative of that one times a factor, which all parameters share.
+Every operation on the tape is followed by its derivative, and every memory and loop variable that depends on a
+parameter has a derivative, except those that determine the step sizes of a loop. At a kink the derivative is that of
+the branch taken. An expression that depends on the parameters through one earlier expression alone has the derivative
+of that one times a factor, which all parameters share.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ _BY_ARGUMENT: Mapping[str, Callable[[Any, Any], Any]] = {
     "arctanh": lambda a, y: 1.0 / (1.0 - a * a),
 }
 _FLAT = frozenset({"sign", "input"})
-_BRANCHING = frozenset({"select", "minimum", "maximum"})  # they discard a derivative that may not be finite
+_BRANCHING = frozenset({"select", "minimum", "maximum"})  # these discard derivatives that may not be finite
 _TINY = 1e-300
 
 
 def with_tangents(tape: Tape, output: Any, along: Sequence[str]) -> dict[str, Any]:
     """Write the derivatives of an output by parameters on its tape; all of them by name, the output first.
 
-    Loops carry the derivatives of what they carry. Raises `TraceError` if an operation has no derivative here: tables.
+    Loops carry the derivatives of their variables. Raises `TraceError` if an operation has no derivative here: tables.
     """
     nodes = postorder([output, *tape.updates.values()])
     updates = dict(tape.updates)
@@ -50,7 +50,7 @@ def with_tangents(tape: Tape, output: Any, along: Sequence[str]) -> dict[str, An
         slopes: dict[int, Any] = {id(tape.parameters[name]): 1.0}
         held = {m: tape.remember(f"{m}_by_{name}") for m, value in updates.items() if id(value) in moving}
         slopes |= {id(tape.memory[m]): slope for m, slope in held.items()}
-        opened: dict[int, dict[int, int]] = {}  # by loop: where the derivative of what is carried at a place is carried
+        opened: dict[int, dict[int, int]] = {}  # by loop: place of the derivative of each loop variable
         chains.begin(moving, slopes)
         for node in nodes:
             if isinstance(node, TracedLoop):
@@ -72,23 +72,23 @@ def with_tangents(tape: Tape, output: Any, along: Sequence[str]) -> dict[str, An
 
 
 class _Chains:
-    """Derivatives by one parameter after the other: some written out, the others as factors of these.
+    """Derivatives by each parameter: some written out, the others as factors of these.
 
-    All are written out where they are not `joined`: with an integrator's steps, whose searches end where rounding says.
+    All are written out if they are not `joined`: with an integrator, whose searches end at rounding errors.
     """
 
     def __init__(self, tape: Tape, *, joined: bool):
         self.tape, self.joined = tape, joined
-        self.factors: dict[tuple[int, int], Any] = {}  # derivatives by an expression through which all of it moves
+        self.factors: dict[tuple[int, int], Any] = {}  # derivatives by an expression that contains all dependence
 
     def begin(self, moving: set[int], slopes: dict[int, Any]) -> None:
         """Begin with another parameter."""
         self.moving, self.slopes = moving, slopes
-        self.above: dict[int, Expression] = {}  # by expression: the last one before it through which all of it moves
+        self.above: dict[int, Expression] = {}  # by expression: the last one before it that contains all dependence
         self.depth: dict[int, int] = {}
 
     def add(self, node: Expression) -> None:
-        """Note what an expression moves through; where that is more than one, write its derivative out."""
+        """Record the expression through which the dependence passes; with more than one, write the derivative out."""
         first, *others = parts = [part for part in node.args if id(part) in self.moving]
         above: Expression | None = first if self.joined and node.op not in _BRANCHING else None
         for part in others:
@@ -127,7 +127,7 @@ class _Chains:
 
 
 def derivatives(tape: Tape, values: Sequence[Any], by: Any) -> list[Any]:
-    """Write the derivatives of values by one expression they are computed from, what is between them alone."""
+    """Write the derivatives of values by one expression that they are computed from."""
     slopes: dict[int, Any] = {id(by): 1.0}
     for node in postorder(list(values)):
         differs = isinstance(node, Expression) and not node.logical and node.op not in _FLAT
@@ -142,7 +142,7 @@ def _moving(
     loops: Mapping[int, tuple[Sequence[Any], Sequence[Any]]],
     name: str,
 ) -> set[int]:
-    """Expressions that depend on a parameter, through memory and loops too."""
+    """Return expressions that depend on a parameter, also through memory and loops."""
     moving: set[int] = set()
 
     def depends(node: Expression) -> bool:
@@ -165,7 +165,7 @@ def _moving(
 def _open(
     loop: TracedLoop, start: Sequence[Any], updates: Sequence[Any], moving: set[int], chains: _Chains
 ) -> dict[int, int]:
-    """Let a loop carry derivatives, from those of its start; their places by the places of what is carried."""
+    """Add derivatives to the variables of a loop, from those of its start; return their places."""
     moved = [i for i in range(loop.still, len(start)) if {id(start[i]), id(updates[i])} & moving]
     places = {place: len(loop.start) + k for k, place in enumerate(moved)}
     loop.start = (*loop.start, *(chains.slope(start[i]) for i in moved))

@@ -1,9 +1,8 @@
-"""The tape a traced model writes on: inputs, parameters, memory, and every operation once.
+"""Tape that records a traced model: inputs, parameters, memory, and every operation once.
 
-`streamed` gives a function of whole arrays its form for one sample. Given arrays it runs as
-it is; given expressions it writes its step on the tape: what it remembers from sample to
-sample, and how that changes. So a model is written once, for arrays, and its C comes out of
-the same lines.
+`streamed` gives a function of whole arrays its form for one sample. With arrays the function runs unchanged; with
+expressions it records its step on the tape: its memory from sample to sample, and how it changes. A model is thus
+written once, for arrays, and exported from the same code.
 """
 
 from __future__ import annotations
@@ -26,12 +25,12 @@ _UNROLLED = 6  # highest integer power written as products
 
 
 class LookupTable(Protocol):
-    """Piecewise polynomials: what a traced lookup needs of them."""
+    """Piecewise polynomials of a traced lookup."""
 
     nodes: Floats  # (K,) ends of the pieces
     cells: Floats  # (K − 1, 7): six coefficients, lowest first, and one over the width
     points: Floats  # (K, 4): u, w, dw/du and the derivative of that with respect to w, at the nodes
-    backwards: bool  # the table reads u over w, not w over u
+    backwards: bool  # the table is u over w, not w over u
 
     def at_float(self, x: float) -> float:
         """Evaluate the table at x; constant beyond the ends."""
@@ -39,9 +38,9 @@ class LookupTable(Protocol):
 
 
 class TracedLoop:
-    """A bounded repetition: carried values change until the condition fails.
+    """A bounded loop: its variables change until the condition fails.
 
-    The first `still` of them measure its steps and have no derivative: a step of given size is differentiated.
+    The first `still` of them determine its step sizes and have no derivative: a step of given size is differentiated.
     """
 
     def __init__(self, start: Sequence[Any], most: int, still: int = 0):
@@ -59,8 +58,8 @@ class Tape:
         self.inputs: dict[str, Expression] = {}
         self.memory: dict[str, Expression] = {}
         self.starts: dict[str, float] = {}
-        self.updates: dict[str, Any] = {}  # what each memory becomes after the sample
-        self.guards: list[tuple[Expression, bool]] = []  # questions settled while tracing, and their answers
+        self.updates: dict[str, Any] = {}  # value of each memory after the sample
+        self.guards: list[tuple[Expression, bool]] = []  # conditions evaluated while tracing, and their values
         self.tables: list[LookupTable] = []
         self._known: dict[tuple[Any, ...], Expression] = {}
         self._previous: dict[int, Any] = {}
@@ -71,12 +70,12 @@ class Tape:
         return self.parameters[name]
 
     def input(self, name: str, example: float | None = None) -> Expression:
-        """Add a number given at every sample; an example answers questions about its range."""
+        """Add an input of every sample; an example value is used for conditions on its range."""
         self.inputs[name] = Expression(self, "input", (), SAMPLE, example, name)
         return self.inputs[name]
 
     def remember(self, name: str, start: float = 0.0) -> Expression:
-        """Add a number kept from one sample to the next."""
+        """Add a memory value, kept from one sample to the next."""
         name = self._free(name)
         self.memory[name] = Expression(self, "memory", (), SAMPLE, None, name)
         self.starts[name] = start
@@ -104,24 +103,24 @@ class Tape:
         return self._previous[id(value)]
 
     def assume(self, value: Any, example: float) -> Any:
-        """Give an expression an example by which questions about its range are answered."""
+        """Give an expression an example value for conditions on its range."""
         value.value = example
         return value
 
     def settle(self, question: Expression) -> bool:
-        """Answer a question by the value at hand, and keep the answer."""
+        """Evaluate a condition with the present value, and keep the result."""
         answer = bool(question.value)
         if not any(guard is question for guard, _ in self.guards):
             self.guards.append((question, answer))
         return answer
 
     def require(self, question: Any) -> None:
-        """Add a condition that must hold at every sample; the program reports where it does not."""
+        """Add a condition that must hold at every sample; the program reports violations."""
         if isinstance(question, Expression):
             self.guards.append((question, True))
 
     def apply(self, op: str, *args: Any) -> Any:
-        """Write an operation down, once; powers of small integers as products."""
+        """Record an operation once; small integer powers as products."""
         args = tuple(plain(a) for a in args)
         if op == "power" and isinstance(args[1], int | float) and args[1] in range(_UNROLLED + 1):
             return self._product(args[0], int(args[1]))
@@ -130,7 +129,7 @@ class Tape:
         return self._note(op, args)
 
     def select(self, condition: Any, then: Any, otherwise: Any) -> Any:
-        """One of two values; only the one that is chosen is computed."""
+        """Select one of two values; only the selected one is computed."""
         then, otherwise = plain(then), plain(otherwise)
         if not isinstance(condition, Expression):
             return then if condition else otherwise
@@ -150,7 +149,7 @@ class Tape:
         most: int,
         still: int = 0,
     ) -> tuple[Expression, ...]:
-        """Do `body(*carried) -> (whether to go on, new values)`, and again, at most so often."""
+        """Repeat `body(*carried) -> (whether to continue, new values)` with a largest number of repetitions."""
         loop = TracedLoop([plain(value) for value in start], most, still)
         loop.going, updates = body(*(Expression(self, "carry", (loop, i), SAMPLE) for i in range(len(loop.start))))
         loop.updates = tuple(plain(value) for value in updates)
@@ -185,7 +184,7 @@ def streamed(step: Callable[..., Any]) -> Callable[[F], F]:
     Parameters
     ----------
     step : function of (tape, *arguments)
-        Writes what is remembered and computed at a sample; returns the value there.
+        Records memory and operations of a sample; returns the value there.
     """
 
     def decorate(of_arrays: F) -> F:
@@ -203,7 +202,7 @@ def streamed(step: Callable[..., Any]) -> Callable[[F], F]:
 
 
 def _simplified(op: str, args: tuple[Any, ...]) -> Any:
-    """Neutral elements x + 0, x · 1, x / 1; comparisons with infinity, which finite numbers all pass."""
+    """Neutral elements x + 0, x · 1, x / 1; comparisons with infinity, which are true for all finite numbers."""
     if op in _WITH_INFINITY and isinstance(args[1], float) and math.isinf(args[1]):
         return _value(op, (0.0, args[1]))
     if op == "logical_and" and not isinstance(args[0], Expression):
@@ -220,7 +219,7 @@ def _simplified(op: str, args: tuple[Any, ...]) -> Any:
 
 
 def _value(op: str, args: tuple[Any, ...]) -> Any:
-    """Value for the model at hand, where every argument has one."""
+    """Value for the present model, where every argument has one."""
     values = [a.value if isinstance(a, Expression) else a for a in args]
     if op == "select":
         return values[1 if values[0] else 2] if values[0] is not None else None

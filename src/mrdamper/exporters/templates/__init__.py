@@ -1,4 +1,4 @@
-"""Text with gaps, and `render`, which fills them."""
+"""Templates, and `render`, which fills them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from mrdamper.data.encoding import xml
 
 
 def render(template: str, **facts: Any) -> str:
-    """Fill a template of this folder; a gap without a fact is an error."""
+    """Fill a template of this folder; a missing value is an error."""
     return _environment().get_template(template).render(**facts)
 
 

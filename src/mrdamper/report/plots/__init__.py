@@ -1,1 +1,1 @@
-"""Figures: they take results and return a matplotlib Figure."""
+"""Figures of results."""

@@ -1,4 +1,4 @@
-"""Models side by side: scores of every entry, and loops over one measured run."""
+"""Comparison of models: scores of every entry, and loops of measured runs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def ranking(scores: Mapping[str, tuple[float, float, float]]) -> Figure:
 
 
 def overlaid_loops(runs: Sequence[Run], dampers: Mapping[str, Damper]) -> Figure:
-    """Draw the last measured cycle of each run, a row each, with the loops of some dampers over it."""
+    """Draw the last measured cycle of each run, one per row, with the loops of some dampers."""
     figure = Figure(len(runs), 2, 0.7 + 2.5 * len(runs))
     for row, run in enumerate(runs):
         sine = equivalent_sine(run)

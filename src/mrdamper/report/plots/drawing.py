@@ -64,7 +64,7 @@ class DrawnPath:
 
 @dataclass(frozen=True)
 class DrawnText:
-    """A line of text on paper: its anchor, at "start", "middle" or "end", lies on the line of writing."""
+    """A line of text on paper: its anchor, at "start", "middle" or "end", is on the baseline."""
 
     x: float
     y: float
@@ -125,7 +125,7 @@ class Drawing:
         return buffer.getvalue()
 
     def _artist(self, part: DrawnPath | DrawnText, sheet: Any) -> Any:
-        """Make the artist of matplotlib for a part."""
+        """Convert a part to an artist of matplotlib."""
         from matplotlib.lines import Line2D
         from matplotlib.patches import Polygon
         from matplotlib.text import Text

@@ -1,7 +1,7 @@
 """Figures: panels of curves, marks and texts, laid out once, written as SVG here and as PDF and PNG by matplotlib.
 
 Lengths on paper are points (1/72 inch) from the top left corner. A figure becomes a list of paths and texts in the
-order in which they are drawn; both writers take that list, so that every file shows the same.
+order in which they are drawn; both writers use that list, so that all files show the same.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ WIDTH = 7.2  # inches, two journal columns
 _SIZE, _SMALL = 9.0, 8.0  # type sizes [pt]: names and titles; ticks and legends
 _GRID = "#e3e3e3"
 _FRAME = 0.7  # width of axes and ticks [pt]
-_TICK, _GAP = 3.5, 3.5  # length of a tick, room between a tick and its text [pt]
-_SPACED = 1.4  # room of a tick's text and the gap to the next one, over the text in a narrow type
+_TICK, _GAP = 3.5, 3.5  # length of a tick, distance between a tick and its text [pt]
+_SPACED = 1.4  # width of a tick's text and the gap to the next one, over the text in a narrow type
 _MARGIN = 0.05  # share of the range left free beside the data
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # distances of ticks in a decade
-_MAX_LABELLED_DECADES = 2.5  # of a logarithmic axis whose 2 and 5 have ticks too
+_MAX_LABELLED_DECADES = 2.5  # of a logarithmic axis with ticks at 2 and 5, too
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A named curve over the numbers of its axes."""
+    """A named curve in the units of its axes."""
 
     x: Floats
     y: Floats
@@ -77,7 +77,7 @@ class Axis:
         return 1 - share if self.reversed else share
 
     def ticks(self, ends: tuple[float, float], room: float = np.inf) -> tuple[Floats, Sequence[str]]:
-        """Places of ticks inside the ends, and their texts, which stand side by side in some room [type sizes]."""
+        """Places of ticks inside the ends, and their texts, which fit side by side into a width [type sizes]."""
         if self.places is not None:
             places = np.asarray(self.places, dtype=float)
             return places, self.texts if self.texts is not None else [f"{p:g}" for p in places]
@@ -142,13 +142,13 @@ class Axes:
 
     @property
     def filled(self) -> bool:
-        """True where something is drawn; an empty panel has no frame either."""
+        """True if something is drawn; an empty panel has no frame."""
         return bool(self.series or self._lines or self._bars or self._texts)
 
     def plot(
         self, x: ArrayLike, y: ArrayLike, mark: str = "", *, label: str = "", shift: float = 0.0, **look: Any
     ) -> None:
-        """Draw a curve in a `Look`; a mark given without a line style stands alone. `shift` is to the right [inch]."""
+        """Draw a curve in a `Look`; a mark without a line style has no line. `shift` is to the right [inch]."""
         look.setdefault("ls", "" if mark else "-")
         across, up = (np.asarray(values, dtype=float).ravel() for values in (x, y))
         self.series.append(Curve(across, up, Look(mark=mark, **look), label, shift * INCH))
@@ -300,7 +300,7 @@ class Axes:
 
 
 def room_beside(texts: Iterable[str]) -> float:
-    """Return the margin that the texts of a vertical axis take [inch]; a wide type takes a tenth more than `_SMALL`."""
+    """Return the margin for the texts of a vertical axis [inch]; a wide type needs a tenth more than `_SMALL`."""
     return 0.2 + 1.1 * max(text_width(text, _SMALL) for text in texts) / INCH
 
 
@@ -313,7 +313,7 @@ class Figure:
     height, width : float
         [inch]
     left, right, top, bottom, gap : float
-        Margins, and room between panels [inch].
+        Margins, and distance between panels [inch].
     share_y : bool
         Give all panels one vertical axis, named on the left.
     lettered : bool

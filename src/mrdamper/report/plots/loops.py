@@ -1,4 +1,4 @@
-"""Loops and forces drawn into axes of one's own, for notebooks."""
+"""Loops and forces in matplotlib axes, for notebooks."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def plot_loop(
         To draw into; new ones by default.
     over : "displacement" or "velocity"
     **line
-        Handed to `Axes.plot`.
+        Passed to `Axes.plot`.
 
     Returns
     -------
@@ -78,12 +78,12 @@ def plot_force(what: Run | Prediction, axes: Axes | None = None, **line: Any) ->
     axes : matplotlib Axes, optional
         To draw into; new ones by default.
     **line
-        Handed to `Axes.plot`.
+        Passed to `Axes.plot`.
 
     Raises
     ------
     AttributeError
-        If matplotlib does not know a property of `line`.
+        If a property of `line` is unknown to matplotlib.
 
     Examples
     --------

@@ -72,7 +72,7 @@ def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
 
 
 def parameter_curves(fit: ModifiedFit) -> Figure:
-    """Return identified values over current, one colour a motion, and the functions through them."""
+    """Return identified values over current, one colour per motion, and the fitted functions."""
     names = [name for name in fit.functions if np.ptp(fit.values[name]) > 0] or list(fit.functions)
     rows = -(-len(names) // 2)
     figure = Figure(rows, 2, 2.5 * rows, right=1.75)
@@ -105,7 +105,7 @@ def parameter_curves(fit: ModifiedFit) -> Figure:
 
 
 def score_strip(validations: Mapping[str, Validation]) -> Figure:
-    """nrmse_pp of every run, one row a model and split; the bar is the median, the tick the run's floor.
+    """Draw nrmse_pp of every run, one row per model and split; the bar is the median, the tick the scatter of the run.
 
     Errors beyond 25 % are arrows at the edge.
     """

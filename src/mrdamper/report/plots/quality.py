@@ -23,7 +23,7 @@ class LoopPanel:
     """One record's loop."""
 
     title: str  # name of the record
-    note: str  # codes of what was found; empty for a good record
+    note: str  # codes of findings; empty for a good record
     # displacement and force: (N,) [m], [N], NaN where a sample is missing
     displacement: Floats
     force: Floats

@@ -1,4 +1,4 @@
-"""Force against the distance since the last reversal: where lost motion shows."""
+"""Force over the distance since the last reversal, which shows free play."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _FARTHEST = 1.5e-3  # m
 
 
 def force_since_reversal(runs: Sequence[Run], damper: Damper) -> Figure:
-    """Mean force in the direction of motion over the distance since the reversal, over its peak.
+    """Draw the mean force in the direction of motion over the distance since the reversal, relative to its peak.
 
     Colours are currents; the thin line on each is the damper's prediction.
     """
@@ -42,7 +42,7 @@ def force_since_reversal(runs: Sequence[Run], damper: Damper) -> Figure:
 
 
 def _means(run: Run, damper: Damper, bins: Floats) -> Floats:
-    """Rows: measured, predicted; mean in each bin, linearly interpolated where a fast run has no sample."""
+    """Rows: measured, predicted; mean in each bin, linearly interpolated in bins without a sample."""
     prediction = damper.predict(run)
     path, inside = prediction.motion.path, run.in_window
     direction, distance = path.direction[inside], path.distance[inside]

@@ -1,4 +1,4 @@
-"""The tests as they were measured: matrix, loops, and what loops say before any model."""
+"""Figures of the measured tests: matrix, loops, and quantities of the loops without a model."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _MOST_MOTIONS = 5  # of the loops at one current
 
 
 def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
-    """Measured frequency against amplitude, one colour a current; hollow marks are held out."""
+    """Draw measured frequency over amplitude, one colour per current; hollow marks are validation runs."""
     steps = levels([loop.condition.current_A for loop in loops])
     colours = current_colours(steps)
     entries = len({(step, loop.split) for step, loop in zip(steps, loops, strict=True)})
     figure = Figure(1, 1, max(3.0, 0.8 + 0.16 * entries), right=1.7)
     (axes,) = figure.axes
     for number, (current, colour) in enumerate(colours.items()):
-        # Marks of one motion stand beside each other, one place a current.
+        # Marks of one motion are drawn side by side, one per current.
         aside = (number - (len(colours) - 1) / 2) * _BESIDE
         for split, face in (("train", colour), ("validate", "none")):
             pairs = zip(steps, loops, strict=True)

@@ -1,4 +1,4 @@
-"""A damper at work: histories, spectra, the damper's loop, controllers between doing nothing and the bound."""
+"""Figures of a simulation: histories, spectra, loops of the damper, comparison of controllers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mrdamper.report.plots.style import MM, PALETTE
 from mrdamper.systems.result import Simulation
 
 _POINTS = 4000  # of a history that are drawn
-_LOOP_POINTS = 20_000  # of a loop, which crosses its chart more often
+_LOOP_POINTS = 20_000  # points of a loop, which crosses its chart more often
 
 
 def histories(runs: Mapping[str, Simulation]) -> Figure:
@@ -38,7 +38,7 @@ def histories(runs: Mapping[str, Simulation]) -> Figure:
 
 
 def spectra(runs: Mapping[str, Simulation]) -> Figure:
-    """Power spectral density of the accelerations that are aimed at."""
+    """Draw the power spectral density of the accelerations among the objectives."""
     first = next(iter(runs.values()))
     point = int(np.argmax(first.peaks["acceleration_m_s2"])) if first.system.ground is not None else 0
     figure = Figure(1, 2, 3.0)
@@ -62,7 +62,7 @@ def spectra(runs: Mapping[str, Simulation]) -> Figure:
 def power_spectral_density(signal: Floats, step: float, size: int) -> tuple[Floats, Floats]:
     """Frequencies [Hz] and one-sided density by Welch's method: segments of `size` samples, half overlapping, Hann.
 
-    As `scipy.signal.welch` between zero and half the sampling rate, which takes as long to import as a simulation runs.
+    As `scipy.signal.welch`, whose import takes as long as a simulation, between zero and half the sampling rate.
     """
     segments = np.lib.stride_tricks.sliding_window_view(signal, size)[:: size - size // 2]
     window = np.hanning(size + 1)[:-1]

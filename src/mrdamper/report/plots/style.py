@@ -17,9 +17,9 @@ from mrdamper.report.plots.figure import Figure, power_of_ten
 PALETTE = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
 MEASURED, PREDICTED = PALETTE[0], PALETTE[2]
 MM, KN = 1e3, 1e-3
-MOST_NAMED = 10  # motions a list beside a figure can name; more are read off a scale
+MOST_NAMED = 10  # motions in a legend; with more a scale is drawn
 KINDS = ("svg", "pdf", "png")  # of files
-# The dark 85 % of viridis, which also grey print tells apart, at even distances.
+# The dark 85 % of viridis at equal distances, distinct in grey print, too.
 _SHADES = ("440154", "482677", "3f4788", "32648e", "277e8e", "1f988b", "2cb17e", "5ac864", "9bd93c")
 
 
@@ -30,7 +30,7 @@ def _shade(share: float) -> str:
 
 
 def current_colours(values: Sequence[float]) -> dict[float, str]:
-    """One colour a value, dark to light with rising value."""
+    """Return one colour per value, from dark to light with rising value."""
     steps = sorted(set(values))
     return {step: _shade(number / max(len(steps) - 1, 1)) for number, step in enumerate(steps)}
 
@@ -41,12 +41,12 @@ def motion_name(condition: Condition) -> str:
 
 
 def levels(currents: Sequence[float]) -> list[float]:
-    """Return the level of the test matrix of each current [A]: what differs by noise alone has one colour."""
+    """Return the level of the test matrix of each current [A]: currents that differ by noise alone have one colour."""
     return current_levels([abs(current) for current in currents])
 
 
 def speed_colours(figure: Figure, speeds: Sequence[float]) -> dict[float, str]:
-    """One colour a peak velocity on a scale that is drawn in the right margin: for more values than a list can name."""
+    """Return one colour per peak velocity on a scale in the right margin, for more values than a legend can list."""
     low, high = min(speeds), max(speeds)
     high = high if high > low else low + 1
     figure.add_scale("Peak velocity (m/s)", low, high, [_shade(share) for share in np.linspace(0, 1, 64)])
@@ -63,15 +63,15 @@ def powered(text: str, largest: float) -> tuple[str, float]:
 
 
 def thin(array: Floats, most: int = 400) -> Floats:
-    """Every n-th sample, so that a curve keeps at most so many points."""
+    """Return every n-th sample, so that a curve has at most so many points."""
     return array[:: max(1, array.size // most)]
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure as files: an SVG, its data as CSV, and further formats where they are wanted."""
+    """A figure as files: an SVG, its data as CSV, and further formats on request."""
 
-    files: Mapping[str, bytes]  # by the ending of the file's name
+    files: Mapping[str, bytes]  # by suffix of the file
 
     @classmethod
     def of(cls, figure: Figure, also: Sequence[str] = ()) -> Self:
@@ -81,18 +81,18 @@ class Picture:
 
     @property
     def svg(self) -> bytes:
-        """The picture a page holds."""
+        """The picture for a page."""
         return self.files["svg"]
 
     def save(self, stem: Path) -> bytes:
-        """Write what there is beside each other; returns the SVG."""
+        """Write the files of the figure; return the SVG."""
         for kind, data in self.files.items():
             stem.with_name(f"{stem.name}.{kind}").write_bytes(data)
         return self.svg
 
 
 def figure_data(figure: Figure) -> str:
-    """Return the points of every curve and every cloud of marks of a figure as CSV, one row a point."""
+    """Return the points of all curves and marks of a figure as CSV, one row per point."""
     names, rows = ("panel", "x_is", "y_is", "series"), ["panel,x_is,y_is,series,x,y\n"]
     head = csv_text([], names)
     for number, axes in enumerate(figure.axes, 1):

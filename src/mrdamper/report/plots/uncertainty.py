@@ -15,7 +15,7 @@ _BINS = 30
 
 
 def profile_curves(profiles: Sequence[LikelihoodProfile]) -> Figure:
-    """Fall of the likelihood as each number moves and all others follow; the line is where 95 % end."""
+    """Draw the profile likelihood of each parameter; the line is the end of the 95 % interval."""
     columns = min(3, len(profiles))
     rows = -(-len(profiles) // columns)
     figure = Figure(rows, columns, 0.9 + 2.1 * rows)
@@ -29,7 +29,7 @@ def profile_curves(profiles: Sequence[LikelihoodProfile]) -> Figure:
 
 
 def corner(samples: Samples) -> Figure:
-    """Return samples of every pair of numbers, and each number's own distribution on the diagonal."""
+    """Draw samples of every pair of parameters, and the distribution of each on the diagonal."""
     size = len(samples.names)
     figure = Figure(size, size, WIDTH, left=0.4, right=0.1, top=0.1, bottom=0.4, gap=0.08, lettered=False)
     for number, axes in enumerate(figure.axes):
@@ -45,7 +45,7 @@ def corner(samples: Samples) -> Figure:
 
 
 def quantiles(samples: Samples, level: float = 0.95) -> list[dict[str, float | str]]:
-    """Median and ends of each number's samples, a row a number."""
+    """Median and ends of the samples of each parameter, one row per parameter."""
     low, middle, high = np.quantile(samples.values, [(1 - level) / 2, 0.5, (1 + level) / 2], axis=0)
     return [
         {"name": name, "low": float(a), "median": float(b), "high": float(c)}

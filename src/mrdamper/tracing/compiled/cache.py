@@ -1,7 +1,7 @@
-"""Compiled libraries in the user's cache: published in one step, verified when loaded, bounded in size.
+"""Compiled libraries in the user's cache: published atomically, verified when loaded, limited in size.
 
-A library's file name holds the hash of its source, compiler and flags, and the hash of the file itself. A folder
-that others can write to is not used; what cannot be kept is compiled for this process alone.
+The file name of a library contains the hash of its source, compiler and flags, and the hash of the file itself. A
+folder that others can write to is not used; what cannot be cached is compiled for this process alone.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ FOLDER = "MRDAMPER_CACHE"  # environment variable: where compiled libraries are 
 _SUFFIX = ".lib"
 _MAX_CACHE_BYTES = 64 * 2**20  # bytes of all libraries
 _DAY = 86_400.0  # s
-_GIVEN_UP = 3_600.0  # s for which a compiler that failed is not tried again
-_KEY = "mrdamper_source"  # name of the constant by which a library says what it was made of
+_GIVEN_UP = 3_600.0  # s for which a failed compiler is not tried again
+_KEY = "mrdamper_source"  # name of the constant with the source of a library
 
 _loaded: dict[tuple[str, str], ctypes.CDLL] = {}  # by compiler and source
-_unusable: dict[str, str] = {}  # by compiler: why it was given up in this process
+_unusable: dict[str, str] = {}  # by compiler: why it is not used in this process
 
 
 class CompilerWarning(UserWarning):
@@ -52,7 +52,7 @@ def cache_folder() -> Path:
 def load(source: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | None:
     """Load the library of a C source, compiled when it is not in the cache; None without a usable compiler.
 
-    `holds`: whether a library that was just compiled computes what it should.
+    `holds`: whether a new library computes correct results.
     """
     compiler = find_compiler()
     if compiler is None:
@@ -95,7 +95,7 @@ def cache_size() -> tuple[int, int]:
 
 
 def private(folder: Path) -> bool:
-    """Tell if a folder is this user's, and nobody else can write to it."""
+    """Tell if a folder belongs to this user, and no other user can write to it."""
     try:
         status = folder.lstat()
     except OSError:
@@ -112,7 +112,7 @@ def _libraries(folder: Path) -> list[Path]:
 
 
 def _kept(key: str) -> ctypes.CDLL | None:
-    """Return the library in the cache, if its file has the hash of its name and was made of this source."""
+    """Return the library in the cache, if its file has the hash of its name and this source."""
     folder = cache_folder()
     if not private(folder):
         return None
@@ -138,7 +138,7 @@ def _made_of(library: ctypes.CDLL) -> str:
 
 
 def _touch(path: Path) -> None:
-    """Say that a library was used, once a day: the oldest go first."""
+    """Record the use of a library, once per day: the oldest are removed first."""
     with suppress(OSError):
         if time.time() - path.stat().st_mtime > _DAY:
             path.touch()
@@ -161,7 +161,7 @@ def _compiled(compiler: Compiler, key: str, source: str, holds: Callable[[ctypes
 
 
 def _give_up(compiler: Compiler, reason: str, note: bool = True) -> None:
-    """Use the interpreter from now on, and say so once."""
+    """Use the interpreter from now on, with one warning."""
     _unusable[compiler.identity] = reason
     warnings.warn(
         f"models are not compiled, {compiler.title}: {reason}; the interpreter gives the same numbers, more slowly",
@@ -185,7 +185,7 @@ def _noted(compiler: Compiler) -> str:
 
 
 def _tried(content: bytes, key: str, holds: Callable[[ctypes.CDLL], bool]) -> ctypes.CDLL | None:
-    """Load a library from a folder of this process, if it computes what it should."""
+    """Load a library from a folder of this process, if it computes correct results."""
     with tempfile.TemporaryDirectory(prefix=SCRATCH, ignore_cleanup_errors=True) as folder:
         path = Path(folder) / f"{key}{_SUFFIX}"
         path.write_bytes(content)
@@ -197,14 +197,14 @@ def _tried(content: bytes, key: str, holds: Callable[[ctypes.CDLL], bool]) -> ct
 
 
 def _usable(folder: Path) -> bool:
-    """Make the folder if there is none; whether it is private."""
+    """Make the folder if there is none; return whether it is private."""
     with suppress(OSError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     return private(folder)
 
 
 def _publish(content: bytes, key: str) -> None:
-    """Put a library into the cache, whole or not at all; a cache that cannot be written to stays as it is."""
+    """Put a library into the cache atomically; a cache that cannot be written to stays unchanged."""
     folder = cache_folder()
     if not _usable(folder):
         if folder.exists():
@@ -232,7 +232,7 @@ def _publish(content: bytes, key: str) -> None:
 
 
 def _bound(folder: Path) -> None:
-    """Remove the libraries used longest ago beyond the size allowed, and what killed processes left behind."""
+    """Remove the least recently used libraries beyond the allowed size, and leftovers of killed processes."""
     for path in (*folder.glob(".*.partial"), *folder.glob(f"{SCRATCH}*")):
         with suppress(OSError):
             if time.time() - path.stat().st_mtime > _DAY:

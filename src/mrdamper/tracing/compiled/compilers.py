@@ -1,4 +1,4 @@
-"""The C compiler of this machine for programs that run here, and what is known of it."""
+"""The C compiler of this machine."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-SCRATCH = ".mrdamper-compiling-"  # how folders begin in which something is compiled
+SCRATCH = ".mrdamper-compiling-"  # prefix of folders for compilation
 VARIABLE = "MRDAMPER_COMPILER"  # a command, or "none": no compiler is used
 _NAMES = ("cc", "gcc", "clang", "cl")
 # No contraction and no unsafe mathematics: the same numbers as the interpreter's, on every processor.
 _FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fvisibility=hidden", "-fPIC", "-shared", "-w")
 _VISUAL = ("/nologo", "/O2", "/fp:precise", "/LD", "/w")
-_COMPILE_TIMEOUT_S = 60.0  # s, after which a compiler is given up
+_COMPILE_TIMEOUT_S = 60.0  # s, after which a compiler is stopped
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Compiler:
     """A command that compiles C for this machine."""
 
     command: tuple[str, ...]
-    identity: str  # changes when the program behind the command, or its flags, are replaced
+    identity: str  # changes with the program of the command and its flags
 
     @property
     def is_visual(self) -> bool:
@@ -84,7 +84,7 @@ def _found(wanted: str, path: str) -> Compiler | None:
 
 
 def _identity(command: Sequence[str], program: Path) -> str:
-    """Hash of the command, its flags, the machine, and the size and time of the program behind it."""
+    """Hash of the command, its flags, the machine, and the size and time of its program."""
     try:
         resolved = program.resolve()
         facts = (str(resolved), resolved.stat().st_size, resolved.stat().st_mtime_ns)
@@ -95,9 +95,9 @@ def _identity(command: Sequence[str], program: Path) -> str:
 
 
 def compiled_file(command: Sequence[str], folder: Path, output: str, patience: float) -> Built:
-    """Run a compiler in a folder that holds its sources, for at most `patience` [s]; its output, or why there is none.
+    """Run a compiler in a folder that holds its sources, for at most `patience` [s]; return its output or the error.
 
-    What the compiler prints goes to a file: a process it leaves behind cannot hold the caller by an open pipe.
+    Messages of the compiler are written to a file, because a process that it leaves could keep a pipe open.
     """
     printed = folder / "printed.txt"
     try:

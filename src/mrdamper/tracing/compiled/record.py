@@ -1,4 +1,4 @@
-"""A traced program along whole records: compiled where there is a compiler, else in the interpreter."""
+"""A traced program along whole records: compiled with a compiler, otherwise in the interpreter."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from mrdamper.tracing.compiled.writer import record_source
 from mrdamper.tracing.python import python_functions, python_source
 
 Floats = NDArray[np.float64]
-_MIN_COMPILED_LINES = 1_000_000  # lines of a program walked in the interpreter, from which compiling pays
+_MIN_COMPILED_LINES = 1_000_000  # lines executed in the interpreter, from which a program is compiled
 _COMPARED_SAMPLES = 24  # samples on which a new library is compared with the interpreter
-_POSITIVE = {"current": 1.0, "frequency": 1.0, "amplitude": 1e-2}  # inputs that are positive there [A], [Hz], [m]
-_MAX_DIFFERENCE = 1e-9  # relative difference allowed there
+_POSITIVE = {"current": 1.0, "frequency": 1.0, "amplitude": 1e-2}  # positive inputs of this comparison [A], [Hz], [m]
+_MAX_DIFFERENCE = 1e-9  # relative difference allowed in this comparison
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +27,12 @@ class Along:
     """A program along a record."""
 
     outputs: Floats  # (K, N)
-    memory: tuple[float, ...]  # after the last sample that has an answer
-    failed: int  # the first sample without an answer; −1 if all have one
+    memory: tuple[float, ...]  # after the last sample with a result
+    failed: int  # the first sample without a result; −1 if all have one
 
 
 class RecordProgram:
-    """A program for one sample, made to run along records."""
+    """A program for one sample that runs along records."""
 
     def __init__(self, program: Program):
         self.program = program
@@ -53,8 +53,8 @@ class RecordProgram:
     ) -> Along:
         """Run along a record: channels (N,) are the inputs in the program's order.
 
-        Parameters are given, with what `prepare` made of them, and the memory before the first sample: `starts` for a
-        damper at rest.
+        Arguments are the parameters, the constants from `prepare`, and the memory before the first sample: `starts` for
+        a damper at rest.
         """
         arrays = [np.asarray(channel, dtype=float) for channel in channels]
         size = arrays[0].size
@@ -74,7 +74,7 @@ class RecordProgram:
     ) -> Along | None:
         """Compute the same as `along`, compiled whatever the length; None without a usable compiler.
 
-        Outputs are those of all samples, or of some at ascending indices. At some others the memory starts anew.
+        Outputs are those of all samples, or of some at ascending indices. At `begins` the memory is reset.
         """
         if (library := self._library) is None:
             return None
@@ -123,7 +123,7 @@ class RecordProgram:
         outputs = _compiled_along(library, self.program, given, derived, self.starts, arrays)
         expected = self.interpreted_along(given, derived, self.starts, arrays)
         size = _COMPARED_SAMPLES if expected.failed < 0 else expected.failed
-        if 0 <= outputs.failed < size:  # a division by zero ends the interpreter, and may not matter in C
+        if 0 <= outputs.failed < size:  # a division by zero raises in the interpreter, and may have no effect in C
             return False
         wanted = expected.outputs[:, :size]
         if not np.isfinite(wanted).all():

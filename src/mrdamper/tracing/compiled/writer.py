@@ -1,4 +1,4 @@
-"""Traced programs as C functions of plain arrays: the words of the export, numbers by their position."""
+"""Traced programs as C functions of plain arrays, with numbers by position."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class ArrayWriter(CWriter):
     Parameters
     ----------
     keep : bool
-        Keep what hangs on the time step or the current alone until these change; step functions then take one array
-        more.
+        Keep results that depend on the time step or the current alone until these change; step functions then take one
+        more array.
     """
 
     member = "["
@@ -35,11 +35,11 @@ class ArrayWriter(CWriter):
         self._places |= {id(e): f"s[{i}]" for i, e in enumerate(tape.memory.values())}
         self._places |= {id(e): f"d[{i}]" for i, e in enumerate(program.derived)}
         self.kept = 0  # numbers that are kept
-        self._kept: set[int] = set()  # expressions whose values they are
+        self._kept: set[int] = set()  # expressions of their values
         self.refresh = self._keep_slow() if keep else ""
 
     def _keep_slow(self) -> str:
-        """Give places to the largest expressions of the slow inputs alone; the code that computes them anew."""
+        """Assign places to the largest expressions of the slow inputs alone; return the code that computes them."""
         groups: dict[frozenset[str], list[Expression]] = {}
         needs, users = _slow_needs(self.program)
         for node, named in needs.items():
@@ -63,7 +63,7 @@ class ArrayWriter(CWriter):
         return text
 
     def lines(self, block: list[Statement], indent: int) -> list[str]:
-        """Write statements but those of kept numbers, which `refresh` computes."""
+        """Write statements except those of kept numbers, which `refresh` computes."""
         own = [s.expression if isinstance(s, Let) else s.select if isinstance(s, Branch) else None for s in block]
         return super().lines([s for s, e in zip(block, own, strict=True) if id(e) not in self._kept], indent)
 
@@ -102,13 +102,13 @@ class ArrayWriter(CWriter):
         return "".join(f"    {line}\n" for line in lines)
 
 
-# Inputs that stay the same from sample to sample more often than not.
+# Inputs that are constant over most samples.
 _SLOW_INPUTS = frozenset({"dt", "current", "frequency", "amplitude"})
 _DEAR = frozenset({"divide", "power", "sqrt", "exp", "expm1", "log", "log1p", "tan", "arctan", "tanh", "arctanh"})
 
 
 def _slow_needs(program: Program) -> tuple[dict[Expression, frozenset[str]], dict[Expression, list[Expression]]]:
-    """Slow inputs each expression of them alone needs, and who uses an expression."""
+    """Return the slow inputs of each expression that depends on these alone, and the users of each expression."""
     needs: dict[Expression, frozenset[str]] = {}
     users: dict[Expression, list[Expression]] = {}
     for node in postorder([*program.outputs.values(), *program.tape.updates.values()]):
@@ -133,7 +133,7 @@ def _is_dear(node: Expression) -> bool:
 
 
 def functions(program: Program, index: int = 0, keep: bool = False) -> str:
-    """C of `prepare_INDEX(p, d)` and `step_INDEX(p, d, s, u, out)`; both return 0 where the program does not hold."""
+    """C of `prepare_INDEX(p, d)` and `step_INDEX(p, d, s, u, out)`; both return 0 where the program is not valid."""
     writer = ArrayWriter(program, keep)
     setup, body = writer.setup(), writer.refresh + writer.sample() + writer.results()
     kept = f", real m[{max(1, writer.kept)}]" if keep else ""
