@@ -1,4 +1,4 @@
-"""Jobs that do what jobs should not."""
+"""Jobs that violate the rules for jobs."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""A browser to look at pages with, and what holds for any picture of them."""
+"""A browser for tests of pages, and checks of their screenshots."""
 
 import base64
 from contextlib import contextmanager
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-# Without the windows of a desktop a page costs a third of the processor time.
+# Headless, a page takes a third of the processor time.
 BROWSERS = (Path("/usr/bin/chromium-headless-shell"), Path("/usr/bin/chromium"))
 # One red point as PNG.
 LOGO = base64.b64decode(

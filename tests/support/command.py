@@ -1,4 +1,4 @@
-"""The command line in this process: what a user types, and what comes of it."""
+"""The command line in this process: arguments and results."""
 
 import contextlib
 import io
@@ -8,7 +8,7 @@ from unittest.mock import patch
 
 from mrdamper.cli import main
 
-# A program that runs several commands in one process: lists of words as JSON on its input, what came of them on stdout.
+# A program that runs several commands in one process: lists of arguments as JSON on stdin, their results on stdout.
 EACH = """
 import json, sys
 from support.command import mrdamper
@@ -18,7 +18,7 @@ print(json.dumps([vars(mrdamper(*words)) for words in json.load(sys.stdin)]))
 
 @dataclass(frozen=True)
 class Done:
-    """Named as those of a process."""
+    """Result, with the names of `subprocess.CompletedProcess`."""
 
     returncode: int
     stdout: str
@@ -26,7 +26,7 @@ class Done:
 
 
 def mrdamper(*arguments):
-    """Run a command as `mrdamper ARGUMENTS` would, without paying for a process."""
+    """Run a command as `mrdamper ARGUMENTS`, without a process."""
     out, err = io.StringIO(), io.StringIO()
     with (
         patch.object(sys, "argv", ["mrdamper", *map(str, arguments)]),

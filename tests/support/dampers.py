@@ -1,4 +1,4 @@
-"""Dampers made without identification, one for each way there is to stream and export them."""
+"""Dampers without identification, one for each kind of streaming and export."""
 
 from functools import cache
 
@@ -22,12 +22,12 @@ VARIANTS = {
 
 
 def all_bare_models():
-    """Every model of the house and some of its branches, by a name for the test's output."""
+    """Every model of the package and some of its branches, by a name for the test's output."""
     plain = {name: cls.build(example_values(name)) for name, cls in all_models().items()}
     return plain | {title: model_type(name).build(values) for title, (name, values) in VARIANTS.items()}
 
 
-@cache  # who asks again gets the same one, which is compiled already
+@cache  # the same object for every test, compiled once
 def joint_damper(name="play-bypass"):
     model = model_type(name).build(EXAMPLES[name])
     return JointDamper(model, tuple(EXAMPLES[name]), rig="bench", envelope=ENVELOPE)
@@ -47,7 +47,7 @@ def modified_damper():
 
 @cache
 def conditioned_damper():
-    """A published damper whose parameters are laws over the condition."""
+    """A published damper whose parameters are functions of the condition."""
     coefficients = {
         **{"alpha1": 2e6, "alpha2": 4e6, "alpha3": 2.0, "alpha4": 8e5, "d2": 0.15, "d4": 0.3},
         **{"beta": 4e6, "gamma1": 3e6, "gamma2": 2e6, "k1": 700.0, "k2": 300.0, "f0": 47.0},
@@ -58,7 +58,7 @@ def conditioned_damper():
 
 
 def all_dampers():
-    """Everything that streams: models, joint dampers, the modified model, a published one of many conditions."""
+    """All kinds of dampers that stream: models, global, modified and published dampers."""
     return {
         **all_bare_models(), "joint": joint_damper(), "modified": modified_damper(), "conditioned": conditioned_damper()
     }  # fmt: skip

@@ -1,4 +1,4 @@
-"""What fleets are compared by, and a line that is small."""
+"""Comparison of fleets, and a small fleet."""
 
 import shutil
 import sqlite3
@@ -9,16 +9,16 @@ from benchmarks.synthetic_fleet import Population
 from mrdamper.fleet.table import TIMES
 
 LINE = Population(dampers=4, sessions=2, golden=1, faults={"wrong coil": 1}, seed=3)
-ROWS = 6  # four dampers, and the golden one in two sessions
+ROWS = 6  # four dampers, and the master damper in two sessions
 
 
 def same_bits(folder):
-    """What has to agree to the last bit: the table without columns that hold times or a host."""
+    """The part of the table that has to agree to the last bit: all columns without times and hosts."""
     return pl.read_parquet(folder / "dampers.parquet").drop(TIMES).rows()
 
 
 def planned(identified, out):
-    """A journal that holds the line's plan and the one full study, so that only fast searches are left to do."""
+    """A journal with the plan and the one full study, so that only fast searches remain."""
     out.mkdir()
     shutil.copyfile(identified.table.parent / "journal.sqlite", out / "journal.sqlite")
     with sqlite3.connect(out / "journal.sqlite") as base:

@@ -1,4 +1,4 @@
-"""FMUs made once a session, and the small C program that opens them."""
+"""FMUs exported once per session, and the C program that opens them."""
 
 import io
 import shutil
@@ -69,7 +69,7 @@ def description(content):
 
 
 def drive(program, path, fmi, content, step, way, drive, rows, before=()):
-    """What the driver prints; `before` goes in front of the command."""
+    """Output of the driver; `before` precedes the command."""
     token, references = description(content)
     names = ("displacement", "velocity", "current", "force", "drive")
     command = [*before, program, path, str(fmi), token, repr(step), way, str(drive), *(references[n] for n in names)]

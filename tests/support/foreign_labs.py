@@ -1,8 +1,8 @@
 # ruff: noqa: E501, B905
-"""Exports of laboratories of many kinds, written by hand: machines, loggers, scripts, spreadsheets, in several languages.
+"""Exports of laboratories of many kinds, of machines, loggers, scripts and spreadsheets, in several languages.
 
-Nothing is shared with the readers nor with `lab_exports`: a damper of its own, and files put together
-line by line or by the format's own library. Every kind writes the same tests into a folder.
+No code is shared with the readers and `lab_exports`: the damper is another one, and files are written line by line or
+by the library of the format. Every kind writes the same tests into a folder.
 """
 
 from __future__ import annotations

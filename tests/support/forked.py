@@ -1,4 +1,4 @@
-"""Work in a fork of this process, which has loaded what a process of its own would load first."""
+"""Work in a fork of this process, in which libraries are already loaded."""
 
 import os
 

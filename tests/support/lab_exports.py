@@ -1,7 +1,7 @@
-"""Exports as laboratories' machines write them: one damper's tests in many kinds of files.
+"""Exports of laboratory machines: the tests of one damper in many kinds of files.
 
-Nothing here is shared with the readers: every file is put together by hand or by the format's
-own library, from the same true channels.
+No code is shared with the readers: every file is written line by line or by the library of the format, from the same
+true channels.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Lab:
-    """How a laboratory writes, and what it campaign."""
+    """Format of a laboratory's files, and its tests."""
 
     tests: tuple[Truth, ...]
     locale: str = "en"
@@ -122,14 +122,14 @@ def _motion(test: Truth) -> str:
 
 
 def current_column(lab: Lab, folder: Path) -> None:
-    """One file a test with a measured current."""
+    """One file per test with a measured current."""
     for number, test in enumerate(lab.tests, 1):
         rows = [lab.header(), *map(lab.row, lab.values(test))]
         (folder / f"run{number:02}.csv").write_bytes(lab.encode(rows))
 
 
 def file_names(lab: Lab, folder: Path) -> None:
-    """The current in the file name, a writing a laboratory."""
+    """The current in the file name, in the notation of the laboratory."""
     forms = (
         lambda i: f"{1e3 * i:.0f}mA", lambda i: f"{i:.1f}A", lambda i: f"{i:.1f}A".replace(".", "p"),
         lambda i: f"-{i:.1f}A-",
@@ -166,7 +166,7 @@ def run_column(lab: Lab, folder: Path) -> None:
 
 
 def specimen_names(lab: Lab, folder: Path) -> None:
-    """All tests in one file, told apart by words in the last column."""
+    """All tests in one file, distinguished by words in the last column."""
     rows = [lab.header() + lab.separator + "Test name"]
     for test in lab.tests:
         rows += [lab.row(v) + f"{lab.separator}sine {_motion(test)} #{test.current:g}" for v in lab.values(test)]
@@ -174,7 +174,7 @@ def specimen_names(lab: Lab, folder: Path) -> None:
 
 
 def side_by_side(lab: Lab, folder: Path) -> None:
-    """Groups of columns beside each other, each with its own time; a row above says the condition."""
+    """Adjacent groups of columns, each with its own time; a row above states the condition."""
     s, width = lab.separator, 3
     over = [f"{lab.number(t.current, 1)} A{s * (width - 1)}" for t in lab.tests]
     longest = max(t.time.size for t in lab.tests) + 3
@@ -268,7 +268,7 @@ def tests_table(lab: Lab, folder: Path) -> None:
 
 
 def sheets(lab: Lab, folder: Path) -> None:
-    """A workbook with a sheet a test, named after its condition."""
+    """A workbook with one sheet per test, named after its condition."""
     from openpyxl import Workbook
 
     book = Workbook()
@@ -298,7 +298,7 @@ def struct_array(lab: Lab, folder: Path) -> None:
 
 
 def hdf5_groups(lab: Lab, folder: Path) -> None:
-    """A group a test, the current as an attribute."""
+    """One group per test, the current as an attribute."""
     import h5py
 
     with h5py.File(folder / "tests.h5", "w") as file:
@@ -312,7 +312,7 @@ def hdf5_groups(lab: Lab, folder: Path) -> None:
 
 
 def tdms_groups(lab: Lab, folder: Path) -> None:
-    """A group a test, waveforms with a step, the current in the group's name."""
+    """One group per test, waveforms with a step, the current in the group's name."""
     from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
     objects = [RootObject()]
@@ -341,7 +341,7 @@ def parquet(lab: Lab, folder: Path) -> None:
 
 
 def npz(lab: Lab, folder: Path) -> None:
-    """Arrays by name, a file a test, the current as a number beside them."""
+    """Arrays by name, one file per test, the current as a number beside them."""
     for number, test in enumerate(lab.tests, 1):
         values = lab.values(test)
         arrays = {
@@ -371,7 +371,7 @@ KINDS = {
 
 
 def faults(lab: Lab, dataset) -> list[str]:
-    """How a dataset differs from the tests it was made of; empty where each is there and right."""
+    """Differences of a dataset from its tests; empty if all are present and correct."""
     wrong = [] if len(dataset) == len(lab.tests) else [f"{len(dataset)} runs of {len(lab.tests)} tests"]
     left = list(dataset)
     for test in lab.tests:

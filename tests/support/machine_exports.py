@@ -1,7 +1,7 @@
-"""Exports by the machine or program that wrote them: testing machines, loggers, hand-made sheets, many languages.
+"""Exports by machine or program: testing machines, loggers, manual sheets, many languages.
 
-As `lab_exports`, nothing here is shared with the readers. A text is told by its head, the form of
-its rows and its foot; what is no text of that kind is a function.
+As in `lab_exports`, no code is shared with the readers. A text is defined by its header, the format of its rows and its
+footer; a function writes any other file.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ G = 9.80665
 
 @dataclass(frozen=True)
 class Text:
-    """One file a test. Fields: n, i (current stated), I, mA, t, ms, x and um, inch, F, kN, daN, lbf, clock, k (row)."""
+    """One file. Fields: n, i (current stated), I, mA, t, ms, x and um, inch, F, kN, daN, lbf, clock, k (row)."""
 
     file: str
     head: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Parameters of a plausible damper, in each model's letters."""
+"""Parameters of a plausible damper for each model."""
 
 from functools import cache
 
@@ -34,5 +34,5 @@ EXAMPLES = {
 
 @cache
 def example_values(name):
-    """Those of a model; one that was dropped in takes what it identifies from a real run."""
+    """Parameters of a model; for an added model those identified from a real run."""
     return EXAMPLES.get(name) or identify(load_dataset()["utf_5mm4Hz_1A"], name).model.values()

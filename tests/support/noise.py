@@ -1,4 +1,4 @@
-"""Coil currents as supplies deliver and loggers store them: constant with every kind of noise, or changing."""
+"""Recorded coil currents: constant with several kinds of noise, or changing."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ CHANGES = ("step", "ramp", "random", "switched", "sine", "pulse")
 
 
 def constant_current(rng, time, level=None, noise=None, kind=None):
-    """A constant current [A] as a channel shows it: 0.1 to 20 mA of noise of a kind, stored to 0 to 6 decimals."""
+    """A recorded constant current [A]: 0.1 to 20 mA of noise of a kind, stored to 0 to 6 decimals."""
     kind = rng.choice(KINDS) if kind is None else kind
     level = rng.choice([0.0, 0.05, 0.25, 0.4, 1.0, 2.5]) if level is None else level
     noise = 10 ** rng.uniform(-4, np.log10(0.02)) if noise is None else noise

@@ -1,6 +1,6 @@
-"""How often faults put into clean records are found, and how often clean records are accused.
+"""Detection rates of faults in synthetic records, and rates of false findings in clean records.
 
-Tests hold the rates to their goals on few records, `benchmarks/import_detection.py` on more.
+Tests compare the rates with their goals on few records, `benchmarks/import_detection.py` on more.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -19,11 +19,11 @@ EXCHANGED_UNITS = (1.0, 1e3, 1e-4)  # metres that stand for a newton where the c
 
 @dataclass(frozen=True)
 class Rate:
-    """What came of a number of records.
+    """Result of a number of records.
 
     Attributes
     ----------
-    missed : tuple of (seed or run id, what came instead)
+    missed : tuple of (seed or run id, result)
     tried : int
     """
 
@@ -40,7 +40,7 @@ class Rate:
 
 
 def rate(cases: Iterable[tuple[object, Record]], wanted: Callable[[list[str]], bool]) -> Rate:
-    """Judge every record, and count those whose codes are as wanted."""
+    """Check every record, and count those with the required codes."""
     missed, tried = [], 0
     for name, record in cases:
         codes = codes_of(record)
@@ -51,25 +51,25 @@ def rate(cases: Iterable[tuple[object, Record]], wanted: Callable[[list[str]], b
 
 
 def clean_passed(count: int, first: int = 0, make=None) -> Rate:
-    """Clean records of all dampers, every other one with a velocity channel, of which nothing is said."""
+    """Clean records of all dampers without findings, every other one with a velocity channel."""
     seeds = range(first, first + count)
     return rate(((s, clean_record(s, velocity=s % 2 == 0, make=make)) for s in seeds), lambda codes: not codes)
 
 
 def bundled_passed(runs) -> Rate:
-    """Runs of which nothing is said that their data sheets do not say."""
+    """Bundled runs without findings beyond those of their data sheets."""
     missed = [(run.id, wrong) for run in runs if (wrong := unfounded_codes(run, codes_of(record_of(run))))]
     return Rate(tuple(missed), len(runs))
 
 
 def unfounded_codes(run, codes: list[str]) -> list[str]:
-    """Of a run's codes those beyond what it has: a flattened sine at the shaking table, positions that drift there."""
+    """Codes of a run beyond its known faults: a flattened sine at the shaking table, positions that drift there."""
     founded = set()
     if run.excitation == "chirp":
         founded = {"W_NOT_SINE", "W_DRIFT"}
     else:
         motion, (start, stop) = analyse_motion(run), run.window
-        # The checks find their own steady window: distortions near the limit may fall on either side.
+        # The checks determine the steady window: distortions near the limit may be on either side.
         if motion.distortion > 0.045:
             founded.add("W_NOT_SINE")
         if abs(motion.drift) * (stop - start) > 0.2 * motion.condition.amplitude_m:
@@ -84,7 +84,7 @@ def opposite_found(count: int) -> Rate:
 
 
 def exchanged_found(count: int, unit: float) -> Rate:
-    """Displacement and force under each other's names, in whatever units the header gave them."""
+    """Exchanged displacement and force, in the units of the header."""
     records = ((s, clean_record(s)) for s in range(count))
     cases = ((s, replace(r, displacement=r.force * unit, force=r.displacement / unit)) for s, r in records)
     return rate(cases, lambda codes: codes[:1] in (["E_DISSIPATION_SIGN"], ["E_RANGE"]))
@@ -162,7 +162,7 @@ def stated_lag(record: Record) -> float | None:
 
 
 def late_force_found(count: int, lag: float, damper: str | None = None, first: int = 0) -> Rate:
-    """Forces late by a share of the period. A smooth force that is late is also one with a spring."""
+    """Forces delayed by a share of the period. A smooth delayed force equals one with a spring."""
     seeds = range(first, first + count)
     records = ((s, late_force(clean_record(s, damper=damper, cycles=3.4), lag)) for s in seeds)
     return rate(records, lambda codes: "W_LAG" in codes)

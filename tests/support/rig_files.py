@@ -1,4 +1,4 @@
-"""Files as rigs write them, made for tests: one clean test, written in many ways."""
+"""Synthetic rig files: one clean test in many formats."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NAMES = ("time_s", "displacement_mm", "force_N")
 
 
 def channels(samples: int = 600, seed: int = 1) -> dict[str, np.ndarray]:
-    """A damper that resists: SI channels of a sine test with 5 N of noise."""
+    """SI channels of a sine test with 5 N of noise."""
     rng = np.random.default_rng(seed)
     t = np.arange(samples) / RATE
     phase = 2 * np.pi * FREQUENCY * t
@@ -135,7 +135,7 @@ def hdf5_bytes(
 
 
 def mat73_bytes(table: dict[str, np.ndarray]) -> bytes:
-    """As MATLAB 7.3 writes: its header in the user block, matrices turned, classes as attributes."""
+    """A file as from MATLAB 7.3: header in the user block, matrices transposed, classes as attributes."""
     import tempfile
 
     import h5py

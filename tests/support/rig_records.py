@@ -1,4 +1,4 @@
-"""Records as rigs make them, from dampers of many models, and what can go wrong with them."""
+"""Synthetic rig records of dampers of many models, and their faults."""
 
 from dataclasses import replace
 
@@ -119,7 +119,7 @@ def _of(motion, seed, noise, kind):
 
 
 def codes_of(record):
-    """Codes of what judging a record finds, or of what refuses it."""
+    """Codes of the findings of a record, or of its refusal."""
     try:
         return [finding.code for finding in check_record(record).findings]
     except QualityError as error:

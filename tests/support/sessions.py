@@ -1,4 +1,4 @@
-"""Runs of a known damper, session by session."""
+"""Runs of a known damper in several sessions."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ MATRIX = [Condition(i, f, a) for i in (0.0, 0.5, 1.0) for f, a in ((0.5, 0.02), 
 
 
 def session_runs(damper, gain=0.045, seed=0, noise=3.0, repeats=1):
-    """Runs of a damper, each a session with a gain of its own."""
+    """Runs of a damper, each in a session with its own gain."""
     rng = np.random.default_rng(seed)
     runs = []
     for number, condition in enumerate(MATRIX * repeats):

@@ -1,6 +1,6 @@
-"""Exports as programs store them: sheets, archives, structs, tables of records, netCDF; tables of tests beside them.
+"""Exports in binary formats: sheets, archives, structs, tables of records, netCDF; tables of tests beside them.
 
-As `lab_exports`, nothing here is shared with the readers.
+As in `lab_exports`, no code is shared with the readers.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def fortran(tests: tuple[Truth, ...], folder: Path) -> None:
 
 
 def pages(tests: tuple[Truth, ...], folder: Path) -> None:
-    """A heading a page."""
+    """One heading per page."""
     for n, test in enumerate(tests, 1):
         lines = [f"TEST REPORT  coil current {test.current:.2f} A"]
         rows = [f"{a:12.5f}{1e3 * b:12.5f}{c:12.3f}" for a, b, c, _ in test.table]
@@ -288,7 +288,7 @@ def _open_cell(value: float | str) -> str:
 
 
 def conditions_on_a_sheet_of_their_own(tests: tuple[Truth, ...], folder: Path) -> None:
-    """One sheet says under which conditions the other was recorded."""
+    """One sheet states the conditions of the other."""
     from openpyxl import Workbook
 
     for n, test in enumerate(tests, 1):

@@ -1,4 +1,4 @@
-"""Runs of a damper whose truth is known."""
+"""Runs of a damper with known parameters."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Cars for tests, by their numbers in a row."""
+"""Cars for tests, by positional parameters."""
 
 from mrdamper.systems.cars import HalfCar, QuarterCar
 

@@ -1,4 +1,4 @@
-"""Texts of the project that a person reads, with the place each stands at."""
+"""Texts of the project that a person reads, with their positions."""
 
 import ast
 import re
@@ -62,7 +62,7 @@ def script_texts(path):
 
 
 def all_texts():
-    """Every file a person reads texts of, with its reader."""
+    """Yield every file with such texts, and its reader."""
     for path in sorted(SOURCE.rglob("*.py")):
         yield path, python_texts
     for path in sorted([*SOURCE.rglob("*.j2"), *SOURCE.rglob("*.html")]):

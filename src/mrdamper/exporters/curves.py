@@ -64,7 +64,7 @@ class AdamsExporter(Exporter):
                 points=points,
             )
             files[f"{name}_{curve.current_A:.3g}A.dmp".replace("-", "minus")] = text.encode("ascii", "replace")
-        return Written(files, ("such a curve knows no hysteresis; c and fmu do",))
+        return Written(files, ("the curves contain no hysteresis; c and fmu do",))
 
 
 class TydexExporter(Exporter):

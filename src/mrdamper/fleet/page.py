@@ -66,13 +66,13 @@ def write_page(table: Path, plan: Plan | None, limits: Mapping[str, ColumnLimits
     }
     with write_file(path) as target:
         text = render_page(
-            "fleet.html.j2", "A line of dampers", f"mrdamper {version('mrdamper')}; {table.name}", **facts
+            "fleet.html.j2", "Fleet of dampers", f"mrdamper {version('mrdamper')}; {table.name}", **facts
         )
         target.write_text(text, encoding="utf-8")
     lines = [
-        f"stands out: {s.serial} {s.session}: {s.cause} ({', '.join(s.findings)})" for s in standing_out[:_MAX_LISTED]
+        f"outlier: {s.serial} {s.session}: {s.cause} ({', '.join(s.findings)})" for s in standing_out[:_MAX_LISTED]
     ]
-    lines += [f"and {len(standing_out) - _MAX_LISTED} more stand out"] * (len(standing_out) > _MAX_LISTED)
+    lines += [f"and {len(standing_out) - _MAX_LISTED} more outliers"] * (len(standing_out) > _MAX_LISTED)
     lines += [f"{features[n][0]}: {d.text}" for n, d in drifts.items() if d.verdict != "none"]
     return lines + [f"limits of {v['name']}: {v['outside']} of {v['count']} outside" for v in verdicts] + facts["notes"]
 
@@ -84,7 +84,7 @@ def _other_rigs(done: pl.DataFrame, plan: Plan | None) -> list[str]:
     if plan is None or not other.height:
         return []
     named = ", ".join(other["serial"].unique(maintain_order=True).to_list()[:_WORST])
-    return [f"{other.height} dampers were not tested on rig {plan.rig!r} like most of the line: {named}"]
+    return [f"{other.height} dampers were not tested on rig {plan.rig!r} like most of the population: {named}"]
 
 
 def _values(frame: pl.DataFrame, name: str) -> Floats:

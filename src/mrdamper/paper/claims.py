@@ -129,8 +129,8 @@ ROWS: Mapping[str, _Row] = MappingProxyType({
          _below("error left by a wrong A, others identified anew", 1e-6, 1e-3))),
     "search": _Row(
         "The genetic algorithm finds α and β.", "section 4.3, Eq. 21–22", "genetic", "method", claims_on_fits.search,
-        (_below("median factor by which α misses the optimum", 1.1, 2.0),
-         _below("median factor by which β misses the optimum", 1.1, 2.0))),
+        (_below("median ratio of α and its optimum", 1.1, 2.0),
+         _below("median ratio of β and its optimum", 1.1, 2.0))),
     "accuracy": _Row(
         "The accuracy is comparable to that of the traditional Bouc–Wen model.", "section 6", "fig26", "method",
         claims_on_fits.accuracy,

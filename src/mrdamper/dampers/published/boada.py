@@ -40,8 +40,8 @@ class BoadaType(ConditionedDamper):
     heading: ClassVar[str] = "Boada-type (arctangent, neural network)"
     source: ClassVar[str] = "after Boada et al.; equations not seen"
     unverified: ClassVar[str] = (
-        "the trigonometric form of the loop, the size of the network and its inputs; the publication is "
-        "said to have few parameters, this network has tens"
+        "the trigonometric form of the loop, the size of the network and its inputs; the "
+        "publication reportedly has few parameters, this network has tens"
     )
     equation: ClassVar[str] = (
         r"F = \frac{2}{\pi} f_y \arctan[\kappa (v + v_0\,\mathrm{sgn}\,x)] + c\,v + k\,x + f_0,\quad "
