@@ -1,4 +1,4 @@
-"""The live bench under twenty sessions that ask at random: no 500, memory and descriptors flat, and how long it takes."""
+"""The app under twenty sessions with random requests: no response 500, constant memory and descriptors, and latency."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ _THINK = 0.25  # seconds a user looks at an answer
 _LATE = 0.2  # answers: p95 below it [s]
 
 
-def attack_bench(share: float) -> list[Count]:
+def attack_app(share: float) -> list[Count]:
     """Random use: good and hostile questions, uploads that break off, sessions that end and begin."""
-    held, flat = Count("bench: no answer 500"), Count("bench: memory, descriptors, time")
+    held, flat = Count("app: no response 500"), Count("app: memory, descriptors, time")
     if not Path("/proc/self/statm").exists():
         return []
     command = [sys.executable, "-m", "mrdamper", "serve", "--port", "0", "--no-browser"]
@@ -127,11 +127,9 @@ class _User:
                 key = rng.choice(table["runs"])["key"]
                 self.ask("GET", f"{at}/data/rigs/{rng.randrange(3)}/runs/{key}/{rng.choice(['cycle', 'window'])}")
         elif chance < 0.5:
-            self.ask(
-                "GET", at + rng.choice(["", "/data", "/jobs", "/exports", "/identify/choices", "/files", "/dampers"])
-            )
+            self.ask("GET", at + rng.choice(["", "/data", "/jobs", "/exports", "/choices", "/files", "/dampers"]))
         elif chance < 0.65:
-            self.drop(name)
+            self.upload(name)
         elif chance < 0.8:
             self.ask("POST", f"{at}/dampers", {"text": _saved_model(rng, odd)})
             for damper in (self.ask("GET", f"{at}/dampers") or [])[-1:]:
@@ -150,10 +148,10 @@ class _User:
             self.ask("DELETE", at)
             self.open()
 
-    def drop(self, name: str) -> None:
-        """Files of a rig or a dataset, good and bad, read at once and dropped anew."""
+    def upload(self, name: str) -> None:
+        """Upload files of a rig or a dataset, good and bad, and read them."""
         rng = self.rng
-        key = (self.ask("POST", f"/{self.session}/uploads") or {}).get("key", "0")
+        key = (self.ask("POST", f"/{self.session}/uploads") or {}).get("upload", "0")
         rows = "".join(f"{i / 100},{10 * ((i % 100) - 50) / 50},{300 if i % 100 < 50 else -300}\n" for i in range(400))
         contents = [
             b"time [s],displacement [mm],force [N]\n" + rows.encode(),
@@ -168,10 +166,10 @@ class _User:
 
 
 def _saved_model(rng: random.Random, odd: object) -> str:
-    from fuzz.counting import bench_damper
+    from fuzz.counting import sample_damper
     from mrdamper.dampers.model_file import dump_model
 
-    document = json.loads(dump_model(bench_damper()))
+    document = json.loads(dump_model(sample_damper()))
     if rng.random() < 0.6:
         document[rng.choice(list(document))] = odd
     return json.dumps(document)

@@ -21,7 +21,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
 from fuzz import counting
-from fuzz.app_soak import SECONDS, attack_bench
+from fuzz.app_soak import SECONDS, attack_app
 from fuzz.extremes import attack_extremes
 from fuzz.hostile_input import attack_calls, attack_datasets, attack_models
 from fuzz.hostile_names import attack_names
@@ -40,7 +40,7 @@ KINDS = {
     "extremes": attack_extremes,
     "kills": attack_kills,
     "limits": attack_limits,
-    "soak": attack_bench,
+    "soak": attack_app,
 }
 SHARES = {"kills": 0.4, "limits": 0.25, "extremes": 0.2, "pages": 0.2, "soak": 0.15}  # where all are tried
 TIMED = "soak"  # by itself, at the end

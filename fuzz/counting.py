@@ -99,7 +99,7 @@ def typed(count: Count, what: object, call: Callable[[], Any]) -> Any:
     return answer
 
 
-def bench_damper() -> Any:
+def sample_damper() -> Any:
     from mrdamper.dampers.envelope import Envelope
     from mrdamper.dampers.joint import JointDamper
     from mrdamper.models import model_type

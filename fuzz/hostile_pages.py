@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from fuzz.counting import NASTY, Count, bench_damper, names, within
+from fuzz.counting import NASTY, Count, names, sample_damper, within
 
 MEANT = (
     "$x_{$",
@@ -41,7 +41,7 @@ def attack_exports(share: float) -> list[Count]:
     from mrdamper.dampers.model_file import dump_model, parse_model
     from mrdamper.exporters import all_exporters
 
-    damper = bench_damper()
+    damper = sample_damper()
     count, saved, rng = Count("whole export of a named rig"), Count("model of a named rig, saved"), random.Random(2)
     exporters = {form: kind(platforms=()) if form == "fmu" else kind() for form, kind in all_exporters().items()}
     usual = {form: _scripts(exporter.export(damper, "damper").files) for form, exporter in exporters.items()}

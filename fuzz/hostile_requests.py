@@ -1,4 +1,4 @@
-"""Requests no page would send: anything in any field, odd bodies and headers, others' sessions, drops that vanish."""
+"""Requests no page would send: anything in any field, odd bodies and headers, sessions of others, uploads that vanish."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import threading
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from fuzz.counting import NASTY, ODD, Count, bench_damper, within
+from fuzz.counting import NASTY, ODD, Count, sample_damper, within
 
 HOST = "app.test:1"
 BODIES = (
@@ -46,7 +46,7 @@ def attack_requests(share: float) -> list[Count]:
     ):
         session = client.post("/api/sessions").json()["session"]
         client.post(f"/api/sessions/{session}/bundled")
-        document = dump_model(bench_damper())
+        document = dump_model(sample_damper())
         damper = client.post(f"/api/sessions/{session}/dampers", json={"text": document}).json()["damper"]
         known = {"session": session, "rig": 0, "number": 0, "key": damper, "name": "c", "part": "cycle"}
         for _ in within(range(max(60, int(4000 * share)))):
@@ -62,7 +62,7 @@ def attack_requests(share: float) -> list[Count]:
 
 
 def _asks(schema: Mapping[str, Any]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
-    """Method, path and fields of the body of every question the bench knows."""
+    """Method, path and fields of the body of every request of the app."""
     for path, methods in schema["paths"].items():
         for method, facts in methods.items():
             body = facts.get("requestBody", {}).get("content", {}).get("application/json", {}).get("schema", {})
@@ -155,7 +155,7 @@ def _strangers(client: Any, count: Count, asks: list[tuple[str, str, Mapping[str
 
 
 def _at_once(client: Any, count: Count, rng: random.Random) -> None:
-    """Files dropped, read, listed and the session ended, all at the same time."""
+    """Files uploaded, read, listed and the session ended, all at the same time."""
     at = f"/api/sessions/{client.post('/api/sessions').json()['session']}"
     rows = b"time [s],displacement [mm],force [N]\n" + b"".join(
         b"%f,%f,%f\n" % (i / 100, (i % 100) / 5 - 10, 300) for i in range(300)
@@ -167,14 +167,14 @@ def _at_once(client: Any, count: Count, rng: random.Random) -> None:
         count.check(held, (method, path, answer.status_code, answer.text[:100]))
         return answer
 
-    def drop() -> None:
+    def upload() -> None:
         begun = ask("POST", "/uploads")
-        key = begun.json().get("key", "0") if begun.status_code == 200 else "0"
+        key = begun.json().get("upload", "0") if begun.status_code == 200 else "0"
         for name in ("0A 1Hz.csv", "runs.csv"):
             ask("PUT", f"/uploads/{key}/files?name={name}", content=rows)
         ask("POST", f"/uploads/{key}/read", json={"toml": ""})
 
-    works = [drop, drop, lambda: ask("GET", "/tests"), lambda: ask("GET", "/data"), lambda: ask("POST", "/bundled")]
+    works = [upload, upload, lambda: ask("GET", "/tests"), lambda: ask("GET", "/data"), lambda: ask("POST", "/bundled")]
     if rng.random() < 0.5:
         works.append(lambda: ask("DELETE", ""))
     threads = [threading.Thread(target=work) for work in works]

@@ -22,7 +22,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from fuzz.counting import Count, bench_damper, within
+from fuzz.counting import Count, sample_damper, within
 
 # What each writes, and how it is asked; {n} is 1 or 2: the second replaces what the first wrote.
 COMMANDS = {
@@ -247,7 +247,7 @@ def _prepare(root: Path) -> None:
             rows = zip(run.time, 1e3 * run.displacement, run.force, strict=True)
             text = "time [s],displacement [mm],force [N]\n" + "".join(f"{t},{x},{f}\n" for t, x, f in rows)
             (root / f"files{n}" / f"{run.id.split('-')[0]}_{run.current_A:g}A.csv").write_text(text)
-        save_model(replace(bench_damper(), rig=f"bench {n}"), root / f"model{n}.json")
+        save_model(replace(sample_damper(), rig=f"rig {n}"), root / f"model{n}.json")
     shutil.copyfile(root / "model1.json", root / "model.json")
     limits = "current_A = [0.0, 1.0]\nfrequency_Hz = [0.5, 4.0]\namplitude_mm = [4, 20]\n"
     (root / "limits.toml").write_text(limits)

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import re
+import shutil
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -12,7 +13,7 @@ from starlette.datastructures import Headers
 from starlette.requests import ClientDisconnect
 
 from mrdamper.web.security import FORM_LIMIT, HEADERS, Guard
-from mrdamper.web.uploads import FILE_LIMIT
+from mrdamper.web.uploads import FILE_LIMIT, Upload
 
 GUARD = Guard(None, ["127.0.0.1:8765", "localhost:8765"])
 GOOD = {"host": "127.0.0.1:8765", "origin": "http://127.0.0.1:8765"}
@@ -184,6 +185,20 @@ def test_a_file_that_broke_off_does_not_stop_the_next(client, session):
     assert client.put(f"{path}?name=big.csv", content=bytes(FILE_LIMIT + 1)).status_code == 413
     assert client.put(f"{path}?name=b.csv", content=b"1\n").status_code == 200
     assert client.put(f"{path}?name=c.csv", content=b"1\n").status_code == 200
+
+
+def test_a_file_of_an_upload_that_was_replaced_meanwhile_is_refused(client, app, session, monkeypatch):
+    upload = client.post(f"{session}/uploads").json()["upload"]
+    (mine,) = app.state.sessions
+
+    def replaced(self, name, place=Upload.place):
+        mine.upload = Upload("another", self.folder)
+        shutil.rmtree(self.folder)
+        return place(self, name)
+
+    monkeypatch.setattr(Upload, "place", replaced)
+    answer = client.put(f"{session}/uploads/{upload}/files?name=a.csv", content=b"1\n")
+    assert (answer.status_code, answer.json()["code"]) == (422, "E_NAME")
 
 
 def test_the_page_announces_its_modules_and_no_more(client):

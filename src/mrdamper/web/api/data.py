@@ -42,12 +42,12 @@ def open_bundled(session: OpenSession) -> dict[str, Any]:
 @router.post("/uploads")
 def begin_upload(session: OpenSession) -> dict[str, str]:
     """Make a folder for files; the one before is removed."""
-    if session.upload is not None:
-        shutil.rmtree(session.upload.folder, ignore_errors=True)
-    key = session.key("upload")
+    key, replaced = session.key("upload"), session.upload
     folder = session.folder / key
     folder.mkdir(mode=0o700)
     session.upload = Upload(key, folder)
+    if replaced is not None:
+        shutil.rmtree(replaced.folder, ignore_errors=True)
     return {"upload": key}
 
 
@@ -60,21 +60,10 @@ async def receive_file(
     announced = request.headers.get("content-length", "0")
     if announced.isdecimal() and int(announced) > FILE_LIMIT:
         raise _too_large(name)
-    path, size = upload.place(name), 0
     try:
-        with path.open("xb") as file:
-            async for piece in request.stream():
-                size += len(piece)
-                if size > FILE_LIMIT:
-                    raise _too_large(name)
-                if upload.size + size > UPLOAD_LIMIT:
-                    raise UploadError(
-                        "the files together exceed 1 GB", remedy="drop fewer at once, or use mrdamper import"
-                    )
-                file.write(piece)
-    except BaseException:  # also an interrupted connection: a part of a file is no file
-        path.unlink(missing_ok=True)
-        upload.names.pop(path, None)
+        size = await _store(upload, name, request)
+    except FileNotFoundError:
+        find_upload(session, key)  # raises if another upload has replaced this one meanwhile
         raise
     upload.size += size
     return {"bytes": size}
@@ -142,6 +131,26 @@ def find_upload(session: Session, key: str | None = None) -> Upload:
     if session.upload is None or key not in (None, session.upload.key):
         raise UnknownNameError("these files are no longer stored", remedy="drop the files again")
     return session.upload
+
+
+async def _store(upload: Upload, name: str, request: Request) -> int:
+    """Write one file of an upload; returns its size."""
+    path, size = upload.place(name), 0
+    try:
+        with path.open("xb") as file:
+            async for piece in request.stream():
+                size += len(piece)
+                if size > FILE_LIMIT:
+                    raise _too_large(name)
+                if upload.size + size > UPLOAD_LIMIT:
+                    remedy = "drop fewer at once, or use mrdamper import"
+                    raise UploadError("the files together exceed 1 GB", remedy=remedy)
+                file.write(piece)
+    except BaseException:  # also an interrupted connection: a part of a file is no file
+        path.unlink(missing_ok=True)
+        upload.names.pop(path, None)
+        raise
+    return size
 
 
 def _findings(checked: Quality) -> list[dict[str, str]]:
