@@ -303,6 +303,6 @@ def not_held(damper: Damper, names: Iterable[str]) -> InputError:
     return InputError(
         f"{', '.join(names)} cannot be held in a saved model of this kind",
         where=damper.title,
-        remedy="release it on the Model page, or save the state of the bench instead",
+        remedy="release it on the Model page, or save the project in the app instead",
         code="E_HELD",
     )

@@ -1,7 +1,7 @@
 """Recipes: procedures from the runs of one rig to a damper, and the scores of that damper.
 
 A recipe says what is identified from single runs and how one damper over all conditions is
-made of it. A study, a comparison, the reproduction of the paper and the live bench take their
+made of it. A study, a comparison, the reproduction of the paper and the app take their
 recipes from here, so that one name means one way and every way is scored alike.
 """
 
