@@ -38,6 +38,44 @@ def require_the_tests(folder) -> None:
         np.testing.assert_allclose(record.force, force(amperes), rtol=0, atol=1e-2)
 
 
+@pytest.mark.parametrize(
+    ("item", "last"),
+    [
+        ("- `{name}` - {what} in {word}\n", ""),
+        ("`{name}`: {what} ({unit})\n", ""),
+        ("{number}. {name}: {what}, in {unit}\n", ""),
+        ("{name} = {what}, {unit}\n", ""),
+        ("{name} ({unit}): {what}\n", ""),
+        ("Column {number}: {what} ({unit})\n", ""),
+        ("{what} {name} in {word}, ", "."),
+        ("| {name} | {what} in {unit} |\n", ""),
+    ],
+)
+def test_units_that_the_items_of_a_readme_give_its_columns(tmp_path, item, last):
+    write(tmp_path, "t,x,F\n")
+    whats, words = ("time", "displacement", "force"), ("seconds", "millimetres", "newtons")
+    columns = zip("txF", whats, ("s", "mm", "N"), words, strict=True)
+    items = [item.format(number=i, name=n, what=t, unit=u, word=w) for i, (n, t, u, w) in enumerate(columns, 1)]
+    tests = "".join(f"| {name}.csv | {amperes} |\n" for name, amperes in CURRENTS.items())
+    text = "# Tests\n\n" + "".join(items).removesuffix(", ") + last + "\n\n| file | current [A] |\n|---|---|\n" + tests
+    (tmp_path / "README.md").write_text(text)
+    require_the_tests(tmp_path)
+
+
+@pytest.mark.parametrize("item", ["F: range of the load cell (N)", "F: oil temperature [degC]", "F: force (N)\nF: kN"])
+def test_an_item_of_a_readme_about_something_else_gives_no_unit(tmp_path, item):
+    write(tmp_path, "t,x,F\n")
+    (tmp_path / "README.md").write_text(f"t: time (s)\nx: displacement (mm)\n{item}\n")
+    assert "E_UNITS_MISSING" in {refusal.error.code for refusal in import_files([tmp_path]).refusals}
+
+
+def test_columns_without_names_that_a_sentence_lists(tmp_path):
+    write(tmp_path, "")
+    (tmp_path / "README.md").write_text("Each file has: time (s), displacement (mm) and force (N).\n")
+    (tmp_path / "tests.csv").write_text("file,current_A\n" + "".join(f"{n}.csv,{a}\n" for n, a in CURRENTS.items()))
+    require_the_tests(tmp_path)
+
+
 def test_fields_and_a_description_of_a_data_package(tmp_path):
     (tmp_path / "data").mkdir()
     write(tmp_path / "data", "t,u,f\n")

@@ -11,8 +11,10 @@ import numpy as np
 
 from mrdamper.rig_files.column_names import (
     DIMENSION,
+    RATING,
     SI,
     WEIGHT,
+    Header,
     holds,
     is_unit,
     meanings,
@@ -52,6 +54,8 @@ _UNITS_IN = rf"(?i:{'|'.join(words('unit'))}|unités|unidades|units)"
 _SI_UNITS = re.compile(rf"\bSI[- ](?:base[- ])?{_UNITS_IN}|{_UNITS_IN}\W*(?:(?:in|du|del|do)\W+)?SI\b")
 _EXCEPT = re.compile(r"(?i)\b(?:except|but|not|no|non|außer|nicht|kein\w*|sauf|salvo|excepto|tranne)\b")
 _LABVIEW = ("Delta_X", "X_Dimension")
+_BEHIND_NAME = re.compile(r"\s*[:=|,]\s*|\s[-–—]\s|$")  # in front of what a name means: t - time
+_MARK = re.compile(r"^(?:[\s#>•*|–-]|[0-9]{1,2}[.)]\s)+|[\s.|]+$")  # of a list or a table
 _COLON = re.compile(r"^([^:=]+)(?::\s+|\s*=\s*)([^\s:=]{1,12})$")  # force: N; force=N
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
 _INDEXED = re.compile(
@@ -194,7 +198,8 @@ def _with_listed_names(table: RawTable) -> RawTable:
             what = (match["what"] or match["after"]).casefold()[:4].replace("desc", "name").replace("labe", "name")
             texts[what][int(match["number"])] = match["value"]
     if any(i not in texts["name"] or not is_unit(texts["unit"].get(i, "")) for i in width):
-        return table
+        rows = {row for line in table.lines if (row := _row_of_names(line, len(width)))}
+        return table.named(dict(enumerate(rows.pop()))) if len(rows) == 1 else table
     table = table.named({i - 1: (texts["name"][i], texts["unit"][i]) for i in width})
     for i, text in texts["scal"].items():
         scale = number(text.strip(), ".")
@@ -202,6 +207,14 @@ def _with_listed_names(table: RawTable) -> RawTable:
             note = f"column {table.names[i - 1]!r} is scaled by {scale:g} as the file states"
             table = scaled(table, i - 1, table.names[i - 1], table.units[i - 1], scale, note)
     return table
+
+
+def _row_of_names(line: str, width: int) -> tuple[Header, ...]:
+    """Return the names and units of as many columns that a line lists, columns: time (s), stroke (mm), load (N)."""
+    listed = line.rpartition(": ")[2].strip(" |")
+    row = tuple(map(_item, re.split(r"[,;|\t]\s*|\s(?:and|und|et|y|e)\s", listed)))
+    known = [header.role for header in row if header.role and header.dimension == DIMENSION[header.role]]
+    return row if len(row) == width == len({*known}) and {"displacement", "force"} <= {*known} else ()
 
 
 def _with_numbered_channels(table: RawTable) -> RawTable:
@@ -275,10 +288,17 @@ def _with_listed_units(table: RawTable) -> RawTable:
     for line in table.lines if names else ():
         cells = [cell.strip(' "') for cell in re.split(r"[,;|\t]", line.lstrip("#%/ "))]
         both = [*cells, *(cell.partition(": ")[2] for cell in cells)]  # rig 7, columns: time [s], load [N]
-        for header in (split_name(_COLON.sub(r"\1 [\2]", cell)) for cell in both):
-            name = header.name.strip()
-            i = wanted.get(name, wanted.get(name.casefold()))
-            if i is not None and header.dimension and header.dimension == DIMENSION.get(header.role or ""):
+        for header in map(_item, (*both, line)):
+            name, meaning = (part.strip("`* ") for part in _BEHIND_NAME.split(header.name, maxsplit=1))
+            own = (
+                name.rpartition(" ")[2] if {*map(role_of, name.split())} == {role_of(name)} - {None} else name
+            )  # time t
+            i = wanted.get(own, wanted.get(own.casefold()))
+            number = NUMBERED.fullmatch(name) if i is None and role_of(meaning) else None
+            i = int(number[1]) - 1 if number else i
+            role = (role_of(names[i]) or header.role or "") if i in names else ""
+            fits = role_of(meaning) in (role, None) and header.dimension == DIMENSION.get(role, "")
+            if fits and not RATING.search(meaning) and not re.search("[0-9]", meaning):
                 behind.setdefault(i, set()).add(header.unit)
         match = _TIME_UNIT.match(line)
         if match and len(times) == 1 and times[0] in bare and split_name("", match["unit"]).dimension == "time":
@@ -294,6 +314,13 @@ def _with_listed_units(table: RawTable) -> RawTable:
     of_name = {names[i]: unit for i, unit in units.items()}
     constants = {f"{name} [{of_name[name]}]" if name in of_name else name: v for name, v in table.constants.items()}
     return replace(table, constants=constants).named({i: (names[i], units[i]) for i in bare if i in units})
+
+
+def _item(text: str) -> Header:
+    """Name and unit in a part of a line, with what the name means behind it: t: s; `x` - stroke in mm; F = load, N."""
+    text = _MARK.sub("", text)
+    match = _COLON.match(text)
+    return Header(match[1], match[2]) if match and parse_unit(match[2]) else split_name(text)
 
 
 def _with_si_units(table: RawTable) -> RawTable:
