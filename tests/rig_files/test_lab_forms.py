@@ -502,11 +502,16 @@ def test_one_step_of_all_channels_in_lines_of_another_language_is_the_step_of_ti
     assert np.median(np.diff(record.time)) == pytest.approx(0.005)
 
 
-def test_a_row_of_notes_states_the_current_of_every_column(tmp_path):
+@pytest.mark.parametrize("notes", ["I = {} A", "Current: {} A", "{} A"])
+@pytest.mark.parametrize("keys", [("Name\t", "Unit\t", "Notes\t"), ("", "", "")])
+def test_a_row_of_notes_states_the_current_of_every_column(tmp_path, keys, notes):
     rows_of = rows(T, X, force(0.2), T, X, force(0.8), separator="\t").splitlines()
-    head = "Name\tt\tx\tF\tt\tx\tF\nUnit\ts\tmm\tN\ts\tmm\tN\nNotes\t0.2 A\t0.2 A\t0.2 A\t0.8 A\t0.8 A\t0.8 A\n"
-    head += "Comments\t\t\t\t\t\t\n"  # which says nothing
-    (tmp_path / "both.txt").write_text(head + "".join(f"{i}\t{row}\n" for i, row in enumerate(rows_of)))
+    lines = ("t\tx\tF\tt\tx\tF", "s\tmm\tN\ts\tmm\tN", "\t".join(notes.format(i) for i in [0.2] * 3 + [0.8] * 3))
+    head = "".join(f"{key}{line}\n" for key, line in zip(keys, lines, strict=True))
+    if keys[0]:
+        head += "Comments\t\t\t\t\t\t\n"  # which says nothing
+        rows_of = [f"{i}\t{row}" for i, row in enumerate(rows_of)]
+    (tmp_path / "both.txt").write_text(head + "\n".join(rows_of) + "\n")
     assert currents(import_files([tmp_path]).records) == [0.2, 0.8]
 
 

@@ -47,6 +47,7 @@ LISTED = re.compile(  # a numbered line that names a column and its unit: 1=Time
     re.IGNORECASE,
 )
 _DECIMAL = re.compile(r"(?i)decimal[ _](?:separator|mark|sign|symbol)\"?\s*[:=;,\t]\s*\"?([.,])\"?;?")
+_CURRENT = re.compile(r":\s*[0-9.,]+ ?m?A\b")
 _DATE = re.compile(r"[0-9]{1,2}\.[0-9]{1,2}\.[0-9]{2,4}|[0-9]{4}\.[0-9]{1,2}\.[0-9]{1,2}")
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
@@ -248,8 +249,9 @@ def _below_preamble(lines: Sequence[str], first: int, separator: str) -> int:
 
 
 def _roles(cells: Sequence[str]) -> set[str | None]:
-    """Return the channels that cells name."""
-    return {split_name(cell.strip('"')).role for cell in cells[:MOST_COLUMNS] if cell} - {None}
+    """Return the channels that cells name; current: 0.5 A names none."""
+    named = [cell.strip('"') for cell in cells[:MOST_COLUMNS] if cell and not _CURRENT.search(cell)]
+    return {split_name(cell).role for cell in named} - {None}
 
 
 def is_footer(line: str, layout: Layout) -> bool:
