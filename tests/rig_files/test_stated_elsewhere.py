@@ -1,5 +1,7 @@
 """Names, clocks, units and tests that a file states in another place than its row of names."""
 
+import re
+
 import h5py
 import numpy as np
 import pytest
@@ -605,3 +607,21 @@ def test_arrays_of_a_folder_have_the_current_of_its_description_once_the_unit_of
 def test_the_remedy_for_a_channel_a_file_names_its_files(tmp_path):
     table(tmp_path / "C1--t--0.txt", ["Time,Ampl"], T, X)
     assert "file = " in import_files([tmp_path]).refusals[0].error.remedy
+
+
+@pytest.mark.parametrize(
+    ("head", "volts"),
+    [("Resistenza bobina;4,2;ohm\nTensione bobina;2,1;V\n", None), ("# coil resistance 5.0 ohm\n", 2.5)],
+)
+def test_voltage_and_resistance_of_the_coil_are_offered_as_its_current_and_not_taken(tmp_path, head, volts):
+    channels = [T, X, 100 * force(0.5)] + ([] if volts is None else [np.full(T.size, volts)])
+    names = "time [s];stroke [mm];force [cN]" + ("" if volts is None else ";coil voltage [V]")
+    rows = "".join(";".join(f"{v:.5f}" for v in row).replace(".", ",") + "\n" for row in zip(*channels, strict=True))
+    (tmp_path / "a.csv").write_text(f"{head}{names}\n{rows}")
+    (refusal,) = import_files([tmp_path]).refusals
+    assert refusal.error.code == "E_CURRENT_MISSING"
+    line = re.search(r"set (\[.*?\] )(.*?) in a profile; else", refusal.error.remedy)
+    assert line
+    profile = parse_profile(f"{line[1]}\n{line[2]}".replace(", unit", "\nunit").replace(" and scale", "\nscale"))
+    (record,) = import_files([tmp_path], profile).records
+    assert np.mean(record.current) == pytest.approx(0.5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Collection
 from dataclasses import replace
@@ -12,7 +13,7 @@ import numpy as np
 from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import chunks
 from mrdamper.errors import ColumnError, printable
-from mrdamper.rig_files.column_names import names_condition, split_name
+from mrdamper.rig_files.column_names import RATING, names_condition, split_name
 from mrdamper.rig_files.conditions import (
     BEHIND_DIGIT,
     LARGEST_STATED,
@@ -28,7 +29,7 @@ from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding, Record
 
 _FEWEST_SLOW = 5  # samples of a current that is recorded more rarely than the force
-NO_CHANNEL = "the current channel is left out"  # beginning of the finding on a column of no current
+NO_CHANNEL = "the current channel is "  # beginning of the finding on a column of no current
 _FOLDERS = 3  # above a file, whose names may state its current
 
 
@@ -118,9 +119,12 @@ def require_current(record: Record, path: Path = Path()) -> Record:
     found = [f.text for f in record.findings if f.text.startswith(NO_CHANNEL)]
     value, first = '"test1*" = 0.5', ""
     if found and "may both" not in found[0]:
-        found[0], given, first = found[0].partition(" if so, ")
-        first = first or 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
-        first = f"{given.lstrip()}{first}; else "
+        found[0], mark, line = found[0].partition(": if so, ")
+        first = (
+            mark[2:] + line
+            or 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
+        )
+        first = f"{first}; else "
     elif match and not found:
         found = [f"{match[0]!r} in its name can be read as {match[2]} A or as {match[1]}.{match[2]} A"]
         stars = ("*", "*") if match.string in places[:2] else ("*/*", "*/*")
@@ -133,6 +137,30 @@ def require_current(record: Record, path: Path = Path()) -> Record:
         "if all tests have one, [current] value = 0.5 in a profile",
         code="E_CURRENT_MISSING",
     )
+
+
+def current_by_resistance(table: RawTable, record_id: str) -> tuple[Finding, ...]:
+    """Tell which current the coil's voltage and resistance give; it is that of the test only while the voltage is held.
+
+    The inductance of the coil delays the current behind a voltage that varies.
+    """
+    stated = [q for q in table.quantities if q.value > 0 or q.unit.dimension == "voltage"]
+    ohms = {q.value for q in stated if q.unit.dimension == "resistance" and not RATING.search(q.key)}
+    volts = {q.value for q in stated if q.unit.dimension == "voltage" and names_condition(q.key, "voltage")}
+    columns = table.columns("voltage", "voltage")
+    if len(ohms) != 1 or len(columns or volts) != 1:
+        return ()
+    (ohm,) = ohms
+    if columns:
+        name, scale = table.names[columns[0]], table.headers[columns[0]].factor / ohm
+        what = f"the coil's voltage {name!r} over {ohm:g} ohm"
+        line = f'[channels.current] column = {json.dumps(name, ensure_ascii=False)}, unit = "A" and scale = {scale:.6g}'
+    else:
+        (volt,) = volts
+        what = f"the coil's {volt:g} V over {ohm:g} ohm = {volt / ohm:.4g} A"
+        line = f"[current] values = {{{json.dumps(record_id)} = {volt / ohm:.4g}}}"
+    text = f"{NO_CHANNEL}missing: {what} is the current only at constant voltage: if so, set {line} in a profile"
+    return (Finding("W_COLUMN", printable(text)),)
 
 
 def with_current_behind_label(record: Record, path: Path, names: Collection[str]) -> Record:

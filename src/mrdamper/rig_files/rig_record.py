@@ -12,7 +12,14 @@ from mrdamper.data import Floats
 from mrdamper.data.arrays import chunks, rescale
 from mrdamper.errors import ColumnError, InputError, listed, printable
 from mrdamper.physics.motion.measured import smooth
-from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, constant, current_of, without_gaps
+from mrdamper.rig_files.coil_current import (
+    NO_CHANNEL,
+    as_data,
+    constant,
+    current_by_resistance,
+    current_of,
+    without_gaps,
+)
 from mrdamper.rig_files.column_names import Unit, role_of, words
 from mrdamper.rig_files.columns import (
     Assigned,
@@ -98,9 +105,11 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         if current is not None:
             part["current"] = constant(current, part["time"])
             noticed = [f for f in findings if not f.text.startswith(NO_CHANNEL)]
+        run = _run_id(table, path) + (f"_{number}" if len(stretches) > 1 else "")
+        noticed = [*noticed, *current_by_resistance(table, run)] if "current" not in part else noticed
         records.append(
             Record(
-                id=_run_id(table, path) + (f"_{number}" if len(stretches) > 1 else ""),
+                id=run,
                 findings=tuple(dict.fromkeys(noticed)), provenance={**remarks, **whence}, rig=profile.rig,
                 excitation=profile.excitation, split=profile.split, lines=its_lines, further=others, **part,  # type: ignore[arg-type]
             )

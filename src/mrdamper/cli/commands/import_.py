@@ -156,7 +156,9 @@ def _missing_currents(files: list[Path], guess: Profile, columns: tuple[str, ...
     counts = Counter(refusal.run for refusal in missing)
     names = [r.run if counts[r.run] == 1 else "*/" + "/".join(Path(r.file).parts[-2:]) for r in missing]
     lines += ["# Tests without a current: remove the #, and write each current [A] behind its =:", "#[current.values]"]
-    lines += [f"#{json.dumps(escape(name) if name[:2] != '*/' else name, ensure_ascii=False)} =" for name in names]
+    keys = [json.dumps(escape(name) if name[:2] != "*/" else name, ensure_ascii=False) for name in names]
+    whys = ["" if r.error.found.startswith("no coil current") else f"  # {r.error.found}" for r in missing]
+    lines += [f"#{key} ={why}" for key, why in zip(keys, whys, strict=True)]
     return "\n".join(["", *lines, ""])
 
 
