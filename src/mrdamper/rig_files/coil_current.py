@@ -116,21 +116,21 @@ def require_current(record: Record, path: Path = Path()) -> Record:
         return record
     places = _places(record, path)
     match = next(filter(None, map(BEHIND_DIGIT.search, places)), None)
-    found = [f.text for f in record.findings if f.text.startswith(NO_CHANNEL)]
+    reasons = [f.text for f in record.findings if f.text.startswith(NO_CHANNEL)]
     value, first = '"test1*" = 0.5', ""
-    if found and "may both" not in found[0]:
-        found[0], mark, line = found[0].partition(": if so, ")
+    if reasons and "may both" not in reasons[0]:
+        reasons[0], mark, line = reasons[0].partition(": if so, ")
         first = (
             mark[2:] + line
             or 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
         )
         first = f"{first}; else "
-    elif match and not found:
-        found = [f"{match[0]!r} in its name can be read as {match[2]} A or as {match[1]}.{match[2]} A"]
+    elif match and not reasons:
+        reasons = [f"{match[0]!r} in its name can be read as {match[2]} A or as {match[1]}.{match[2]} A"]
         stars = ("*", "*") if match.string in places[:2] else ("*/*", "*/*")
         value = f'"{stars[0]}{match[0]}{stars[1]}" = {match[2]}'
     raise ColumnError(
-        (found or ["no coil current in a column, or in the name of the file or of its folder"])[0],
+        (reasons or ["no coil current in a column, or in the name of the file or of its folder"])[0],
         where=Path(record.provenance.get("file", record.id)).name,
         remedy=f"{first}write the currents into tests.csv (--write-tests), or set [current] "
         f'pattern = "*_{{current}}A_*" and unit = "A", values = {{{value}}}, [channels.current] column = "..." or, '

@@ -152,8 +152,8 @@ def current_behind_label(name: str, names: Collection[str]) -> float | None:
 
     def alike(pattern: re.Pattern[str]) -> list[re.Match[str]]:
         """Return what names have in the place of the label and the number."""
-        form, found = re.sub("[0-9]+", "0", name[: match.start()]), map(pattern.search, {*names})
-        return [m for m in found if m and re.sub("[0-9]+", "0", m.string[: m.start()]) == form]
+        form, matches = re.sub("[0-9]+", "0", name[: match.start()]), map(pattern.search, {*names})
+        return [m for m in matches if m and re.sub("[0-9]+", "0", m.string[: m.start()]) == form]
 
     if alike(_BEHIND_LABEL):
         return stated[0]
@@ -161,8 +161,8 @@ def current_behind_label(name: str, names: Collection[str]) -> float | None:
     labels, numbers = ({*of} for of in zip(*both, strict=True))
     whole = numbers == {*map(str, range(len(numbers)))} and 3 <= len(numbers) <= _LARGEST_STEP + 1 and "0" not in labels
     counted = len(labels) == len(both) and labels == {*map(str, range(1, len(labels) + 1))}
-    known = whole and (counted or both == {*product(labels, numbers)})
-    return stated[0] if known and letters and role_of(letters[1]) != "current" else None
+    complete = whole and (counted or both == {*product(labels, numbers)})
+    return stated[0] if complete and letters and role_of(letters[1]) != "current" else None
 
 
 def motions_in(text: str, unit: str) -> set[float]:

@@ -48,6 +48,19 @@ _MOST_FURTHER = 12  # channels
 _LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged cell there costs the channel, not the run
 
 
+def _tests_of(channels: Mapping[str, Floats], profile: Profile) -> tuple[list[slice], list[Finding]]:
+    """Return the tests of a table: between restarts of its time, or rests and steps of the current of a session."""
+    time = channels["time"]
+    if profile.file.blocks == "join":
+        return [slice(0, time.size)], []
+    stretches = stretches_of_time(time)
+    if len(stretches) > 1:
+        return stretches, []
+    stretches = stretches_of_session(time, channels["displacement"], channels.get("current"))
+    text = f'cut at its rests or steps of the current into {len(stretches)} tests (blocks = "join" keeps it)'
+    return stretches, [Finding("W_CUT", text)] if len(stretches) > 1 else []
+
+
 def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     """Return the records a table of one test holds, not yet judged: several where its time starts again and again.
 
@@ -68,25 +81,21 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         channels["displacement"] = integral(channels["time"], channels["displacement"])
         findings.append(Finding("W_SCALE", "the displacement is the integral of the velocity"))
     further = _further(table, assigned, size)
-    stretches = [slice(0, size)] if profile.file.blocks == "join" else stretches_of_time(channels["time"])
-    if len(stretches) == 1 and profile.file.blocks != "join":
-        stretches = stretches_of_session(channels["time"], channels["displacement"], channels.get("current"))
-        if len(stretches) > 1:
-            text = f'cut at its rests or steps of the current into {len(stretches)} tests (blocks = "join" keeps it)'
-            findings.append(Finding("W_CUT", text))
-    motion = stated_motion(stated_quantities(table.remarks, decimal=table.decimal))
+    stretches, cut = _tests_of(channels, profile)
+    findings += cut
     remarks = {
         **recording_time(table.remarks),
         **_remarks(table, assigned),
         "sign_changed": ", ".join(role for role, entry in assigned.items() if entry.sign < 0),
         "scaled": ", ".join(f"{r} = {scale:g}" for r in assigned if (scale := profile.channel(r).scale)),
         "time_from": rate,
-        "motion_stated": motion if len(stretches) == 1 else "",
     }
+    if len(stretches) == 1:
+        remarks["motion_stated"] = stated_motion(stated_quantities(table.remarks, decimal=table.decimal))
     remarks = {key: text for key, text in remarks.items() if text}
     findings += [Finding("W_CHOSEN", text) for text in measured_beside_others(table, profile, assigned)]
-    for name, why in left_out(table, profile, assigned).items():
-        findings.append(Finding("W_COLUMN", f"the {name} channel is left out: {why}"))
+    left_out_channels = left_out(table, profile, assigned).items()
+    findings += [Finding("W_COLUMN", f"the {name} channel is left out: {why}") for name, why in left_out_channels]
     records = []
     for number, stretch in enumerate(stretches, 1):
         part = {name: values[stretch] for name, values in channels.items()}

@@ -213,8 +213,8 @@ def _row_of_names(line: str, width: int) -> tuple[Header, ...]:
     """Return the names and units of as many columns that a line lists, columns: time (s), stroke (mm), load (N)."""
     listed = line.rpartition(": ")[2].strip(" |")
     row = tuple(map(_item, re.split(r"[,;|\t]\s*|\s(?:and|und|et|y|e)\s", listed)))
-    known = [header.role for header in row if header.role and header.dimension == DIMENSION[header.role]]
-    return row if len(row) == width == len({*known}) and {"displacement", "force"} <= {*known} else ()
+    roles = {header.role for header in row if header.role and header.dimension == DIMENSION[header.role]}
+    return row if len(row) == width == len(roles) and {"displacement", "force"} <= roles else ()
 
 
 def _with_numbered_channels(table: RawTable) -> RawTable:
@@ -298,7 +298,7 @@ def _with_listed_units(table: RawTable) -> RawTable:
             i = int(number[1]) - 1 if number else i
             role = (role_of(names[i]) or header.role or "") if i in names else ""
             fits = role_of(meaning) in (role, None) and header.dimension == DIMENSION.get(role, "")
-            if fits and not RATING.search(meaning) and not re.search("[0-9]", meaning):
+            if i is not None and fits and not RATING.search(meaning) and not re.search("[0-9]", meaning):
                 behind.setdefault(i, set()).add(header.unit)
         match = _TIME_UNIT.match(line)
         if match and len(times) == 1 and times[0] in bare and split_name("", match["unit"]).dimension == "time":
