@@ -48,7 +48,7 @@ _MOST_FURTHER = 12  # channels
 _LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged cell there costs the channel, not the run
 
 
-def _tests_of(channels: Mapping[str, Floats], profile: Profile) -> tuple[list[slice], list[Finding]]:
+def _tests_of(channels: dict[str, Floats], profile: Profile) -> tuple[list[slice], list[Finding]]:
     """Return the tests of a table: between restarts of its time, or rests and steps of the current of a session."""
     time = channels["time"]
     if profile.file.blocks == "join":
