@@ -14,7 +14,7 @@ from typing import IO
 from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RigFileError, Source, scratch
 
 _PIECE = 2**20
-_GZIP, _ZIP = b"\x1f\x8b", b"PK\x03\x04"
+_GZIP = b"\x1f\x8b"
 _PACKED = (_GZIP, b"BZh", b"\xfd7zXZ", b"7z\xbc\xaf", b"Rar!", b"\x28\xb5\x2f\xfd")
 _TAR = slice(257, 262)
 # What zipfile raises for a zip it cannot read; NotImplementedError for a packing method it does not know.
