@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from mrdamper.rig_files.conditions import recording_time
 from mrdamper.rig_files.mapping.proposals import displacement_of
 from mrdamper.rig_files.preview import question_of
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import import_files
+from mrdamper.rig_files.rig_record import recording_time
 
 T = np.arange(0.0, 3.0, 0.002)
 X = 10 * np.sin(2 * np.pi * T + 0.3)  # [mm]

@@ -78,15 +78,16 @@ _PLACES = ("column", "number", "index", "no", "position", "channel")  # of a col
 def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Add what short texts beside the file state of signs, and of names, units and scales where they lack."""
     lacking = bool(scaled_columns(table)) or _lacks_names_or_units(table)
-    readme, structures, listing = _texts_in(path.parent)
-    texts = readme or _texts_in(path.parent.parent)[0]
+    readme, structures, listing = _texts_in(path.parent, path.parent.stat().st_mtime_ns)
+    texts = readme or _texts_in(path.parent.parent, path.parent.parent.stat().st_mtime_ns)[0]
     texts = texts + (structures if lacking or len(structures) <= _FEW_FILES else [])
     texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(p.name)]
     lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
     names = {header.name.casefold() for header in table.headers}
+    counted = {line: {match["name"].casefold() for match in NUMBER_IS.finditer(line)} for line in lines}
     stated = [
-        (lacking and _of_channels(line)) or (line if states_sign(line) or names & {*_counted(line)} else "")
+        (lacking and _of_channels(line)) or (line if states_sign(line) or names & counted[line] else "")
         for line in lines
     ]
     timed = profile.file.sample_rate_Hz or any("time" in (h.role, h.dimension) for h in table.headers)
@@ -98,13 +99,9 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     return replace(table, remarks=(*table.remarks, *filter(None, stated)), calibrated=calibrated)
 
 
-def _texts_in(folder: Path) -> tuple[list[Path], list[Path], list[Path]]:
-    """Return the files of a folder that may describe its records: by their names, structures, and other texts."""
-    return _texts_as_of(folder, folder.stat().st_mtime_ns)
-
-
 @lru_cache(maxsize=64)  # every file of a folder asks
-def _texts_as_of(folder: Path, changed_ns: int) -> tuple[list[Path], list[Path], list[Path]]:
+def _texts_in(folder: Path, changed_ns: int) -> tuple[list[Path], list[Path], list[Path]]:
+    """Return the files of a folder that may describe its records: by their names, structures, and other texts."""
     names: list[str] = []
     with suppress(PermissionError), os.scandir(folder) as entries:  # nothing of a folder that may not be read
         names = [e.name for e in entries if "." not in e.name or e.name.lower().endswith(_READ)]
@@ -127,10 +124,6 @@ def _lacks_names_or_units(table: RawTable) -> bool:
     return not {"displacement", "force"} <= roles or any(
         table.headers[i].role in REQUIRED or NUMBERED.fullmatch(table.names[i].strip()) for i in bare
     )
-
-
-def _counted(line: str) -> list[str]:
-    return [match["name"].casefold() for match in NUMBER_IS.finditer(line)]
 
 
 def _of_channels(line: str) -> str:
