@@ -37,10 +37,8 @@ GAIN = 0.05  # of the force
 OFFSET = 0.04  # of its peak-to-peak value
 LATE = 0.012  # of the period
 STROKE = 0.06  # of the amplitude: a step that the force does not follow
-_EVEN_STROKES, _FOLLOWS = (
-    0.02,
-    0.1,
-)  # strokes before and after a step differ by at most so much; and the force by so much of it
+_EVEN_STROKES = 0.02  # strokes before and after a step differ by at most so much
+_FOLLOWS = 0.1  # of such a step, by which the force follows
 _FEWEST_CYCLES = 3  # cycles
 
 
