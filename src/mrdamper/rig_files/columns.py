@@ -279,15 +279,8 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
         fixed |= {role: fixed.get(role, "") + each for role in missing if role != "time"}
     beside = f"(found {shown})"
     bare = {r: ' and unit = "..."' for r in missing if not volts and not table.columns(dimension=DIMENSION[r])}
-    return [
-        _refusal(
-            ColumnError,
-            table,
-            f"no column is known to be {r} {beside}",
-            remedy.format(r, bare.get(r, "") + fixed.get(r, "")),
-        )
-        for r in missing
-    ]
+    remedies = {r: remedy.format(r, bare.get(r, "") + fixed.get(r, "")) for r in missing}
+    return [_refusal(ColumnError, table, f"no column is known to be {r} {beside}", remedies[r]) for r in missing]
 
 
 def _ambiguous(table: RawTable, role: str, names: Sequence[str]) -> RigFileError:

@@ -103,11 +103,8 @@ def _plain(source: Source) -> Source:
     file = scratch(source.keep)
     source.file.seek(0)
     for line in source.file:
-        file.write(
-            _ARRIVED.sub(b"", line)
-            if arrived
-            else _LATEX.sub(lambda of: b"\t" if of[1] else of[2] or b"", line.rstrip()) + b"\n"
-        )
+        plain = b"" if arrived else _LATEX.sub(lambda of: b"\t" if of[1] else of[2] or b"", line.rstrip()) + b"\n"
+        file.write(_ARRIVED.sub(b"", line) if arrived else plain)
     return replace(source, file=file, size=file.tell())
 
 

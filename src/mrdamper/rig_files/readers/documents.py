@@ -79,12 +79,8 @@ def tables_of_sheets(source: Source, sheets: Sequence[tuple[str, Source]], form:
             first = first or error
             tables = []
         tables = [replace(t, label=t.label or name, form={"sheet": name}) for t in tables if len(t.names) >= _FEWEST]
-        noted = (
-            sheet.size <= _NOTES
-            and all(  # lists of quantities, one a line, that name no channel
-                any(table.odd[:1]) and not any(header.channel for header in table.headers) for table in tables
-            )
-        )
+        named = [header.channel for table in tables for header in table.headers]
+        noted = sheet.size <= _NOTES and all(any(table.odd[:1]) for table in tables) and not any(named)  # quantities
         beside += sheet.head(_NOTES).decode("utf-8", "replace").splitlines() if noted or not tables else ()
         (lists if noted else all_tables).extend(tables)
     all_tables = all_tables or lists
