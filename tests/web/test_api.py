@@ -231,6 +231,12 @@ def test_the_table_of_a_loop_is_in_the_units_asked_for(client, loaded, joint):
     )
 
 
+def test_models_to_compare_have_titles_of_their_own(client, session):
+    titles = [choice["title"] for choice in client.get(f"{session}/compare/choices").json()]
+    assert all(titles)
+    assert len(set(titles)) == len(titles)
+
+
 @pytest.mark.parametrize("form", ["c", "latex"])
 def test_exports_are_made_in_a_worker(client, loaded, joint, form):
     assert form in {f["name"] for f in client.get(f"{loaded}/exports").json()}

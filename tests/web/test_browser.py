@@ -544,7 +544,7 @@ def test_every_number_and_axis_follows_the_units_chosen(on_model, shoot):
     comes_to(page, lambda: any("lbf" in text for text in axes()), True)
     at_rest(page)
     assert set(axes()) == {"Displacement (in)", "Force (lbf)", "Velocity (in/s)", "Time (s)", "Current (A)",
-                           "Half peak-to-peak (lbf)", "Energy (in·lbf)"}  # fmt: skip
+                           "Peak force (lbf)", "Energy (in·lbf)"}  # fmt: skip
     assert peak("lbf") == pytest.approx(before[0] / 4.4482216, rel=2e-3)
     assert number(page, "amplitude_m") == pytest.approx(before[1] / 25.4, rel=1e-3)
     comes_to(page, lambda: curve(page, "Force over displacement") == shape, True)  # the same picture on other axes

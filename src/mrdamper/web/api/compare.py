@@ -37,7 +37,7 @@ def choices(session: OpenSession) -> list[dict[str, Any]]:
     return [
         {
             "name": c.name,
-            "title": c.title,
+            "title": ", ".join(filter(None, (c.title or c.source, c.way))),
             "source": c.source,
             "slow": bool(c.basis and c.basis.costly),
             "studied": c.model in (*STUDIED, *WHOLE_DAMPER),

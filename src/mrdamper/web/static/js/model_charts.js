@@ -10,7 +10,7 @@ export class ModelCharts {
     this.turn = 0; // of several responses being drawn, the newest counts
     Object.assign(this, loopCharts("model", "x"));
     this.t = new Chart({ title: "Force over time", x: ["Time", "s"], y: ["Force", "N"], name: "model-force-time" });
-    this.peak = new Chart({ title: "Peak force over current", x: ["Current", "A"], y: ["Half peak-to-peak", "N"], name: "model-peak-force", zero: true, keys: true });
+    this.peak = new Chart({ title: "Peak force over current", x: ["Current", "A"], y: ["Peak force", "N"], name: "model-peak-force", zero: true, keys: true });
     this.energy = new Chart({ title: "Energy per cycle over current", x: ["Current", "A"], y: ["Energy", "J"], name: "model-energy", zero: true });
     this.all = [this.x, this.v, this.t, this.peak, this.energy];
     this.element = h("div", { class: "figures model" }, this.all.map((chart) => chart.element));
