@@ -148,9 +148,9 @@ def test_a_session_that_ended_is_gone_with_its_files(client, app, session):
 
 def test_an_unused_session_is_swept(client, app, session):
     app.state.sessions.sweep(idle_s=3600)
-    assert len(app.state.sessions) == 1
+    assert len(list(app.state.sessions)) == 1
     app.state.sessions.sweep(idle_s=-1)
-    assert len(app.state.sessions) == 0
+    assert len(list(app.state.sessions)) == 0
 
 
 def test_stopping_leaves_nothing_behind(app):

@@ -7,6 +7,7 @@ import contextlib
 import ctypes
 import gc
 import importlib.util
+import mimetypes
 import sys
 import traceback
 from collections.abc import AsyncIterator, Callable, Iterable
@@ -19,16 +20,18 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
+from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mrdamper.errors import InputError, MissingExtraError
 from mrdamper.web.api import routers
 from mrdamper.web.jobs import error_parts
-from mrdamper.web.page import STATIC, PageFiles, page
 from mrdamper.web.security import Guard
 from mrdamper.web.sessions import BrowserSessions
 from mrdamper.web.uploads import AllRefusedError
 
+STATIC = Path(__file__).parent / "static"
+mimetypes.add_type("text/javascript", ".js")  # systems register other types, which browsers refuse
 _SWEEP_S = 60.0
 # Two arenas (M_ARENA_MAX), as one a thread keeps all it has held; arrays of 256 KB and more
 # (M_MMAP_THRESHOLD) return to the system when they are freed.
@@ -70,7 +73,7 @@ def create_app(
     for router in routers():
         app.include_router(router, prefix="/api")
 
-    front = HTMLResponse(page(), headers={"Cache-Control": "no-cache"})
+    front = HTMLResponse(_page())
 
     @app.get("/")
     async def front_page() -> HTMLResponse:
@@ -80,7 +83,7 @@ def create_app(
     async def charts() -> Response:
         return Response(chart_library, media_type="text/javascript", headers={"Cache-Control": "max-age=3600"})
 
-    app.mount("/static", PageFiles(directory=STATIC))
+    app.mount("/static", StaticFiles(directory=STATIC))
     app.add_middleware(_InternalErrors)
     app.add_middleware(Guard, hosts=tuple(hosts))
     return app
@@ -96,6 +99,13 @@ def plotly_script() -> Path:
     if script is None or not script.is_file():
         raise MissingExtraError("the app requires plotly", remedy="pip install 'mrdamper[web]'")
     return script
+
+
+def _page() -> str:
+    """Return the page with a preload link for every module, so that all are fetched at once."""
+    modules = [path.relative_to(STATIC).as_posix() for path in sorted(STATIC.rglob("*.js"))]
+    links = "".join(f'  <link rel="modulepreload" href="/static/{name}">\n' for name in modules)
+    return (STATIC / "index.html").read_text(encoding="utf-8").replace("</head>", f"{links}</head>")
 
 
 async def _sweep(sessions: BrowserSessions) -> None:

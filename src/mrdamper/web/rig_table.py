@@ -23,6 +23,8 @@ MM = 1e3
 _MAX_NEAREST = 3  # measured loops shown with a prediction
 _MAX_DISTANCE = 0.4  # of the nearest run from a condition; relative current, logarithms of frequency and amplitude
 _MAX_DISTANCE_OF_OTHERS = 0.2
+_LOOP_QUANTITIES = {"peak_N": "peak_force", "energy_J": "dissipated_energy", "mean_N": "mean_force"}
+_LOOP_QUANTITIES["damping_Ns_m"] = "equivalent_damping"
 _TABLES: WeakKeyDictionary[Dataset, dict[str, RigTable]] = WeakKeyDictionary()
 _BUILDING = threading.Lock()
 
@@ -131,28 +133,19 @@ def describe(row: TableRow) -> dict[str, Any]:
     """Return a row in the units of the page."""
     run, loop = row.run, row.loop
     return {
-        "key": row.key,
-        "id": run.id,
-        "split": run.split,
+        "key": row.key, "id": run.id, "split": run.split, "refused": row.refused,
         "condition": screen_condition(row.condition),
         "samples": int(run.time.size),
         "duration_s": finite(float(run.time[-1] - run.time[0])),
         "cycles": finite(loop.motion.cycles) if loop else None,
-        "peak_N": finite(loop.peak_force) if loop else None,
-        "energy_J": finite(loop.dissipated_energy) if loop else None,
-        "mean_N": finite(loop.mean_force) if loop else None,
-        "damping_Ns_m": finite(loop.equivalent_damping) if loop else None,
+        **{name: finite(getattr(loop, quantity)) if loop else None for name, quantity in _LOOP_QUANTITIES.items()},
         "repeatability": finite(run.repeatability),
-        "refused": row.refused,
-    }
+    }  # fmt: skip
 
 
 def screen_condition(condition: Condition | None) -> dict[str, float] | None:
     """Return a condition in the units of the page."""
     if condition is None:
         return None
-    return {
-        "current_A": condition.current_A,
-        "frequency_Hz": condition.frequency_Hz,
-        "amplitude_mm": MM * condition.amplitude_m,
-    }
+    current_A, frequency_Hz, amplitude_mm = condition.current_A, condition.frequency_Hz, MM * condition.amplitude_m
+    return {"current_A": current_A, "frequency_Hz": frequency_Hz, "amplitude_mm": amplitude_mm}

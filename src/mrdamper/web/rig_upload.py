@@ -6,15 +6,16 @@ round), so the taken files can be kept while the refused ones are read again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
-from mrdamper.rig_files.profile import Profile
+from mrdamper.rig_files.preview import guess_profile
+from mrdamper.rig_files.profile import Profile, parse_profile, profile_text
 from mrdamper.rig_files.record import Refusal
-from mrdamper.rig_files.rig_import import ImportResult
+from mrdamper.rig_files.rig_import import ImportResult, import_files, to_dataset, with_unique_ids
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import StatedTest, TestsTable, load_tests
 from mrdamper.web.uploads import AllRefusedError, ImportedData, Upload, Verdict
@@ -27,16 +28,13 @@ def read_rig_files(upload: Upload, toml: str, refused_only: bool, only: Path | N
 
     Raises `InputError` if the profile cannot be read, and `AllRefusedError` if every file is refused.
     """
-    from mrdamper.rig_files.profile import parse_profile
-    from mrdamper.rig_files.rig_import import import_files, to_dataset, with_unique_ids
-
     profile = parse_profile(toml) if toml.strip() else None
     tables = [path for path, name in upload.names.items() if PurePosixPath(name).name == TESTS]
     wanted = [path for path in upload.names if path not in tables and (not refused_only or path in upload.refused)]
     wanted = wanted if only is None else [only]
     table = load_tests(tables[0]) if tables else None
     for path in wanted:
-        result = _imported(upload, path, profile, table, import_files)
+        result = _imported(upload, path, profile, table)
         upload.taken[path], upload.refused[path] = result.records, result.refusals
     upload.taken = {path: records for path, records in upload.taken.items() if records}
     upload.refused = {path: refusals for path, refusals in upload.refused.items() if refusals}
@@ -59,17 +57,15 @@ def with_split(dataset: Dataset, validation: Collection[str] | None) -> Dataset:
     return dataset.only([replace(run, split="validate" if run.id in validation else "train") for run in dataset])
 
 
-def _imported(
-    upload: Upload, path: Path, profile: Profile | None, table: TestsTable | None, read: Callable[..., ImportResult]
-) -> ImportResult:
+def _imported(upload: Upload, path: Path, profile: Profile | None, table: TestsTable | None) -> ImportResult:
     """Read a file with the statements of the uploaded table, and the currents stated on the page."""
     rows = () if table is None else table.of_file(Path(upload.names[path]))
     stated = [StatedTest(0, "", run, current) for (file, run), current in upload.currents.items() if file == path]
     if not rows and not stated:
-        return read([path], profile)
+        return import_files([path], profile)
     runs = {row.run for row in stated}
     statements = (*stated, *(replace(row, file="") for row in rows if row.run not in runs))
-    return read([path], profile, tests=TestsTable(path.with_name(TESTS), statements))
+    return import_files([path], profile, tests=TestsTable(path.with_name(TESTS), statements))
 
 
 def _verdicts(upload: Upload) -> tuple[Verdict, ...]:
@@ -110,9 +106,6 @@ def _dataset_name(upload: Upload, count: int) -> str:
 
 def _guessed_profile(paths: Sequence[Path]) -> str:
     """Return the profile of the first file whose format can be guessed; an empty one where none can."""
-    from mrdamper.rig_files.preview import guess_profile
-    from mrdamper.rig_files.profile import parse_profile, profile_text
-
     for path in paths[:_MAX_GUESSES]:
         try:
             return profile_text(guess_profile(path))

@@ -77,13 +77,11 @@ def save_project(session: Session, state: str, shown: str | None, logo: str = ""
     imported, dampers = session.imported, list(session.dampers.values())
     files = [f"dampers/{i}.json" for i in range(len(dampers))]
     contents = _Contents(
-        format="mrdamper-project",
-        version=1,
-        source=imported.source if imported else "",
-        name=imported.dataset.name if imported else "",
+        format="mrdamper-project", version=1,
+        source=imported.source if imported else "", name=imported.dataset.name if imported else "",
         dampers=[_Damper(file=f, origin=d.origin, note=d.note[:500]) for f, d in zip(files, dampers, strict=True)],
         current=next((i for i, damper in enumerate(dampers) if damper.key == shown), None),
-    )
+    )  # fmt: skip
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(CONTENTS, contents.model_dump_json(indent=1))  # first: the page recognises the file by it

@@ -12,6 +12,7 @@ import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 import uvicorn
 from starlette.applications import Starlette
@@ -35,19 +36,9 @@ def serve(create_app: Callable[..., Starlette], port: int, open_browser: bool = 
     token = secrets.token_urlsafe(24)
     hosts = [f"{LOOPBACK}:{port}", f"localhost:{port}"]
     app = create_app(hosts, lambda: server.should_exit, read_ahead=True, token=token)
-    server = _Server(
-        uvicorn.Config(
-            app,
-            http=Connection,
-            log_level="error",
-            ws="none",
-            access_log=False,
-            timeout_graceful_shutdown=3,
-            server_header=False,
-        ),
-        f"http://{LOOPBACK}:{port}/?token={token}",
-        open_browser,
-    )
+    settings: dict[str, Any] = {"http": Connection, "ws": "none", "log_level": "error", "access_log": False}
+    config = uvicorn.Config(app, timeout_graceful_shutdown=3, server_header=False, **settings)
+    server = _Server(config, f"http://{LOOPBACK}:{port}/?token={token}", open_browser)
     try:
         server.run(sockets=[listener])
     finally:
@@ -74,17 +65,19 @@ class Connection(H11Protocol):
         self._set_deadline()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        if self._deadline is not None:
-            self._deadline.cancel()
+        self._cancel_deadline()
         super().connection_lost(exc)
 
     def _set_deadline(self) -> None:
         if self._busy:
-            if self._deadline is not None:
-                self._deadline.cancel()
-            self._deadline = None
+            self._cancel_deadline()
         elif self._deadline is None:
             self._deadline = self.loop.call_later(HEAD_TIMEOUT_S, self._time_out)
+
+    def _cancel_deadline(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+        self._deadline = None
 
     def _time_out(self) -> None:
         self._deadline = None
@@ -128,9 +121,7 @@ def _listen(port: int) -> socket.socket:
         listener.bind((LOOPBACK, port))
     except (OSError, OverflowError) as error:
         listener.close()
-        raise InputError(
-            f"port {port} cannot be used: {getattr(error, 'strerror', None) or error}",
-            remedy="choose another with --port, or --port 0 for any that is free",
-            code="E_PORT",
-        ) from error
+        problem = f"port {port} cannot be used: {getattr(error, 'strerror', None) or error}"
+        remedy = "choose another with --port, or --port 0 for any that is free"
+        raise InputError(problem, remedy=remedy, code="E_PORT") from error
     return listener

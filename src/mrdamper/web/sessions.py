@@ -15,7 +15,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Protocol, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from fastapi import Depends, Request
 
@@ -38,16 +38,12 @@ _NAME_BYTES = 16
 _STOP_TIMEOUT_S = 10.0  # for workers to end when the app stops
 
 
-class _Cached(Protocol):
-    def cache_clear(self) -> None: ...
+_SHARED: list[Any] = []
+_Cached = TypeVar("_Cached")
 
 
-_SHARED: list[_Cached] = []
-_C = TypeVar("_C", bound=_Cached)
-
-
-def shared(cached: _C) -> _C:
-    """Clear a cached function, whose results all sessions share, when no session is left."""
+def shared(cached: _Cached) -> _Cached:
+    """Clear an `lru_cache`, whose results all sessions share, when no session is left."""
     _SHARED.append(cached)
     return cached
 
@@ -202,9 +198,6 @@ class BrowserSessions:
 
     def __iter__(self) -> Iterator[Session]:
         return iter(list(self._open.values()))
-
-    def __len__(self) -> int:
-        return len(self._open)
 
     def open(self) -> Session:
         """Open a session; the longest unused one ends where there are too many."""

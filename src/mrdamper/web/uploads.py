@@ -71,11 +71,8 @@ class Upload:
     def place(self, name: str) -> Path:
         """Reserve the path of a file of a name; raises `UploadError` if there are too many."""
         if self.places >= FILE_COUNT_LIMIT:
-            raise UploadError(
-                f"over {FILE_COUNT_LIMIT} files",
-                remedy="drop fewer at once, or use mrdamper import",
-                code="E_UPLOAD_COUNT",
-            )
+            remedy = "drop fewer at once, or use mrdamper import"
+            raise UploadError(f"over {FILE_COUNT_LIMIT} files", remedy=remedy, code="E_UPLOAD_COUNT")
         # Run ids and currents are read from file names, so the safe part of the name stays.
         safe = _UNSAFE.sub("_", PurePosixPath(name.replace("\\", "/")).name).lstrip(".")[-_NAME_LENGTH:]
         folder = self.folder / f"{self.places:04d}"

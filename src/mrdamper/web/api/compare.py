@@ -36,14 +36,11 @@ def choices(session: OpenSession) -> list[dict[str, Any]]:
     """List the models that can be compared; those of a study are selected at first."""
     return [
         {
-            "name": c.name,
-            "title": ", ".join(filter(None, (c.title or c.source, c.way))),
-            "source": c.source,
-            "slow": bool(c.basis and c.basis.costly),
-            "studied": c.model in (*STUDIED, *WHOLE_DAMPER),
+            "name": c.name, "title": ", ".join(filter(None, (c.title or c.source, c.way))), "source": c.source,
+            "slow": bool(c.basis and c.basis.costly), "studied": c.model in (*STUDIED, *WHOLE_DAMPER),
         }
         for c in recipes()
-    ]
+    ]  # fmt: skip
 
 
 @router.post("")
@@ -110,13 +107,9 @@ def _conclude(session: Session, number: int, comparison: Comparison) -> dict[str
         for split in ("validate", "train")
     }
     return {
-        "rig": rig.rig,
-        "number": number,
-        "entries": entries,
-        "refused": dict(rig.refused),
-        "validation_runs": runs["validate"],
-        "identification_runs": runs["train"],
-    }
+        "rig": rig.rig, "number": number, "entries": entries, "refused": dict(rig.refused),
+        "validation_runs": runs["validate"], "identification_runs": runs["train"],
+    }  # fmt: skip
 
 
 def _entry(entry: RecipeResult, key: str, keys: dict[str, str]) -> dict[str, Any]:
@@ -126,12 +119,8 @@ def _entry(entry: RecipeResult, key: str, keys: dict[str, str]) -> dict[str, Any
     ]
     medians = {"cross_validation": entry.cross_validated, "validation": entry.validation}
     return {
-        "damper": key,
-        "title": entry.title,
-        "source": entry.recipe.source,
-        "parameter_count": entry.damper.parameter_count,
-        "runs_needed": entry.conditions_needed,
+        "damper": key, "title": entry.title, "source": entry.recipe.source, "seconds": round(entry.seconds, 2),
+        "parameter_count": entry.damper.parameter_count, "runs_needed": entry.conditions_needed,
         **{name: finite(scored.median()) if scored.runs else None for name, scored in medians.items()},
-        "seconds": round(entry.seconds, 2),
         "scores": scores,
-    }
+    }  # fmt: skip

@@ -82,13 +82,10 @@ def overview(session: OpenSession) -> dict[str, Any]:
     imported: ImportedData = session.imported or bundled()
     data = session.dataset
     return {
-        "name": data.name,
-        "source": imported.source,
+        "name": data.name, "source": imported.source, "runs": len(data), "profile": imported.profile,
         "rigs": [{"name": name, "runs": len(data.rig(name))} for name in data.rigs],
-        "runs": len(data),
         "verdicts": [asdict(v) for v in imported.verdicts],
-        "profile": imported.profile,
-    }
+    }  # fmt: skip
 
 
 @router.get("/data/rigs/{number}")
@@ -169,9 +166,6 @@ def _motion(group: list[Any], currents: list[float]) -> dict[str, Any]:
 
 
 def _too_large(name: str) -> UploadError:
-    return UploadError(
-        f"the file is over {FILE_LIMIT // 1_000_000} MB",
-        where=name,
-        remedy="read it with mrdamper import, which has no such limit, and drop the dataset folder",
-        code="E_UPLOAD_SIZE",
-    )
+    remedy = "read it with mrdamper import, which has no such limit, and drop the dataset folder"
+    problem = f"the file is over {FILE_LIMIT // 1_000_000} MB"
+    return UploadError(problem, where=name, remedy=remedy, code="E_UPLOAD_SIZE")

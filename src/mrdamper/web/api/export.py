@@ -15,7 +15,7 @@ from mrdamper.errors import InputError
 from mrdamper.exporters import all_exporters
 from mrdamper.report.tables import prediction_rows
 from mrdamper.web.api.data import find_upload
-from mrdamper.web.api.model import PredictionRequest
+from mrdamper.web.api.model import Held, PredictionRequest
 from mrdamper.web.held_parameters import as_damper, predict_held
 from mrdamper.web.responses import archive, download, in_units, zipped
 from mrdamper.web.saved_project import open_saved_project, save_project
@@ -29,12 +29,6 @@ class Document(BaseModel, extra="forbid"):
     """The text of a model.json."""
 
     text: str = Field(max_length=2_000_000)
-
-
-class Held(BaseModel, extra="forbid", allow_inf_nan=False):
-    """Parameters held by hand."""
-
-    held: dict[str, float] = Field(default_factory=dict, max_length=64)
 
 
 class Units(BaseModel, extra="forbid"):
@@ -149,12 +143,8 @@ def open_project(key: str, session: OpenSession) -> dict[str, Any]:
     if project.imported is not None:
         session.load(project.imported)
     keys = [session.add(damper, origin, note).key for damper, origin, note in project.dampers]
-    return {
-        "data": project.imported is not None,
-        "state": project.state,
-        "logo": project.logo,
-        "damper": keys[project.current] if project.current is not None else None,
-    }
+    damper = keys[project.current] if project.current is not None else None
+    return {"data": project.imported is not None, "state": project.state, "logo": project.logo, "damper": damper}
 
 
 def _written(session: Session) -> list[Path]:

@@ -67,10 +67,8 @@ def choices(session: OpenSession) -> dict[str, Any]:
         "method": defaults["method"].default,
         "models": [
             {
+                **{field: getattr(cls, field) for field in ("title", "source", "integrated")},
                 "name": name,
-                "title": cls.title,
-                "source": cls.source,
-                "integrated": cls.integrated,
                 "whole_damper": bool(cls.current_levels),
                 "parameters": [{field: getattr(p, field) for field in shown} for p in cls.parameters()],
             }
@@ -149,14 +147,10 @@ def _conclude_study(session: Session, study: Study, written: list[Path]) -> dict
 
 def _candidate(candidate: RecipeResult, key: str) -> dict[str, Any]:
     return {
-        "damper": key,
-        "title": candidate.title,
-        "parameter_count": candidate.damper.parameter_count,
-        "individual_fits": finite(candidate.per_run),
-        "cross_validation": finite(candidate.cross_validated.median()),
-        "validation": _median(candidate.validation),
-        "seconds": round(candidate.seconds, 2),
-    }
+        "damper": key, "title": candidate.title, "parameter_count": candidate.damper.parameter_count,
+        "individual_fits": finite(candidate.per_run), "seconds": round(candidate.seconds, 2),
+        "cross_validation": finite(candidate.cross_validated.median()), "validation": _median(candidate.validation),
+    }  # fmt: skip
 
 
 def _conclude_identification(
@@ -168,51 +162,42 @@ def _conclude_identification(
 ) -> dict[str, Any]:
     table = session.table(choice.rig)
     session.results["identified"] = table, identifications, scored
-    about_damper: dict[str, Any] = dict.fromkeys(("damper", "title", "parameter_count", "validation"))
+    answer: dict[str, Any] = dict.fromkeys(("damper", "title", "parameter_count", "validation", "joint"))
     if isinstance(scored, RecipeResult):
         note = f"validation {_percent(scored.validation)}" if scored.validation.runs else ""
-        about_damper = {
-            "damper": session.add(scored.damper, "identification", note).key,
-            "title": scored.damper.title,
-            "parameter_count": scored.damper.parameter_count,
-            "validation": _median(scored.validation),
-        }
-    errors = [i.scores.nrmse_pp for i in identifications] or _joint_fit(scored).nrmse_pp.tolist()
+        answer["damper"] = session.add(scored.damper, "identification", note).key
+        answer |= {"title": scored.damper.title, "parameter_count": scored.damper.parameter_count}
+        answer |= {"validation": _median(scored.validation)}
+    if identifications:
+        errors, fitted = [i.scores.nrmse_pp for i in identifications], identifications[0]
+    else:  # a model of one set of parameters
+        assert isinstance(scored, RecipeResult)
+        assert isinstance(scored.fit, JointFit)
+        errors, fitted, answer["joint"] = scored.fit.nrmse_pp.tolist(), scored.fit.damper, _joint(scored, scored.fit)
+    parameters = [info for info in fitted.model.parameters() if info.name in fitted.free]
     return {
-        **about_damper,
+        **answer,
         "rig": table.dataset.rigs[0],
         "no_damper": scored if isinstance(scored, str) else "",
         "median": finite(float(np.median(errors))),
         "runs": [_identified(i) for i in identifications],
-        "joint": None if identifications else _joint(scored),
-        "parameters": _parameters(identifications, scored),
+        "parameters": [{"name": info.name, "unit": info.unit, "meaning": info.meaning} for info in parameters],
         "refused": refused,
     }
 
 
 def _identified(one: Identification) -> dict[str, Any]:
     return {
-        "id": one.run_id,
-        "nrmse_pp": finite(one.scores.nrmse_pp),
-        "floor": finite(one.floor),
+        "id": one.run_id, "nrmse_pp": finite(one.scores.nrmse_pp), "floor": finite(one.floor),
         "values": {n: finite(v) for n, v in one.model.values().items()},
         "intervals": {name: ends for name in one.free if (ends := one.interval(name))},
         "states": dict(zip(one.table["parameter"], one.table["state"], strict=True)),
-        "at_bounds": one.at_bounds,
-        "notes": (*one.notes, *one.doubts),
-    }
+        "at_bounds": one.at_bounds, "notes": (*one.notes, *one.doubts),
+    }  # fmt: skip
 
 
-def _joint_fit(scored: RecipeResult | str) -> JointFit:
-    """Return the fit of a model of one set of parameters: without identifications there is always one."""
-    assert isinstance(scored, RecipeResult)
-    assert isinstance(scored.fit, JointFit)
-    return scored.fit
-
-
-def _joint(scored: RecipeResult | str) -> dict[str, Any]:
-    fit = _joint_fit(scored)
-    assert isinstance(scored, RecipeResult)
+def _joint(scored: RecipeResult, fit: JointFit) -> dict[str, Any]:
+    errors = zip(scored.train.runs, fit.nrmse_pp.tolist(), strict=True)
     return {
         "values": {n: finite(v) for n, v in fit.damper.model.values().items()},
         "intervals": {
@@ -220,17 +205,8 @@ def _joint(scored: RecipeResult | str) -> dict[str, Any]:
             for row in intervals(scored.damper)
         },
         "at_bounds": fit.at_bounds,
-        "runs": [
-            {"id": run.run_id, "nrmse_pp": finite(error)}
-            for run, error in zip(scored.train.runs, fit.nrmse_pp.tolist(), strict=True)
-        ],
+        "runs": [{"id": run.run_id, "nrmse_pp": finite(error)} for run, error in errors],
     }
-
-
-def _parameters(identifications: tuple[Identification, ...], scored: RecipeResult | str) -> list[dict[str, str]]:
-    fitted = identifications[0] if identifications else _joint_fit(scored).damper
-    infos = fitted.model.parameters()
-    return [{"name": i.name, "unit": i.unit, "meaning": i.meaning} for i in infos if i.name in fitted.free]
 
 
 def _median(validation: Validation) -> float | None:

@@ -22,7 +22,7 @@ from mrdamper.statistics.metrics import dissipated_power, peak_force
 from mrdamper.web.curves import predicted_cycle, screen_arrays
 from mrdamper.web.held_parameters import held_loop, held_model, predict_held, sliders
 from mrdamper.web.responses import frame
-from mrdamper.web.rig_table import RigTable, screen_condition
+from mrdamper.web.rig_table import RigTable, TableRow, describe
 from mrdamper.web.sessions import OpenSession, Session, SessionDamper, shared
 
 router = APIRouter(prefix="/sessions/{session}/dampers")
@@ -34,13 +34,18 @@ _QUANTITIES = ("current_A", "frequency_Hz", "amplitude_m")
 _BEYOND = 1.25  # factor to which sliders and curves exceed the tested conditions
 
 
-class PredictionRequest(BaseModel, extra="forbid", allow_inf_nan=False):
+class Held(BaseModel, extra="forbid", allow_inf_nan=False):
+    """Parameters held by hand."""
+
+    held: dict[str, float] = Field(default_factory=dict, max_length=64)
+
+
+class PredictionRequest(Held):
     """Values of the sliders [SI units]."""
 
     current_A: float = Field(ge=0, le=1000)
     frequency_Hz: float = Field(gt=0, le=10_000)
     amplitude_m: float = Field(gt=0, le=10)
-    held: dict[str, float] = Field(default_factory=dict, max_length=64)
     family: bool = False
     currents: int = Field(default=33, ge=0, le=100)
     interval: bool = False
@@ -160,15 +165,9 @@ def _peak_and_energy(motion: Excitation, force: Floats, frequency_Hz: float) -> 
     return peak_force(force), dissipated_power(force, motion.velocity, motion.time) / frequency_Hz
 
 
-def _measured(row: Any) -> dict[str, Any]:
-    return {
-        "key": row.key,
-        "id": row.run.id,
-        "split": row.run.split,
-        "condition": screen_condition(row.condition),
-        "peak_N": finite(row.loop.peak_force),
-        "energy_J": finite(row.loop.dissipated_energy),
-    }
+def _measured(row: TableRow) -> dict[str, Any]:
+    described = describe(row)
+    return {name: described[name] for name in ("key", "id", "split", "condition", "peak_N", "energy_J")}
 
 
 def _describe(damper: SessionDamper) -> dict[str, Any]:

@@ -26,9 +26,8 @@ def open_session(request: Request) -> dict[str, Any]:
     """Open a session; returns its name and the limits of uploads."""
     token, given = request.app.state.token, request.headers.get("x-app-token", "")
     if token is not None and not secrets.compare_digest(given.encode(), token.encode()):
-        raise HTTPException(
-            403, "Open the address that the terminal shows: its token is missing or of an earlier start of the app."
-        )
+        text = "Open the address that the terminal shows: its token is missing or of an earlier start of the app."
+        raise HTTPException(403, text)
     session = request.app.state.sessions.open()
     if request.app.state.read_ahead:  # not at the start of the app, where it would delay the page
         request.app.state.read_ahead = False

@@ -87,21 +87,15 @@ def _simulated(
     result = simulate_system(system, source, dampers, law, highest=None if kind is Passive else current_A)
     passive, passive_cost = _passive(damper, system_name, source_name, scaled, result.step)
     head = {
-        "kind": _kind(system),
-        "scale": scale,
-        "capacity_N": capacity,
-        "title": f"{system.title}, {type(law).title}",
-        "coordinates": system.coordinates,
-        "channels": system.channels,
-        "dampers": [link.name for link in result.dampers],
+        "title": f"{system.title}, {type(law).title}", "kind": _kind(system), "scale": scale, "capacity_N": capacity,
+        "coordinates": system.coordinates, "channels": system.channels,
         "coordinate": system.coordinates[-1 if system.ground is not None else 0],  # whose acceleration is shown
+        "dampers": [link.name for link in result.dampers],
         "peaks": {name: values.tolist() for name, values in result.peaks.items()},
         "gain": finite(1 - (cost(result) / passive_cost) ** 0.5 if passive_cost > 0 else None),
-        "outside": result.outside,
-        "converged": result.settled,
-        "step_s": result.step,
-        "halving": finite(result.halving),
-    }
+        "outside": result.outside, "converged": result.settled,
+        "step_s": result.step, "halving": finite(result.halving),
+    }  # fmt: skip
     return head, _thinned(_histories(result, source)) | passive
 
 
@@ -146,9 +140,7 @@ def _road_title(name: str) -> str:
 
 def _scaled(system: System, factor: float) -> System:
     """Multiply masses, dashpots and springs; frequencies and strokes on the same road remain."""
-    links = tuple(
-        replace(link, stiffness=factor * link.stiffness, damping=factor * link.damping) for link in system.links
-    )
+    links = tuple(replace(k, stiffness=factor * k.stiffness, damping=factor * k.damping) for k in system.links)
     push = None if system.push is None else (factor * system.push[0], factor * system.push[1])
     return replace(system, M=factor * system.M, C=factor * system.C, K=factor * system.K, push=push, links=links)
 

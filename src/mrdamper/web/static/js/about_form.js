@@ -38,12 +38,12 @@ export class AboutForm {
   async readLogo() {
     const [file] = this.logo.files;
     if (file && file.size > MAX_LOGO_BYTES) {
-      this.app.logo = "";
+      this.app.setLogo("");
       render(this.message, `${file.name} is over 500 kB: give a smaller picture.`);
       return;
     }
     const content = file ? new Uint8Array(await file.arrayBuffer()) : [];
-    this.app.logo = btoa(Array.from(content, (byte) => String.fromCharCode(byte)).join(""));
+    this.app.setLogo(btoa(Array.from(content, (byte) => String.fromCharCode(byte)).join("")));
   }
 
   /** Show the logo: chosen here, or of a saved project. */
@@ -52,7 +52,7 @@ export class AboutForm {
     if (!logo) this.logo.value = "";
     render(this.message, logo ? [
       h("img", { class: "logo", alt: "The logo", src: `data:image/png;base64,${logo}` }), // browsers recognise JPEG by its content
-      h("button", { class: "quiet", onclick: () => (this.app.logo = "") }, "Remove the logo"),
+      h("button", { class: "quiet", onclick: () => this.app.setLogo("") }, "Remove the logo"),
     ] : null);
   }
 }

@@ -13,7 +13,7 @@ export class App {
     this.loading = ""; // description of the loading under way
     this.studyRunning = false;
     this.cache = new Map(); // promises of responses about the loaded data, by path
-    this.picture = ""; // logo of the report as base64; too large for a link
+    this.logo = ""; // of the report, as base64; too large for a link
     this.unsavable = null; // key of the last damper without a file format
   }
 
@@ -21,12 +21,8 @@ export class App {
     return this.store.state;
   }
 
-  get logo() {
-    return this.picture;
-  }
-
-  set logo(picture) {
-    this.picture = picture;
+  setLogo(logo) {
+    this.logo = logo;
     this.emit("logo");
   }
 

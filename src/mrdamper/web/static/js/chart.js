@@ -1,7 +1,7 @@
 // Charts: the library of the plotly package in the colours of the page.
 
 import { paint } from "./colours.js";
-import { h, render } from "./dom.js";
+import { arrowKeys, h, render } from "./dom.js";
 import { heading } from "./format.js";
 import { legend } from "./legend.js";
 import { onScreen } from "./units.js";
@@ -100,7 +100,9 @@ export class Chart {
 
   async redraw() {
     const Plotly = window.Plotly ?? (await library());
-    this.showKeys();
+    const keys = this.keys && legend(this.traces);
+    if (keys && this.keysShown !== keys.outerHTML) render(this.keys, keys);
+    this.keysShown = keys?.outerHTML;
     const data = this.traces.map((t, i) => ({ ...trace(t), uid: `curve${i}` }));
     this.ranges = axisRanges(this.traces, this.axesHeld ? this.ranges : null, this.zero);
     this.marks = this.traces.map((t) => t.x.length);
@@ -111,25 +113,12 @@ export class Chart {
 
   /** Make the tool bar one stop of the Tab key; arrow keys move inside it. */
   makeToolBarOneTabStop() {
-    const buttons = [...this.plot.querySelectorAll(".modebar-btn")];
-    buttons.forEach((button, i) => (button.tabIndex = i ? -1 : 0));
+    const buttons = () => [...this.plot.querySelectorAll(".modebar-btn")];
+    buttons().forEach((button, i) => (button.tabIndex = i ? -1 : 0));
     const bar = this.plot.querySelector(".modebar");
     if (!bar || bar.dataset.keys) return;
     bar.dataset.keys = "arrows";
-    bar.addEventListener("keydown", (event) => {
-      const all = [...bar.querySelectorAll(".modebar-btn")];
-      const step = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[event.key];
-      if (!step) return;
-      event.preventDefault();
-      all[(all.indexOf(document.activeElement) + step + all.length) % all.length].focus();
-    });
-  }
-
-  showKeys() {
-    if (!this.keys) return;
-    const keys = legend(this.traces);
-    if (this.keysShown !== keys.outerHTML) render(this.keys, keys);
-    this.keysShown = keys.outerHTML;
+    arrowKeys(bar, buttons, (button) => button.focus(), true);
   }
 
   /** Save as an image file with title and legend, on the background of the page. */

@@ -20,6 +20,20 @@ export function render(element, ...children) {
   return element;
 }
 
+/** Call `choose` with the next, previous, first or last button of a bar on its key. */
+export function arrowKeys(bar, buttons, choose, vertical = false) {
+  bar.addEventListener("keydown", (event) => {
+    const all = buttons();
+    const current = all.indexOf(document.activeElement);
+    const [next, previous] = [current + 1, current - 1 + all.length].map((i) => i % all.length);
+    const more = vertical ? { ArrowDown: next, ArrowUp: previous } : {};
+    const target = { ArrowRight: next, ArrowLeft: previous, Home: 0, End: all.length - 1, ...more }[event.key];
+    if (target === undefined) return;
+    event.preventDefault();
+    choose(all[target]);
+  });
+}
+
 /** A control that has an id, below its label. */
 export function field(label, control, ...more) {
   return h("div", { class: "field" }, h("label", { for: control.id }, label), control, more);
@@ -73,6 +87,11 @@ export function errorMessage(error) {
 /** A message of a kind: "", "good", "warn" or "bad". */
 export function note(kind, ...children) {
   return h("div", { class: `message ${kind}` }, ...children);
+}
+
+/** A finding of a check with its code. */
+export function finding(code, text, kind = "") {
+  return h("div", { class: kind }, capitalise(text), " ", h("code", {}, code));
 }
 
 /** A text with a capital letter at its beginning. */

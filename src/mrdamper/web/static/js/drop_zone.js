@@ -79,11 +79,6 @@ export class DropZone {
     });
   }
 
-  /** Read the last upload again with a corrected profile: all files, or those refused. */
-  readAgain(toml, refusedOnly = false) {
-    return this.load(() => this.read(toml, refusedOnly));
-  }
-
   async load(request) {
     try {
       await this.app.loadData(request, "Reading the files", { view: "data" });
@@ -113,6 +108,7 @@ export class DropZone {
     }
   }
 
+  /** Read the last upload with a profile: all files, or those refused. */
   read(toml, refusedOnly = false) {
     render(this.message, h("p", { class: "small faint" }, "Checking each file …"));
     return this.app.api.post(`/uploads/${this.upload}/read`, { toml, refused_only: refusedOnly });
@@ -128,7 +124,7 @@ export class DropZone {
       return project.data ? app.api.get("/data") : app.overview;
     }, "Opening the saved project");
     render(this.message);
-    app.logo = project.logo;
+    app.setLogo(project.logo);
     await app.refreshDampers();
     await app.restore({ ...parseState(JSON.parse(project.state)), damper: project.damper });
   }

@@ -1,5 +1,7 @@
 // Files: those of a drop, folders included, and files to save.
 
+import { h } from "./dom.js";
+
 /** List all files of a drop with their paths: [{file, name}]. */
 export async function droppedFiles(transfer) {
   const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
@@ -17,11 +19,9 @@ export async function isProject(file) {
 
 /** Save a file. */
 export function save(blob, name) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+  const href = URL.createObjectURL(blob);
+  h("a", { href, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 10_000);
 }
 
 async function collect(entry, path, files) {

@@ -1,6 +1,6 @@
 // Results of an import, file by file, and the profile the files were read with.
 
-import { capitalise, h } from "./dom.js";
+import { finding, h } from "./dom.js";
 import { count } from "./format.js";
 
 /** The verdict on every file; files that were taken without findings are folded. */
@@ -17,7 +17,7 @@ export function profilePanel(overview, zone) {
   const { profile, verdicts } = overview;
   const refused = verdicts.filter((v) => v.state === "refused").length;
   const text = h("textarea", { "aria-label": "Rig profile, TOML", spellcheck: "false", rows: String(Math.min(30, profile.split("\n").length + 1)) }, profile);
-  const button = (label, refusedOnly) => h("button", { onclick: () => zone.readAgain(text.value, refusedOnly) }, label);
+  const button = (label, refusedOnly) => h("button", { onclick: () => zone.load(() => zone.read(text.value, refusedOnly)) }, label);
   return h("details", { class: "group" }, h("summary", {}, "Rig profile as text"),
     h("div", { class: "group" },
       h("p", { class: "small faint" }, "As guessed or last given. Correct it and read the files again."), text,
@@ -41,7 +41,7 @@ function message(verdict, names = null) {
   const kind = verdict.state === "refused" ? "bad" : "warn";
   return h("div", { class: `message ${kind}` },
     h("div", { class: "row" }, h("b", {}, verdict.name), h("span", { class: `badge ${kind}` }, verdict.state)),
-    verdict.findings.map(([code, text]) => h("div", {}, capitalise(text), " ", h("code", {}, code))), names);
+    verdict.findings.map(([code, text]) => finding(code, text)), names);
 }
 
 function folded(summary, verdicts, open) {

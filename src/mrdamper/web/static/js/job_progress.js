@@ -22,7 +22,7 @@ export class JobProgress {
     return !this.box.hidden;
   }
 
-  /** Start a job; resolves to its result, or to null where it did not end well. */
+  /** Start a job; resolves to its result, or to null where it did not end well or other data were loaded meanwhile. */
   start(path, body) {
     return this.follow(() => this.app.api.post(path, body));
   }
@@ -30,12 +30,6 @@ export class JobProgress {
   /** Follow a job that was started before the page was reloaded. */
   resume(job) {
     return this.follow(() => job);
-  }
-
-  /** Remove the message of the last job. */
-  clear() {
-    render(this.message);
-    this.element.hidden = this.box.hidden;
   }
 
   report({ share, step, seconds: elapsed }) {
@@ -59,6 +53,7 @@ export class JobProgress {
 
   async follow(begin) {
     const { app, box } = this;
+    const { overview } = app;
     render(this.message);
     const opener = document.activeElement;
     this.element.hidden = box.hidden = false;
@@ -73,10 +68,11 @@ export class JobProgress {
       this.cancel.disabled = false;
       const last = await app.api.follow(job.key, (report) => this.report(report));
       app.announce(last.state === "done" ? "Done" : "");
+      if (overview !== app.overview) return null;
       if (last.state === "done") return last.result;
       render(this.message, last.state === "cancelled" ? note("", "Cancelled. Nothing was changed.") : errorMessage({ details: last.error }));
     } catch (error) {
-      render(this.message, errorMessage(error));
+      if (overview === app.overview) render(this.message, errorMessage(error));
     } finally {
       clearInterval(timer);
       this.cancel.disabled = true;

@@ -4,7 +4,7 @@ import { Address } from "./address.js";
 import { ApiError, openSession } from "./api.js";
 import { App } from "./app.js";
 import { library } from "./chart.js";
-import { capitalise, errorMessage, h, note, options, render } from "./dom.js";
+import { arrowKeys, capitalise, errorMessage, h, note, options, render } from "./dom.js";
 import { canCompress } from "./state.js";
 import { browserStorage, tabStorage } from "./storage.js";
 import { startTheme, themeButton } from "./theme.js";
@@ -73,12 +73,7 @@ async function start() {
 function makeTabs(app) {
   const tabs = VIEWS.map(({ id, label }) =>
     h("button", { role: "tab", id: `tab-${id}`, "aria-controls": "view", "aria-selected": "false", onclick: () => app.showView(id) }, label));
-  render(document.getElementById("tabs"), tabs).addEventListener("keydown", (event) => {
-    const current = tabs.indexOf(document.activeElement);
-    const target = { ArrowRight: current + 1, ArrowLeft: current - 1, Home: 0, End: tabs.length - 1 }[event.key];
-    if (target === undefined) return;
-    event.preventDefault();
-    const tab = tabs[(target + tabs.length) % tabs.length];
+  arrowKeys(render(document.getElementById("tabs"), tabs), () => tabs, (tab) => {
     tab.focus();
     tab.click();
   });

@@ -12,15 +12,13 @@ export class ModelCharts {
     this.t = new Chart({ title: "Force over time", x: ["Time", "s"], y: ["Force", "N"], name: "model-force-time" });
     this.peak = new Chart({ title: "Peak force over current", x: ["Current", "A"], y: ["Peak force", "N"], name: "model-peak-force", zero: true, keys: true });
     this.energy = new Chart({ title: "Energy per cycle over current", x: ["Current", "A"], y: ["Energy", "J"], name: "model-energy", zero: true });
+    this.axesHeld = false; // while a slider is dragged
     this.all = [this.x, this.v, this.t, this.peak, this.energy];
     this.element = h("div", { class: "figures model" }, this.all.map((chart) => chart.element));
   }
 
-  get axesHeld() {
-    return this.x.axesHeld;
-  }
-
-  set axesHeld(held) {
+  holdAxes(held) {
+    this.axesHeld = held;
     for (const chart of this.all) chart.axesHeld = held;
   }
 

@@ -28,11 +28,6 @@ export class ModelPanel {
     this.family = h("input", { type: "checkbox", id: "family", onchange: () => app.store.commit({ family: this.family.checked }) });
   }
 
-  /** Show that there is no damper. */
-  empty() {
-    render(this.element, h("p", { class: "faint" }, "No model yet."));
-  }
-
   /** Build the sliders of a damper. */
   build(damper) {
     this.damper = damper;

@@ -1,6 +1,6 @@
 // Properties of a run, and the findings of its quality check.
 
-import { capitalise, h, note, render } from "./dom.js";
+import { capitalise, finding, h, note, render } from "./dom.js";
 import { figures, percent, quantity } from "./format.js";
 
 export class RunFacts {
@@ -36,6 +36,6 @@ export class RunFacts {
   /** Show the findings, which arrive after the run. */
   showFindings({ verdict, findings }) {
     const kind = verdict === "refused" ? "bad" : "warn";
-    if (findings.length) render(this.findings, findings.map((f) => note(kind, h("div", {}, capitalise(f.text), " ", h("code", {}, f.code)))));
+    if (findings.length) render(this.findings, findings.map((f) => note(kind, finding(f.code, f.text))));
   }
 }

@@ -1,6 +1,6 @@
 // The test list: columns of the channels, and current, split and findings of every uploaded test, to be corrected.
 
-import { capitalise, errorMessage, h, note, options, render, table } from "./dom.js";
+import { capitalise, errorMessage, finding, h, note, options, render, table } from "./dom.js";
 
 const CHANNELS = ["time", "displacement", "force", "current"];
 const UNITS = { time: ["s", "ms"], displacement: ["mm", "m", "in"], force: ["N", "kN", "lbf", "kgf"], current: ["A", "mA"] };
@@ -114,6 +114,5 @@ function columnPicker(name, preview) {
 
 function state(test) {
   const [kind, text] = test.state === "refused" ? ["bad", "refused"] : test.findings.length ? ["warn", "noted"] : ["good", "taken"];
-  return [h("span", { class: `badge ${kind}` }, text),
-    test.findings.map(([code, finding]) => h("div", { class: "small" }, finding ? `${capitalise(finding)} ` : "", h("code", {}, code)))];
+  return [h("span", { class: `badge ${kind}` }, text), test.findings.map(([code, problem]) => finding(code, problem, "small"))];
 }

@@ -90,18 +90,15 @@ export class CompareView extends View {
   }
 
   async follow(job) {
-    const { overview } = this.app;
     this.comparing = true;
     this.updateForm();
     if (!this.result) this.show();
     const result = await job;
     this.comparing = false;
     this.updateForm();
-    if (overview !== this.app.overview) return this.progress.clear(); // other data were loaded meanwhile
     if (result) await this.app.refreshDampers();
     if (result) this.take(result);
     else if (!this.result) this.show();
-    return undefined;
   }
 
   take(result) {

@@ -55,16 +55,11 @@ export class IdentifyView extends View {
 
   async follow(study, job) {
     const { form, app } = this;
-    const { overview } = app;
     form.setBusy(true);
     if (this.stage.querySelector(".empty")) render(this.stage, loading(study ? "Study running …" : "Identifying …", "The other views can be used meanwhile."));
     const result = await (study ? app.duringStudy(job) : job);
     form.setBusy(false);
-    if (overview !== app.overview) return this.progress.clear(); // other data were loaded meanwhile
-    if (!result) {
-      if (this.stage.querySelector(".spinner")) this.clear();
-      return undefined;
-    }
+    if (!result) return this.stage.querySelector(".spinner") && this.clear();
     const key = study ? (result.rigs[app.state.rig] ?? result.rigs[0]).chosen : result.damper;
     await app.refreshDampers();
     // A damper whose sliders the user moves meanwhile stays selected.

@@ -76,7 +76,7 @@ export class ModelView extends View {
     const key = dampers.some((d) => d.key === state.damper) ? state.damper : this.app.defaultDamper();
     if (key === null) {
       this.damper = null;
-      this.panel.empty();
+      render(this.panel.element, h("p", { class: "faint" }, "No model yet."));
       this.setBusy(false);
       return render(this.stage, placeholder("No model yet",
         "Identify a model from the data, or drop a model.json. Sliders of current, frequency, amplitude and every parameter then change its loops.",
@@ -167,7 +167,7 @@ export class ModelView extends View {
   drag(change, time) {
     clearTimeout(this.settling);
     this.movedAt = time;
-    this.charts.axesHeld = true;
+    this.charts.holdAxes(true);
     this.app.store.update(change);
   }
 
@@ -176,7 +176,7 @@ export class ModelView extends View {
     if (!this.charts.axesHeld) return; // a number that was typed
     clearTimeout(this.settling); // keys move a slider step by step: the axes wait for the last
     this.settling = setTimeout(() => {
-      this.charts.axesHeld = false;
+      this.charts.holdAxes(false);
       this.request(); // finely, with axes that fit
     }, SETTLE_MS);
   }
