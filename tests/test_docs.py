@@ -17,6 +17,7 @@ DOCS = Path(__file__).parent.parent / "docs"
 FENCE = re.compile(r"(?P<slow><!-- slow -->\n)?^```(?P<kind>python|sh)\n(?P<body>.*?)^```", re.MULTILINE | re.DOTALL)
 PAGES = sorted(p for p in DOCS.rglob("*.md") if FENCE.search(p.read_text(encoding="utf-8")))
 LINK = re.compile(r"\]\(([^)#\s]+)")
+NAMED = re.compile(r"`([\w/]+\.py)`")
 
 
 def blocks(page, *, slow):
@@ -85,3 +86,12 @@ def test_links_lead_to_files():
     assert len(links) > 20
     files = [link for link in links if not link[1].startswith(("http:", "https:", "mailto:", *made))]
     assert [(page.name, target) for page, target in files if not (page.parent / target).exists()] == []
+
+
+def test_code_that_a_page_names_exists():
+    root = DOCS.parent
+    files = ["/" + path.relative_to(root).as_posix() for path in root.glob("[a-z]*/**/*.py")]
+    pages = [*sorted(root.glob("*.md")), *sorted(DOCS.rglob("*.md"))]
+    named = [(page.name, name) for page in pages for name in NAMED.findall(page.read_text(encoding="utf-8"))]
+    assert len(named) > 40
+    assert [one for one in named if not any(file.endswith("/" + one[1]) for file in files)] == []

@@ -32,13 +32,10 @@ _KNOBS = (
     ("amplitude", "amplitude_m", "Amplitude", "mm", 1e3, 0.5, 1.5),
 )
 _UNTESTED = Envelope((0.0, 1.0), (0.5, 4.0), (2e-3, 2e-2), (6e-3, 0.5))  # slider ranges of a model without tests
-_SIGNS = (
-    "Displacement is counted from mid-stroke; displacement, velocity and force are positive in extension, "
-    "so the damper resists."
-)
+_SIGNS = "Displacement is measured from mid-stroke; displacement, velocity and force are positive in extension."
 _FUNCTIONS = (
-    "Its parameters are functions of current, frequency and amplitude: they follow the motion over about a cycle "
-    "of the slowest test, and stay at the edge of the tests outside."
+    "Its parameters are functions of current, frequency and amplitude, which are averaged over about a cycle of the "
+    "slowest test and limited to the tested ranges."
 )
 
 

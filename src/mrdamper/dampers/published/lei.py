@@ -37,7 +37,7 @@ class LeiType(ConditionedDamper):
         r"v_0 = \max(0, v_{00} + v_{01} I + v_{02} I^2)"
     )
     basis: ClassVar[str] = "biviscous"
-    limits: ClassVar[str] = "knows neither frequency nor amplitude; memoryless, sines only"
+    limits: ClassVar[str] = "no dependence on frequency and amplitude; memoryless, sines only"
 
     @classmethod
     def start(cls, identifications: Sequence[Identification], reference: Condition) -> dict[str, float]:
