@@ -267,7 +267,7 @@ def test_a_name_is_text_and_nothing_else(opened, no_compiler):
 
 def test_without_scripts_it_says_why_nothing_moves(opened, no_compiler):
     page = opened(joint_damper(), java_script_enabled=False)
-    assert "scripts are switched off" in page.locator("#message").inner_text()
+    assert "scripts are disabled" in page.locator("#message").inner_text()
 
 
 def test_forces_that_differ_are_not_shown_as_good(opened, no_compiler):

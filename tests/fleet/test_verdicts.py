@@ -214,4 +214,4 @@ def test_a_damper_of_another_rig_is_named(identified, tmp_path):
     )
     other.write_parquet(tmp_path / "dampers.parquet")
     said = write_page(tmp_path / "dampers.parquet", identified.plan, {}, tmp_path / "fleet.html")
-    assert "1 dampers were not tested on rig 'virtual' like most of the line: D000002" in said
+    assert "1 dampers were not tested on rig 'virtual' like most of the population: D000002" in said
