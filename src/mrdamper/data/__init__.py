@@ -1,4 +1,4 @@
-"""Test data: a `Condition` of the test matrix, a recorded `Run`, a `Dataset` of runs; and how notebooks show them."""
+"""Test data: a `Condition` of the test matrix, a recorded `Run`, a `Dataset` of runs; display in notebooks."""
 
 from mrdamper.data.arrays import Floats, index_at
 from mrdamper.data.conditions import Condition, current_levels, same_condition, same_motion

@@ -1,4 +1,4 @@
-"""Long arrays in pieces: what looks at every sample of a column that lies in a file lets go of its memory."""
+"""Memory-mapped arrays in chunks, whose memory is released after use."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def chunks(values: NDArray[T], overlap: int = 0) -> Iterator[tuple[int, NDArray[
 def take(values: NDArray[T], index: NDArray[np.intp]) -> NDArray[T]:
     """Return the samples of an increasing index, without holding all of a memory-mapped array at once."""
     if index.size == values.size <= CHUNK:
-        return values  # the same array: what is remembered of it holds
+        return values  # the same array: cached results of it are valid
     if values.size <= CHUNK:
         return values[index]
     bounds = np.searchsorted(index, np.arange(CHUNK, values.size, CHUNK))
@@ -41,7 +41,7 @@ def index_at(values: NDArray[np.generic], value: float, side: Literal["left", "r
 
 
 def drop_pages(values: NDArray[np.generic]) -> None:
-    """Let go of the memory of a memory-mapped array, or of a view of one; its numbers stay in its file."""
+    """Release the memory of a memory-mapped array, or of a view of one; its numbers stay in its file."""
     held: object = values
     while held is not None:
         inner = getattr(held, "_mmap", None)

@@ -1,9 +1,8 @@
-"""Files and folders that appear whole or not at all, whenever the process is killed.
+"""Atomic writing of files and folders, also if the process is killed.
 
-What is written stands complete and synced in a hidden folder beside its place, named
-`.NAME.….partial` and locked by its process; one rename or exchange puts it there. What a
-killed process left behind is not locked any more, and goes when the same place is next
-written to.
+A result is written and synced in a hidden folder beside its destination, named `.NAME.….partial` and locked by its
+process, and moved by one rename or exchange. Leftovers of a killed process are not locked and are removed when the same
+destination is written next.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from pathlib import Path
 from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import OutputError, is_a, resource_error, shown
 
-MADE = "made.json"  # which files of a folder are a result's, and what differs from run to run: times
+MADE = "made.json"  # files of a result in a folder, and computing times
 _MAX_NAME_BYTES = 255  # bytes, of a file or folder
 _MAX_FOREIGN_FILES = 200  # foreign files of a folder that are carried over into its successor
 _REMEDY = "choose a folder you may write to"
@@ -31,16 +30,16 @@ _REMEDY = "choose a folder you may write to"
 
 @dataclass(frozen=True)
 class ResultRecord:
-    """Contents of `made.json`: the files of a result, and what differs from one computation to the next.
+    """Contents of `made.json`: the files of a result, and its computing times.
 
     Attributes
     ----------
     files : tuple of str
         Paths relative to the folder, sorted.
     seconds : mapping
-        Durations [s] by what was computed, or by rig and model.
+        Durations [s] by computation, or by rig and model.
     processes : int or None
-        Number of processes that worked on it.
+        Number of processes.
     """
 
     files: tuple[str, ...] = ()
@@ -49,7 +48,7 @@ class ResultRecord:
 
 
 def path_of(path: str | os.PathLike[str]) -> Path:
-    """Return the path a user gave; raises `OutputError` (E_PATH) if it is none."""
+    """Convert a path of the user; raises `OutputError` (E_PATH) if it is none."""
     if is_a(path, (str, os.PathLike)):
         with contextlib.suppress(UnicodeEncodeError):
             parts = os.fsencode(path).split(os.sep.encode())
@@ -62,8 +61,8 @@ def path_of(path: str | os.PathLike[str]) -> Path:
 def write_folder(folder: str | Path, *, replace: bool = False) -> Generator[Path]:
     """Give a temporary folder that takes the final name when the block ends without an error.
 
-    An existing folder is replaced only if it is empty, or if that is asked for: its other files then move into the
-    new one. Raises `OutputError` if the folder exists and is not empty, or cannot be made.
+    An existing folder is replaced only if it is empty or on request: its other files then move into the new one. Raises
+    `OutputError` if the folder exists and is not empty, or cannot be made.
     """
     if replace:
         with write_into(folder) as work:
@@ -81,7 +80,7 @@ def write_folder(folder: str | Path, *, replace: bool = False) -> Generator[Path
 
 @contextmanager
 def write_into(folder: str | Path) -> Generator[Path]:
-    """Give a temporary folder whose files come to `folder` in one step when the block ends.
+    """Give a temporary folder whose files move to `folder` in one step when the block ends.
 
     Files of the same name are replaced; others stay. Raises `OutputError` if the folder cannot be made or written to.
     """
@@ -94,15 +93,15 @@ def write_into(folder: str | Path) -> Generator[Path]:
 
 @contextmanager
 def write_result(folder: str | Path, record: ResultRecord | None = None) -> Generator[Path]:
-    """Give a temporary folder whose files take the place of an earlier result in one step when the block ends.
+    """Give a temporary folder whose files replace an earlier result in one step when the block ends.
 
-    Files of the earlier result that this one does not have are gone afterwards; files of others stay. `made.json`
-    says which are the result's. Raises `OutputError` if the folder cannot be made or written to.
+    Further files of the earlier result are removed; other files stay. `made.json` lists the files of a result. Raises
+    `OutputError` if the folder cannot be made or written to.
 
     Parameters
     ----------
     record : ResultRecord, optional
-        Durations and processes, which stand nowhere else.
+        Durations and processes, which no other file contains.
     """
     final = Path(folder)
     with _beside(final) as work:
@@ -117,7 +116,7 @@ def write_result(folder: str | Path, record: ResultRecord | None = None) -> Gene
 def publish(
     folder: str | Path, first: str, fill: Callable[[Path], None], record: ResultRecord | None = None
 ) -> list[Path]:
-    """Have `fill` write a result as `write_result` does; what was written, the page `first` before the others."""
+    """Have `fill` write a result as `write_result` does; return the files, the page `first` before the others."""
     with write_result(folder, record) as work:
         fill(work)
         written = [p.relative_to(work) for p in work.rglob("*") if p.is_file()]
@@ -147,9 +146,9 @@ def write_file(path: str | Path) -> Generator[Path]:
 
 
 def require_writable(path: str | Path | None) -> None:
-    """Refuse at once what could not be written after minutes of work; None is written nowhere.
+    """Refuse a path that cannot be written to before the work begins; None is no path.
 
-    Raises `OutputError` if the path lies in a place that cannot be written to.
+    Raises `OutputError` then.
     """
     if path is None or ((final := Path(path)).exists() and not final.is_dir() and not final.is_file()):
         return
@@ -177,7 +176,7 @@ def _beside(final: Path) -> Generator[Path]:
 
 @contextmanager
 def _coded(final: Path) -> Generator[None]:
-    """Say with a code what the system refuses; errors of reading elsewhere pass."""
+    """Convert errors of the system on writing to errors with a code; others pass."""
     try:
         yield
     except OSError as error:
@@ -199,8 +198,8 @@ def _require_absent(final: Path) -> None:
 
 
 def _earlier(final: Path) -> frozenset[str]:
-    """Files of the result that stands there."""
-    if not (final / MADE).is_file():  # nothing, or something that may have no end
+    """Files of the present result."""
+    if not (final / MADE).is_file():  # nothing, or a file without an end
         return frozenset()
     try:
         files = json.loads((final / MADE).read_text(encoding="utf-8"))["files"]
@@ -210,7 +209,7 @@ def _earlier(final: Path) -> frozenset[str]:
 
 
 def _put(work: Path, final: Path, stale: frozenset[str]) -> None:
-    """Move the finished folder to its place: by a rename, by an exchange, or file by file where neither will do."""
+    """Move the finished folder to its destination: by a rename, by an exchange, or file by file."""
     final = final.absolute()
     if not final.exists():
         try:
@@ -224,13 +223,13 @@ def _put(work: Path, final: Path, stale: frozenset[str]) -> None:
     final = final.resolve()
     if _carried(final, work, stale) and _exchange(work, final):
         _sync_entry(final.parent)
-        _carried(work, final, stale)  # what was put there in between
+        _carried(work, final, stale)  # files that were added in between
         return None
     return _move(work, final, stale)
 
 
 def _carried(old: Path, new: Path, stale: frozenset[str]) -> bool:
-    """Link the files of others into the new folder; False where there are too many, or more than files."""
+    """Link other files into the new folder; False if there are too many, or folders."""
     if old == Path.cwd() or old in Path.cwd().parents or os.path.ismount(old):
         return False
     foreign: list[Path] = []
@@ -265,7 +264,7 @@ def _exchange(one: Path, other: Path) -> bool:
 
 
 def _move(work: Path, final: Path, stale: frozenset[str]) -> None:
-    """File by file, the page last: the way of a folder that must stay the same one."""
+    """Move file by file, the page last, for a folder that must keep its identity."""
     moved = sorted((p.relative_to(work) for p in work.rglob("*") if p.is_file()), key=lambda p: -len(p.parts))
     for path in moved:
         (final / path).parent.mkdir(parents=True, exist_ok=True)
@@ -278,7 +277,7 @@ def _move(work: Path, final: Path, stale: frozenset[str]) -> None:
 
 
 def _sync(folder: Path) -> None:
-    """Have the disk hold a folder and all in it."""
+    """Sync a folder and its contents to disk."""
     for path in [*folder.rglob("*"), folder]:
         if path.is_file() and not path.is_symlink():
             with path.open("rb") as file:

@@ -1,4 +1,4 @@
-"""A process that answers requests and may be killed: what crashes, hangs or fills the memory in it fails alone.
+"""A child process that answers requests and may be killed, which isolates crashes, hangs and memory.
 
 Parent and child exchange lines of JSON, with the bytes of numbers behind them; nothing is pickled.
 """
@@ -45,8 +45,8 @@ class Child:
     module : str
         Imported in the process; linear algebra has one thread there.
     session : bool
-        In a session of its own, which Ctrl-C at the terminal does not reach; `serve` ends it with its parent. Else it
-        is ended with its parent from the start.
+        In a separate session, which Ctrl-C at the terminal does not reach; `serve` ends it with its parent. Otherwise
+        it ends with its parent from the start.
     """
 
     died = 0  # signal that ended it, or minus its exit status
@@ -80,9 +80,9 @@ class Child:
         return os.name == "posix" and not select.select([self._answers], [], [], seconds)[0]
 
     def ask(self, request: Answer, watch: Callable[[], Answer | None], grace: float) -> Answer | None:
-        """Return the answer to a request; None if the process died over it, within `grace` [s] after its last word.
+        """Return the answer to a request; None if the process ended instead, within `grace` [s] after its last output.
 
-        `watch` returns once there is an answer; what it gives in place of one ends the process.
+        `watch` returns when there is an answer; another value that it returns ends the process.
         """
         line = b""
         try:
@@ -144,7 +144,7 @@ def descendants(pid: int) -> list[int]:
 
 
 def end_with_parent(*, group: bool = False) -> None:
-    """Have a process of `multiprocessing` end when its parent does; with its group, what it started ends too."""
+    """Make a process of `multiprocessing` end with its parent, and its descendants with its group."""
     parent = parent_process()
 
     def watch() -> None:
@@ -159,7 +159,7 @@ def end_with_parent(*, group: bool = False) -> None:
 
 
 def standard_output() -> BinaryIO:
-    """Take the standard output of a child for its answers; what libraries print does not come between them."""
+    """Use the standard output of a child for its answers, without output of libraries."""
     replies = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     return replies

@@ -1,4 +1,4 @@
-"""A point of the test matrix, and which of them are one: by current, frequency and amplitude."""
+"""Points of the test matrix, and groups of equal ones, by current, frequency and amplitude."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ import numpy as np
 
 from mrdamper.errors import ConditionError, shown
 
-_MOST_CURRENT = 1e6  # of a coil [A]; more is no current
-_LONGEST = 2.0  # amplitude of a damper [m]; more is a slip of the unit
-_SLOWEST, _FASTEST = 1e-100, 1e100  # [Hz]; beyond, times or accelerations of a cycle are no numbers
+_MOST_CURRENT = 1e6  # largest current of a coil [A]
+_LONGEST = 2.0  # largest amplitude of a damper [m]; beyond, the unit is wrong
+_SLOWEST, _FASTEST = 1e-100, 1e100  # [Hz]; beyond, times or accelerations of a cycle are not finite
 _SAME = 0.03  # frequencies and amplitudes this close are one condition of the test matrix
 _NO_NUMBERS = (type(None), str, bytes, complex, list, tuple, dict, set)
 
@@ -25,7 +25,7 @@ _Class = TypeVar("_Class", bound=type)
 
 
 def _named_with_units(owner: _Class) -> _Class:
-    """Answer unknown and missing names with those that state the unit: an amplitude may be meant in mm or in m."""
+    """Refuse unknown and missing names and list those with a unit, because an amplitude may be in mm or m."""
     initialise = owner.__init__
 
     @wraps(initialise)
@@ -74,7 +74,7 @@ class Condition:
     amplitude_m: float
 
     def __post_init__(self) -> None:
-        # A traced model is asked at symbols in place of numbers; these have no size.
+        # A traced model is evaluated at symbols, which have no size.
         given = (("current", self.current_A, -math.inf), ("frequency", self.frequency_Hz, 0.0))
         for name, value, least in (*given, ("amplitude", self.amplitude_m, 0.0)):
             no_number = isinstance(value, _NO_NUMBERS) or (isinstance(value, np.ndarray) and value.ndim > 0)

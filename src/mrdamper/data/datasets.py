@@ -65,7 +65,7 @@ class Dataset(Displayable):
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
-        """A row a run."""
+        """One row per run."""
         runs = self.runs
         return {
             "run_id": [run.id for run in runs],

@@ -1,8 +1,7 @@
-"""Text from data, written so that it stays text where it goes: one function a place.
+"""Encoding of text from data, with one function per output format.
 
-Names, ids, notes and units come from rig files, profiles, tables and saved models, so anybody
-may have written them. HTML is escaped by the page templates themselves; the terminal by
-`errors.printable`.
+Names, ids, notes and units come from rig files, profiles, tables and saved models, and are not trusted. Page templates
+escape HTML, and `errors.printable` terminal output.
 """
 
 from __future__ import annotations
@@ -25,13 +24,13 @@ _LATEX = str.maketrans(
     | {"<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}"}
 )
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "!\"#$%&'()*+,-./:;<=>?@[\\]^_`{|}~"})
-_FORMULA = re.compile(r"'*\s*[=+\-@\t\r]")  # what a spreadsheet computes instead of showing
-_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # that Windows keeps for itself
+_FORMULA = re.compile(r"'*\s*[=+\-@\t\r]")  # characters that begin a formula in a spreadsheet
+_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # reserved by Windows
 _MAX_NAME_PART = 48  # characters; of four bytes each, with prefix, suffix and hash, below 255
 
 
 def c_comment(text: str) -> str:
-    """One line of ASCII that cannot end a comment: marks that mean something together stand apart."""
+    """Return one line of ASCII that cannot end a comment: a space separates characters with a meaning together."""
     plain = " ".join(text.translate(_SPELLED).split()).encode("ascii", "replace").decode()
     plain = re.sub(r"[^ -~]", "?", plain).replace("\\", "/")
     return re.sub(r"(?<=[*/?])(?=[*/?])", " ", plain)
@@ -53,14 +52,14 @@ def markdown(text: str) -> str:
 
 
 def finite(value: float | None) -> float | None:
-    """Return a number that JSON can hold: what is not finite becomes nothing."""
+    """Return a number for JSON: None if it is not finite."""
     return float(value) if value is not None and math.isfinite(value) else None
 
 
 def csv_cell(text: str) -> str:
-    """Write a cell that a spreadsheet shows and does not compute; `csv_value` undoes it.
+    """Write a cell that a spreadsheet does not evaluate; `csv_value` is the inverse.
 
-    An apostrophe goes before =, +, -, @ and tab, as spreadsheets write it themselves; numbers stay.
+    An apostrophe precedes =, +, -, @ and tab, as in spreadsheets; numbers are unchanged.
     """
     return f"'{text}" if _FORMULA.match(text) and not _is_number(text) else text
 
@@ -73,7 +72,7 @@ def csv_value(cell: str) -> str:
 def csv_text(rows: Sequence[Mapping[str, object]], names: Iterable[str] | None = None) -> str:
     """Rows as CSV; columns in order of first appearance, numbers exact, nothing as an empty cell.
 
-    Cells that hold a semicolon or a tab are quoted too: some countries' spreadsheets split there.
+    Cells with a semicolon or a tab are quoted, too, because spreadsheets of some countries split there.
     """
     heads = list(names) if names is not None else list(dict.fromkeys(name for row in rows for name in row))
     lines = [",".join(map(_csv_field, heads))]
@@ -83,10 +82,10 @@ def csv_text(rows: Sequence[Mapping[str, object]], names: Iterable[str] | None =
 
 
 def file_names(texts: Iterable[str]) -> dict[str, str]:
-    """Make a part of a file name for each text: safe on every system, no two alike.
+    """Make a part of a file name for each text: safe on every system, and unique.
 
-    Letters, digits, dot, dash and underscore stay; a text that was changed otherwise than by
-    replacing them, or would meet another's name, ends in a few digits of its hash.
+    Letters, digits, dot, dash and underscore stay; a text that was changed otherwise, or has the name of another, ends
+    with a few digits of its hash.
     """
     names: dict[str, str] = {}
     taken: set[str] = set()
@@ -107,14 +106,14 @@ def _csv_field(value: object) -> str:
     return repr(float(value)) if isinstance(value, float) else str(value)  # NumPy's floats name their type
 
 
-@lru_cache(maxsize=256)  # names of rigs, runs and axes stand in every row
+@lru_cache(maxsize=256)  # names of rigs, runs and axes are in every row
 def _csv_words(text: str) -> str:
     text = csv_cell(text)
     return '"{}"'.format(text.replace('"', '""')) if re.search(r'[,"\n\r;\t]', text) else text
 
 
 def _one_line(text: str) -> str:
-    """Without line breaks, control characters, and marks that turn the direction of writing."""
+    """Remove line breaks, control characters, and marks that change the direction of writing."""
     plain = re.sub(r"\s+", " ", text)
     return "".join("?" if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Co", "Cn") else c for c in plain)
 

@@ -1,6 +1,6 @@
-"""`param()`: a model parameter's unit, bounds, scale and meaning, written once, on the field.
+"""`param()`: a model parameter's unit, bounds, scale and meaning, defined once, on the field.
 
-Fitting, the command line, reports, exports and the documentation all ask the field.
+Fitting, the command line, reports, exports and the documentation use the field.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ _KEY = "mrdamper.parameter"
 class ParameterInfo:
     """Description of one parameter."""
 
-    # name, unit, meaning: field name, SI unit, one phrase a damper engineer understands
+    # name, unit, meaning: field name, SI unit, one phrase
     name: str
     unit: str
     meaning: str
     bounds: tuple[float, float]  # physical limits [unit]; searches stay inside them
     scale: Scale  # "linear" or "log"; scale on which a search moves
-    linear: bool  # the force is linear in it, so it is solved for and not searched
+    linear: bool  # the force is linear in it, so it is solved for instead of searched
     preset: bool  # held at its default unless the user frees it
     default: float | None  # value when none is given
     symbol: str  # letter in equations, as LaTeX
@@ -49,7 +49,7 @@ def param(
 ) -> Any:
     """Declare a model parameter as a dataclass field (see `ParameterInfo` for the meanings).
 
-    Without a `symbol` the name is read as one (`latex_symbol`).
+    Without a `symbol` it follows from the name (`latex_symbol`).
     """
     facts = dict(unit=unit, meaning=meaning, bounds=bounds, scale=scale, linear=linear, preset=preset, symbol=symbol)
     metadata = {_KEY: facts}
@@ -59,7 +59,7 @@ def param(
 
 
 def is_number(value: object) -> bool:
-    """Tell if a value is a single real number, or stands for one while code is traced."""
+    """Tell if a value is a single real number, or an expression while code is traced."""
     if isinstance(value, bool):
         return False
     return isinstance(value, numbers.Real) or hasattr(value, "tape")

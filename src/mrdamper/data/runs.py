@@ -1,8 +1,7 @@
 """A recorded `Run`, and its coil current: constant but for noise, or changing.
 
-SI units. Displacement and force count positive in the same direction, so that a damper
-resists: a positive velocity meets a positive force. What enters here has been checked;
-code further up trusts it.
+SI units. Displacement and force are positive in the same direction: a positive velocity causes a positive force. Runs
+are checked when they are created.
 """
 
 from __future__ import annotations
@@ -55,15 +54,15 @@ class Run(Displayable):
     rig : str
         Test rig and damper the run belongs to.
     excitation : str
-        Kind of motion as the rig names it: "sine", "chirp", ...
+        Kind of motion, named by the rig: "sine", "chirp", ...
     split : "train" or "validate"
-        Models never see validate runs.
+        Validate runs are not used for identification.
     nominal : Condition, optional
-        The condition as commanded. Nothing is computed from it.
+        The commanded condition, which is not used for calculations.
     window : (float, float), optional
         Start and end [s] of steady motion; scores use it. Default: the whole record.
     repeatability : float, optional
-        Cycle-to-cycle scatter of the force over its peak-to-peak value: no model can beat it.
+        Cycle-to-cycle scatter of the force over its peak-to-peak value, the lower limit of the error of any model.
     segments : tuple of (int, int), optional
         Half-open sample ranges without a gap in time. Default: one range.
     further : mapping of str to (N,) array
@@ -151,14 +150,14 @@ class Run(Displayable):
 
     @property
     def table(self) -> Mapping[str, Floats]:
-        """A row a sample, SI."""
+        """One row per sample, SI."""
         channels = {"time_s": self.time, "displacement_m": self.displacement, "force_N": self.force}
         velocity = {} if self.velocity is None else {"velocity_m_s": self.velocity}
         return {**channels, **velocity, "current_A": self.current}
 
     @property
     def current_A(self) -> float:
-        """The run's one coil current [A]: the mean over the steady window, however noisy the channel is.
+        """The run's one coil current [A]: the mean over the steady window.
 
         Raises
         ------
@@ -187,7 +186,7 @@ class Run(Displayable):
 
     @property
     def coil_current(self) -> Floats:
-        """(N,) magnitude of the current [A], which models are given: without noise where it is constant.
+        """(N,) magnitude of the current [A] for models: without noise where it is constant.
 
         The direction of the current in the coil does not change the force.
         """
@@ -197,7 +196,7 @@ class Run(Displayable):
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """Codes of what the import noticed, for example W_CLIPPED."""
+        """Codes of the findings of the import, for example W_CLIPPED."""
         return tuple(self.notes.get("findings", "").split())
 
     @cached_property
@@ -279,7 +278,7 @@ class Run(Displayable):
 
 
 def require_name(what: str, name: object) -> None:
-    """Refuse a name that would not stay a name on a page, in a terminal or in a table.
+    """Refuse a name that is not safe on a page, in a terminal or in a table.
 
     Raises `RunError` unless it is printable text of one line.
     """
@@ -291,10 +290,9 @@ def require_name(what: str, name: object) -> None:
 
 
 def once_per_run(function: Callable[[K], T]) -> Callable[[K], T]:
-    """Remember what a function of a run, or of a view or study of runs, found for as long as that lives.
+    """Cache the result of a function of a run, or of a view or study of runs, with its object.
 
-    A study asks for the same run's motion dozens of times; runs are frozen, so the answer
-    cannot change.
+    A study uses the motion of a run dozens of times; runs are frozen, so the result cannot change.
     """
     results: WeakKeyDictionary[K, T] = WeakKeyDictionary()
 
@@ -307,7 +305,7 @@ def once_per_run(function: Callable[[K], T]) -> Callable[[K], T]:
     return remembered
 
 
-_MAX_CURRENT_SAMPLES = 2_000_000  # samples of a current looked at
+_MAX_CURRENT_SAMPLES = 2_000_000  # samples of a current that are checked
 _BLOCKS = 64  # stretches of a record whose mean currents are compared
 # A current may differ by so much from begin to end: [A], and of its mean.
 _MAX_TREND_A, _MAX_RELATIVE_TREND = 0.01, 0.03
@@ -317,8 +315,8 @@ _MAX_RMS_A, _MAX_RELATIVE_RMS = 0.03, 0.02  # RMS of all of it
 _LEVEL_STEP = 5e-3  # step of currents in a test plan [A]
 # Measured means may differ from a level by so much: [A], and of the mean.
 _LEVEL_TOLERANCE_A, _LEVEL_TOLERANCE = 5e-4, 2e-3
-_MAX_RESOLUTION_A = 0.1  # [A]: a channel of such steps flickers by half a step
-_WHITE_NOISE_FACTOR = 4  # times as much where it has no memory from sample to sample: no coil follows that
+_MAX_RESOLUTION_A = 0.1  # [A]: a channel of such resolution varies by half a step
+_WHITE_NOISE_FACTOR = 4  # factor of the limit for uncorrelated samples, which no coil current has
 _VON_NEUMANN_RATIO = 1.0  # von Neumann's ratio: two for white noise, near zero for a current that keeps its levels
 
 
@@ -331,7 +329,7 @@ def _held_current(run: Run) -> tuple[float, str]:
 
 
 def as_written(current: float) -> float:
-    """Round the mean of a noisy current channel as a test plan would write it [A].
+    """Round the mean of a noisy current channel as in a test plan [A].
 
     Values within 0.5 mA + 0.2 % of a multiple of 5 mA are that multiple: −0.0003 A is 0 A, 0.4997 A is 0.5 A.
     """
@@ -343,9 +341,9 @@ def as_written(current: float) -> float:
 def held_current(current: Floats) -> tuple[float, str]:
     """Mean of a current [A], and how it changes; empty if it is constant but for noise.
 
-    A channel is a constant with noise if it neither trends nor wanders by more than a supply
-    does. What is left after averaging over stretches of the record counts as wandering, less
-    what white noise leaves there, so that noise of any size is none.
+    A channel is a constant with noise if its trend and slow variation are within those of a supply. The slow variation
+    is the variance of the means of blocks of the record, less that of white noise, so that white noise of any size has
+    none.
 
     `current` (N,): at least three samples [A].
     """
@@ -375,7 +373,7 @@ def held_current(current: Floats) -> tuple[float, str]:
 
 
 def _resolution(current: Floats) -> float:
-    """Step in which a coarse channel counts [A]; zero where it is fine, or coarser than any channel of currents."""
+    """Resolution of a coarse channel [A]; zero if it is fine, or coarser than any channel of currents."""
     levels = np.unique(current[:: max(1, current.size // 2000)])
     step = float(np.min(np.diff(levels))) if 1 < levels.size < 10 else 0.0
     return step if step <= _MAX_RESOLUTION_A * 1.001 else 0.0

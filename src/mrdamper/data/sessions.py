@@ -1,4 +1,4 @@
-"""The session a run was recorded in: runs of one session share what a rig changes from day to day."""
+"""The session a run was recorded in: runs of one session share the effects of the rig that differ from day to day."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ SESSIONS_NEEDED = 3  # sessions from which the scatter between sessions is estim
 def session_of(run: Run) -> str | None:
     """Session of a run: as stated in its note `session`, else the day of `recorded_at`, else None.
 
-    A run of unknown session (None) belongs to no session, not to one of its own. Raises `InputError` (E_CLOCK) if the
-    clock is needed and is no date.
+    A run of unknown session (None) belongs to no session. Raises `InputError` (E_CLOCK) if the clock is needed and is
+    no date.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Files and texts that anybody may have written: what a format leaves to its reader is refused instead of guessed.
+"""Strict reading of files and texts from other sources.
 
-JSON without doubt, and TOML as people write it: short, and no name of many parts, for which the
-standard reader takes minutes. A file is opened without waiting for a writer, and has an end.
+JSON is unambiguous; TOML is short and has no name of many parts, for which the standard reader takes minutes. A file is
+opened without waiting for a writer, and has an end.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _MAX_DIGITS = 40  # characters of a whole number
 _LONGEST = 200_000  # characters; the profiles of the documentation have under 3,000
 _TABLE: type[Any] = dict
 _NESTED: tuple[type[Any], ...] = (dict, list)
-_DOTTED = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){17}""")  # ours have two parts
+_DOTTED = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){17}""")  # those of this package have two parts
 
 
 def open_regular(path: Path) -> BinaryIO:
@@ -40,7 +40,7 @@ def open_regular(path: Path) -> BinaryIO:
 
 
 def content_of(path: Path, largest: int, refuse: type[InputError], kind: str) -> bytes:
-    """Return the bytes of a file that should be `kind`, as "a CSV file"; no more of it is read than it may hold.
+    """Return the bytes of a file that should be `kind`, as "a CSV file"; at most its largest size is read.
 
     Raises `refuse` if it cannot be read, or is larger.
     """
@@ -58,8 +58,8 @@ def content_of(path: Path, largest: int, refuse: type[InputError], kind: str) ->
 def parse_json(text: str) -> Any:
     """Values of a JSON text.
 
-    Raises `ValueError`, also for a key that stands twice, NaN and infinity, numbers beyond a double, whole numbers of
-    more than forty digits, and nesting beyond 64.
+    Raises `ValueError`, also for a repeated key, NaN and infinity, numbers beyond a double, whole numbers of more than
+    forty digits, and nesting beyond 64.
     """
     try:
         value = json.loads(
@@ -100,7 +100,7 @@ def _whole(text: str) -> int:
 
 
 def _depth(value: Any) -> int:
-    """Level by level, so that depth costs no stack."""
+    """Level by level, without recursion."""
     depth, level = 0, [value]
     while level:
         depth += 1

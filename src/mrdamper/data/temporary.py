@@ -1,4 +1,4 @@
-"""Folders that do not stay when their process is killed: each is locked while its process lives, and swept later."""
+"""Temporary folders, locked while their process runs, and removed later if it was killed."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _PREFIX, _SUFFIX = "mrdamper-", ".scratch"
 
 @contextmanager
 def temporary_folder(parent: Path | None = None, prefix: str = _PREFIX, suffix: str = _SUFFIX) -> Generator[Path]:
-    """Give a new folder that goes with the block; those of its kind whose process was killed go first.
+    """Give a new folder that is removed after the block; those of its kind whose process was killed are removed before.
 
     Parameters
     ----------
     parent : path, optional
-        Default: where this system keeps temporary files.
+        Default: the folder of the system for temporary files.
     prefix, suffix : str
-        The names of the kind begin and end so.
+        Prefix and suffix of the names of the kind.
     """
     parent = Path(tempfile.gettempdir()) if parent is None else parent
     _sweep(parent, prefix, suffix)
@@ -30,7 +30,7 @@ def temporary_folder(parent: Path | None = None, prefix: str = _PREFIX, suffix: 
         yield folder
     finally:
         if lock is not None:
-            os.close(lock)  # first: looking into a folder takes a descriptor, and this may be the last one
+            os.close(lock)  # first: listing a folder needs a descriptor, and this may be the last one
         shutil.rmtree(folder, ignore_errors=True)
         with suppress(OSError):
             folder.rmdir()  # takes none
@@ -40,7 +40,7 @@ def _locked(parent: Path, prefix: str, suffix: str) -> tuple[Path, int | None]:
     while True:
         folder = Path(tempfile.mkdtemp(prefix=prefix, suffix=suffix, dir=parent))
         lock = _lock(folder)
-        if folder.exists():  # else another process swept it before it was locked
+        if folder.exists():  # otherwise another process removed it before it was locked
             return folder, lock
 
 

@@ -1,4 +1,4 @@
-"""Damper models, one file each: a new file here, or a package with the entry point `mrdamper.models`, is found."""
+"""Damper models, one file each, found here and in packages with the entry point `mrdamper.models`."""
 
 from __future__ import annotations
 

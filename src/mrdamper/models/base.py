@@ -1,10 +1,9 @@
 """Base class of damper models: frozen parameters, and the force along a motion.
 
-A model is one file with one class. Its fields are its parameters (`param()` states unit,
-bounds and meaning); `force` is pure arithmetic on them. A model with memory also says how
-its internal state follows a motion (`state`), depending on its nonlinear parameters only:
-given the state, the force is linear in the parameters marked linear, and identification
-solves for those instead of searching.
+A model is one file with one class. Its fields are its parameters (`param()` states unit, bounds and meaning); `force`
+is pure arithmetic on them. A model with memory also computes its internal state along a motion (`state`) from its
+nonlinear parameters only: given the state, the force is linear in the parameters marked linear, and identification
+solves for these instead of searching.
 """
 
 from __future__ import annotations
@@ -37,9 +36,9 @@ GENERAL_FORMS = (
 
 @dataclass(frozen=True, slots=True)
 class SearchAxis:
-    """One coordinate a nonlinear search moves along."""
+    """Coordinate of a nonlinear search."""
 
-    name: str  # what it is called in results
+    name: str  # name in results
     # lower, upper: limits in search units (the logarithm's argument for a log scale)
     lower: float
     upper: float
@@ -55,7 +54,7 @@ class SearchAxis:
         if not self.log:
             return coordinate
         value = math.exp(coordinate)
-        # A parameter may end where the axis does, and rounding must not carry it beyond.
+        # A parameter may end at the end of the axis, and rounding must not move it beyond.
         return next((end for end in (self.lower, self.upper) if math.isclose(value, end, rel_tol=1e-12)), value)
 
     def below(self, limit: float) -> SearchAxis:
@@ -79,16 +78,16 @@ def axes_of(free: Sequence[str], *axes: SearchAxis) -> tuple[SearchAxis, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """Sizes of the data that a search is laid out for."""
+    """Sizes of the data for a search."""
 
     amplitude: float  # displacement amplitude [m]
     speed: float  # peak velocity [m/s]
-    force: float = 1.0  # largest force, either way from the middle [N]
-    current: float = 0.0  # largest current [A]; 0 where none flowed
+    force: float = 1.0  # largest force in either direction from the middle [N]
+    current: float = 0.0  # largest current [A]; 0 without current
 
     @classmethod
     def of(cls, motion: Excitation, force: Floats, amplitude: float) -> Self:
-        """Read the sizes off a motion and the force measured along it."""
+        """Take the sizes from a motion and the force measured along it."""
         speed, current = (float(np.max(np.abs(channel))) for channel in (motion.velocity, motion.current))
         return cls(amplitude, speed, float(np.ptp(force)) / 2, current)
 
@@ -101,9 +100,9 @@ class Model(ABC):
     title: ClassVar[str]
     equation: ClassVar[str]
     source: ClassVar[str]
-    coordinates: ClassVar[Mapping[str, tuple[str, str, str]]] = {}  # what `build` takes instead: symbol, relation, unit
-    integrated: ClassVar[bool] = False  # the state is stepped: following a motion costs a hundred times more
-    # Linear parameter whose column the state is, where the search moves no other column; None: no such one.
+    coordinates: ClassVar[Mapping[str, tuple[str, str, str]]] = {}  # coordinates of `build`: symbol, relation, unit
+    integrated: ClassVar[bool] = False  # the state is integrated, which takes a hundred times longer
+    # Linear parameter whose column is the state, if the search changes no other column; None: no such parameter.
     state_column: ClassVar[str | None] = None
     # Levels of the current that determine each parameter of its effects; a model with such parameters describes a whole
     # damper by one set of them.
@@ -114,7 +113,7 @@ class Model(ABC):
             value = getattr(self, info.name)
             low, high = info.bounds
             if type(value) is float and low <= value <= high and -math.inf < value < math.inf:
-                continue  # searches make models by the thousand
+                continue  # searches create thousands of models
             no_float = isinstance(value, int) and value.bit_length() > 1023
             if no_float or not is_number(value):
                 raise ParameterError(f"{info.name} = {shown(value)}", where=self.title, remedy="give a number")
@@ -135,16 +134,16 @@ class Model(ABC):
 
     @property
     def shape(self) -> Shape | None:
-        """Bouc–Wen shape whose zeta/kappa the state is; None: the memory is another, or there is none.
+        """Bouc–Wen shape whose zeta/kappa is the state; None: another memory, or none.
 
-        A model that has one is also built from `yield_force` [N], the size of zeta, in place of its
-        state column's parameter.
+        A model with a shape is also built from `yield_force` [N], the factor of zeta, in place of the parameter of its
+        state column.
         """
         return None
 
     @property
     def yield_length(self) -> float | None:
-        """Motion after a reversal in which the force turns over [m]; None without such a length."""
+        """Displacement after a reversal in which the force changes its sign [m]; None without such a length."""
         return None
 
     @classmethod
@@ -159,7 +158,7 @@ class Model(ABC):
         Parameters
         ----------
         scale : Scale
-            Sizes of the data, which lay the box and the starts.
+            Sizes of the data, which determine the box and the starts.
         free : sequence of str
             Names of the parameters to be determined.
         """
@@ -167,28 +166,28 @@ class Model(ABC):
 
     @classmethod
     def within(cls, axes: tuple[SearchAxis, ...], fixed: Mapping[str, float]) -> tuple[SearchAxis, ...]:
-        """Search coordinates cut to where parameters held at a value leave the others inside their bounds.
+        """Limit search coordinates so that the other parameters are inside their bounds, given the held ones.
 
         Raises
         ------
         IdentificationError
-            If that cannot be said beforehand.
+            If that cannot be decided beforehand.
         """
         return axes
 
     @classmethod
     def build(cls, values: Mapping[str, float]) -> Self:
-        """Make the model from its parameters or from the coordinates it is searched in."""
+        """Make the model from its parameters or from its search coordinates."""
         return cls(**cls.resolved(values))
 
     @classmethod
     def resolved(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Parameters from parameters and coordinates; nothing is checked yet."""
+        """Parameters from parameters and coordinates, without checks."""
         return dict(values)
 
     @classmethod
     def nearest(cls, values: Mapping[str, float]) -> Self:
-        """Make the model as `build` does, every parameter stopped at its bounds."""
+        """Make the model as `build` does, with every parameter limited to its bounds."""
         bounds = {info.name: info.bounds for info in cls.parameters()}
         inside = {name: plain(np.clip(value, *bounds[name])) for name, value in values.items() if name in bounds}
         model = cls.resolved({**values, **inside})
@@ -210,7 +209,7 @@ class Model(ABC):
 
 
 def require_positive(where: str, **values: float) -> None:
-    """Refuse letters of a publication that stand below a fraction line and are not above zero.
+    """Refuse parameters of a publication that are denominators and not positive.
 
     Raises `ParameterError`.
     """

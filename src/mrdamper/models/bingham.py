@@ -1,4 +1,4 @@
-"""Bingham: Coulomb yield force beside a viscous damper."""
+"""Bingham: Coulomb yield force parallel to a viscous damper."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Bingham(Model):
     References
     ----------
     Stanway, Sproston and Stevens (1987), "Non-linear modelling of an electro-rheological
-    vibration damper", J. Electrostatics 20, 167–184. The form is recalled, not seen in print.
+    vibration damper", J. Electrostatics 20, 167–184. The form is recalled.
     """
 
     name: ClassVar[str] = "bingham"

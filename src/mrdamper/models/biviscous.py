@@ -19,15 +19,15 @@ from mrdamper.physics.motion import Excitation
 class Biviscous(Model):
     """F = c_po v + f_y clip((v − v_h sgn a)/v_y, −1, 1) + f0.
 
-    The published six branches in one line: c_pr (v ∓ v0) before the yield, c_po v ± f_y after
-    it, with c_pr = c_po + f_y/v_y and v0 = v_h f_y/(v_y c_pr). In this form the force is linear
-    in c_po and f_y. Memoryless: the branch follows the sign of the acceleration.
+    The six published branches in one equation: c_pr (v ∓ v0) before the yield, c_po v ± f_y after it, with c_pr = c_po
+    + f_y/v_y and v0 = v_h f_y/(v_y c_pr). In this form the force is linear in c_po and f_y. Memoryless: the branch
+    follows the sign of the acceleration.
 
     References
     ----------
     Wereley, Pang and Kamath (1998), "Idealized hysteresis modeling of electrorheological and
-    magnetorheological dampers", J. Intelligent Material Systems and Structures 9, 642–649. The
-    form is recalled, not seen in print; its continuity was checked.
+    magnetorheological dampers", J. Intelligent Material Systems and Structures 9, 642–649. The form is recalled;
+    its continuity was checked.
     """
 
     name: ClassVar[str] = "biviscous"

@@ -23,10 +23,9 @@ from mrdamper.tracing import plain
 class BoucWen(Model):
     """F = k1 x + k2 x² + k3 x³ + c v + m a + alpha z + f0, dz/dt = v − beta |v| |z|^(n−1) z − gamma v |z|^n.
 
-    The factor A of the general form is 1: it can be absorbed in alpha, beta and gamma
-    without changing any force. `beta` multiplies |v| and `gamma` multiplies v; Spencer and
-    co-workers use the letters the other way round. On one frequency m and k1 cannot be told
-    apart (a = −ω² x), so m is preset to zero unless the gas spring is known.
+    The factor A of the general form is 1: it can be absorbed in alpha, beta and gamma without changing any force.
+    `beta` multiplies |v| and `gamma` multiplies v; Spencer and co-workers exchange the two symbols. At one frequency m
+    and k1 cannot be separated (a = −ω² x), so m is preset to zero unless the gas spring is known.
 
     References
     ----------
@@ -66,7 +65,7 @@ class BoucWen(Model):
 
     @property
     def yield_displacement(self) -> float:
-        """z_max: the displacement in which the hysteretic force is spent [m]."""
+        """z_max: the displacement at which the hysteretic element yields [m]."""
         return self.shape.yield_displacement  # type: ignore[return-value]
 
     @property
@@ -100,7 +99,7 @@ class BoucWen(Model):
 
     @classmethod
     def within(cls, axes: tuple[SearchAxis, ...], fixed: Mapping[str, float]) -> tuple[SearchAxis, ...]:
-        """Bound the yield displacement: a fixed gamma leaves room for beta >= 0 below gamma^(−1/n)."""
+        """Bound the yield displacement: a fixed gamma allows beta >= 0 below gamma^(−1/n)."""
         gamma = fixed.get("gamma", 0.0)
         if gamma <= 0 or "beta" in fixed:
             return axes
@@ -115,7 +114,7 @@ class BoucWen(Model):
 
     @classmethod
     def map_forms(cls) -> Mapping[str, tuple[str, ...]]:
-        """Yield force and yield displacement are mapped: alpha and beta alone hang together too closely."""
+        """Yield force and yield displacement are mapped, because alpha and beta are strongly correlated."""
         yielding = ("decaying-current", "current-decay-frequency")
         return {
             "c": GENERAL_FORMS,
@@ -132,10 +131,10 @@ class BoucWen(Model):
 
     @classmethod
     def resolved(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Parameters, from themselves or from physical coordinates in their place.
+        """Parameters, from themselves or from physical coordinates.
 
-        `yield_displacement` [m] with `asymmetry` (default 0: gamma = beta), or with one of beta and
-        gamma, stands for both; `yield_force` [N] for alpha.
+        `yield_displacement` [m] with `asymmetry` (default 0: gamma = beta), or with one of beta and gamma, replaces
+        both; `yield_force` [N] replaces alpha.
         """
         given = dict(values)
         n = given.get("n", 2.0)

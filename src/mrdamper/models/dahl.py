@@ -1,4 +1,4 @@
-"""Dahl: friction that builds up exponentially with displacement, beside a viscous damper."""
+"""Dahl: friction that increases exponentially with displacement, parallel to a viscous damper."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ from mrdamper.physics.motion import Excitation
 class Dahl(Model):
     """F = kappa_x v + kappa_w w + f0, dw/dt = rho (v − |v| w).
 
-    A Bouc–Wen element with n = 1 and gamma = 0, so it is followed exactly. `yield_displacement`
-    is 1/rho.
+    A Bouc–Wen element with n = 1 and gamma = 0, with an exact solution. `yield_displacement` is 1/rho.
 
     References
     ----------
     Dahl (1968), "A solid friction model", The Aerospace Corporation TOR-0158(3107-18)-1; as
     "viscous + Dahl" for MR dampers in Ikhouane and Rodellar (2007), "Systems with Hysteresis".
-    The forms are recalled, not seen in print.
+    The forms are recalled.
     """
 
     name: ClassVar[str] = "dahl"
@@ -56,14 +55,14 @@ class Dahl(Model):
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """Search the displacement in which the friction builds up."""
+        """Search the displacement over which the friction increases."""
         amplitude = scale.amplitude
         ladder = tuple(amplitude * np.geomspace(1e-4, 2.0, 14))
         return axes_of(free, SearchAxis("yield_displacement", amplitude * 1e-5, amplitude * 10, ladder, log=True))
 
     @classmethod
     def map_forms(cls) -> Mapping[str, tuple[str, ...]]:
-        """Let the yield force saturate with the current, and the displacement shrink with it."""
+        """Let the yield force saturate with the current, and the displacement decrease with it."""
         return {
             "kappa_x": GENERAL_FORMS,
             "kappa_w": (*GENERAL_FORMS, "saturating-current"),

@@ -17,17 +17,15 @@ from mrdamper.physics.motion import Excitation
 
 @dataclass(frozen=True)
 class Guo(Model):
-    """F = (2/pi) f_y arctan[kappa (v + v0 sgn x)] + c v + k x + f0, k zero unless freed.
+    """F = (2/pi) f_y arctan[kappa (v + v0 sgn x)] + c v + k x + f0, k is zero unless freed.
 
-    Memoryless: sgn(x) stands in for the branch of the loop, so the form holds for sines about
-    mid-stroke. Just before a reversal at positive x the damper still pushes back, which fixes
-    the sign of the shift.
+    Memoryless: sgn(x) replaces the branch of the loop, so the form holds for sines about mid-stroke. Just before a
+    reversal at positive x the force is still positive, which determines the sign of the shift.
 
     References
     ----------
     Guo, Yang and Pan (2006), "Dynamical modeling of magneto-rheological damper behaviors",
-    J. Intelligent Material Systems and Structures 17, 3–14. The form is recalled, not seen in
-    print.
+    J. Intelligent Material Systems and Structures 17, 3–14. The form is recalled.
     """
 
     name: ClassVar[str] = "guo"

@@ -15,7 +15,7 @@ from mrdamper.models.base import Model, Scale, SearchAxis, axes_of, require_posi
 from mrdamper.physics.motion import Excitation
 from mrdamper.tracing import Tape, choose, streamed
 
-_KNOTS = 4000  # of the table the flow curve is inverted with; Newton's method finishes the digits
+_KNOTS = 4000  # of the table that inverts the flow curve, refined by Newton's method
 _NEWTON = 3
 _NEWTON_FROM_AFAR = 8
 
@@ -29,8 +29,8 @@ class HerschelBulkley(Model):
 
     |v|/v_c = m/(2m + 1) T^(−1/m) (1 − T)^(1 + 1/m) (1 + T m/(m + 1)),  G = 1/T,
 
-    f_y = 2 L A_p tau_y/h and v_c = w h²/(2 A_p) (tau_y/K)^(1/m), for a piston area A_p and a slot
-    length L. A force record determines f_y, v_c and m; the geometry behind them it cannot.
+    f_y = 2 L A_p tau_y/h and v_c = w h²/(2 A_p) (tau_y/K)^(1/m), for a piston area A_p and a slot length L. A force
+    record determines f_y, v_c and m, but not the geometry.
 
     References
     ----------
@@ -105,7 +105,7 @@ class HerschelBulkley(Model):
 
 
 def flow_step(tape: Tape, speed: Any, m: Any) -> Any:
-    """`flow_curve` for one sample: the curve bends one way, so Newton's method comes in from below."""
+    """`flow_curve` for one sample: the curve is convex, so Newton's method converges from below."""
 
     def flowing() -> Any:
         y = np.log(speed)

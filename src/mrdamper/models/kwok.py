@@ -19,15 +19,15 @@ from mrdamper.physics.motion import Excitation
 class Kwok(Model):
     """F = c v + k x + alpha tanh(beta v + delta sgn x) + f0.
 
-    Memoryless: sgn(x) stands in for the branch of the loop, so the form holds for sines about
-    mid-stroke. At x = 0 the force jumps by alpha [tanh(beta v + delta) − tanh(beta v − delta)],
-    which is little where beta v is large; a positive `xs` rounds it off.
+    Memoryless: sgn(x) replaces the branch of the loop, so the form holds for sines about mid-stroke. At x = 0 the force
+    jumps by alpha [tanh(beta v + delta) − tanh(beta v − delta)], which is small where beta v is large; a positive `xs`
+    smooths it.
 
     References
     ----------
     Kwok, Ha, Nguyen, Li and Samali (2006), "A novel hysteretic model for magnetorheological
     fluid dampers and parameter identification using particle swarm optimization", Sensors
-    and Actuators A 132, 441–451. The form is recalled, not seen in print.
+    and Actuators A 132, 441–451. The form is recalled.
     """
 
     name: ClassVar[str] = "kwok"

@@ -1,4 +1,4 @@
-"""LuGre: bristles that bend before they slide, with a Stribeck curve, beside viscosity."""
+"""LuGre: elastic bristles that slide, with a Stribeck curve, parallel to a viscous damper."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from mrdamper.physics.motion import Excitation
 class LuGre(Model):
     """F = F_c u + sigma1 dz/dt + sigma2 v + f0 with z = z_c u the deflection of the bristles.
 
-    dz/dt = v − |v| u/g, g = 1 + (s − 1) exp(−(v/v_s)²). In the published letters z_c = F_c/sigma0
-    and s = F_s/F_c; written with z_c the force is linear in F_c, sigma1 and sigma2. The rate of z
-    depends on the velocity, so it is integrated with error control.
+    dz/dt = v − |v| u/g, g = 1 + (s − 1) exp(−(v/v_s)²). In the published symbols z_c = F_c/sigma0 and s = F_s/F_c; with
+    z_c the force is linear in F_c, sigma1 and sigma2. The rate of z depends on the velocity, so it is integrated with
+    error control.
 
     References
     ----------
     Canudas de Wit, Olsson, Åström and Lischinsky (1995), "A new model for control of systems
-    with friction", IEEE Trans. Automatic Control 40, 419–425. Recalled, not seen in print. For
+    with friction", IEEE Trans. Automatic Control 40, 419–425. Recalled. For
     MR dampers Jiménez and Álvarez-Icaza (2005) use a variant without the Stribeck curve, which
     is s = 1.
     """
@@ -59,7 +59,7 @@ class LuGre(Model):
 
     @classmethod
     def from_bristles(cls, sigma0: float, sigma1: float, sigma2: float, fc: float, fs: float, vs: float) -> Self:
-        """Make the model from the published letters.
+        """Make the model from the published parameters.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class LuGre(Model):
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """Search the velocity over which the onset force fades, well below the peak velocity."""
+        """Search the Stribeck velocity, well below the peak velocity."""
         amplitude, speed = scale.amplitude, scale.speed
         lengths = tuple(amplitude * np.geomspace(1e-3, 0.3, 5))
         return axes_of(

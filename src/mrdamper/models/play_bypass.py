@@ -1,9 +1,9 @@
-"""Play and bypass: a yield force that seats only after lost motion, bridged by a viscous bypass.
+"""Play and bypass: a yield force behind a free play with a parallel viscous bypass.
 
-Real dampers lose some 0.4 mm of motion after every reversal: the force drops to a viscous
-shoulder, stays there while the play closes, then jumps to the full yield force. A Bouc–Wen
-element is steepest right at the reversal and cannot do that. No frequency and no amplitude
-enters: what looks like dependence on them comes out of play, rate and lag.
+Real dampers have a free play of some 0.4 mm after every reversal: the force decreases to a viscous plateau until the
+play is closed, and then rises to the full yield force. The tangent stiffness of a Bouc–Wen element is largest at the
+reversal, so it cannot describe this. Frequency and amplitude are no inputs: the apparent dependence on them follows
+from play, velocity and lag.
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ from mrdamper.physics.motion.lag import first_order_lag, leaking_load
 from mrdamper.physics.motion.path import memoize_per_path
 from mrdamper.tracing import Tape, streamed
 
-RISE_CURRENT = 0.12  # A; where nothing else is known, the yield force starts with zero slope over this current
+RISE_CURRENT = 0.12  # A; preset of Ic: the current over which the yield force begins to rise with zero slope
 
 
 @dataclass(frozen=True)
 class PlayBypass(Model):
     """F = f0 + k x (1 − S) + (c0 + c1 I) v + cq |v| + fy(I) (S + q |S|) + m a, S the lagged share of the yield force.
 
-    With δ the play's position (stop operator, |δ| ≤ d), φ = sgn δ · max(0, |δ| − (d − e))/e is
-    how far the seat is loaded and η its loading along the motion; b = r/√(1 + r²) with
-    r = cb |v|/fy is the bypass, capped by the yield force. Then
+    With δ the position in the play (stop operator, |δ| ≤ d), φ = sgn δ · max(0, |δ| − (d − e))/e is the relative load
+    of the series spring and η its load along the motion; b = r/√(1 + r²) with r = cb |v|/fy is the bypass, limited by
+    the yield force. Then
 
     s = (1 − h) φ G + sgn v [h |v|/(|v| + vh) η + (1 − η) b],  T dS/dt + S = s,
     dG/dt = (|v|/e)(1 − G) − l G,
 
-    G the load of the seat that has not leaked away (l = 0: held for ever),
+    G the remaining load of the series spring (l = 0: no relaxation),
 
-    fy(I) = fy0 + fy1 I (1 − exp(−I/Ic))/(1 + si I), h = h0 + h1 I within 0 and 1, q, cq and qb the
-    surplus of yield, viscosity and bypass (cb (1 + qb sgn v)) in extension. Of the level law and
-    the asymmetries only what the tests show is freed (`dampers.choice`).
+    fy(I) = fy0 + fy1 I (1 − exp(−I/Ic))/(1 + si I), h = h0 + h1 I within 0 and 1, q, cq and qb the excess of yield,
+    viscosity and bypass (cb (1 + qb sgn v)) in extension. Parameters of fy(I) and asymmetries are free only if
+    cross-validation selects them (`dampers.choice`).
 
     References
     ----------
@@ -152,9 +152,9 @@ class PlayBypass(Model):
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """Each nonlinear parameter on its own scale: forces, speeds, currents by the data, lengths of any damper.
+        """Each nonlinear parameter on its own scale: forces, speeds and currents of the data, lengths of any damper.
 
-        Lost motion of all sizes is tried, for no search finds its way from 0.4 mm to 8.
+        Several lengths of free play are tried, because no search converges from 0.4 mm to 8 mm.
         """
         X, V, F, I = scale.amplitude, scale.speed, scale.force, scale.current or 1.0
         longest = min(1e-2, 0.7 * X)
@@ -182,7 +182,7 @@ class PlayBypass(Model):
         )
 
 
-# What of the state and the force one parameter leads to is remembered while the search moves another.
+# Parts of the state and the force are cached while the search changes other parameters.
 
 
 @memoize_per_path
@@ -204,7 +204,7 @@ def _level_law(current: Floats, fy0: float, fy1: float, Ic: float, si: float) ->
 
 @memoize_per_path
 def _loaded(path: Path, d: float, seat: float) -> Floats:
-    """φ, how far the seat is loaded."""
+    """φ, the relative load of the series spring."""
     play = play_position(path, d)
     return np.sign(play) * np.maximum(0.0, np.abs(play) - (d - seat)) * (1 / seat)
 
@@ -217,20 +217,20 @@ def _along(velocity: Floats, loaded: Floats) -> Floats:
 
 @memoize_per_path
 def _bypass(velocity: Floats, cb: float, qb: float, yield_force: Floats) -> Floats:
-    """b, what the bypass carries of the yield force."""
+    """b, the force of the bypass over the yield force."""
     ratio = (cb / yield_force) * (1 + qb * _sign(velocity)) * _speed(velocity)
     return ratio / np.sqrt(1 + ratio**2)
 
 
 @memoize_per_path
 def _fading(current: Floats, h0: float, h1: float) -> Floats:
-    """Share h that fades, within 0 and 1."""
+    """Stribeck amplitude h, within 0 and 1."""
     return np.clip(h0 + h1 * current, 0.0, 1.0)
 
 
 @memoize_per_path
 def _seated(velocity: Floats, vh: float, fading: Floats, along: Floats) -> Floats:
-    """Calculate the part of the series force that builds up with velocity, h |v|/(|v| + vh) η."""
+    """Calculate the part of the series force that increases with velocity, h |v|/(|v| + vh) η."""
     speed = _speed(velocity)
     return fading * speed / (speed + vh) * along
 
@@ -250,8 +250,8 @@ def play_step(tape: Tape, path: Any, limit: Any) -> Any:
 def play_position(path: Path, limit: float) -> Floats:
     """Position δ of a stop operator along a path: it moves with the motion and stops at ±limit.
 
-    [Brokate and Sprekels 1996; recalled] Within a stroke δ rises with the distance until it
-    stops, so samples are independent; only the reversals follow one another.
+    [Brokate and Sprekels 1996; recalled] Within a stroke δ increases with the distance until it stops, so samples are
+    independent; only the reversals are sequential.
     """
     return _stopped(path, limit)
 
@@ -266,8 +266,8 @@ def _stopped(path: Path, limit: float) -> Floats:
 def _clipped_sums(moves: Floats, limit: float) -> Floats:
     """δ after each of some moves from 0, δ → clip(δ + move, ±limit).
 
-    Two such maps one after the other are a third, clip(δ + a, low, high): spans of 1, 2, 4, ... are
-    joined until every one forgets where it began.
+    The composition of two such maps is a third, clip(δ + a, low, high): spans of 1, 2, 4, ... are joined until the
+    result is independent of the start.
     """
     a, low, high = moves.copy(), np.full(moves.size, -limit), np.full(moves.size, limit)
     span = 1

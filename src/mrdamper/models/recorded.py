@@ -21,14 +21,14 @@ from mrdamper.tracing.tangent import with_tangents
 _MOVES = ("turn", "turn_back", "move")
 CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", *_MOVES)
 S = TypeVar("S", bound=Callable[..., Floats])
-_MIN_COMPILED_SAMPLES = 2_000  # samples of a motion, from which compiled code is used; never the history of the process
+_MIN_COMPILED_SAMPLES = 2_000  # samples of a motion, from which compiled code is used, independent of earlier calls
 
 
 def recorded(state: S) -> S:
-    """Have a model's `state` follow records compiled, where there is a compiler.
+    """Compute a model's `state` by compiled code, where there is a compiler.
 
-    The array code runs once on symbols; without a compiler, and for few samples, it runs as it is written. Both
-    agree to rounding. For models whose state is one number a sample.
+    The array code runs once on symbols; without a compiler, and for few samples, it runs unchanged. Both agree to
+    rounding. For models whose state is one number per sample.
     """
 
     @wraps(state)
@@ -103,21 +103,21 @@ def compiled_outputs(
     picked: NDArray[np.intp] | None = None,
     begins: NDArray[np.intp] | None = None,
 ) -> Floats | None:
-    """(K, N) outputs of a compiled program along a record, or None: no compiler, no derivative, no answer at a sample.
+    """(K, N) outputs of a compiled program along a record, or None: no compiler, derivative or solution.
 
     Parameters
     ----------
     key : (type, names)
-        Of the programs, which are kept: what is traced, and along which parameters there are tangents.
+        Of the cached programs: traced model type, and parameters of the tangents.
     values : mapping of str to float
         Parameters.
     traced : function (tape, parameters, inputs)
         Writes the outputs at one sample.
     inputs : sequence of str
     channel : function (name)
-        (N,) array of an input; asked for what the program reads alone.
+        (N,) array of an input; called for the inputs that the program uses.
     picked, begins : arrays of int, optional
-        Samples whose outputs are wanted, and those at which the memory starts anew.
+        Samples of the outputs, and samples at which the memory is reset.
     """
     given = tuple(map(float, values.values()))
     # Values are given by position: another order is another program.
@@ -143,7 +143,7 @@ def compiled_outputs(
 
 
 def _without_unread(tape: Tape, outputs: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the outputs, and take the inputs off the tape that nothing reads; the first stays and gives the length."""
+    """Return the outputs, and remove unused inputs from the tape; the first stays and gives the length."""
     questions = [question for question, _ in tape.guards]
     read = {id(node) for node in postorder([*outputs.values(), *tape.updates.values(), *questions])}
     for place, (name, symbol) in enumerate([*tape.inputs.items()]):
@@ -161,7 +161,7 @@ def channel(motion: Excitation, name: str) -> Floats:
 
 @memoize_per_path
 def _steps(time: Floats) -> Floats:
-    """(N,) steps of time to what its rounding leaves: steps that differ by it are one, and what hangs on it is kept."""
+    """(N,) time steps, equal where they differ by rounding only, so that results of one step are cached."""
     if time.size < 2:
         return np.ones(1)
     steps = np.diff(time, prepend=2 * time[0] - time[1])

@@ -1,4 +1,4 @@
-"""Bingham with a yield that is passed through smoothly."""
+"""Bingham model with a smooth yield."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ class SmoothBingham(Model):
 
     References
     ----------
-    Stanway, Sproston and Stevens (1987) for Bingham's form, recalled, not seen in print; the
-    tanh in place of the sign is common practice.
+    Stanway, Sproston and Stevens (1987) for Bingham's form, recalled; the tanh in place of the sign is common practice.
     """
 
     name: ClassVar[str] = "smooth-bingham"

@@ -1,4 +1,4 @@
-"""Spencer's modified Bouc–Wen: a damper in series with a Bouc–Wen element, beside a spring."""
+"""Spencer's modified Bouc–Wen: a damper in series with a Bouc–Wen element, parallel to a spring."""
 
 from __future__ import annotations
 
@@ -20,11 +20,10 @@ from mrdamper.physics.motion import Excitation
 class Spencer(Model):
     """F = c1 dy/dt + k1 x + f0, dy/dt = [alpha z + c0 v + k0 (x − y)]/(c0 + c1).
 
-    z is a Bouc–Wen element driven by r = x − y. All forces over c1 are velocities, so that c1
-    scales the force and enters linearly; the published letters come back as properties and go
-    in through `from_letters`. Beware: the publication's gamma multiplies |v| and its beta v,
-    the reverse of the letters used here for Bouc–Wen. A is 1, absorbed in the others; x0 is
-    part of the offset, f0 = −k1 x0. Integrated with error control.
+    z is a Bouc–Wen element driven by r = x − y. All forces over c1 are velocities, so that c1 scales the force
+    linearly; the published parameters are properties, and `from_letters` accepts them. The publication's gamma
+    multiplies |v| and its beta v, the reverse of the symbols used here for Bouc–Wen. A is 1, absorbed in the others; x0
+    is part of the offset, f0 = −k1 x0. Integrated with error control.
 
     References
     ----------
@@ -101,7 +100,7 @@ class Spencer(Model):
         n: float = 2.0,
         x0: float = 0.0,
     ) -> Self:
-        """Make the model from the letters of the publication.
+        """Make the model from the parameters of the publication.
 
         Parameters
         ----------
@@ -144,9 +143,9 @@ class Spencer(Model):
         )
 
     def to_letters(self, A: float = 1.0) -> dict[str, float]:
-        """Return the letters of the publication for an A [-] of choice: gamma with |v|, beta with v, SI units.
+        """Return the parameters of the publication for a given A [-]: gamma with |v|, beta with v, SI units.
 
-        x0 is 0 where there is no k1 to stand for the offset force.
+        x0 is 0 if k1 is zero.
         """
         require_positive(self.title, A=A)
         z_max = A * self.yield_displacement
@@ -195,7 +194,7 @@ class Spencer(Model):
 
     @classmethod
     def map_forms(cls) -> Mapping[str, tuple[str, ...]]:
-        """Map the published letters: their ratios mix what depends on the current with what does not."""
+        """Map the published parameters, because ratios mix quantities that depend on the current with others."""
         return {
             "c1": GENERAL_FORMS,
             "c0": GENERAL_FORMS,

@@ -20,16 +20,15 @@ class Tanh(Model):
 
     S = (1 - w) tanh u + w (2/pi) arctan(pi u/2), u = (v + lambda x)/vy, fy(I) = fy0 + fy1 I/(1 + si I).
 
-    Without memory and without jumps: the displacement, counted from mid-stroke, moves the yield
-    to either side of the loop, in any motion. The viscous damping is c0 + c1 I at 1 m/s; p is
-    negative for a fluid that thins with shear, 1 for quadratic damping. Of the parameters that
-    are preset to zero only those are determined that improve the cross-validation. I is the size of
-    the current.
+    The model has no memory and no jumps: the displacement from mid-stroke shifts the yield to the branches of the loop,
+    in any motion. The viscous damping is c0 + c1 I at 1 m/s; p is negative for a fluid that thins with shear, 1 for
+    quadratic damping. Of the parameters that are preset to zero, only those that reduce the cross-validated error are
+    determined. I is the magnitude of the current.
 
     References
     ----------
     Common in work on control; the sum of velocity and displacement in one argument is recalled
-    from Guo, Yang and Pan (2006), whose function is an arctangent, not seen in print.
+    from Guo, Yang and Pan (2006), whose function is an arctangent.
     """
 
     name: ClassVar[str] = "tanh"
