@@ -49,9 +49,9 @@ def identify(
     gas : GasSpring, optional
         Known gas spring: fixes k1, k2, k3 and lets the mass be determined.
     with_delay : bool
-        Determine a delay of the force channel too, within ±3 ms.
+        Determine a delay of the force channel, too, within ±3 ms.
     clipped : bool
-        Identify also from a record whose import found a channel cut off at its extreme.
+        Use a record with a clipped channel, too.
 
     Returns
     -------
@@ -62,9 +62,9 @@ def identify(
     UnknownNameError
         If there is no such model, method or parameter.
     ExcitationError
-        If the steady window holds under one cycle.
+        If the steady window has less than one cycle.
     IdentificationError
-        If the run cannot determine what is asked for.
+        If the run does not determine the parameters.
     QualityError
         As `mrdamper.identify`, if the record is refused by a quality check.
 
@@ -108,11 +108,11 @@ def identify(
 
 
 def refuse_unusable(run: Run, clipped: bool = False) -> None:
-    """Refuse a run whose force does not change, or with a channel cut off at its extreme: not the damper's peaks.
+    """Refuse a run with a constant force or a clipped channel.
 
-    Raises `IdentificationError`; of a channel that is cut off unless `clipped` runs are wanted.
+    Raises `IdentificationError`; for clipping unless `clipped` is set.
     """
-    force = run.force[run.in_window]  # an empty window is refused where its samples are asked for
+    force = run.force[run.in_window]  # an empty window is refused when its samples are used
     if force.size and np.ptp(force) == 0:
         raise IdentificationError("the force does not change", where=f"run {run.id}", remedy="check the channel")
     if "W_CLIPPED" in run.findings and not clipped:
@@ -124,7 +124,7 @@ def refuse_unusable(run: Run, clipped: bool = False) -> None:
 
 
 def conclude(problem: Problem, method: Method, solution: Solution) -> Identification:
-    """Score a solution; how certain it is, it says when asked."""
+    """Score a solution; its uncertainty is computed on request."""
     motion = problem.motion.delayed(solution.delay) if solution.delay else problem.motion
     scored = motion.part(problem.scored)
     state = solution.model.state(motion)[problem.scored]

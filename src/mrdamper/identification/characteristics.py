@@ -1,8 +1,8 @@
-"""Forces at set velocities, rebound and compression apart, as test engineers tabulate them.
+"""Forces at set velocities in rebound and compression, as in test reports.
 
-Gas force is the force that does not change sign with the motion; friction is what remains at the
-lowest current as the motion becomes slow. Both are taken away or stated, never mixed into the
-damping forces. Extension is positive here, so rebound is the side of positive velocity and force.
+Gas force is the force that does not change sign with the motion; friction is the remainder at the lowest current and
+low velocity. Both are subtracted or stated separately from the damping forces. Extension is positive, so rebound is the
+side of positive velocity and force.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from mrdamper.identification.loop_analysis import analyse_loop, whole_cycles
 from mrdamper.physics.motion import equivalent_sine, measured_motion
 
 SIDES = ("rebound", "compression")
-_DEFAULT_VELOCITIES = 6  # velocities of a ladder nobody gave
+_DEFAULT_VELOCITIES = 6  # number of default velocities
 _SLOW_VELOCITY = 0.010  # peak velocity [m/s] up to which a test counts as slow: viscous force is then a few newtons
-_MIDDLE = 0.25  # share of the amplitude around mid-stroke where the force at mid-stroke is read
+_MIDDLE = 0.25  # share of the amplitude around mid-stroke in which the force at mid-stroke is evaluated
 
 
 @dataclass(frozen=True)
 class Stroke:
-    """Figures of one run, sides apart, gas force not yet subtracted."""
+    """Values of one run for both sides, including the gas force."""
 
     run_id: str
     condition: Condition  # measured, its current rounded to the level of the test matrix
@@ -33,42 +33,42 @@ class Stroke:
     # largest force in the direction of rebound and of compression, signed, median over the cycles [N]
     peak_force: tuple[float, float]
     mid_force: tuple[float, float]  # force at mid-stroke, moving in rebound and in compression, signed [N]
-    # half the width of the force–velocity loop: velocity at which the force, gas force taken away, passes zero, mean of
+    # half the width of the force–velocity loop: velocity at which the force less the gas force is zero, mean of
     # both sides [m/s]
     zero_force_velocity: float
     energy: float  # dissipated per cycle [J]
 
     @property
     def gas_force(self) -> float:
-        """Half the sum of the forces at mid-stroke [N]: what does not change sign with the motion."""
+        """Half the sum of the forces at mid-stroke [N], which does not change its sign with the motion."""
         return (self.mid_force[0] + self.mid_force[1]) / 2
 
     @property
     def mid_damping_force(self) -> float:
-        """Half the difference of the forces at mid-stroke [N]: what changes sign with the motion."""
+        """Half the difference of the forces at mid-stroke [N], which changes its sign with the motion."""
         return (self.mid_force[0] - self.mid_force[1]) / 2
 
 
 @dataclass(frozen=True)
 class Characteristics:
-    """Characteristic values of one damper's runs, without any model."""
+    """Characteristic values of one damper's runs, without a model."""
 
     strokes: tuple[Stroke, ...]  # by current and peak velocity
     currents: tuple[float, ...]  # levels of the test matrix [A]
-    # gas_force, friction: [N]; friction is nan where the tests cannot tell
+    # gas_force, friction: [N]; friction is nan where the tests do not determine it
     gas_force: float
     friction: float
-    # gas_from, friction_from: how each was found
+    # gas_from, friction_from: how each was determined
     gas_from: str
     friction_from: str
-    passed_over: Mapping[str, str]  # by run, why it holds no steady cycle at one current
+    passed_over: Mapping[str, str]  # by run, why it has no steady cycle at one current
 
     def at(self, current: float) -> tuple[Stroke, ...]:
         """Return the strokes of a level, slow to fast."""
         return tuple(s for s in self.strokes if s.condition.current_A == current)
 
     def damping_force(self, stroke: Stroke, side: int) -> float:
-        """Peak force of a side (0 rebound, 1 compression) with the gas force taken away, positive [N]."""
+        """Peak force of a side (0 rebound, 1 compression) with the gas force subtracted, positive [N]."""
         return abs(stroke.peak_force[side] - self.gas_force)
 
     def curve(self, current: float, side: int) -> tuple[Floats, Floats]:
@@ -84,7 +84,7 @@ class Characteristics:
         return float(np.interp(velocity, *self.curve(current, side), left=np.nan, right=np.nan))
 
     def ladder(self) -> tuple[float, ...]:
-        """Round velocities [m/s] spread over what most currents were tested at."""
+        """Round velocities [m/s] over the range that was tested at most currents."""
         slowest = [min(s.peak_velocity[side] for s in self.at(c)) for c in self.currents for side in (0, 1)]
         fastest = [max(s.peak_velocity[side] for s in self.at(c)) for c in self.currents for side in (0, 1)]
         low, high = float(np.median(slowest)), float(np.median(fastest))
@@ -96,7 +96,7 @@ class Characteristics:
 
 
 def characterise(runs: Sequence[Run]) -> Characteristics:
-    """Characterise one damper from its steady sine runs; other motion is passed over.
+    """Characterise one damper from its steady sine runs; other motions are ignored.
 
     Raises `IdentificationError` if no run holds a steady cycle at one current.
 

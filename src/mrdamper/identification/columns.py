@@ -1,4 +1,4 @@
-"""The part of an identification that is linear: the force one unit of each parameter adds."""
+"""Linear part of an identification: the force per unit of each parameter."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mrdamper.physics.motion.excitation import Excitation
 def linear_table(
     bare: Model, linear: Sequence[ParameterInfo], motion: Excitation, state: Floats, base: Floats | None = None
 ) -> tuple[Floats, Floats]:
-    """Force of a model without its linear parameters, and what one unit of each adds.
+    """Force of a model without its linear parameters, and the force per unit of each.
 
     Parameters
     ----------

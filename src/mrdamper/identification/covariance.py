@@ -1,9 +1,8 @@
 """Covariance of least-squares parameters where residuals are not independent.
 
-Two things make a damper's residuals depend on each other. Noise is correlated: its spectrum decides
-what a parameter sees of it, an offset force the noise at 0 Hz, a viscous damping that at the
-frequency of the motion. And model error repeats with every cycle: more cycles do not average it
-away, so it counts as one unknown function of the phase, not as noise.
+Residuals of dampers are correlated for two reasons. Noise has a spectrum: an offset force depends on the noise at 0 Hz,
+a viscous damping on that at the frequency of the motion. Model error repeats with every cycle: more cycles do not
+reduce it, so it counts as one unknown function of the phase and not as noise.
 """
 
 from __future__ import annotations
@@ -17,15 +16,15 @@ from mrdamper.data.arrays import Floats
 from mrdamper.identification.autoregression import Autoregression, mean_weights, models_by_likelihood, transform_length
 from mrdamper.identification.intervals import dof_of_quantile, student
 
-_MIN_VARIANCE = 1e-200  # a variance of nothing, that shares of it can still be divided by
-_HARMONICS = 24  # of the motion in which model error is looked for
-_REPEATS = 0.95  # cycles from which harmonics of the motion can be told apart
-_MIN_CYCLES = 1.9  # cycles from which repeats are seen as such
-_MAX_SAMPLES = 2001  # samples that are looked at
+_MIN_VARIANCE = 1e-200  # smallest variance, by which shares are divided
+_HARMONICS = 24  # harmonics of the motion in which model error is estimated
+_REPEATS = 0.95  # cycles from which harmonics of the motion are resolved
+_MIN_CYCLES = 1.9  # cycles from which repetition is detected
+_MAX_SAMPLES = 2001  # largest number of samples
 _MAX_SHARE = 0.1  # of the noise in the fit, above which its residual does not show the correlation time of the noise
 _LEVEL = 0.95  # of intervals whose degrees of freedom are sought
 _TAKES_PART = 0.1  # in a direction, of its unit vector
-_NO_MORE = 1e-12  # of the largest: eigenvalue of the scaled normal matrix below which nothing is known
+_NO_MORE = 1e-12  # of the largest: eigenvalue of the scaled normal matrix below which a direction is not determined
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +32,11 @@ class ParameterCovariance:
     """Covariance of parameters."""
 
     covariance: Floats  # (P, P) infinite on the diagonal where the data does not determine a parameter
-    dof: Floats  # (P,) degrees of freedom behind each variance, for Student's t
-    effective: Floats  # (P,) independent samples that would give each parameter's error, were the residual white
+    dof: Floats  # (P,) degrees of freedom of each variance, for Student's t
+    effective: Floats  # (P,) independent samples with the same error of each parameter for a white residual
     textbook: Floats  # (P,) standard errors by s² (JᵀJ)⁻¹, as if the residual were white
-    memory: float  # length of the record in lags of its residual; a record shorter than some ten says little
-    # parameters that do the same to the residual: of each group only some combinations are known
+    memory: float  # length of the record in correlation times of its residual, of which about ten are needed
+    # parameters with the same effect on the residual, of which only some combinations are determined
     alike: tuple[tuple[int, ...], ...] = ()
 
     @property
@@ -51,9 +50,9 @@ def spread(
 ) -> ParameterCovariance:
     """Covariance of the parameters of a least-squares fit to one record.
 
-    (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹ with Σ from the residual: an autoregression whose order an
-    information criterion chooses, and beside it, where the motion repeats, what the residual
-    repeats with it, each harmonic corrected for what the fit took out of it.
+    (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹ with Σ from the residual: an autoregression whose order an information criterion selects,
+    and, if the motion repeats, the repeating part of the residual, each harmonic corrected for the part that the fit
+    absorbed.
 
     Parameters
     ----------
@@ -66,7 +65,7 @@ def spread(
         Of the motion, where it repeats [Hz].
     """
     whole, squares = residual.size, float(residual @ residual)
-    if (block := max(1, whole // _MAX_SAMPLES)) > 1:  # means over a few samples keep all that is slower than them
+    if (block := max(1, whole // _MAX_SAMPLES)) > 1:  # means over a few samples keep slower components
         kept = whole // block * block
         jacobian, residual = (a[:kept].reshape(-1, block, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))
         time = None if time is None else time[:kept].reshape(-1, block).mean(axis=1)
@@ -101,10 +100,10 @@ def spread(
 
 
 def alike_groups(vectors: Floats) -> list[tuple[list[int], int]]:
-    """Group the parameters with the same effect on a residual, each with the one that takes most part.
+    """Group the parameters with the same effect on a residual, each with its main parameter.
 
-    Two pairs that are alike span a plane, and any mixture of them is an eigenvector as well: each
-    group is told by the reduced form of the basis, in which it has a parameter of its own.
+    Two such pairs span a plane in which any vector is an eigenvector, so groups follow from the reduced form of the
+    basis, in which each has its own parameter.
 
     `vectors` (P, K): combinations of parameters that change nothing.
     """
@@ -124,7 +123,7 @@ def score_covariance(
 ) -> tuple[Floats, Floats, float]:
     """Jᵀ Σ J, (P,) degrees of freedom behind each parameter's variance, the record's length in lags of its residual.
 
-    `inverse` is (JᵀJ)⁻¹, for what the fit took out of the residual.
+    `inverse` is (JᵀJ)⁻¹, for the part of the residual that the fit absorbed.
     """
     repeats = time is not None and frequency is not None and np.ptp(time) * frequency >= _REPEATS
     rest, parts = residual, []
@@ -163,15 +162,15 @@ def _repeated(
     amplitudes = np.linalg.solve(gram, along)
     rest = residual - amplitudes @ waves
     responses = (waves @ jacobian).T  # (P, 2K)
-    # Share of every wave that the parameters can take up, and so have taken out of the residual.
+    # Share of every harmonic that the parameters describe, and that the residual therefore lacks.
     taken = np.clip(np.sum(responses * (inverse @ responses), axis=0) / np.diag(gram), 0.0, 1.0)
     left = (1 - taken).reshape(most, 2).mean(axis=1)
     power = (amplitudes**2).reshape(most, 2).mean(axis=1)
-    # By leakage, a record that ends elsewhere than it began has more power there than the spectrum of its noise.
+    # By leakage, a record that does not end where it began has more power there than the spectrum of its noise.
     windows = np.abs(np.fft.rfft(waves.T, transform_length(size), axis=0)) ** 2
     expected = (mean_weights(size) * Autoregression.of(rest).spectrum(size)) @ windows / np.diag(gram) ** 2
     expected = expected.reshape(most, 2).mean(axis=1) * size / (size - 2 * most)
-    # Noise alone has power at these frequencies too; only a surplus that chance does not explain repeats.
+    # Noise has power at these frequencies, too; only a significant excess counts as repeating.
     if np.sum(power) < (1 + 3 / np.sqrt(left.sum())) * np.sum(expected * left):
         return residual, []
     level, relative = _power_law(orders, power, expected, left)
@@ -180,15 +179,15 @@ def _repeated(
     shares = (pull**2 * np.repeat(level, 2)).reshape(count, most, 2).sum(axis=2)
     weights = shares / np.maximum(shares.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     if np.ptp(time) * frequency < _MIN_CYCLES:
-        rest = residual  # what does not repeat cannot be told from what would
+        rest = residual  # the repeating part cannot be separated
     return rest, [(lines, np.sum(weights @ relative * weights, axis=1))]
 
 
 def _power_law(orders: Floats, power: Floats, expected: Floats, left: Floats) -> tuple[Floats, Floats]:
     """Mean power of repeated lines at every order, and the covariance of its logarithm.
 
-    A symmetric damper's model error has odd lines far above even ones; each kind falls with a
-    power of the order. The lines the fit took away are read off those it left [Whittle 1953].
+    The model error of a symmetric damper has odd lines far above even ones; each kind decreases with a power of the
+    order. The lines that the fit absorbed are estimated from the others [Whittle 1953].
     """
     odd = orders % 2 == 1
     groups = [group for group in (odd, ~odd) if left[group].sum() > 1]
@@ -208,7 +207,7 @@ def _power_law(orders: Floats, power: Floats, expected: Floats, left: Floats) ->
 
 
 def _noise(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, float]:
-    """Calculate the score's covariance from the residual's own spectrum, and its memory in samples."""
+    """Calculate the score's covariance from the spectrum of the residual, and its correlation time in samples."""
     size = residual.size
     model = Autoregression.of(residual)
     spectrum = model.spectrum(size)
@@ -217,12 +216,12 @@ def _noise(jacobian: Floats, residual: Floats, inverse: Floats) -> tuple[Part, f
     memory = np.fft.irfft(spectrum, transform_length(size))[: model.order + 1]  # covariance of the residual at its lags
     if memory[0] <= 0:
         return (score, np.zeros(len(inverse))), 1.0
-    # The fit took a share of the noise with it.
+    # The fit absorbed a share of the noise.
     taken = float(np.sum(inverse * score)) / (size * memory[0])
     if model.order and taken > _MAX_SHARE:
         return _noise_by_likelihood(jacobian, residual, inverse)
     relative = np.full(len(inverse), 2.0 / size)
-    if order := model.order:  # what uncertain coefficients bend of the spectrum, as each parameter sees it
+    if order := model.order:  # uncertainty of the spectrum by its coefficients, for each parameter
         lags = np.arange(order)
         doubt = model.variance / size * np.linalg.pinv(memory[np.abs(np.subtract.outer(lags, lags))])
         influence = np.abs(transformed @ inverse) ** 2 * spectrum[:, None]

@@ -1,8 +1,8 @@
-"""Elimination of linear parameters where all columns but one stay what they are in the search.
+"""Elimination of linear parameters if all columns but one are constant in the search.
 
-In the Bouc–Wen family and many other models the state fills one column, and no search
-coordinate touches the others. They are factored once; a point of the search then costs its
-state and one projection. A model declares that it is of this kind (`Model.state_column`, `Model.shape`).
+In the Bouc–Wen family and many other models the state is one column, and the others do not depend on the search
+coordinates. They are factored once; a point of the search then costs its state and one projection. A model declares
+this by `Model.state_column` and `Model.shape`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _LENGTH, _ASYMMETRY, _SHARPNESS = "yield_displacement", "asymmetry", "n"  # sear
 
 @dataclass(frozen=True, eq=False)
 class Elimination:
-    """A problem whose state fills one column: what stays the same however the search moves."""
+    """A problem whose state is one column: the constant part of the search."""
 
     problem: Problem
     kind: LinearStructure
@@ -47,11 +47,11 @@ class Elimination:
         return cls(problem, kind)
 
     def fixed_columns(self, rows: slice | NDArray[np.intp] = slice(None)) -> FixedColumns:
-        """Columns that stay, and measured force less the force without linear parameters [N], at scored samples."""
+        """Constant columns, and measured force less the force without linear parameters [N], at scored samples."""
         motion = self.problem.seen.part(rows)
         base, columns = linear_table(self.kind.bare, self.kind.others, motion, np.zeros(len(motion)))
         right = self.problem.force[rows] - base
-        del base  # of a long record worth its memory
+        del base  # kept for long records, too
         return FixedColumns.of(columns, right)
 
     @cached_property
@@ -63,7 +63,7 @@ class Elimination:
         return FixedColumnSolver(fixed, *bounds_of(self.kind.others), self.kind.state.bounds)
 
     def residual(self, point: Mapping[str, float]) -> Floats | None:
-        """Residual at a point of the search; None where it takes the general way."""
+        """Residual at a point of the search; None where the general method is needed."""
         return None if self.projector is None else self.projector.residual(self._state(point))
 
     def residual_and_slope(self, length: float) -> tuple[Floats, Floats] | None:
@@ -75,7 +75,7 @@ class Elimination:
         return self.projector.residual_and_slope(state, np.negative(by_kappa, out=by_kappa))
 
     def solved(self, point: Mapping[str, float]) -> Model | None:
-        """Model at a point of the search; None where it takes the general way."""
+        """Model at a point of the search; None where the general method is needed."""
         solution = self.projector.solve(self._state(point)) if self.projector else None
         if solution is None:
             return None
@@ -85,7 +85,7 @@ class Elimination:
         return self.problem.model_type.build({**self.problem.fixed, **point, **values})
 
     def _state(self, point: Mapping[str, float]) -> Floats:
-        # Its size does not matter to the residual.
+        # Its size has no effect on the residual.
         shape = self.kind.shape(point)
         if shape is None:
             return self._bare(point).state(self.problem.motion)[self.problem.scored]
@@ -101,9 +101,9 @@ class LinearStructure:
     """Structure of the search: the linear and the nonlinear parameters of a model."""
 
     coordinates: tuple[str, ...]  # names of the search coordinates
-    state: ParameterInfo  # parameter whose column the state is
+    state: ParameterInfo  # parameter whose column is the state
     others: tuple[ParameterInfo, ...]  # the other linear parameters
-    bare: Model  # with all linear parameters at zero, anywhere on the search: the columns of `others` are its
+    bare: Model  # with all linear parameters at zero, at any point of the search: source of the columns of `others`
     # rho, n: of a Bouc–Wen shape of length 1/kappa, where they are not searched
     rho: float = 0.0
     n: float = 2.0
@@ -121,10 +121,10 @@ class LinearStructure:
 def linear_structure(
     model_type: type[Model], free: tuple[str, ...], fixed: tuple[tuple[str, float], ...]
 ) -> LinearStructure | None:
-    """Ask a model what its state is, at two places of the search.
+    """Determine the structure from a model at two points of the search.
 
-    `free`: parameters to be determined; `fixed`: parameters held at a value. Returns None where the state fills no
-    column of its own, or that column's parameter is held.
+    `free`: parameters to be determined; `fixed`: parameters held at a value. Returns None if the state is no column, or
+    the parameter of that column is held.
     """
     linear = tuple(i for i in model_type.parameters() if i.linear and i.name in free)
     axes = model_type.search_axes(_SCALE, free)
@@ -134,7 +134,7 @@ def linear_structure(
     points = [{**dict(fixed), **{axis.name: at(axis) for axis in axes}} for at in (_first, _other)]
     try:
         bare = [model_type.build({**point, **{i.name: 0.0 for i in linear}}) for point in points]
-    except ParameterError:  # what is held leaves no room at one of the places
+    except ParameterError:  # held parameters exclude one of the points
         return None
     structure = LinearStructure(
         tuple(axis.name for axis in axes), state, tuple(i for i in linear if i is not state), bare[0]
@@ -143,7 +143,7 @@ def linear_structure(
     if shape is None or not {_LENGTH} <= set(structure.coordinates) <= {_LENGTH, _ASYMMETRY, _SHARPNESS}:
         return structure
     shaped = replace(structure, rho=float(shape.rho), n=float(shape.n), has_shape=True)
-    # A gamma that is held bends the asymmetry with the length.
+    # With a held gamma the asymmetry depends on the length.
     return shaped if all(_has_shape(shaped, *pair) for pair in zip(bare, points, strict=True)) else structure
 
 
@@ -154,7 +154,7 @@ def _has_shape(kind: LinearStructure, model: Model, point: Mapping[str, float]) 
     return np.allclose((float(shape.kappa), float(shape.rho), shape.n), expected, rtol=1e-9, atol=1e-12)
 
 
-_SCALE = Scale(amplitude=0.02, speed=0.1)  # of the search a model is asked at
+_SCALE = Scale(amplitude=0.02, speed=0.1)  # points of the search at which a model is evaluated
 
 
 def _first(axis: SearchAxis) -> float:
@@ -169,9 +169,9 @@ def _other(axis: SearchAxis) -> float:
 
 @dataclass(frozen=True, eq=False)
 class FixedColumnSolver:
-    """Least squares on columns that stay and one that moves: the ones that stay are solved once."""
+    """Least squares on constant columns and one that changes: the constant ones are factored once."""
 
-    fixed: FixedColumns  # the columns that stay
+    fixed: FixedColumns  # the constant columns
     # lower, upper: (L,) bounds of their coefficients
     lower: Floats
     upper: Floats
@@ -194,7 +194,7 @@ class FixedColumnSolver:
         growth = (float(moved @ rest) - 2 * size * float(moved @ beside)) / float(beside @ beside)
         residual = size * beside
         residual -= rest
-        moved *= size  # in place: these may be channels of a long record
+        moved *= size  # in place, because these may be long
         beside *= growth
         moved += beside
         return residual, moved

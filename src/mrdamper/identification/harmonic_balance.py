@@ -1,10 +1,9 @@
-"""Harmonic balance of a damper on a sine: the paper's closed forms, and what is missing in them.
+"""Harmonic balance of a damper on a sine: the paper's closed forms, and their correction.
 
-The paper balances the first harmonic of the whole force against viscosity, inertia and gas
-spring and gets c and m in closed form. The hysteretic force alpha z has a first harmonic of
-its own, so c and m then hold part of it and it is identified twice: `double_counted` says by
-how much. A balance that evaluates the hysteresis too, over three or more harmonics, does not
-have this flaw; `HarmonicProjection` takes any signal to the space in which it is done.
+The paper balances the first harmonic of the whole force with viscosity, inertia and gas spring and obtains c and m in
+closed form. The hysteretic force alpha z has a first harmonic, too, so c and m contain part of it and it is counted
+twice: `double_counted` calculates this part. A balance that evaluates the hysteresis over three or more harmonics does
+not have this error; `HarmonicProjection` maps signals to the space of this balance.
 """
 
 from __future__ import annotations
@@ -25,12 +24,12 @@ from mrdamper.statistics.linear import solve_linear
 AmplitudeReading = Literal["first-harmonic", "half-peak-to-peak", "maximum"]
 PhaseReading = Literal["harmonic", "peaks"]
 OffsetReading = Literal["extremes", "mean"]
-_FORCE_HARMONICS = 9  # the first is wanted; the next few must not leak into it where the last cycle is broken
+_FORCE_HARMONICS = 9  # the first is needed; the next few must not leak into it if the last cycle is incomplete
 
 
 @dataclass(frozen=True, eq=False)
 class SineRecord:
-    """A steady run as harmonic balance sees it: x = amplitude · sin theta, and the force."""
+    """A steady run for harmonic balance: x = amplitude · sin theta, and the force."""
 
     run_id: str
     condition: Condition  # with the amplitude of the first harmonic of the displacement
@@ -75,7 +74,7 @@ class SineRecord:
 
 @dataclass(frozen=True)
 class ForceReading:
-    """Force ≈ offset + amplitude · sin(theta + phase), as the closed forms want it."""
+    """Force ≈ offset + amplitude · sin(theta + phase), for the closed forms."""
 
     # amplitude, phase, offset: F0 [N], its lead phi over the displacement [rad], f0 [N]
     amplitude: float
@@ -89,9 +88,9 @@ def read_force(
     phase: PhaseReading = "harmonic",
     offset: OffsetReading = "extremes",
 ) -> ForceReading:
-    """Read F0, phi and f0 off a measured force.
+    """Calculate F0, phi and f0 of a measured force.
 
-    [Qian et al. 2024, Eq. 16] The text leaves open how; every reading is offered.
+    [Qian et al. 2024, Eq. 16] The text leaves their definition open; the options are the possible ones.
 
     Parameters
     ----------
@@ -102,7 +101,7 @@ def read_force(
     offset : {"extremes", "mean"}
         f0 is the mid-point of maximum and minimum (the paper's), or the mean over the cycles.
     """
-    # No drift: over a few cycles a line is not orthogonal to the sines and would take part of them.
+    # No drift: over a few cycles a line is not orthogonal to the sines and would absorb part of them.
     series = fit_harmonics(record.theta, record.force, _FORCE_HARMONICS, frequency=1 / (2 * np.pi), drift=False)
     top, bottom = _extremes(record)
     sizes = {
@@ -177,17 +176,17 @@ class StiffnessAndMass:
 def separate_mass(
     conditions: Sequence[Condition], in_phase: Sequence[float], with_cubic: bool = False
 ) -> StiffnessAndMass:
-    """Tell mass from stiffness by regression of k1 + 3/4 k3 X² − m omega² over several runs.
+    """Separate mass from stiffness by regression of k1 + 3/4 k3 X² − m omega² over several runs.
 
-    At one frequency x and its acceleration are one signal, so one run can not do it. Raises `IdentificationError`
-    with fewer than two frequencies, or, for k3, than two amplitudes.
+    At one frequency x and its acceleration are proportional, so one run does not determine both. Raises
+    `IdentificationError` with fewer than two frequencies, or, for k3, than two amplitudes.
 
     Parameters
     ----------
     in_phase : sequence of float
         In-phase force over displacement of each run, the hysteretic part removed [N/m].
     with_cubic : bool
-        Determine k3 too; needs two amplitudes.
+        Determine k3, too; requires two amplitudes.
     """
     omega = 2 * np.pi * np.array([c.frequency_Hz for c in conditions])
     X = np.array([c.amplitude_m for c in conditions])
@@ -204,19 +203,18 @@ def separate_mass(
 
 
 class HarmonicProjection:
-    """Takes signals at given phases to their mean and harmonics 1...H, in an orthonormal basis.
+    """Projection of signals at given phases to their mean and harmonics 1...H, in an orthonormal basis.
 
-    Measured and modelled force pass through the same projection, so neither an incomplete
-    last cycle nor the harmonics left out disturb the balance: equal signals have equal
-    projections. Squared differences there are squared differences in time of what the
-    harmonics carry. A linear drift is projected out.
+    Measured and modelled force have the same projection, so neither an incomplete last cycle nor the omitted harmonics
+    affect the balance: equal signals have equal projections. Squared differences of projections equal those in time of
+    the harmonics. A linear drift is projected out.
 
     Parameters
     ----------
     theta : (N,) array
         [rad]
     harmonics : int
-        H; lowered to what the samples resolve.
+        H; reduced to the harmonics that the samples resolve.
     """
 
     def __init__(self, theta: Floats, harmonics: int):

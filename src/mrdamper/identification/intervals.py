@@ -1,4 +1,4 @@
-"""Intervals of parameters as numbers and as text, and in words what cannot be known."""
+"""Intervals of parameters as numbers and as text, and descriptions of parameters that are not identifiable."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST_DEGREES_OF_FREEDOM, _HALVINGS = 1e6, 30  # that a quantile is looked for i
 _NODES = 80  # of Gauss and Legendre's rule
 _MAX_NEWTON_STEPS = 200  # of Newton's method
 _EXPONENT = 1e6  # from this number on, numbers are written with an exponent
-_LOPSIDED = 0.1  # of an interval's half width: shifted by less, it is written with ±
+_LOPSIDED = 0.1  # share of an interval's half width: less asymmetric, it is written with ±
 
 
 def student(level: float, dof: float) -> float:
@@ -51,7 +51,7 @@ def _student(level: float, dof: float) -> float:
     whole = 0.5 * math.sqrt(math.pi) * math.exp(math.lgamma(dof / 2) - math.lgamma((dof + 1) / 2))
     nodes, weights = gauss_legendre(_NODES)
     angle = 0.0
-    for _ in range(_MAX_NEWTON_STEPS):  # the integral is concave: Newton's steps come from below
+    for _ in range(_MAX_NEWTON_STEPS):  # the integral is concave: Newton's method converges from below
         reached = angle / 2 * float(weights @ np.cos(angle / 2 * (nodes + 1)) ** (dof - 1))
         step = (level * whole - reached) / max(math.cos(angle) ** (dof - 1), 1e-300)
         angle = min(angle + step, math.pi / 2 - 1e-12)
@@ -91,7 +91,7 @@ def relative_width(value: float, half: float, log: bool, exponent: float = 0.0) 
     return half / (_MAX_RATIO * abs(value)) if value else math.inf if half else 0.0
 
 
-_SHOWN = {"-": (1.0, ""), "m": (1e3, "mm"), "m/s": (1e3, "mm/s")}  # how a unit stands on screens
+_SHOWN = {"-": (1.0, ""), "m": (1e3, "mm"), "m/s": (1e3, "mm/s")}  # unit on screens
 
 
 def written(value: float, ends: tuple[float, float] | None, unit: str = "") -> str:
@@ -127,16 +127,16 @@ def weaknesses(
     alike: Sequence[Sequence[int]] = (),
     conditions: Sequence[Condition] = (),
 ) -> list[str]:
-    """List the parameters that cannot be determined, or only roughly, in words.
+    """List the parameters that are not, or only roughly, determined, in words.
 
     Parameters
     ----------
     covariance : (P, P) array
-        Infinite on the diagonal where nothing is known.
+        Infinite on the diagonal for parameters that are not determined.
     alike : sequence of sequences of int
-        Parameters that do the same to the force.
+        Parameters with the same effect on the force.
     conditions : sequence of Condition
-        Of the tests: what they have one of only is the likely reason.
+        Of the tests, whose single values are the probable reasons.
     """
     reason = _only_one(conditions)
     sentences = [
@@ -186,7 +186,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _only_one(conditions: Sequence[Condition]) -> str:
-    """Of what the tests had one value only, as a reason."""
+    """List quantities of which the tests have one value only, as a reason."""
     if not conditions:
         return ""
     values = {

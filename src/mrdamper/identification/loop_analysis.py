@@ -21,7 +21,7 @@ from mrdamper.statistics.metrics import dissipated_power
 
 @dataclass(frozen=True)
 class LoopAnalysis:
-    """Figures of one run's steady loops."""
+    """Values of one run's steady loops."""
 
     run_id: str
     split: str
@@ -63,7 +63,7 @@ def analyse_loop(run: Run) -> LoopAnalysis:
 
 
 def damping_share(motion: Excitation, force: Floats) -> float:
-    """Part of a force's standard deviation that opposes the velocity; negative where the loop gives energy.
+    """Part of a force's standard deviation that opposes the velocity; negative with negative dissipated energy.
 
     The sign is that of c in F = f0 + r t + k x + c v by least squares.
     """

@@ -26,7 +26,7 @@ from mrdamper.statistics.metrics import Scores
 from mrdamper.statistics.stop_reason import StopReason
 
 DELAY = "delay"  # name of the search coordinate
-DELAY_LIMIT = 3e-3  # a free delay between the channels runs away beyond this [s]
+DELAY_LIMIT = 3e-3  # largest delay between the channels [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +50,14 @@ class Problem:
         gas: GasSpring | None = None,
         with_delay: bool = False,
     ) -> Problem:
-        """Settle which parameters are free: all but the presets, the fixed ones, and what gas fixes.
+        """Determine which parameters are free: all but the presets, the fixed ones, and those of the gas spring.
 
-        Raises `UnknownNameError` if the model has no such parameter. Raises `IdentificationError` if m and k1 are
-        both to be free: on one frequency a = −ω² x, so no data can tell them apart. Raises `ParameterError` if the
-        motion would compress the gas to no volume at all.
+        Raises `UnknownNameError` if the model has no such parameter. Raises `IdentificationError` if m and k1 are both
+        to be free: at one frequency a = −ω² x, so they cannot be separated. Raises `ParameterError` if the motion would
+        compress the gas to no volume at all.
 
         `free`: presets to free as well; `fixed`: parameters to hold at a value [SI]; `gas`: a known gas spring fixes
-        k1, k2 and k3 and thereby lets the mass be determined.
+        k1, k2 and k3, so that the mass is identifiable.
         """
         infos = {info.name: info for info in model_type.parameters()}
         held = dict(fixed or {})
@@ -134,7 +134,7 @@ class Solution:
 
 
 class Method(ABC):
-    """A way to determine the free parameters. A file dropped into `methods` is found."""
+    """A method to determine the free parameters."""
 
     name: ClassVar[str]
     summary: ClassVar[str]
@@ -144,20 +144,20 @@ class Method(ABC):
         """Determine the free parameters of a problem."""
 
     def for_many_runs(self) -> Method:
-        """Return the method with the effort that is affordable where dozens of runs are identified."""
+        """Return the method with reduced effort for dozens of runs."""
         return self
 
 
 @dataclass(frozen=True)
 class RunUncertainty:
-    """Standard errors of a run's parameters and search coordinates, and what to know of them."""
+    """Standard errors of a run's parameters and search coordinates, and notes on them."""
 
-    # errors, dof: standard errors, and the degrees of freedom behind them
+    # errors, dof: standard errors, and their degrees of freedom
     errors: Mapping[str, float] = field(default_factory=dict[str, float])
     dof: Mapping[str, float] = field(default_factory=dict[str, float])
-    # independent samples that would give each error, were the residual white
+    # independent samples with the same error for a white residual
     effective: Mapping[str, float] = field(default_factory=dict[str, float])
-    doubts: tuple[str, ...] = ()  # what the samples cannot tell
+    doubts: tuple[str, ...] = ()  # parameters that the samples do not determine
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -181,7 +181,7 @@ class Identification(Displayable):
     scores : Scores
         Inside the steady window.
     floor : float or None
-        The run's cycle-to-cycle scatter as nrmse_pp: no model can do better.
+        The run's cycle-to-cycle scatter as nrmse_pp, the lower limit of the error of any model.
     start, end : mapping of str to float
         Search coordinates the refinement began and ended at.
     evaluations : int
@@ -191,11 +191,11 @@ class Identification(Displayable):
     seed : int or None
         Of the random search, where one was used.
     notes : tuple of str
-        What the reader should know before trusting a parameter.
+        Remarks on the parameters.
     residual : (N,) array
         Predicted minus measured force in the steady window [N].
     ask : callable
-        For the uncertainty, which takes longer than the search and is computed when first wanted.
+        Returns the uncertainty, which takes longer than the search and is computed on first use.
     """
 
     run_id: str
@@ -219,7 +219,7 @@ class Identification(Displayable):
 
     @cached_property
     def uncertainty(self) -> RunUncertainty:
-        """Errors, their degrees of freedom, independent samples, and what the samples cannot tell."""
+        """Errors, their degrees of freedom, independent samples, and parameters that the samples do not determine."""
         try:
             return self.ask()
         except (np.linalg.LinAlgError, ArithmeticError) as error:
@@ -230,7 +230,7 @@ class Identification(Displayable):
 
     @property
     def standard_errors(self) -> Mapping[str, float]:
-        """Of the free parameters and the search coordinates, as the residual depends on itself."""
+        """Standard errors of the free parameters and the search coordinates, for a correlated residual."""
         return self.uncertainty.errors
 
     @property
@@ -239,7 +239,7 @@ class Identification(Displayable):
         return self.uncertainty.doubts
 
     def __getstate__(self) -> dict[str, Any]:
-        """With its uncertainty known, so that no other process needs the run."""
+        """Compute the uncertainty, so that another process does not need the run."""
         return {**self.__dict__, "uncertainty": self.uncertainty, "ask": RunUncertainty}
 
     @property
@@ -250,7 +250,7 @@ class Identification(Displayable):
 
     @property
     def details(self) -> Sequence[str]:
-        """Free parameters with their 95 % intervals and units, and the independent samples these rest on."""
+        """Free parameters with their 95 % intervals and units, and the numbers of independent samples."""
         infos = {info.name: info for info in self.model.parameters()}
         lines: list[str] = []
         for name in self.free:
@@ -287,7 +287,7 @@ class Identification(Displayable):
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
-        """A row a parameter."""
+        """One row per parameter."""
         infos = self.model.parameters()
         names = [info.name for info in infos]
         intervals = [self.interval(name) for name in names]

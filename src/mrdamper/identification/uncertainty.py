@@ -16,17 +16,17 @@ from mrdamper.identification.problem import DELAY, Problem, RunUncertainty, Solu
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.statistics.linear import on_one_blas_thread
 
-_DIFFERENCE_STEP = 1e-6  # of a coordinate, for derivatives
-_NOISE_FACTOR = 4.0  # times what noise gives away to the columns of a hysteresis that is not there
-_AT_LEAST = 20.0  # independent samples that any record of a cycle has for this question
-_MIN_LAGS = 3.0  # lags of its residual below which a record says little of its own noise
+_DIFFERENCE_STEP = 1e-6  # relative step of a coordinate, for derivatives
+_NOISE_FACTOR = 4.0  # factor of the part of noise that the columns of an absent hysteresis absorb
+_AT_LEAST = 20.0  # independent samples that any record of a cycle has at least in this test
+_MIN_LAGS = 3.0  # correlation times of its residual below which a record does not determine its noise
 
 
 @on_one_blas_thread
 def uncertainty_of_run(
     problem: Problem, solution: Solution, motion: Excitation, state: Floats, residual: Floats
 ) -> RunUncertainty:
-    """Differentiate the force by each free coordinate; those at a bound have no error to state.
+    """Differentiate the force by each free coordinate; those at a bound have no error.
 
     `motion`: with the delay that was found; `state` (N,): of the solution inside the scored samples; `residual` (N,):
     predicted minus measured force there [N].
@@ -60,8 +60,8 @@ def _unseen(
 ) -> list[str]:
     """Parameters of the hysteresis where the other columns alone explain the force as well [Davies 1987].
 
-    Both fits determine every linear parameter anew: a method that computes some of them in closed form has a
-    larger residual, which says nothing about the motion.
+    Both fits determine every linear parameter again, because a method that computes some of them in closed form has a
+    larger residual, independent of the motion.
     """
     hysteretic = problem.model_type.state_column
     searched = [i.name for i in problem.model_type.parameters() if i.name in problem.free and not i.linear]
@@ -113,7 +113,7 @@ def _sensitivities(
 def _of_parameters(
     problem: Problem, point: Mapping[str, float], names: Sequence[str], covariance: Floats
 ) -> dict[str, tuple[float, list[str]]]:
-    """Variances of parameters searched in other coordinates, as beta is in the yield displacement, and in which."""
+    """Variances of parameters that are searched in other coordinates, as beta in the yield displacement, and these."""
     missing = [name for name in problem.free if name not in names]
     searched = [i for i, name in enumerate(names) if name in point and name not in problem.free]
     if not missing or not searched:

@@ -1,4 +1,4 @@
-"""Identification methods, one file each: a new file here, or a package with the entry point `mrdamper.methods`."""
+"""Identification methods, one file each, found here and in packages with the entry point `mrdamper.methods`."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def values_of_fields(cls: type, settings: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _reader(kind: Any) -> Callable[[str, str], Any] | None:
-    """Return what reads a field of a type from its name and text; None where text cannot give it."""
+    """Return the parser of a field of a type; None if the type has no text form."""
     if get_origin(kind) is Literal:
         return partial(_choice, get_args(kind))
     if kind == tuple[float, float]:

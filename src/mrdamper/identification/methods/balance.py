@@ -1,8 +1,8 @@
-"""Harmonic balance that evaluates the hysteresis too: consistent, over several harmonics.
+"""Consistent harmonic balance, which evaluates the hysteresis over several harmonics.
 
-The same model as the paper's, without its double counting: in every trial the exact steady
-loop gives the harmonics of the hysteretic force (alternating frequency and time, with a
-closed form in place of time stepping), and all harmonics up to H are matched at once.
+The same model as the paper's, without its double counting: the exact steady loop of each trial gives the harmonics of
+the hysteretic force (alternating frequency and time, with a closed form in place of time stepping), and all harmonics
+up to H are matched at once.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Balance(Method):
     name: ClassVar[str] = "balance"
     summary: ClassVar[str] = "harmonic balance over several harmonics on the exact steady loop"
 
-    harmonics: int = 15  # H, three at least. Fifteen carry all but 4e-5 of the power of a saturated loop.
+    harmonics: int = 15  # H, three at least. Fifteen contain all but 4e-5 of the power of a saturated loop.
 
     def __post_init__(self) -> None:
         if self.harmonics < _MIN_HARMONICS:
@@ -111,7 +111,7 @@ class _Balanced:
         return model, columns @ solution - right, tuple(n for n, h in zip(names, held, strict=True) if h)
 
     def _table(self, bare: Model, state: Floats) -> tuple[Floats, Floats]:
-        """`linear_table`, made once where a shape changes one column alone."""
+        """`linear_table`, computed once if a shape changes one column only."""
         infos = [i for i in self.linear if i.name == bare.state_column]
         if self._once is None or not infos:
             self._once = linear_table(bare, self.linear, self.motion, state)

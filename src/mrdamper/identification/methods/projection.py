@@ -1,9 +1,8 @@
-"""Variable projection: solve the linear parameters, search the few that shape the loop.
+"""Variable projection: solve the linear parameters, search the shape parameters.
 
-Given the internal state, the force is linear in most parameters. They are eliminated by
-least squares inside the search, so what is left is one to three well-scaled coordinates:
-a coarse grid, then Levenberg–Marquardt. Golub and Pereyra (1973), SIAM J. Numer. Anal. 10;
-Kaufman (1975), BIT 15, 49–57.
+Given the internal state, the force is linear in most parameters. They are eliminated by least squares inside the
+search, which leaves one to three well-scaled coordinates: a coarse grid, then Levenberg–Marquardt. Golub and Pereyra
+(1973), SIAM J. Numer. Anal. 10; Kaufman (1975), BIT 15, 49–57.
 """
 
 from __future__ import annotations
@@ -32,10 +31,10 @@ from mrdamper.statistics.linear import on_one_blas_thread, project_out_columns, 
 from mrdamper.statistics.scalar_least_squares import least_squares_in_one
 from mrdamper.statistics.stop_reason import StopReason
 
-_GRID_SAMPLES = 1500  # the grid only has to find the valley
+_GRID_SAMPLES = 1500  # the grid only has to find the region of the minimum
 _GRID_SAMPLES_A_CYCLE, _GRID_CYCLES = 100, 3  # where all shapes are tried at once
-_LONG_RECORD_SAMPLES = 40_000  # samples from which the search of a model that is stepped is rehearsed on a piece
-_MAX_TANGENT_STEPS = 100  # steps of a refinement by exact slopes, whose cost falls to its end
+_LONG_RECORD_SAMPLES = 40_000  # samples from which an integrated model is first searched on the last cycles
+_MAX_TANGENT_STEPS = 100  # steps of a refinement by exact derivatives, which decreases the cost to its end
 _PIECE_CYCLES, _PIECE_SAMPLES_A_CYCLE = 5, 500
 
 
@@ -47,7 +46,7 @@ class Projection(Method):
     summary: ClassVar[str] = "least squares on the force in time, linear parameters eliminated"
 
     # number of grid points from which the refinement starts
-    refine_best: int = 2  # where more than one coordinate is searched; one alone has one valley
+    refine_best: int = 2  # with more than one coordinate; one alone has one minimum
 
     @on_one_blas_thread
     def solve(self, problem: Problem) -> Solution:
@@ -111,7 +110,7 @@ def _project(problem: Problem, point: Mapping[str, float], thin: int = 1) -> Pro
 
 
 def search_axes(problem: Problem) -> tuple[SearchAxis, ...]:
-    """Coordinates that are searched, with start values read off the data."""
+    """Search coordinates, with start values from the data."""
     scale = Scale.of(problem.seen, problem.force, problem.analysis.condition.amplitude_m)
     axes = problem.model_type.search_axes(scale, problem.free)
     axes = problem.model_type.within(axes, problem.fixed)
@@ -146,7 +145,7 @@ def _refined(problem: Problem, axes: tuple[SearchAxis, ...], elimination: Elimin
 def _refined_by_tangents(
     problem: Problem, axes: tuple[SearchAxis, ...], start: Floats, lower: Floats, upper: Floats
 ) -> Minimum:
-    """Minimum of a model whose state is integrated: differences would be those of its steps, too."""
+    """Minimum of an integrated model, by exact derivatives: differences would contain those of its steps."""
     names = tuple(axis.name for axis in axes)
     picked = np.arange(len(problem.motion))[problem.scored]
     latest: dict[bytes, Projected] = {}
@@ -157,7 +156,7 @@ def _refined_by_tangents(
         return latest[u.tobytes()].residual
 
     def slopes(u: Floats) -> Floats:
-        """Slopes of the projected residual but for those along the columns [Kaufman 1975]."""
+        """Return derivatives of the projected residual without those along the columns [Kaufman 1975]."""
         at = latest.get(u.tobytes()) or _project(problem, _point(axes, u))
         tangents = force_tangents(at.model, problem.motion, names, picked)
         if tangents is None:
@@ -199,7 +198,7 @@ def _batched_costs(elimination: Elimination, points: list[dict[str, float]]) -> 
 def _few_cycles(problem: Problem) -> tuple[Path, NDArray[np.intp]]:
     """Return the last strokes of the motion, thinned, and which scored samples they hold.
 
-    The grid only has to find the valley. The reversals stay where the whole motion has them.
+    The grid only has to find the region of the minimum. The reversals are those of the whole motion.
     """
     whole, size = problem.motion.path, len(problem.motion)
     cycle = (size - 1) / float(np.ptp(problem.motion.time)) / problem.analysis.condition.frequency_Hz
@@ -219,7 +218,7 @@ def _few_cycles(problem: Problem) -> tuple[Path, NDArray[np.intp]]:
 
 
 def _last_cycles(problem: Problem) -> Problem:
-    """Reduce the problem to the thinned end of the record: a long one costs a second per force."""
+    """Reduce the problem to the thinned end of the record: a long one takes a second per force."""
     run, cycle = problem.run, 1.0 / problem.analysis.condition.frequency_Hz
     last = int(np.flatnonzero(run.in_window)[-1]) + 1
     size = max(8, math.ceil(cycle * (run.time.size - 1) / float(np.ptp(run.time))))
