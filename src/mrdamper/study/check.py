@@ -32,7 +32,7 @@ class DatasetFinding:
     severity : "refused", "set aside" or "noted"
         Refused by its own record, set aside because it contradicts other runs, or noted only.
     text : str
-        Figures, and the remedy.
+        Values, and the remedy.
     """
 
     run_id: str
@@ -69,7 +69,7 @@ class DatasetCheck(Displayable):
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
-        """A row a finding."""
+        """One row per finding."""
         return {
             name: [getattr(one, name) for one in self.findings]
             for name in ("run_id", "rig", "code", "severity", "text")
@@ -77,7 +77,7 @@ class DatasetCheck(Displayable):
 
     @property
     def details(self) -> Sequence[str]:
-        """A line a finding."""
+        """One line per finding."""
         return [str(one) for one in self.findings]
 
 
@@ -146,7 +146,7 @@ def _of_accepted_runs(
     @wraps(identify_run)
     def identify_accepted(run: Run, *args: P.args, **kwargs: P.kwargs) -> identification.Identification:
         if not is_a(run, Run):
-            return identify_run(run, *args, **kwargs)  # says what to give instead
+            return identify_run(run, *args, **kwargs)  # states the correct argument
         refusal, noted = check_run(run)
         if refusal is not None:
             raise refusal

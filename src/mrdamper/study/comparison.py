@@ -1,8 +1,8 @@
-"""Every model on the same data: accuracy, numbers, data, time; ranked by cross-validation over conditions.
+"""Comparison of models on the same data, ranked by cross-validation over conditions.
 
-A model is identified run by run, then made a damper over all conditions in its own way:
-parameter functions, the published laws over current, frequency and amplitude, or one joint
-fit. All are scored alike: on identification runs, on cross-validated conditions, on validation runs.
+A damper over all conditions follows from individual fits with parameter functions, from the published functions of
+current, frequency and amplitude, or from one global fit. All are scored on identification runs, cross-validated
+conditions and validation runs.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ class RigComparison(Displayable):
     rig : str
     dataset : Dataset
     sines : frozenset of str
-        Runs whose motion is a steady sine; held-out errors of other motions stand apart.
+        Runs whose motion is a steady sine; validation errors of other motions are separate.
     entries : tuple of Scored
     refused : mapping of name to reason
-        Recipes that could not be followed with this rig's data.
+        Recipes that this rig's data do not allow.
     not_identified : mapping of run id to reason
     """
 
@@ -62,7 +62,7 @@ class RigComparison(Displayable):
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
-        """A row a model, the smallest cross-validation error first."""
+        """One row per model, the smallest cross-validation error first."""
         return table_of(self.dataset.name, self.entries)
 
 
@@ -82,7 +82,7 @@ class Comparison(Displayable):
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
-        """A row a model of every rig."""
+        """One row per model of every rig."""
         return joined(self.rigs)
 
 
@@ -108,7 +108,7 @@ def compare(
     method : StudyMethod, optional
         Options of a published method, as the gas spring and presets of `PaperOptions`.
     jobs : int, optional
-        Processes; default one a core. Any number gives the same bits.
+        Processes; default one per core. Any number gives the same bits.
     progress : callable
 
     Raises
@@ -158,7 +158,7 @@ def _usable(rig: Dataset) -> UsableRuns:
 
 
 def _completed(chosen: Sequence[Recipe], rig: UsableRuns) -> tuple[list[Recipe], dict[str, str]]:
-    """Complete the recipes for a rig; and why some cannot be followed on its runs."""
+    """Complete the recipes for a rig, with the reasons why its runs do not allow some."""
     pure = [run for run in rig.train if analyse_motion(run).is_sine]
     recipes_of_rig, refused = list[Recipe](), dict[str, str]()
     for recipe in chosen:
@@ -196,7 +196,7 @@ def _ranked(
 
 
 def _per_run(basis: Basis | None, sines: Sequence[Run], cache: IdentificationCache) -> float:
-    """Median error of all sines, the held-out ones too, each identified for itself."""
+    """Median error of the individual fits of all sines, including the validation runs."""
     every = [cache[basis, run.id][0] for run in sines] if basis else []
     errors = [one.scores.nrmse_pp for one in every if isinstance(one, Identification)]
     return float(np.median(errors)) if errors else float("nan")

@@ -24,7 +24,7 @@ _MOTION_TOLERANCE = 0.05  # frequencies and amplitudes this close are one motion
 _FAST_VELOCITY_RATIO = 0.8  # of the largest peak velocity, from which a motion is among the fastest
 _MIN_STRETCH_CYCLES = 12  # cycles of a long record that are omitted together, at least
 _MAX_STRETCHES = 8  # stretches of a record
-NO_CURRENT = "no current"  # kind of fold that is shown and that no model is ranked by: no current lies below 0 A
+NO_CURRENT = "no current"  # kind of fold that is reported without effect on the ranking: no current lies below 0 A
 _STRETCH_NOTE = "stretch of"  # note of a stretch: the record it was cut from
 
 
@@ -53,10 +53,10 @@ def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
     Returns
     -------
     dict
-        "current": every level of sines but 0 A; "no current": all sines at 0 A, shown but not ranked by, as no current
-        lies below it; "fastest motions": those whose peak velocity is within a fifth of the largest; "session": every
-        session of several; "other records": everything that is no sine at one current. A kind is absent where it would
-        leave fewer than two levels, two motions or two sessions.
+        "current": every level of sines but 0 A; "no current": all sines at 0 A,
+        reported without effect on the ranking; "fastest motions": those whose peak velocity is within a fifth of the
+        largest; "session": every session of several; "other records": all records except sines at one current. A kind
+        is absent where it would leave fewer than two levels, two motions or two sessions.
     """
     motions = [equivalent_sine(piece) for piece in pieces]
     sines = [i for i, motion in enumerate(motions) if motion.is_sine and not pieces[i].current_changes]
@@ -120,7 +120,7 @@ def cross_validate_by_kind(
 ) -> dict[str, Validation]:
     """Score runs with dampers made without their fold, by kind of fold (`folds_by_kind`); arguments as there.
 
-    Runs of a fold without which no damper can be made are among the refused.
+    Runs of a fold without which no damper can be identified are among the refused.
     """
     scores: dict[str, Validation] = {}
     for kind, groups in folds_by_kind(pieces).items():
@@ -137,7 +137,7 @@ def cross_validate_by_kind(
 
 
 def stretches(run: Run) -> list[Run]:
-    """Return a record that is no sine, cut into stretches of a dozen cycles or more, eight at most; a sine as it is."""
+    """Divide a record that is no sine into stretches of a dozen cycles or more, eight at most; keep a sine."""
     motion = equivalent_sine(run)
     period = 1 / motion.condition.frequency_Hz
     begin, end = run.window or (float(run.time[0]), float(run.time[-1]))
@@ -155,7 +155,7 @@ def stretches(run: Run) -> list[Run]:
 
 
 def _whole_again(validation: Validation, pieces: Sequence[Run]) -> Validation:
-    """One score a record where its stretches were scored one by one."""
+    """Combine the scores of stretches to one score per record."""
     record = {piece.id: piece.notes.get(_STRETCH_NOTE, piece.id) for piece in pieces}
     scored: dict[str, list[RunScore]] = {}
     for score in validation.runs:
@@ -164,7 +164,7 @@ def _whole_again(validation: Validation, pieces: Sequence[Run]) -> Validation:
 
 
 def _joined(name: str, scores: Sequence[RunScore]) -> RunScore:
-    """Errors of stretches of about one length as those of the whole: squares add up."""
+    """Combine errors of stretches of about one length by their squares."""
     if len(scores) == 1 and scores[0].run_id == name:
         return scores[0]
 

@@ -13,13 +13,13 @@ from mrdamper.statistics.metrics import dissipated_power
 def gains_energy(damper: Damper) -> str:
     """Find a condition at which a steady loop of a damper does not dissipate.
 
-    Looked at are the lowest and the highest tested current and a fifth more, at the corners of the tested ranges of
+    Checked are the lowest and the highest tested current and a fifth more, at the corners of the tested ranges of
     frequency and amplitude and a fifth beyond these.
 
     Returns
     -------
     str
-        Where, as a sentence; empty where every loop dissipates.
+        The condition, as a sentence; empty if every loop dissipates.
     """
     tested = damper.envelope
     if not tested.tested:

@@ -8,11 +8,11 @@ from mrdamper.data import Condition
 from mrdamper.study.limits import Limits
 from mrdamper.study.proposal import Proposal
 
-_SESSIONS = 2  # so that a repeat tells how much they differ
+_SESSIONS = 2  # whose repeats show how much they differ
 
 
 def first_matrix(limits: Limits, hours: float) -> list[Proposal]:
-    """Return a first test matrix, the most telling rows first.
+    """Return a first test matrix, the most informative rows first.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def first_matrix(limits: Limits, hours: float) -> list[Proposal]:
     reserved = limits.opening + again.minutes if again else 0.0
     first = proposed(wanted[1], 1)
     if again is None or first is None or left < reserved + 2 * first.minutes:
-        again, reserved = None, 0.0  # a repeat takes time that the first rows need
+        again, reserved = None, 0.0  # a repeat takes time of the first rows
     left -= reserved
     for item in filter(None, (proposed(row, 1) for row in wanted)):
         if item.minutes <= left:

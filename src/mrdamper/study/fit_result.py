@@ -1,4 +1,4 @@
-"""A damper identified from runs, and how it is identified again from some of them."""
+"""A damper identified from runs, and its identification from some of them."""
 
 from __future__ import annotations
 

@@ -40,14 +40,14 @@ class Limits:
     minutes_between : float
         From the end of a record to the start of the next: set-up and cooling.
     session_minutes : float
-        To begin a session, another hour or day: pin the damper, zero the load cell, warm it up.
+        To begin a session: mount the damper, zero the load cell, warm up.
     sessions : int
-        At most; a plan takes as many as pay.
+        Largest number; a plan uses the best number.
 
     Raises
     ------
     InputError
-        E_LIMITS if they allow nothing, or look like another unit.
+        E_LIMITS if they allow nothing, or appear to have another unit.
     """
 
     read_by: ClassVar = "mrdamper.study.limits.Limits.read(file) or .of(damper)"
@@ -112,7 +112,7 @@ class Limits:
 
     @classmethod
     def of(cls, damper: Damper) -> Limits:
-        """Return the ranges a damper was tested over."""
+        """Return the tested ranges of a damper."""
         e = damper.envelope
         amplitudes = 1e3 * e.amplitude_m[0], 1e3 * e.amplitude_m[1]
         rate = min(cls.sample_rate_Hz, 0.5 * _MAX_SAMPLES * e.frequency_Hz[0] / cls.cycles)
@@ -120,7 +120,7 @@ class Limits:
 
     @property
     def opening(self) -> float:
-        """Minutes a session costs beside its records: one pause between records falls into setting it up."""
+        """Set-up time of a session in addition to its records, which includes one pause [min]."""
         return max(self.session_minutes - self.minutes_between, 0.0)
 
     def minutes(self, condition: Condition) -> float:

@@ -24,8 +24,8 @@ from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.processes import processes
 from mrdamper.study.recipe import IdentificationCache, Progress, Recipe, RecipeResult, fit_and_score_all
 
-_CYCLES = 2  # of a run that costly identifications see
-_PER_CYCLE = 200  # samples of a cycle they see
+_CYCLES = 2  # last cycles of a run for expensive identifications
+_PER_CYCLE = 200  # samples per cycle for these
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -33,7 +33,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Processes:
-    """The process at hand, and the pool of worker processes beside it if there is one. `several` starts the pool."""
+    """The current process and its pool of worker processes, if any. `several` starts the pool."""
 
     pool: Executor | None = None
     count: int = 1
@@ -47,8 +47,8 @@ class Processes:
     ) -> list[R]:
         """Return the results of a function of a module for every item, in order.
 
-        A process that starts has imports to do, so this one takes an item too, the last, and goes on from the
-        end with those that none has begun: the longest ought to stand first. Weights say how long each takes.
+        While worker processes import, this process computes items, too, from the last to the first, as long as no other
+        has begun them: the longest should be first. Weights are relative durations.
         """
         weight, last = list(weights or [1.0] * len(items)), len(items) - 1
         pending = [self.pool.submit(_quietly, function, item) for item in items[:-1]] if self.pool else []
@@ -115,9 +115,9 @@ def follow_each(
     *,
     leave_out: bool = True,
 ) -> list[RecipeResult | str]:
-    """Follow recipes from identifications there are already; the result of each, or why there is none.
+    """Follow recipes from existing identifications; return the result of each, or why there is none.
 
-    A step is a recipe, its identification runs and the runs held out; those that take longest ought to stand first.
+    A step is a recipe, its identification runs and the validation runs; the longest should be first.
     """
     tasks = [
         (recipe, runs, held_out, {key: cache[key] for r in runs if (b := recipe.basis) and (key := (b, r.id)) in cache})
@@ -137,7 +137,7 @@ def _follow_one(
 
 @on_one_blas_thread
 def identify_quickly(basis: Basis, run: Run) -> tuple[Identification | str, float]:
-    """One of many identifications, or why there is none, and its seconds: what is costly sees a few cycles."""
+    """One of many identifications, or why there is none, and its time; expensive ones use a few cycles."""
     begin = time.perf_counter()
     try:
         method, shortened_run = shortened_method(basis, run)
@@ -147,16 +147,16 @@ def identify_quickly(basis: Basis, run: Run) -> tuple[Identification | str, floa
 
 
 def shortened_method(basis: Basis, run: Run) -> tuple[Method, Problem]:
-    """Return the method where it is one of many, and what it sees of a run."""
+    """Return the method with reduced effort, and its part of a run."""
     method = (method_named(basis.method) if isinstance(basis.method, str) else basis.method).for_many_runs()
     if model_type(basis.model).integrated:
         method = Projection(refine_best=1)
     return method, basis.problem(shortened(run) if basis.costly else run)
 
 
-@lru_cache(maxsize=1)  # of one run after the other, for several models
+@lru_cache(maxsize=1)  # of successive runs, for several models
 def shortened(run: Run) -> Run:
-    """Return the last cycles of a run's steady window, thinned: what costly identifications see."""
+    """Return the last cycles of a run's steady window, thinned, for expensive identifications."""
     steady = run.steady()
     frequency = analyse_motion(run).condition.frequency_Hz
     begin = index_at(steady.time, steady.time[-1] - (_CYCLES + 1) / frequency)

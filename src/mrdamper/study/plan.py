@@ -1,9 +1,8 @@
 """Test planning: records within the limits of a rig that reduce the uncertainty of a damper most.
 
-Records are added one after the other, each time the one that reduces the mean variance of the force
-over the envelope most for its rig time. Each session has a gain and an offset of its own, so the
-tenth record of a session carries less information than the first of the next; but setting up a
-session takes time, and the number of sessions is optimised too.
+Records are added in sequence, each time the one that reduces the mean variance of the force over the envelope most for
+its rig time. Each session has its own gain and offset, so the tenth record of a session has less information than the
+first of the next; but a session takes set-up time, and the number of sessions is optimised, too.
 """
 
 from __future__ import annotations
@@ -28,13 +27,13 @@ from mrdamper.study.limits import Limits
 from mrdamper.study.proposal import Proposal
 from mrdamper.study.recipe import Progress
 
-_SAMPLES = 24  # of a cycle that count; model error leaves fewer independent ones than a rig records
+_SAMPLES = 24  # independent samples per cycle; model error leaves fewer than a rig records
 _DRAWS = 2  # of the parameters, beside the estimate
-_NEARER = (1.0, 0.5, 0.25, 0.125, 0.0)  # shares of a draw that are tried until the model has a force
-_MIN_ERROR_RATIO = 0.01  # of half the peak-to-peak force: what no record is better than
+_NEARER = (1.0, 0.5, 0.25, 0.125, 0.0)  # factors of a draw that are tried until the model has a force
+_MIN_ERROR_RATIO = 0.01  # of half the peak-to-peak force: smallest error of a record
 _MIN_SESSION_GAIN = 1e-4  # standard deviation of the gain between sessions, at least [-]
 _MIN_SESSION_OFFSET = 1e-3  # the same of the offset, over half the peak-to-peak force
-_PRIOR_LOG_DEVIATION = 1.0  # standard deviation of the logarithm of a number that no run could tell
+_PRIOR_LOG_DEVIATION = 1.0  # standard deviation of the logarithm of a parameter that no run determines
 _LEVEL = 0.9  # of bands
 _SEED = 20240813
 
@@ -55,11 +54,11 @@ def plan_tests(
         With its covariance.
     limits : Limits
     hours : float
-        Of rig time, sessions set up in it.
+        Rig time, including set-up of sessions.
     about : str, Condition or None
         The uncertainty to reduce: of a parameter, of the force at a condition, or over the limits.
     progress : callable
-        Told what is being done and the share done, 0...1.
+        Called with the step and the share done, 0...1.
 
     Raises
     ------
@@ -85,7 +84,7 @@ def plan_tests(
     return reckoning.proposals(reckoning.chosen(hours)), reckoning
 
 
-Sessions = list[list[int]]  # conditions played in each, by their place in the grid
+Sessions = list[list[int]]  # conditions of each session, by index in the grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +101,7 @@ class ExperimentDesign:
     grams: Floats
     session: Floats  # (2,) precision of the gain and the offset of a session not yet begun
     about: str  # the uncertainty to reduce, as text
-    beside: float  # variance of the force beside that by the numbers: an unknown session's, and the form's own
+    beside: float  # variance of the force in addition to the parameters: unknown session and model error
 
     @classmethod
     def of(
@@ -118,7 +117,7 @@ class ExperimentDesign:
         if uncertainty is None or not uncertainty.names:
             remedy = "study the tests again, or plan without a model"
             raise InputError("the model was saved without its uncertainty", remedy=remedy, code="E_CERTAINTY")
-        # What no run could tell is planned for too: anything within a factor, or what moves the force by all of it.
+        # Parameters that no run determines have a wide prior: a factor, or a change of the whole force.
         unknown = [n for n in damper.fitted_parameters if n not in uncertainty.names and n not in uncertainty.one_sided]
         names = (*uncertainty.names, *unknown)
         slopes_of_draws: list[Floats] = []
@@ -161,7 +160,7 @@ class ExperimentDesign:
         return np.array([self.limits.minutes(condition) for condition in self.conditions])
 
     def information(self, sums: Floats) -> Floats:
-        """(..., P, P) of sessions on the numbers, their own gains and offsets not being known."""
+        """(..., P, P) information of sessions on the parameters, with unknown gains and offsets."""
         size = len(self.names)
         own, cross = sums[..., size:, size:] + np.diag(self.session), sums[..., :size, size:]
         shared = cross @ np.linalg.solve(own, np.swapaxes(cross, -1, -2))
@@ -172,7 +171,7 @@ class ExperimentDesign:
         return np.trace(np.linalg.solve(precision, np.broadcast_to(self.goal, precision.shape)), axis1=-2, axis2=-1)
 
     def precision(self, played: Sessions) -> Floats:
-        """(P, P) of the numbers after some records."""
+        """(P, P) precision of the parameters after some records."""
         return self.prior + sum(self.information(self.grams[rows].sum(axis=0)) for rows in played if rows)
 
     def spread(self, played: Sessions) -> float:
@@ -193,7 +192,7 @@ class ExperimentDesign:
         left = 60 * hours - sessions * self.limits.opening
         while True:
             at = min(range(sessions), key=lambda s: self.minutes[played[s]].sum())
-            # Sessions still empty keep what their shortest record takes.
+            # Empty sessions reserve the time of their shortest record.
             free = left - self.minutes.min() * sum(not rows for i, rows in enumerate(played) if i != at)
             options = np.flatnonzero(self.minutes <= free * (1 + 1e-12))
             if not options.size:
@@ -207,7 +206,7 @@ class ExperimentDesign:
             information[at], left = then[best], left - self.minutes[options[best]]
 
     def _exchanged(self, played: Sessions) -> Sessions:
-        """Exchange each record for the one that lowers the variance most in its place and takes no longer."""
+        """Exchange each record for the one that lowers the variance most and takes no longer."""
         for rows in played:
             others = self.precision([other for other in played if other is not rows])
             for k, now in enumerate(rows):
@@ -253,7 +252,7 @@ class ExperimentDesign:
 def _slopes(damper: Damper, uncertainty: Uncertainty, names: Sequence[str], condition: Condition) -> Floats:
     """(D, K, P + 2) derivatives over half the peak-to-peak force: by the parameters, by a gain, by an offset [N].
 
-    A draw at which the model has no force (a rate of the current far beyond its estimate) is taken nearer to the
+    A draw at which the model has no force (a rate of the current far beyond its estimate) is moved nearer to the
     estimate.
     """
     rng = np.random.default_rng(_SEED)

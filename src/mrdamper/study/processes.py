@@ -1,4 +1,4 @@
-"""Worker processes that end with the one that started them, however that ends."""
+"""Worker processes that end with their parent, however it ends."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from mrdamper.errors import ResourceError
 
 @contextmanager
 def processes(count: int) -> Generator[ProcessPoolExecutor]:
-    """Yield a pool of processes; an exception in the block ends them at once, the death of this process too.
+    """Yield a pool of processes; an exception in the block, and the end of this process, end them at once.
 
     Raises
     ------
     ResourceError
-        E_WORKER if a process was ended from outside, as systems do that run short of memory.
+        E_WORKER if a process was ended from outside, as by a system short of memory.
     """
     pool = ProcessPoolExecutor(count, SPAWNED, initializer=_begin)
     try:
@@ -47,8 +47,8 @@ def processes(count: int) -> Generator[ProcessPoolExecutor]:
 class _Process(SpawnProcess):
     """Spawned, not forked: a fork of a process whose libraries run threads can hang.
 
-    A spawned process imports the script that was started, and a script without a guard would begin its work again
-    in each. All that is sent to these stands in modules of their own, so no script is told to them.
+    A spawned process imports the main script, and a script without a guard would run again in each. Functions for the
+    processes are in modules, so the main script is hidden from them.
     """
 
     _lock = threading.Lock()

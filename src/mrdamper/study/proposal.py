@@ -1,4 +1,4 @@
-"""Records proposed to a rig: what to play, in which session, and why."""
+"""Proposed records: motion, session and reason."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mrdamper.study.limits import Limits
 
 @dataclass(frozen=True)
 class Proposal:
-    """A record to play.
+    """A proposed record.
 
     Attributes
     ----------
@@ -23,11 +23,10 @@ class Proposal:
         From 1.
     condition : Condition
     minutes : float
-        Of rig time, setting the session up not counted.
+        Rig time without the set-up of the session.
     reason : str
     before, after : float
-        The doubt that is to shrink, without this record and with it, those before it being played; NaN
-        without a model.
+        The uncertainty to reduce, without and with this record, after those before it; NaN without a model.
     """
 
     session: int
@@ -38,7 +37,7 @@ class Proposal:
     after: float = math.nan
 
     def record(self, limits: Limits, damper: Damper | None) -> tuple[Excitation, Floats]:
-        """Return the motion to play, eased in and out over a cycle, and the expected force [N] for the load cell."""
+        """Return the motion to play, with smooth ends of a cycle, and the expected force [N] for the load cell."""
         condition = self.condition
         per_cycle = max(20, round(limits.sample_rate_Hz / condition.frequency_Hz))
         motion = sine(condition, math.ceil(limits.cycles) + 2, per_cycle)
@@ -49,7 +48,7 @@ class Proposal:
         eased = replace(motion, displacement=displacement, velocity=velocity, acceleration=acceleration)
         if damper is not None:
             return eased, damper.force_along(eased, condition)
-        share = 0.2 + 0.8 * condition.current_A / max(limits.current_A[1], 1e-9)  # of the rated force; a guess
+        share = 0.2 + 0.8 * condition.current_A / max(limits.current_A[1], 1e-9)  # of the rated force; an assumption
         return eased, limits.force_N * share * np.tanh(velocity / (0.05 * condition.peak_velocity))
 
 
@@ -70,7 +69,7 @@ class PlanRow:
 
     @classmethod
     def of(cls, order: int, item: Proposal, file: str) -> PlanRow:
-        """Take the row of a record whose motion stands in a file."""
+        """Take the row of a record whose motion is in a file."""
         c, (before, after) = item.condition, (None if math.isnan(b) else b for b in (item.before, item.after))
         return cls(
             order, item.session, file, c.current_A, float(f"{c.frequency_Hz:.6g}"),

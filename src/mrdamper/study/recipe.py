@@ -1,8 +1,8 @@
 """Recipes: procedures from the runs of one rig to a damper, and the scores of that damper.
 
-A recipe says what is identified from single runs and how one damper over all conditions is
-made of it. A study, a comparison, the reproduction of the paper and the app take their
-recipes from here, so that one name means one way and every way is scored alike.
+A recipe states the individual fits and the procedure from these to one damper over all conditions. A study, a
+comparison, the reproduction of the paper and the app use these recipes, so that one name has one meaning and all are
+scored in the same way.
 """
 
 from __future__ import annotations
@@ -45,34 +45,34 @@ IdentificationCache = dict[tuple[Basis, str], tuple[Identification | str, float]
 
 @dataclass(frozen=True)
 class Recipe:
-    """A way from runs of one rig to a damper over all conditions."""
+    """Procedure from runs of one rig to a damper over all conditions."""
 
-    name: str  # model, and way where there are several: "bouc-wen:joint"
+    name: str  # model, and procedure if there are several: "bouc-wen:joint"
     basis: Basis | None  # identification of single runs, if any
     # makes the damper from runs and their identifications
     make: Callable[[Sequence[Run], Sequence[Identification]], FitResult] = field(compare=False)
     way: str = ""  # in words: "individual fits", "global fit"
     title: str = ""  # label of the method in a reproduction; `RecipeResult.title` stands in tables
     source: str = ""  # where it was published
-    limits: str = ""  # what it cannot do
-    pure: bool = False  # identified from pure sines only; scored on every run all the same
+    limits: str = ""  # limitations
+    pure: bool = False  # identified from pure sines only, and scored on every run
     on_request: bool = False  # takes most of the time of a comparison
-    notes: tuple[str, ...] = ()  # for the reader of the result
+    notes: tuple[str, ...] = ()  # note on the result
     complete: Callable[[Sequence[Run]], Recipe] | None = field(default=None, compare=False)  # from the runs of a rig
 
     def for_runs(self, sines: Sequence[Run]) -> Recipe:
-        """Return the recipe for a rig, of which the pure sines of identification are given.
+        """Return the recipe for a rig from its pure sines for identification.
 
         Raises
         ------
         InputError
-            If it cannot be followed on these runs.
+            If these runs do not allow it.
         """
         return self if self.complete is None else self.complete(sines)
 
     @property
     def model(self) -> str:
-        """Name of the model behind it."""
+        """Name of its model."""
         return self.name.partition(":")[0]
 
 
@@ -83,9 +83,9 @@ class RecipeResult:
     recipe: Recipe
     damper: Damper
     fit: ModifiedFit | JointFit | None
-    # of the identification runs; empty where nothing is identified from single runs
+    # individual fits of the identification runs; empty if there are none
     identifications: tuple[Identification, ...]
-    per_run: float  # median nrmse_pp of runs identified for themselves: what one run allows; NaN without
+    per_run: float  # median nrmse_pp of individual fits; NaN without
     # train, cross_validated and validation: identification runs; the same cross-validated by condition; validation runs
     train: Validation
     cross_validated: Validation
@@ -93,12 +93,12 @@ class RecipeResult:
     seconds: float  # spent on identification and the fit over conditions
     # train runs predicted without their fold, by kind of fold (`cross_validation.folds_by_kind`)
     by_kind: Mapping[str, Validation] = field(default_factory=dict[str, Validation])
-    # lowest and highest value of a parameter that holds everywhere, over leave-one-condition-out fits
+    # lowest and highest value of a constant parameter over leave-one-condition-out fits
     spread: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
 
     @property
     def title(self) -> str:
-        """Damper and way, for tables."""
+        """Damper and procedure, for tables."""
         return f"{self.damper.title}, {self.recipe.way}" if self.recipe.way else self.damper.title
 
     @property
@@ -108,7 +108,7 @@ class RecipeResult:
 
     @property
     def conditions_needed(self) -> int:
-        """As many conditions as the longest function has numbers; one fit of all needs currents, not conditions."""
+        """Number of conditions for the coefficients of the longest function; a global fit needs currents instead."""
         if not isinstance(self.fit, ModifiedFit):
             return 3
         return max(len(f.function.coefficients) + len(f.function.rates) for f in self.fit.functions.values())
@@ -124,13 +124,13 @@ def fit_and_score(
     leave_out: bool = True,
     kinds: bool = False,
 ) -> RecipeResult:
-    """Make a recipe's damper and score it.
+    """Identify a recipe's damper and score it.
 
     Parameters
     ----------
     recipe : Recipe
     train : sequence of Run, length N
-        Of one rig; the damper is made of these.
+        Of one rig; the damper is identified from these.
     identifications : sequence of Identification
         Of identification runs, as `identified` gives them for the recipe's basis.
     held_out : sequence of Run
@@ -177,7 +177,7 @@ def fit_and_score(
 
 
 def _spread(dampers: Sequence[Damper]) -> dict[str, tuple[float, float]]:
-    """Lowest and highest of every number of the one model that some dampers are."""
+    """Lowest and highest value of every parameter of dampers with one model."""
     values = [model.values() for damper in dampers if (model := damper.one_model) is not None]
     return {name: (min(v[name] for v in values), max(v[name] for v in values)) for name in (values or [{}])[0]}
 
@@ -191,7 +191,7 @@ def fit_and_score_all(
     kinds: bool = False,
     cache: IdentificationCache | None = None,
 ) -> tuple[list[RecipeResult], dict[str, str]]:
-    """Follow several recipes on one rig; what more than one of them starts from is identified once.
+    """Follow several recipes on one rig; individual fits that they share are made once.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def fit_and_score_all(
     leave_out, kinds : bool
         As `fit_and_score` takes them.
     cache : mapping, optional
-        Identifications there are already, by basis and run id; added to.
+        Existing identifications by basis and run id, to which new ones are added.
 
     Returns
     -------
@@ -233,12 +233,12 @@ def fit_and_score_all(
 def identified(
     basis: Basis | None, runs: Sequence[Run], cache: IdentificationCache, progress: Progress = lambda what, share: None
 ) -> tuple[list[Identification], float]:
-    """Identifications of runs, made where they are not found yet, and the seconds they took.
+    """Identifications of runs, made if missing, and their time [s].
 
     Raises
     ------
     IdentificationError
-        If a run was found to allow none.
+        If a run allows none.
     """
     if basis is None:
         return [], 0.0
@@ -258,7 +258,7 @@ def identified(
 
 
 def fit_per_run(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
-    """Parameter functions through the values identified from single runs."""
+    """Parameter functions fitted to individual fits."""
     about = _about(runs, identifications, "individual fits")
     fit = fit_modified(identifications, provenance=about)
     return FitResult(fit.damper, lambda rows: fit_modified([identifications[i] for i in rows]).damper, fit)
@@ -285,7 +285,7 @@ def fit_whole_damper(model: str, runs: Sequence[Run], identifications: Sequence[
 
 
 def fit_published(cls: Published, runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
-    """Return the laws of a published damper, started from single runs and refined on all."""
+    """Return the functions of a published damper, from individual fits and refined on all runs."""
     about = {"identification runs": str(len(runs))}
 
     def refit(rows: Sequence[int]) -> Damper:
@@ -295,7 +295,7 @@ def fit_published(cls: Published, runs: Sequence[Run], identifications: Sequence
 
 
 def modified(name: str, method: str = "projection") -> Recipe:
-    """Return a model identified run by run, then functions through its parameters."""
+    """Return a model with parameter functions fitted to individual fits."""
     cls = model_type(name)
     stepped = "stepped, not closed; " if cls.integrated else ""
     plain = method == "projection"
@@ -322,7 +322,7 @@ def current_only(name: str) -> Recipe:
 
 
 def whole_damper(name: str) -> Recipe:
-    """Return a model whose one set of parameters holds for every condition."""
+    """Return a model with one set of parameters for every condition."""
     cls, limits = model_type(name), "takes any motion and a current that varies"
     return Recipe(name, None, partial(fit_whole_damper, name), "global fit", cls.title, cls.source, limits)
 
@@ -339,7 +339,7 @@ class StudyMethod(ABC):
     Attributes
     ----------
     name : str
-        What `study --model` calls it.
+        Name for `study --model`.
     """
 
     name: ClassVar[str]
@@ -351,15 +351,15 @@ class StudyMethod(ABC):
         Raises
         ------
         InputError
-            If the method cannot be followed on these runs.
+            If these runs do not allow the method.
         """
 
     def beside_others(self) -> StudyMethod:
-        """Return the method with the effort that is affordable beside other recipes."""
+        """Return the method with reduced effort for a comparison."""
         return self
 
     def compared(self) -> Sequence[Recipe]:
-        """Recipes that a comparison of models offers besides."""
+        """Further recipes for a comparison of models."""
         return ()
 
 
@@ -389,7 +389,7 @@ def study_method(name: str, settings: Mapping[str, str] | None = None, gas: GasS
 
 
 def catalogue(method: StudyMethod | None = None) -> Mapping[str, Recipe]:
-    """Every recipe that can be compared, by name; models and dampers dropped in are found.
+    """Every recipe that can be compared, by name, including those of added models and dampers.
 
     Parameters
     ----------
@@ -411,7 +411,7 @@ def recipes(names: Sequence[str] = (), genetic: bool = False, method: StudyMetho
     ----------
     names : sequence of str
     genetic : bool
-        Of all, also those that identify by a genetic algorithm, which take most of the time.
+        Include those by genetic algorithms, which take most of the time.
     method : StudyMethod, optional
         A published method with options, in place of its own defaults.
 

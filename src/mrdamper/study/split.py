@@ -12,11 +12,11 @@ from mrdamper.physics.motion import equivalent_sine
 
 SHARE = 0.2  # of the conditions, by default
 _MIN_CONDITIONS = 2  # conditions to identify from
-_CURRENT_TOLERANCE_A, _CURRENT_TOLERANCE = 0.02, 0.05  # of a current named: [A], and of it
+_CURRENT_TOLERANCE_A, _CURRENT_TOLERANCE = 0.02, 0.05  # tolerance of a given current: [A], and relative
 
 
 class SplitError(InputError):
-    """A split that cannot be made, or that leaves nothing to identify from."""
+    """A split that is not possible, or that leaves no identification runs."""
 
     code = "E_SPLIT"
 
@@ -45,8 +45,8 @@ def hold_out(
     Raises
     ------
     SplitError
-        E_SPLIT if nothing is there to be held out, nothing is left to identify from, or the
-        dataset has a split already that is not to be given up.
+        E_SPLIT if there are no runs to select, no identification runs would remain, or the dataset has a split that is
+        not to be replaced.
     UnknownNameError
         If a run is not there.
     ConditionError

@@ -14,15 +14,15 @@ from mrdamper.physics.motion import analyse_motion, equivalent_sine
 from mrdamper.rig_files.quality import check_run, with_findings
 from mrdamper.study.contradictions import Contradiction, find_contradictions
 
-_MIN_SAMPLES_PER_CYCLE = 8  # below, neither the velocity nor a loop can be told
+_MIN_SAMPLES_PER_CYCLE = 8  # below, velocity and loop are not determined
 _MAX_DISTORTION = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
-_DUPLICATE_TOLERANCE = 1e-4  # of the range: two tests never agree so well, a file written twice does
-_MIN_RUNS = 4  # runs that say what is usual
+_DUPLICATE_TOLERANCE = 1e-4  # share of the range within which two runs are copies
+_MIN_RUNS = 4  # runs from which a usual value is known
 
 
 @dataclass(frozen=True)
 class _Quantity:
-    """A size of runs, and the units that explain one far from the others' (empty: none does)."""
+    """A size of runs, and the units that explain an outlier (empty: none)."""
 
     name: str
     unit: str
@@ -47,14 +47,14 @@ class UsableRuns:
     contradictions: tuple[Contradiction, ...]
     sines: Sequence[Run]  # steady, at one current
     train: Sequence[Run]  # of the sines, those to identify from
-    everything: Sequence[Run]  # to identify a whole damper from: any motion and current
+    everything: Sequence[Run]  # for a global fit: any motion and current
     held_out: Sequence[Run]
     unusable: Mapping[str, str]  # by run, why nothing is identified from it
     not_identified: Mapping[str, str]  # by run, why it is not identified by itself
 
     @classmethod
     def of(cls, dataset: Dataset, keep: Collection[str] = ()) -> UsableRuns:
-        """Sort the runs of a rig; `keep` names some that may contradict the others."""
+        """Classify the runs of a rig; `keep` names some that may contradict the others."""
         dataset, contradictions = without_contradictions(dataset, keep)
         sines, refused = usable_sines(dataset)
         accepted, reasons = accepted_runs(dataset)
@@ -116,7 +116,7 @@ def _are_one_test(run: Run, other: Run) -> bool:
 
 
 def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
-    """Return runs whose force, stroke or current is so far from all others' that its unit must be another."""
+    """Return runs whose force, stroke or current differs so much from the others that its unit must be wrong."""
     reasons: dict[str, str] = {}
     for quantity in _QUANTITIES:
         sizes = {run.id: quantity.size_of(run) for run in runs}
@@ -177,5 +177,5 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
 
 
 def _reason(error: InputError, run: Run) -> str:
-    """State an error of a run whose name stands beside it: runs of one reason are listed together."""
+    """State an error of a run without its name: runs with one reason are listed together."""
     return str(error).removeprefix(f"run {run.id}: ")

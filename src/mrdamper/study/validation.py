@@ -17,8 +17,8 @@ from mrdamper.data import Condition, Displayable, Floats, Run
 from mrdamper.errors import InputError, RunError, UnknownNameError, require, validate_arguments
 from mrdamper.statistics.metrics import Scores, dissipated_power, score
 
-SCORES = ("nrmse_pp", "nrmse_std", "wape", "energy_error", "peak_error")  # that tables show of a run
-_MIN_SWING_N = 1e-100  # of a force, and its inverse the most [N]: their squares are numbers
+SCORES = ("nrmse_pp", "nrmse_std", "wape", "energy_error", "peak_error")  # columns of a run in tables
+_MIN_SWING_N = 1e-100  # smallest force, and its inverse the largest [N], whose squares are finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,21 +30,20 @@ class RunScore:
     run_id : str
     rig : str
     condition : Condition
-        That the run's measured motion amounts to.
+        Of the sine that is equivalent to the measured motion.
     scores : Scores
     floor : float or None
         Cycle-to-cycle scatter of the run as nrmse_pp.
     extrapolation : tuple of str
         Quantities outside the envelope of the tests the damper was identified from.
     rest : float or None
-        RMS error while the motion stands still, anywhere in the record, over the peak-to-peak
-        force; None where it never does.
+        RMS error at rest, anywhere in the record, over the peak-to-peak force; None without rest.
     session : str
         "unknown": predicted as it is; "known": corrected by other runs of its session.
     reading : GainOffset or None
-        Gain and offset that would have fitted the run best; no score is corrected by them.
+        Gain and offset of the best fit to the run; no score is corrected by them.
     predicted : PredictedRun or None
-        Samples of the uncorrected prediction beside the measured ones.
+        Samples of the uncorrected prediction and the measured ones.
     """
 
     run_id: str
@@ -84,7 +83,7 @@ class Validation(Displayable):
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
-        """A row a run."""
+        """One row per run."""
         return {
             "run_id": [run.run_id for run in self.runs],
             **{name: [float(getattr(run.scores, name)) for run in self.runs] for name in SCORES},
@@ -107,7 +106,7 @@ class Validation(Displayable):
 
     @validate_arguments()
     def worst_error(self, name: str = "nrmse_pp") -> float:
-        """Its magnitude in that run; NaN without runs."""
+        """Largest magnitude of a score; NaN without runs."""
         return max(self._magnitudes(name), default=float("nan"))
 
     def _magnitudes(self, name: str) -> list[float]:
@@ -128,8 +127,7 @@ def validate(
 ) -> Validation:
     """Predict runs from their measured motion and score them inside their steady windows.
 
-    A run that cannot be predicted, for want of motion say, does not stop the others: it is among
-    the `refused`, with the reason.
+    A run that cannot be predicted, for example without motion, is listed among the `refused` with the reason.
 
     Parameters
     ----------
@@ -138,7 +136,7 @@ def validate(
     title : str, optional
         Default: the damper's.
     sessions : Sessions, optional
-        What is known of the runs' sessions (`sessions_known`); by default nothing is, and nothing is corrected.
+        Known sessions of the runs (`sessions_known`); by default none, and no correction.
 
     Raises
     ------
@@ -173,7 +171,7 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> Run
     Raises
     ------
     InputError
-        If the run does not move, or its force does not change, or not as a force does.
+        If the run does not move, or its force is constant or not that of a damper.
     """
     swing = float(np.ptp(run.force[run.in_window]))
     if not _MIN_SWING_N < swing < 1 / _MIN_SWING_N:
@@ -213,7 +211,7 @@ def peak_band(
 ) -> dict[str, float]:
     """Half the peak-to-peak force [N] and the energy of a cycle [J] in a run's steady window, and their bands.
 
-    The ends are missing where the damper does not know how sure it is.
+    The ends are missing for dampers without uncertainty.
     """
     prediction, inside = damper.predict(run), run.in_window
     if expected is None:
@@ -244,7 +242,7 @@ def leave_out(
     folds : iterable of sequence of int
         Indices of the runs omitted together.
     fit : callable
-        Makes a damper from the runs at the given indices.
+        Identifies a damper from the runs at the given indices.
     title : str
     """
     scored: dict[int, RunScore] = {}
@@ -260,13 +258,12 @@ def leave_out(
 class SessionDrift:
     """Part of the error that a gain and an offset fitted to each run would explain.
 
-    Estimated to be stated, never to correct a score.
+    Estimated for the report; scores are not corrected.
     """
 
     gain: float  # standard deviation of the gains between runs
     offset: float  # standard deviation of the offsets [N]
-    # median nrmse_pp that would be left. No floor of every model: gains and offsets also take in this model's own
-    # misfit
+    # remaining median nrmse_pp; no lower limit for other models: gains and offsets absorb model error, too
     floor: float
 
 

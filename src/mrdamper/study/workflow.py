@@ -1,7 +1,6 @@
 """The complete procedure: identify every run, fit parameter functions or one global model, validate.
 
-`run_study` reads like the methods section of a paper; everything it returns is a result
-object that plots, reports and files take from there.
+`run_study` returns result objects, which plots, reports and files use.
 """
 
 from __future__ import annotations
@@ -51,12 +50,12 @@ from mrdamper.study.usable_runs import UsableRuns
 from mrdamper.study.validation import RunScore, Validation, validate
 
 CONDITION = "condition"  # kind of fold: the runs of one condition, a stretch of another record
-AWAY = ("current", "fastest motions")  # kinds that tell how errors grow away from the tests
-STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the one everybody compares with
+AWAY = ("current", "fastest motions")  # kinds that determine the growth of errors away from the tests
+STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the usual reference
 
 
 def headline_of(rig: str, result: RecipeResult) -> str:
-    """Return rig, model and its errors in a line."""
+    """Return rig, model and its errors in one line."""
     kinds = {"cross-validation": result.cross_validated, "validation": result.validation}
     errors = ", ".join(f"{kind} {100 * s.median():.2f} %" if s.runs else f"no {kind} runs" for kind, s in kinds.items())
     return f"{f'rig {rig}: ' if rig else ''}{result.title}, {errors} (median nrmse_pp)"
@@ -90,10 +89,10 @@ class RigStudy(Displayable):
     refused : mapping of recipe name to the reason
         Recipes whose damper could not be determined from this rig's data, or whose loops gain energy somewhere.
     asked_for : bool
-        The user named the model; the evidence did not choose it.
+        The model was requested by the user, not selected.
     session_known : float or str
-        Median nrmse_pp of omitted conditions corrected by the other runs of their session, beside
-        the scores, which are of sessions nobody has seen; or why there is none.
+        Median nrmse_pp of omitted conditions, corrected by the other runs of their session (scores are for unknown
+        sessions); or why there is none.
     contradictions : tuple of Contradiction
         Runs that were set aside because they contradict the others; `dataset` is without them.
     """
@@ -122,7 +121,7 @@ class RigStudy(Displayable):
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
-        """A row a candidate, the chosen one first."""
+        """One row per candidate, the selected one first."""
         return table_of(self.dataset.name, self.candidates)
 
     @property

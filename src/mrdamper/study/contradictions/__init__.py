@@ -1,7 +1,7 @@
 """Runs of a rig that contradict the others, each with the explanation that fits best.
 
-The runs of a damper are compared with each other before any model is chosen. Where one explanation of a run
-(a unit, an offset, another current, another damper, a copy) is far better than none, the run is set aside.
+The runs of a damper are compared with each other before a model is selected. Where one explanation of a run (a unit, an
+offset, another current, another damper, a copy) is far better than none, the run is set aside.
 """
 
 from mrdamper.study.contradictions.findings import Contradiction

@@ -1,4 +1,4 @@
-"""Runs that are copies of others: with noise added, cropped, moved in time, decimated, or under another name.
+"""Runs that are copies of others: with added noise, cropped, shifted in time, decimated, or under another name.
 
 Two tests never share their noise. The highest frequencies of the force, where a sampled test holds
 noise alone, are correlated between two runs over all shifts in time; a copy has one sharp peak.
@@ -25,7 +25,7 @@ _MIN_EXCESS_CORRELATION = (
 )
 _SIGNIFICANCE = 9.0  # standard deviations of a correlation by chance
 _MAX_RATE_RATIO = 10  # ratio of two sample rates
-_PHASES = 8  # parts of a sample by which a run is moved before it is compared at another sample rate
+_PHASES = 8  # fractions of a sample by which a run is shifted before the comparison at another sample rate
 _RATIO_TOLERANCE = 0.01  # relative deviation of that ratio from a whole number
 
 
@@ -111,7 +111,7 @@ def _correlation(a: Floats, b: Floats) -> float | None:
 
 
 def _largest_own(noise: Floats) -> float:
-    """Largest correlation of a run's noise with itself at another time: what repeats in every cycle."""
+    """Largest correlation of a run's noise with itself at another time: noise that repeats in every cycle."""
     size = 2 ** int(np.ceil(np.log2(2 * noise.size)))
     own = np.fft.irfft(np.abs(np.fft.rfft(noise, size)) ** 2, size)[: noise.size // 2]
     if own[0] <= 0:
@@ -121,7 +121,7 @@ def _largest_own(noise: Floats) -> float:
 
 
 def _noise(force: Floats) -> Floats:
-    """Return the highest frequencies of a force, without what stands out of them."""
+    """Return the highest frequencies of a force, without dominant lines."""
     part = force[:_MAX_SAMPLES]
     if part.size < _MIN_OVERLAP:
         return np.zeros(0)

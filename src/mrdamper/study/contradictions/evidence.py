@@ -92,7 +92,7 @@ class RowProducts:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Weighted products of the rows of a run, all that its probability needs."""
+    """Weighted products of the rows of a run, for its probability."""
 
     gram: Floats  # (E, E), or (P, P) where the current changes
     moment: Floats  # (E,) or (P,)
@@ -238,7 +238,7 @@ class Evidence:
     def log_evidence(self, members: Sequence[Moments]) -> float:
         """Logarithm of the evidence that runs follow one model."""
         gram, moment = self._scaled(members)
-        # The last row of the factor is what the others solve for: no eigenvalue of the products is below one.
+        # The last row of the factor is the solution for the others: no eigenvalue of the products is below one.
         bordered = np.zeros((len(moment) + 1, len(moment) + 1))
         bordered[:-1, :-1], bordered[-1, :-1], bordered[-1, -1] = gram, moment, 1 + moment @ moment
         factor = np.linalg.cholesky(bordered)

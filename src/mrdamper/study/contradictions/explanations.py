@@ -1,4 +1,4 @@
-"""Explanations of a run that contradicts the others: what is changed, and how probable the run is afterwards."""
+"""Explanations of a run that contradicts the others: the change, and the probability of the run after it."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ _TRIED_CURRENTS = 31  # currents that are tried
 
 # Logarithms of prior odds against an explanation: one that names a unit, a tested level or a tested motion is simpler.
 _UNIT_ODDS, _LEVEL_ODDS, _FREE_ODDS, _SIGN_ODDS, _ODD_MOTION_ODDS, _ALONE_ODDS = 4.0, 4.0, 7.0, 4.0, 16.0, 10.0
-_TESTED_MOTION_ODDS = 5.0  # what a motion of other runs lowers them by, and losing such a motion raises them by
-_LOST_MOTION_ODDS = 30.0  # what leaving the motion of other runs for one that none has raises those of no unit by
-EMPTY_CELL_ODDS = 6.0  # what an empty cell of the matrix of tests that is filled lowers them by, down to its inverse
+_TESTED_MOTION_ODDS = 5.0  # decrease for a motion of other runs, and increase for losing such a motion
+_LOST_MOTION_ODDS = 30.0  # increase, without a unit, for a motion that no other run has instead of one that they have
+EMPTY_CELL_ODDS = 6.0  # decrease for a filled empty cell of the matrix of tests, down to its inverse
 MAX_IRREGULARITY = 0.5  # repeated and missing tests of a matrix that is nearly complete, over its tests
-_EDGE_ODDS = 14.0  # what the only run at the lowest or highest current raises those of a factor or another current by
+_EDGE_ODDS = 14.0  # increase of a factor or another current for the only run at the lowest or highest current
 _USUAL_STEP = 3.0  # the same of the time between two samples
 _SAME_STEP = 0.01  # relative difference of times between samples that are one
 
-# Sizes below which an explanation is no contradiction but what sessions and tests differ by.
+# Sizes below which an explanation is within the differences between sessions and tests.
 MIN_FACTOR = 1.25  # of a force or a displacement
 MIN_OFFSET = 0.2  # of the median half range of the force
 MIN_CURRENT_EFFECT = 0.12  # RMS change of the force over the run's half range
@@ -46,7 +46,7 @@ MAX_SESSION_GAIN = 1.12  # gain of a session against the others
 class Trial:
     """A change of a run that may explain it."""
 
-    # "force", "offset", "current", "displacement", "time", "sign", or "damper" for a run no change explains
+    # "force", "offset", "current", "displacement", "time", "sign", or "damper" for a run without an explanation
     cause: Cause
     value: float  # factor that corrects the force, the displacement or the time; force to add [N]; current [A]
     unit: str  # unit the channel is in, where the factor is that of a unit
@@ -63,7 +63,7 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """Change of a run's data that would make it agree with the others."""
+    """Change of a run's data with which it agrees with the others."""
 
     trial: Trial
     gain: float  # logarithm of the odds of the explanation against no explanation
@@ -105,7 +105,7 @@ class ExplanationCandidate:
         Parameters
         ----------
         others : Posterior
-            What the other runs determine.
+            Coefficients by the other runs.
         like : sequence of Trial
             Look only at explanations like one of these, if there are any.
         """
@@ -119,7 +119,7 @@ class ExplanationCandidate:
         return sorted(candidates, key=lambda e: -e.gain)
 
     def alone(self, others: Posterior) -> Explanation:
-        """Return the last resort: the run is of another damper."""
+        """Return the explanation without a change: the run is of another damper."""
         prior = self.evidence.prior
         own = others.weigh([self.own])
         gain = prior.log_probabilities(own)[0] - _ALONE_ODDS - others.log_probabilities(own)[0]

@@ -49,7 +49,7 @@ class Contradiction:
 
 
 def describe(run: Run, explanation: Explanation, others: int) -> Contradiction:
-    """Say in words what explains a run.
+    """Describe the explanation of a run.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def describe(run: Run, explanation: Explanation, others: int) -> Contradiction:
 
 
 def describe_copy(copy: Copy, validation: bool) -> Contradiction:
-    """Say in words that a run is a copy."""
+    """Describe a copy of a run."""
     text = f"a copy of run {copy.original}: their forces share the noise (correlation {copy.correlation:.2f})"
     remedy = "a test counts once" + (", and validation needs tests of its own" if validation else "")
     return Contradiction(copy.run_id, "copy", copy.correlation, float("inf"), text, f"{remedy}: delete the file")
@@ -93,7 +93,7 @@ def _displacement(run: Run, e: Trial) -> tuple[str, str]:
 
 
 def _misread(run: Run, channel: str, usual: str, e: Trial) -> tuple[str, str]:
-    """Say that a channel was in the usual unit and read in another, or the other way round."""
+    """Describe a channel in the usual unit that was read in another, or the reverse."""
     true, read = (usual, e.unit[4:]) if e.unit.startswith("not ") else (e.unit, usual)
     text = f"its {channel} is {1 / e.value:.3g} times what the others show, as if {true} had been read as {read}"
     return text, _corrected(run, channel, e.value, true, read=read)
@@ -124,7 +124,7 @@ def _current(run: Run, e: Trial) -> tuple[str, str]:
 
 def _time(run: Run, e: Trial) -> tuple[str, str]:
     remedy = _corrected(run, "time", e.value)
-    if run.notes.get("time_from"):  # no column holds it
+    if run.notes.get("time_from"):  # no column contains it
         rate = (run.time.size - 1) / float(np.ptp(run.time)) / e.value
         remedy = _own_profile(run, f"[file] sample_rate_Hz = {rate:.5g}")
     return f"its time runs {1 / e.value:.2g} times as long as its force shows: another sample rate", remedy
@@ -182,7 +182,7 @@ def _specimen(run: Run) -> str:
 
 
 def _stated_current(run: Run, current: float) -> str:
-    """State how the current of a run without a current channel is corrected; an import again would read the old one."""
+    """State how the current of a run without a current channel is corrected; another import would read the old one."""
     return f"set current_A of {run.id} to {current:.3g} in runs.csv of the dataset"
 
 

@@ -1,8 +1,8 @@
-"""Runs whose gains differ from those of the others by more than sessions do, each by a factor of its own.
+"""Runs whose gains differ from those of the others by more than those of sessions, each by its own factor.
 
-A damper of another strength changes the force by another factor at every current, which a model of many
-coefficients describes nearly as well as a single damper. The evidence that some runs have wide gains of
-their own needs no second model, and it is low wherever sessions explain the differences.
+A damper of another strength changes the force by another factor at every current, which a model of many coefficients
+describes nearly as well as a single damper. The evidence for independent gains of some runs needs no second model, and
+it is low if sessions explain the differences.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ _ROUNDS = 4  # sets of runs that are tried in turn
 class GainDifferences:
     """The runs whose gains differ, and logarithms of odds against gains as of sessions."""
 
-    members: frozenset[int]  # positions of the runs with gains of their own; the others agree
-    odds: float  # that these runs have gains of their own
-    everywhere: float  # that every run has: so many differ that none can be called wrong
+    members: frozenset[int]  # positions of the runs with independent gains; the others agree
+    odds: float  # logarithm of the odds that these runs have independent gains
+    everywhere: float  # the same for every run: so many differ that the wrong ones cannot be identified
 
 
 def gain_differences(evidence: Evidence, products: Sequence[RowProducts]) -> GainDifferences:
-    """Find the runs with gains of their own.
+    """Find the runs with independent gains.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from mrdamper.study.contradictions.search import Search
 from mrdamper.study.contradictions.tracks import Track, tracks_of
 
 MIN_RUNS = 4  # identification runs from which one can contradict the others
-_MAX_SHARE = 0.34  # share of the runs that may contradict the others; beyond, nobody knows which are right
+_MAX_SHARE = 0.34  # share of the runs that may contradict the others; beyond, the correct ones cannot be identified
 _REFUSED_SHARE = 0.2  # share of the runs from which they are refused if the others do not agree either
 _MAX_MISFIT_FACTOR = 4.0  # factor of the usual model error at which runs do not agree
 _INVERSE_TOLERANCE = 0.1  # logarithm of the product of two factors up to which one is the inverse of the other
@@ -27,7 +27,7 @@ _MILLIAMPERE_RATIO = 50.0  # ratio of a current to the usual one from which it i
 
 
 class ContradictionError(InputError):
-    """So many runs contradict each other that none can be called wrong."""
+    """Too many runs contradict each other to identify the wrong ones."""
 
     code = "E_CONTRADICTIONS"
 
@@ -66,7 +66,7 @@ def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list
             t for t in tracks if t.run.split != "train" and t.run.id not in keep and t.run.id not in contradictions
         ]
         contradictions |= _beside(validation, trusted)
-        # A force may have been pasted from one test into another: the copy is the test if the original is not.
+        # A force may have been copied from one test to another: the copy stays if the original is excluded.
         of_wrong = {copy.run_id for copy in copies if copy.original in contradictions}
         doubted = tracks_of([run for run in runs if run.id in of_wrong and run.split == "train"])
         if len(trusted) >= MIN_RUNS:
@@ -95,13 +95,13 @@ def _among(train: Sequence[Track], keep: Collection[str]) -> dict[str, Contradic
 
 
 def _opposed(contradictions: Sequence[Contradiction]) -> bool:
-    """Tell whether some runs need a factor and others its inverse: nobody knows which of them are right."""
+    """Tell whether some runs need a factor and others its inverse: the correct ones cannot be identified."""
     factors = [one.value for one in contradictions if one.cause == "force"]
     return any(abs(np.log(a * b)) < _INVERSE_TOLERANCE for a, b in combinations(factors, 2))
 
 
 def _beside(validation: Sequence[Track], trusted: Sequence[Track]) -> dict[str, Contradiction]:
-    """Compare further runs with those that are trusted."""
+    """Compare further runs with the accepted ones."""
     if not validation or len(trusted) < MIN_RUNS:
         return {}
     search = Search(trusted)
@@ -131,7 +131,7 @@ def _split(runs: Sequence[Run], name: str) -> str:
 
 
 def _parted(train: Sequence[Track], gains: Mapping[int, float]) -> list[dict[str, float]]:
-    """Part runs where their gains differ most."""
+    """Divide runs where their gains differ most."""
     if not gains:
         return []
     ranked = sorted(gains, key=gains.__getitem__)

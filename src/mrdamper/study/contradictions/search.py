@@ -33,7 +33,7 @@ from mrdamper.study.contradictions.tracks import SAME_CURRENT, Track, irregulari
 
 _ODDS, _FEW_ODDS = 6.0, 36.0  # logarithm of the odds from which an explanation is far better: always, over the runs
 _GAIN_ODDS = 12.0  # the first of these for runs with gains of their own
-_ALONE_ODDS = 10.0  # more of them for a run that nothing explains
+_ALONE_ODDS = 10.0  # additional odds for a run without an explanation
 _MISFITS = (4.0, 2.0, 1.4, 1.0, 0.7, 0.5, 0.35)  # factors of the usual model error that are tried
 _SATURATIONS = (4.0, 1.0, 0.5, 0.25)  # saturation of the course over the current that is tried
 _BENDS = (0.8, 0.3, 0.1)  # deviations from the common course over the current that are tried
@@ -50,7 +50,7 @@ _MIN_SHIFT_ODDS = -EMPTY_CELL_ODDS  # prior odds of shifted rows at least, where
 _MEMBER_ODDS = 4.0  # the same against a further run with the same cause
 _MAJORITY_ODDS = 6.0  # the same against another current of most runs at a current
 _MIN_SHIFTED_RUNS = 2  # runs whose current a shift has to change
-_TIE_ODDS = 6.0  # odds up to which a run nothing explains better takes the best explanation
+_TIE_ODDS = 6.0  # odds up to which a run without a better explanation has the best one
 _SHARED_CAUSES = ("force", "offset", "displacement", "time", "sign")  # causes that several runs have with one value
 _COMPARED_EXPLANATIONS = 6  # explanations of a run that are compared with those of other runs
 _GROUP_SEEDS = 5  # runs from which a second group of runs is grown
@@ -83,7 +83,7 @@ class Search:
     def __init__(self, tracks: Sequence[Track]) -> None:
         self.tracks = list(tracks)
         self.found: dict[int, Explanation] = {}  # runs that contradict the others, by position
-        # gains of the runs left, by position, if so many differ that none can be called wrong
+        # gains of the other runs, by position, if too many differ to identify the wrong ones
         self.differing: dict[int, float] = {}
         self.evidence = Evidence(tracks)
         self._products = self.evidence.products(tracks)
@@ -121,7 +121,7 @@ class Search:
         """Logarithm of the odds from which explanations are far better than none.
 
         A cause that other runs have, and runs at the motion of one that is explained, need less: tests of one motion
-        are made one after the other.
+        are successive.
         """
         beside = [self.tracks[k] for k in self.found]
         if self._is_shared(explanations.values()) or all(
@@ -161,7 +161,7 @@ class Search:
         self._adapt()
 
     def _adapt(self) -> None:
-        """Choose the spread that suits the runs, whatever a minority of them does; weigh the runs with it."""
+        """Select the spread that suits the runs, robust against a minority; weigh the runs with it."""
         agreeing = self._agreeing()
         expected = self.evidence.prior
         self.evidence.spread = AssumedScatter(2.0)
@@ -199,8 +199,8 @@ class Search:
     def _widened(self) -> list[RowProducts]:
         """Return the runs with a wider model error at motions and currents that the linear model describes worse.
 
-        It fails there in every run alike: the others there say how much, and not the run itself. At a current several
-        runs may be wrong together, so that the best of the others counts.
+        It fails there in every run, so the error follows from the others there and not from the run itself. At a
+        current several runs may be wrong together, so the best of the others counts.
         """
         posterior = self.posterior()
         ratios: dict[int, float] = {}
@@ -228,7 +228,7 @@ class Search:
         self._own = self.evidence.log_evidence([self._members[k] for k in self._agreeing()])
         self._options: dict[int, list[Explanation]] = {}
         most = max(_RUNS_PER_ROUND, len(order) // 4)
-        # A record of many currents is improbable before any run, too: what the others leave of it counts as well.
+        # A record of many currents is improbable a priori: its error by the others counts as well.
         improbable = sorted(left, key=by_others.__getitem__)
         singles = [self._of_one(i) for i in dict.fromkeys([*order[:most], *improbable[: most // 3]])]
         yield from map(self._refined, sorted(singles, key=lambda proposal: -proposal.gain)[:_REFINED_EXPLANATIONS])
@@ -255,9 +255,9 @@ class Search:
         return JointExplanation({i: replace(best, gain=gain)}, gain)
 
     def _of_gains(self, gain: float) -> JointExplanation:
-        """Return the few runs that have gains of their own; note the gains where too many do.
+        """Return the few runs with independent gains; note the gains if there are too many.
 
-        Too many do where this is more probable than the best explanation of some runs, whose gain is given.
+        There are too many if this is more probable than the best explanation of some runs, whose gain is given.
         """
         left, least = self._agreeing(), _GAIN_ODDS + _FEW_ODDS / len(self.tracks)
         differences = gain_differences(self.evidence, [self._products[k] for k in left])
@@ -309,7 +309,7 @@ class Search:
         return best
 
     def _falling(self, members: Sequence[Moments]) -> float:
-        """Logarithm of the prior odds against a force that falls with the current, by the share it falls by."""
+        """Logarithm of the prior odds against a force that falls with the current, by its relative decrease."""
         occupied = np.sum([m.over for m in members if m.over is not None and m.over.max() > _AT_NODE], axis=0)
         if np.ndim(occupied) == 0 or np.count_nonzero(np.asarray(occupied) > 0) < 2:
             return 0.0
@@ -370,7 +370,7 @@ class Search:
         return float(swing @ products.moment) / max(float(swing @ products.gram @ swing), 1e-12)
 
     def _grown(self, seeds: Sequence[int], posterior: Posterior) -> list[int]:
-        """Return the group of runs about some that follow a damper of their own rather than that of the others."""
+        """Return the group of runs about some that follow another damper than the others."""
         every = [k for k in self._agreeing() if k not in self.found]
         spread = self.evidence.spread
         self.evidence.spread = replace(spread, misfit=max(spread.misfit / _GROUP_ERROR_RATIO, _MIN_MISFIT))
@@ -440,7 +440,7 @@ class Search:
         return inside <= outside and (len(inside) == 1 or current <= SAME_CURRENT)
 
     def _outnumbers(self, group: tuple[int, ...]) -> bool:
-        """Tell whether a group is most of the runs at one of its currents: the few others may be the wrong ones."""
+        """Tell whether a group is most of the runs at one of its currents: the few others may be wrong."""
         levels = self._levels(range(len(self.tracks)))
         inside, every = [levels[k] for k in group if k in levels], list(levels.values())
         return any(2 * inside.count(level) > every.count(level) for level in inside)

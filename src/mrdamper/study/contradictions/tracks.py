@@ -1,7 +1,7 @@
 """Short versions of runs for the comparison of all runs with each other: a few hundred samples of motion and force.
 
-A sine counts with its last cycles, any other motion with its whole steady window; the samples are
-dense enough for hysteresis operators, and a part of them are the rows of the regression.
+The last cycles of a sine and the whole steady window of other motions are used; the samples are dense enough for
+hysteresis operators, and some of them are the rows of the regression.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class Track:
 
 
 def tracks_of(runs: Sequence[Run]) -> list[Track]:
-    """Make the short versions of the runs that move; others are left out."""
+    """Make the short versions of the runs that move; others are omitted."""
     tracks: list[Track] = []
     for run in runs:
         try:
@@ -120,7 +120,7 @@ def _track(run: Run) -> Track:
     x = motion.displacement[index]
     rows = np.unique(np.linspace(0, index.size - 1, min(_ROWS, index.size)).astype(int))
     if sine.is_sine:
-        rows = rows[rows >= index.size // 3]  # the first cycle settles the hysteresis operators
+        rows = rows[rows >= index.size // 3]  # the first cycle is transient for the hysteresis operators
     force = _averaged(run.force, index)
     low, high = np.percentile(force, (1, 99))
     return Track(
