@@ -1,6 +1,7 @@
 """`mrdamper import`: everything or nothing, twice the same, and every refusal listed."""
 
 import json
+import zipfile
 
 import numpy as np
 import pytest
@@ -183,3 +184,24 @@ def test_files_of_one_name_in_several_folders_are_told_apart(tmp_path):
     assert [item.notes["file"] for item in load_dataset(tmp_path / "out")] == ["1Hz/0.5A.csv", "2Hz/0.5A.csv"]
     run(tmp_path / "raw", "--write-tests", tmp_path / "raw" / "tests.csv")
     assert run(tmp_path / "raw", "--out", tmp_path / "again").exit_code == 0
+
+
+def test_tests_without_a_current_are_named_within_their_archive_and_a_table_takes_their_currents(tmp_path):
+    table = np.vstack([np.column_stack([rows(seed=i), np.full(600, i)]) for i in (1, 2)])
+    with zipfile.ZipFile(tmp_path / "rig.zip", "w") as archive:
+        archive.writestr("data/both.csv", text(table, ("time_s,displacement_mm,force_N,run",)))
+        archive.writestr("data/photo.txt", "a photo of the rig")
+    done = run(tmp_path / "rig.zip", "--out", tmp_path / "out")
+    assert "refused 2 tests in rig.zip/data (both.csv: both_1, both.csv: both_2): no coil current" in done.output
+    assert "--write-tests tests.csv" in done.output
+    assert "not imported as tests: photo.txt" in done.output
+    assert run(tmp_path / "rig.zip", "--write-tests", tmp_path / "tests.csv").exit_code == 0
+    table = (tmp_path / "tests.csv").read_text().replace("both_1,", "both_1,0.5").replace("both_2,", "both_2,1.0")
+    (tmp_path / "tests.csv").write_text(table)
+    assert run(tmp_path / "rig.zip", "--out", tmp_path / "out", "--tests", tmp_path / "tests.csv").exit_code == 0
+
+
+def test_a_key_that_stands_twice_in_a_profile_is_named(tmp_path):
+    profile = write(tmp_path, "rig.toml", '[file]\nnames = ["a"]\nnames = ["time [s]"]\n')
+    done = run(write(tmp_path, "a.csv", text()), "--profile", profile)
+    assert "every key once" in str(done.output) + str(done.exception)

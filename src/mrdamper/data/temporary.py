@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Generator
@@ -34,6 +35,11 @@ def temporary_folder(parent: Path | None = None, prefix: str = _PREFIX, suffix: 
         shutil.rmtree(folder, ignore_errors=True)
         with suppress(OSError):
             folder.rmdir()  # takes none
+
+
+def without_temporary_folder(path: str) -> str:
+    """Return a path from behind such a folder on, as that of a file of an archive that is unpacked there."""
+    return re.sub(rf"^.*[/\\]{_PREFIX}[^/\\]*\{_SUFFIX}[/\\]", "", path)
 
 
 def _locked(parent: Path, prefix: str, suffix: str) -> tuple[Path, int | None]:

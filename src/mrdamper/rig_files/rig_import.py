@@ -15,6 +15,7 @@ import numpy as np
 
 from mrdamper.data import Dataset
 from mrdamper.data.displayable import Displayable
+from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files.coil_current import as_data, require_current, with_current_behind_label, with_stated_current
 from mrdamper.rig_files.file_records import files_in, records_of_file, unpacked
@@ -170,10 +171,11 @@ def import_files(
             table.require_found(intake.met)
         profile.require_matches([*intake.met, *((path, "") for path in files)])
         refusals = intake.refusals or ([] if intake.tests() else intake.notes)
+        told = tuple(replace(refusal, file=without_temporary_folder(refusal.file)) for refusal in refusals)
         left_out += [] if refusals is intake.notes else [Path(note.file) for note in intake.notes]
         left_out += intake.copies
         names = tuple(path.name for path in left_out)
-        return ImportResult(with_unique_ids(_with_folders(intake.tests())), tuple(refusals), names)
+        return ImportResult(with_unique_ids(_with_folders(intake.tests())), told, names)
 
 
 class _Intake:
@@ -249,7 +251,7 @@ class _Intake:
                     checked = step(checked)
             except InputError as error:
                 problems.append(error)
-        where = f"{path}, {record.id}" if several else str(path)
+        where = f"{path}: {record.id}" if several else str(path)
         self.refusals += [Refusal(where, problem, record.id) for problem in problems]
         if not problems:
             self._found.append((path, checked))

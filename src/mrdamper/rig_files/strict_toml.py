@@ -40,7 +40,8 @@ def parse_toml(text: str, kind: type[T], refuse: type[InputError], help: str, wh
     try:
         table = read_toml(text)
     except tomllib.TOMLDecodeError as error:
-        raise refuse(str(error) or "nested too deeply", where=where, remedy="correct the TOML") from error
+        remedy = "write every section and every key once" if "Cannot" in str(error) else "correct the TOML"
+        raise refuse(str(error) or "nested too deeply", where=where, remedy=remedy) from error
     return checked_table(table, kind, refuse, help, where)
 
 

@@ -114,8 +114,8 @@ def _write_tests(files: list[Path], settings: Profile, target: Path) -> None:
     from mrdamper.rig_files.tests_table import tests_text
 
     records, refusals = found_tests(files, settings)
-    for refusal in refusals:
-        typer.echo(f"not in the table: {refusal.error}", err=True)
+    for line in _refused_lines(refusals):
+        typer.echo(f"not in the table: {line}", err=True)
     if not records:
         raise InputError("no test can be read", remedy="correct the files listed above, or give a profile")
     put_text(tests_text(records), target)
@@ -300,11 +300,16 @@ def _print(result: ImportResult, out: Path | None, total: int, new: int, *, dry:
         if verbose or finding.code not in _OF_FORM
     )
     findings = [f"  {line}" for line in finding_lines(every, verbose)]
-    for some, most in ((lines, 7), (findings, 4), (_refused_lines(result), 4)):
+    for some, most in ((lines, 7), (findings, 4), (_refused_lines(result.refusals), 4)):
         print("".join(f"{line}\n" for line in shortened(some, most, verbose)), end="")
     if result.left_out:
-        print(f"not imported, no tests or copies of tests: {listed(result.left_out, 5)}")
-    if any("profile" in refusal.error.remedy for refusal in result.refusals):
+        print(f"not imported as tests: {listed(result.left_out, 5)}")
+    if result.refusals and all(refusal.error.remedy.startswith("write the currents") for refusal in result.refusals):
+        print(
+            "a table takes the current of each test: mrdamper import FILES --write-tests tests.csv, "
+            "fill in current_A, import with --tests tests.csv"
+        )
+    elif any("profile" in refusal.error.remedy for refusal in result.refusals):
         print(
             "a profile answers once for all files: mrdamper import FILE --write-profile rig.toml, "
             "correct rig.toml, import with --profile rig.toml"
@@ -322,10 +327,10 @@ def _print(result: ImportResult, out: Path | None, total: int, new: int, *, dry:
         print("nothing written; correct or leave out the refused files, or give --skip-refused")
 
 
-def _refused_lines(result: ImportResult) -> list[str]:
+def _refused_lines(all_refused: Sequence[Refusal]) -> list[str]:
     """One line a refusal; those of several files that differ in numbers only are one, with folder and number."""
     alike: dict[tuple[str, ...], list[Refusal]] = {}
-    for refusal in result.refusals:
+    for refusal in all_refused:
         error = refusal.error
         kind = (re.sub(r"[0-9]+([.,][0-9]+)*", "#", text) for text in (error.found, error.remedy))
         alike.setdefault((error.code, *kind), []).append(refusal)
