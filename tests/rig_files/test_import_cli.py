@@ -1,6 +1,7 @@
 """`mrdamper import`: everything or nothing, twice the same, and every refusal listed."""
 
 import json
+import re
 import zipfile
 
 import numpy as np
@@ -205,3 +206,16 @@ def test_a_key_that_stands_twice_in_a_profile_is_named(tmp_path):
     profile = write(tmp_path, "rig.toml", '[file]\nnames = ["a"]\nnames = ["time [s]"]\n')
     done = run(write(tmp_path, "a.csv", text()), "--profile", profile)
     assert "every key once" in str(done.output) + str(done.exception)
+
+
+def test_units_and_currents_that_lack_are_asked_for_at_once(tmp_path):
+    for name in ("a", "b"):
+        write(tmp_path, f"{name}.csv", text(rows(seed=ord(name)), ("time_s,displacement,force_N",)))
+    done = run(tmp_path, "--out", tmp_path / "out")
+    assert "column 'displacement' has no unit" in done.output
+    assert "and give the current of each test" in done.output
+    column = 'column = "displacement"\n'
+    profile = run(tmp_path, "--write-profile", "-").output.replace(column, f'{column}unit = "mm"\n')
+    profile = re.sub(r'#("[ab]") =', r"\1 = 0.5", profile.replace("#[current.values]", "[current.values]"))
+    path = write(tmp_path, "rig.toml", profile[profile.index("rig =") :])
+    assert run(tmp_path, "--profile", path, "--out", tmp_path / "out").exit_code == 0

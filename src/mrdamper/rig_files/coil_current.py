@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 from collections.abc import Collection
@@ -12,7 +13,7 @@ import numpy as np
 
 from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import chunks
-from mrdamper.errors import ColumnError, printable
+from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.column_names import RATING, names_condition, split_name
 from mrdamper.rig_files.conditions import (
     BEHIND_DIGIT,
@@ -30,6 +31,7 @@ from mrdamper.rig_files.record import Finding, Record
 
 _FEWEST_SLOW = 5  # samples of a current that is recorded more rarely than the force
 NO_CHANNEL = "the current channel is "  # beginning of the finding on a column of no current
+CURRENT_TOO = "and give the current of each test"  # within the remedy of a refusal of units
 _FOLDERS = 3  # above a file, whose names may state its current
 
 
@@ -137,6 +139,17 @@ def require_current(record: Record, path: Path = Path()) -> Record:
         "if all tests have one, [current] value = 0.5 in a profile",
         code="E_CURRENT_MISSING",
     )
+
+
+def ask_current_too(error: InputError, table: RawTable, profile: Profile, path: Path) -> None:
+    """Add to a refusal of units that the file states no current either: one answer gives both."""
+    last = getattr(error, "errors", (error,))[-1]
+    channel = table.columns("current") or table.columns(dimension="current")
+    if channel or profile.current or not last.code.startswith("E_UNITS"):
+        return
+    with contextlib.suppress(InputError):
+        if current_of(table, profile, path, None, slice(None))[0] is None:
+            last.remedy += f"; {CURRENT_TOO}, set [current.values], where no other file has them"
 
 
 def current_by_resistance(table: RawTable, record_id: str) -> tuple[Finding, ...]:

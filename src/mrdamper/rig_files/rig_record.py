@@ -16,6 +16,7 @@ from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import (
     NO_CHANNEL,
     as_data,
+    ask_current_too,
     constant,
     current_by_resistance,
     current_of,
@@ -84,7 +85,11 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     Raises `InputError` if a channel is missing, has no unit, or holds something else than numbers, or if two places
     contradict each other about the current.
     """
-    assigned = assign(table, profile)
+    try:
+        assigned = assign(table, profile)
+    except InputError as error:
+        ask_current_too(error, table, profile, path)
+        raise
     raw, findings, lines = _read(table, assigned, profile)
     channels = {name: rescale(raw[of.column], of.factor, of.offset) for name, of in assigned.items()}
     size, rate = next(iter(raw.values())).size, ""

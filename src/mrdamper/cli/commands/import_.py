@@ -6,7 +6,6 @@ import json
 import os
 import re
 import sys
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from glob import escape
@@ -141,24 +140,28 @@ def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
 
 def _missing_currents(files: list[Path], guess: Profile, columns: tuple[str, ...]) -> str:
     """List what a person fills in for tests without a current, as comments: their currents, or a column's scale."""
+    from mrdamper.rig_files.coil_current import CURRENT_TOO
     from mrdamper.rig_files.rig_import import import_files
 
     refusals = import_files(files, guess).refusals if guess.current is None else ()
-    missing = [refusal for refusal in refusals if refusal.error.code == "E_CURRENT_MISSING"]
+    missing = [r for r in refusals if r.error.code == "E_CURRENT_MISSING" or CURRENT_TOO in r.error.remedy]
     if not missing:
         return ""
     lines = []
-    column = next((name for name in columns if name and f"column {name!r}" in missing[0].error.found), None)
+    found = ["" if r.error.code != "E_CURRENT_MISSING" else r.error.found for r in missing]  # else of units
+    column = next((name for name in columns if name and f"column {name!r}" in found[0]), None)
     if column is not None:
         shown = json.dumps(column, ensure_ascii=False)
         lines = ["# Calibration of the current: A for 1 of the column:", "#[channels.current]", f"#column = {shown}"]
         lines += ['#unit = "A"', "#scale =", ""]
-    counts = Counter(refusal.run for refusal in missing)
-    names = [r.run if counts[r.run] == 1 else "*/" + "/".join(Path(r.file).parts[-2:]) for r in missing]
+    runs = [r.run or Path(r.file).stem for r in missing]
+    names = [
+        escape(run) if runs.count(run) == 1 else "*/" + "/".join(Path(r.file).parts[-2:])
+        for run, r in zip(runs, missing, strict=True)
+    ]
     lines += ["# Tests without a current: remove the #, and write each current [A] behind its =:", "#[current.values]"]
-    keys = [json.dumps(escape(name) if name[:2] != "*/" else name, ensure_ascii=False) for name in names]
-    whys = ["" if r.error.found.startswith("no coil current") else f"  # {r.error.found}" for r in missing]
-    lines += [f"#{key} ={why}" for key, why in zip(keys, whys, strict=True)]
+    whys = [f"  # {text}" if text and not text.startswith("no coil current") else "" for text in found]
+    lines += [f"#{json.dumps(name, ensure_ascii=False)} ={why}" for name, why in zip(names, whys, strict=True)]
     return "\n".join(["", *lines, ""])
 
 
