@@ -49,6 +49,7 @@ def require_the_tests(folder) -> None:
         ("Column {number}: {what} ({unit})\n", ""),
         ("{what} {name} in {word}, ", "."),
         ("| {name} | {what} in {unit} |\n", ""),
+        ("{name}: {what} in {word} (as recorded)\n", ""),
     ],
 )
 def test_units_that_the_items_of_a_readme_give_its_columns(tmp_path, item, last):
@@ -69,11 +70,14 @@ def test_an_item_of_a_readme_about_something_else_gives_no_unit(tmp_path, item):
     assert "E_UNITS_MISSING" in {refusal.error.code for refusal in import_files([tmp_path]).refusals}
 
 
-def test_columns_without_names_that_a_sentence_lists(tmp_path):
+def test_columns_without_names_that_a_sentence_lists_and_currents_of_the_names_of_files(tmp_path):
     write(tmp_path, "")
-    (tmp_path / "README.md").write_text("Each file has: time (s), displacement (mm) and force (N).\n")
-    (tmp_path / "tests.csv").write_text("file,current_A\n" + "".join(f"{n}.csv,{a}\n" for n, a in CURRENTS.items()))
+    currents = "".join(f"- {name}.csv: {amperes} A\n" for name, amperes in CURRENTS.items())
+    text = f"Each file has: time (s), displacement (mm) and force (N).\n{currents}"
+    (tmp_path / "README.md").write_text(text)
     require_the_tests(tmp_path)
+    (tmp_path / "README.md").write_text(f"{text}m09.csv: 1 A\n")
+    assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
 
 
 def test_fields_and_a_description_of_a_data_package(tmp_path):

@@ -212,7 +212,7 @@ def _with_listed_names(table: RawTable) -> RawTable:
 def _row_of_names(line: str, width: int) -> tuple[Header, ...]:
     """Return the names and units of as many columns that a line lists, columns: time (s), stroke (mm), load (N)."""
     listed = line.rpartition(": ")[2].strip(" |")
-    row = tuple(map(_item, re.split(r"[,;|\t]\s*|\s(?:and|und|et|y|e)\s", listed)))
+    row = tuple(map(item_of, re.split(r"[,;|\t]\s*|\s(?:and|und|et|y|e)\s", listed)))
     roles = {header.role for header in row if header.role and header.dimension == DIMENSION[header.role]}
     return row if len(row) == width == len(roles) and {"displacement", "force"} <= roles else ()
 
@@ -287,12 +287,11 @@ def _with_listed_units(table: RawTable) -> RawTable:
     listed: dict[int, set[str]] = {}
     for line in table.lines if names else ():
         cells = [cell.strip(' "') for cell in re.split(r"[,;|\t]", line.lstrip("#%/ "))]
-        both = [*cells, *(cell.partition(": ")[2] for cell in cells)]  # rig 7, columns: time [s], load [N]
-        for header in map(_item, (*both, line)):
+        behind_colon = [cell.partition(": ")[2] for cell in cells]  # rig 7, columns: time [s], load [N]
+        for header in map(item_of, (*cells, *behind_colon, line)):
             name, meaning = (part.strip("`* ") for part in _BEHIND_NAME.split(header.name, maxsplit=1))
-            own = (
-                name.rpartition(" ")[2] if {*map(role_of, name.split())} == {role_of(name)} - {None} else name
-            )  # time t
+            both = {*map(role_of, name.split())} == {role_of(name)} - {None}  # time t
+            own = name.rpartition(" ")[2] if both else name
             i = wanted.get(own, wanted.get(own.casefold()))
             number = NUMBERED.fullmatch(name) if i is None and role_of(meaning) else None
             i = int(number[1]) - 1 if number else i
@@ -316,11 +315,12 @@ def _with_listed_units(table: RawTable) -> RawTable:
     return replace(table, constants=constants).named({i: (names[i], units[i]) for i in bare if i in units})
 
 
-def _item(text: str) -> Header:
+def item_of(text: str) -> Header:
     """Name and unit in a part of a line, with what the name means behind it: t: s; `x` - stroke in mm; F = load, N."""
     text = _MARK.sub("", text)
     match = _COLON.match(text)
-    return Header(match[1], match[2]) if match and parse_unit(match[2]) else split_name(text)
+    header = Header(match[1], match[2]) if match and parse_unit(match[2]) else split_name(text)
+    return header if header.unit else split_name(re.sub(r"\s*\([^()]*\)$", "", text))  # (tension positive)
 
 
 def _with_si_units(table: RawTable) -> RawTable:

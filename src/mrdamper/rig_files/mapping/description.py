@@ -20,7 +20,7 @@ import numpy as np
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import DIMENSION, is_unit, parse_unit, split_name, words, words_of
 from mrdamper.rig_files.conditions import stated_by_lines
-from mrdamper.rig_files.mapping.completion import NUMBERED, states_si
+from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, states_si
 from mrdamper.rig_files.mapping.results import numbered_tests
 from mrdamper.rig_files.mapping.scales import (
     NUMBER_IS,
@@ -133,7 +133,7 @@ def _of_channels(line: str) -> str:
         return f"channel {cells[0]}: {' '.join(cells[1:])}"
     if len(cells) > 1 and split_name(cells[0]).role and all(c.isascii() and c.isdigit() for c in cells[1:]):
         return f"channel {cells[1]}: {cells[0]}"  # a tag with its index, and its type
-    units = [split_name(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]
+    units = [item_of(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]
     stated = states_scale(line) or states_shift(line) or states_si(line)
     return line if stated or (any(map(is_unit, units)) and not stated_by_lines([line], ".")) else ""
 
