@@ -171,11 +171,11 @@ def import_files(
             table.require_found(intake.met)
         profile.require_matches([*intake.met, *((path, "") for path in files)])
         refusals = intake.refusals or ([] if intake.tests() else intake.notes)
-        told = tuple(replace(refusal, file=without_temporary_folder(refusal.file)) for refusal in refusals)
+        named = tuple(replace(refusal, file=without_temporary_folder(refusal.file)) for refusal in refusals)
         left_out += [] if refusals is intake.notes else [Path(note.file) for note in intake.notes]
         left_out += intake.copies
         names = tuple(path.name for path in left_out)
-        return ImportResult(with_unique_ids(_with_folders(intake.tests())), told, names)
+        return ImportResult(with_unique_ids(_with_folders(intake.tests())), named, names)
 
 
 class _Intake:

@@ -105,13 +105,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     further = _further(table, assigned, size)
     stretches, cut = _tests_of(channels, profile)
     findings += cut
-    remarks = {
-        **recording_time(table.remarks),
-        **_remarks(table, assigned),
-        "sign_changed": ", ".join(role for role, entry in assigned.items() if entry.sign < 0),
-        "scaled": ", ".join(f"{r} = {scale:g}" for r in assigned if (scale := profile.channel(r).scale)),
-        "time_from": rate,
-    }
+    remarks = {**_remarks(table, profile, assigned), "time_from": rate}
     if len(stretches) == 1:
         remarks["motion_stated"] = stated_motion(stated_quantities(table.remarks, decimal=table.decimal))
     remarks = {key: text for key, text in remarks.items() if text}
@@ -307,7 +301,7 @@ def _aligned(channels: dict[str, Floats], assigned: dict[str, Assigned], lines):
     return cut, None if lines is None else lines[inside]
 
 
-def _remarks(table: RawTable, assigned: dict[str, Assigned]) -> dict[str, str]:
+def _remarks(table: RawTable, profile: Profile, assigned: dict[str, Assigned]) -> dict[str, str]:
     used = {entry.column for entry in assigned.values()}
     columns = [i for i, header in enumerate(table.headers) if header.dimension in _KEPT]
     sessions = [i for i, header in enumerate(table.headers) if header.name.casefold() == "session"]
@@ -320,7 +314,12 @@ def _remarks(table: RawTable, assigned: dict[str, Assigned]) -> dict[str, str]:
     remarks = {"columns": ", ".join(taken)} | ({"session": session[0]} if len(session) == 1 else {})
     if ignored:
         remarks["ignored_columns"] = listed(ignored, 20)
-    return {key: as_data(text) for key, text in remarks.items()}
+    return {
+        **recording_time(table.remarks),
+        **{key: as_data(text) for key, text in remarks.items()},
+        "sign_changed": ", ".join(role for role, entry in assigned.items() if entry.sign < 0),
+        "scaled": ", ".join(f"{r} = {scale:g}" for r in assigned if (scale := profile.channel(r).scale)),
+    }
 
 
 def _run_id(table: RawTable, path: Path) -> str:

@@ -148,8 +148,8 @@ def _missing_currents(files: list[Path], guess: Profile, columns: tuple[str, ...
     if not missing:
         return ""
     lines = []
-    found = ["" if r.error.code != "E_CURRENT_MISSING" else r.error.found for r in missing]  # else of units
-    column = next((name for name in columns if name and f"column {name!r}" in found[0]), None)
+    reasons = ["" if r.error.code != "E_CURRENT_MISSING" else r.error.found for r in missing]  # else of units
+    column = next((name for name in columns if name and f"column {name!r}" in reasons[0]), None)
     if column is not None:
         shown = json.dumps(column, ensure_ascii=False)
         lines = ["# Calibration of the current: A for 1 of the column:", "#[channels.current]", f"#column = {shown}"]
@@ -160,7 +160,7 @@ def _missing_currents(files: list[Path], guess: Profile, columns: tuple[str, ...
         for run, r in zip(runs, missing, strict=True)
     ]
     lines += ["# Tests without a current: remove the #, and write each current [A] behind its =:", "#[current.values]"]
-    whys = [f"  # {text}" if text and not text.startswith("no coil current") else "" for text in found]
+    whys = [f"  # {text}" if text and not text.startswith("no coil current") else "" for text in reasons]
     lines += [f"#{json.dumps(name, ensure_ascii=False)} ={why}" for name, why in zip(names, whys, strict=True)]
     return "\n".join(["", *lines, ""])
 
