@@ -23,7 +23,7 @@ MOST_RUNS = 2000
 _FEWEST_ROWS = 5  # of a test, on average
 _MOST_LEVELS = 200  # currents of a column of texts that are looked at
 _SMALL = 32 * 2**20  # bytes of a file whose columns are kept together
-_RUN_WORDS, _NUMBER_WORDS = words("run"), words("run_number")
+_RUN_WORDS = words("run")
 _VALUE, _CHANNEL, _UNIT, _NUMBER = words("value"), words("channel"), words("unit"), words("run_number")
 _MOST_CHANNELS = 60
 _FEWEST_SAMPLES = 50  # of channels whose names say nothing
@@ -45,7 +45,7 @@ def _run_column(table: RawTable, form: FileForm) -> int | None:
     wanted = form.run_column
     if wanted is None:
         words = [[word.casefold().rstrip("0123456789") for word in words_of(name[:60])] for name in table.names]
-        named = [i for i, of in enumerate(words) if _RUN_WORDS & {*of} and {*of} <= _RUN_WORDS | _NUMBER_WORDS]
+        named = [i for i, of in enumerate(words) if _RUN_WORDS & {*of} and {*of} <= _RUN_WORDS | _NUMBER]
         if table.words is None:
             return None
         named = [i for i in named if len(table.words(i).labels) > 1] if len(named) > 1 else named

@@ -37,6 +37,7 @@ from mrdamper.rig_files.mapping.description import is_description, is_readme
 from mrdamper.rig_files.mapping.proposals import is_integrated
 from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.profile import Profile, profile_of
+from mrdamper.rig_files.quality import check_long_record, to_run
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
 from mrdamper.rig_files.record import Record, Refusal, unique_names
 from mrdamper.rig_files.sequences import follows, goes_on, tests_of_files
@@ -94,8 +95,6 @@ def read_run(path: str | Path, profile: Profile | str | Path | None = None) -> R
 
 def read_runs(path: str | Path, profile: Profile | str | Path | None = None) -> tuple[Record, ...]:
     """Read every test of a rig's file and check it: testing machines record several blocks; as `read_run`."""
-    from mrdamper.rig_files.quality import check_long_record
-
     with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused as such
         records, problems = records_of_file(Path(path), profile_of(profile))
         CombinedError.raise_from(problems)
@@ -242,8 +241,6 @@ class _Intake:
                 self._check(path, record, problems, several=len(records) > 1)
 
     def _check(self, path: Path, record: Record, problems: list[InputError], *, several: bool) -> None:
-        from mrdamper.rig_files.quality import check_long_record
-
         checked = record
         for step in (partial(require_current, path=path), check_long_record):
             try:
@@ -415,8 +412,6 @@ def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
 
     Raises `InputError` if a record has no current, or there is no record.
     """
-    from mrdamper.rig_files.quality import to_run
-
     return Dataset(tuple(to_run(require_current(record)) for record in records), name)
 
 

@@ -16,6 +16,7 @@ from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.columns import candidates_of, column_called
 from mrdamper.rig_files.conditions import BARE_RATE, motions_in, stated_rate
+from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding, Record
 
@@ -138,8 +139,6 @@ def stated_frequencies(table: RawTable) -> Iterator[float]:
 
 def frequency_of(time: Floats, x: Floats) -> float | None:
     """Frequency of a motion, by the reversals of its sign about the middle."""
-    from mrdamper.rig_files.quality.view import find_strokes
-
     there = np.isfinite(time) & np.isfinite(x)
     if np.count_nonzero(there) < 20 or np.any(np.diff(time[there]) <= 0):
         return None

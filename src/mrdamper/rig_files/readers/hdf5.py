@@ -26,7 +26,7 @@ from mrdamper.rig_files.readers.arrays import (
     whole,
 )
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
-from mrdamper.rig_files.readers.nested import DEEPEST, nested_tables
+from mrdamper.rig_files.readers.nested import DEEPEST, MOST_TEXT, nested_tables
 from mrdamper.rig_files.text.stream import decoded
 
 # pyright: reportMissingImports=false, reportAttributeAccessIssue=false
@@ -34,8 +34,6 @@ from mrdamper.rig_files.text.stream import decoded
 HDF5_MARK = b"\x89HDF\r\n\x1a\n"
 _MOST_OBJECTS = 10_000
 MOST_STRUCTS = 2000  # of an array of structs
-_DEEPEST = 8  # groups within groups
-_MOST_TEXT = 200  # characters
 _UNIT_NAMES = ("units", "unit", "Units", "Unit", "UNIT", "UNITS", "unit_string")
 _OF_MATLAB = ("#refs#", "#subsystem#")  # what lies there is met where its reference stands
 _NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
@@ -94,7 +92,7 @@ class _Walk:
 
     def _count(self, objects: int, depth: int) -> None:
         self._seen += objects
-        if self._seen > _MOST_OBJECTS or depth > _DEEPEST:
+        if self._seen > _MOST_OBJECTS or depth > DEEPEST:
             problem = f"over {_MOST_OBJECTS} objects, or groups within groups without end"
             raise self._source.refuse("E_TOO_MANY_COLUMNS", problem, "export fewer channels")
 
@@ -151,12 +149,12 @@ class _Walk:
         if dataset.external or dataset.is_virtual:
             raise self._source.refuse("E_UNSAFE", f"{name!r} lies in another file", "export one whole file")
         if says == "char":
-            return "".join(map(chr, np.reshape(dataset[()], -1)[:_MOST_TEXT].tolist())) if kind.kind in "iu" else None
+            return "".join(map(chr, np.reshape(dataset[()], -1)[:MOST_TEXT].tolist())) if kind.kind in "iu" else None
         if not dataset.size or says == "cell" or "MATLAB_empty" in dataset.attrs:
             return None
         if dataset.size == 1 and (kind.kind in "iufS" or h5py.check_string_dtype(kind)):
             value = np.reshape(dataset[()], -1)[0]
-            return float(value) if kind.kind in "iuf" else text_of(value)[:_MOST_TEXT]
+            return float(value) if kind.kind in "iuf" else text_of(value)[:MOST_TEXT]
         if dataset.size == 1:
             return None
         texts = h5py.check_string_dtype(kind) or kind.kind == "S"
@@ -211,7 +209,7 @@ def _attributes(item: Any) -> dict[str, Any]:
             unit = next((text_of(item.attrs[f"{name}_{u}"]) for u in _UNIT_NAMES if f"{name}_{u}" in item.attrs), "")
             says[f"{name} [{unit}]" if is_unit(unit) else name] = float(value.reshape(-1)[0])
         elif value.size == 1 and value.dtype.kind in "SUO":
-            says[name] = text_of(item.attrs[name])[:_MOST_TEXT]
+            says[name] = text_of(item.attrs[name])[:MOST_TEXT]
         elif words := texts_in(value):
             says[name] = words
     return says

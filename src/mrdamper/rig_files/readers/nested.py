@@ -24,7 +24,7 @@ from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES, MOST_ITEMS,
 
 _VALUE = words("value")
 DEEPEST = 8  # levels
-_MOST_TEXT = 200  # characters
+MOST_TEXT = 200  # characters
 _HEAD = re.compile(r"_?(?:header|info|properties|attributes|meta(?:data)?)$", re.IGNORECASE)
 _BODY = re.compile(r"_?(?:data|values)$", re.IGNORECASE)
 _LISTING = re.compile(r"(?i)^\s*(?:columns?|channels?|spalten|kanäle|colonnes|names)\s*[:=]\s*")
@@ -107,13 +107,13 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     node.units = {**node.units, **{key: u for key, u in own.items() if isinstance(u, str) and is_unit(u)}}
     sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= FEWEST_SAMPLES}
     texts = [_LISTING.sub("", value) for value in tree.values() if isinstance(value, str)]
-    node.lists += [re.split(r"\s*[,;]\s*", text.strip()) for text in texts if len(text) < _MOST_TEXT]
+    node.lists += [re.split(r"\s*[,;]\s*", text.strip()) for text in texts if len(text) < MOST_TEXT]
     inner += [(key, {"column": tree[key]}) for key in _matrices_of_tests(tree)]
     tree = {key: value for key, value in tree.items() if key not in {key for key, _ in inner}}
     for key, value in _paired(tree, node.units).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
             if split_name(key).role is not None or len(value) in sizes:
-                node.columns += _across(key, np.array([word[:_MOST_TEXT] for word in value]))
+                node.columns += _across(key, np.array([word[:MOST_TEXT] for word in value]))
             elif value:
                 node.lists.append(value)
         elif isinstance(value, list):
@@ -280,7 +280,7 @@ def _records(items: list[Mapping[str, Any]]) -> dict[str, Any]:
         if all(cell is None or isinstance(cell, (int, float)) for cell in cells):
             columns[key] = np.array([np.nan if cell is None else cell for cell in cells], dtype=float)
         elif all(isinstance(cell, str) for cell in cells):
-            columns[key] = np.array([cell[:_MOST_TEXT] for cell in cells])
+            columns[key] = np.array([cell[:MOST_TEXT] for cell in cells])
         else:
             return {}
     return columns
@@ -372,7 +372,7 @@ def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
             value_of = node.constants.get(key, value)
             node.constants[key if value_of == value else f"{above} {key}"] = value
         elif isinstance(value, str) and len(node.remarks) < MOST_COLUMNS:
-            node.remarks.append(f"{key}: {value}"[:_MOST_TEXT])
+            node.remarks.append(f"{key}: {value}"[:MOST_TEXT])
 
 
 def _across(key: str, array: Array) -> list[_Column]:
