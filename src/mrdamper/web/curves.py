@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Floats, Run
 from mrdamper.models import Model
 from mrdamper.physics.motion import Excitation, analyse_motion, centred_motion, equivalent_sine
@@ -51,11 +50,6 @@ def raw_record(run: Run) -> dict[str, Floats]:
     velocity = np.zeros(run.time.size) if run.velocity is None else run.velocity
     motion = Excitation(run.time, run.displacement, velocity, np.zeros(run.time.size), run.current)
     return screen_arrays(motion, run.force, limit=_MAX_WINDOW_POINTS)
-
-
-def predicted_cycle(prediction: Prediction) -> dict[str, Floats]:
-    """Return a predicted closed loop."""
-    return screen_arrays(prediction.motion, prediction.force)
 
 
 def modelled_cycle(model: Model, run: Run, delay: float = 0.0) -> dict[str, Floats]:

@@ -58,16 +58,10 @@ def download(content: bytes, name: str, kind: str) -> Response:
     return Response(content, media_type=kind, headers={"Content-Disposition": f'attachment; filename="{name}"'})
 
 
-def archive(written: Sequence[Path], name: str) -> Response:
-    """Return the files of a folder as a zip with their relative paths; the first file is at its top."""
-    top = written[0].parent
-    return zipped({f"{name}/{path.relative_to(top).as_posix()}": path.read_bytes() for path in written}, f"{name}.zip")
-
-
-def zipped(files: Mapping[str, bytes], name: str) -> Response:
-    """Return files by their names as a zip."""
+def archive(files: Sequence[Path], name: str, folder: str = "") -> Response:
+    """Return files as a zip, in a folder of it, with their paths relative to that of the first."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for inside, content in files.items():
-            archive.writestr(inside, content)
-    return download(packed.getvalue(), name, "application/zip")
+        for path in files:
+            archive.writestr(f"{folder}{path.relative_to(files[0].parent).as_posix()}", path.read_bytes())
+    return download(packed.getvalue(), f"{name}.zip", "application/zip")

@@ -87,7 +87,8 @@ def start_files(rig: int, session: OpenSession) -> dict[str, Any]:
 def files(rig: int, session: OpenSession) -> Response:
     """Return the written files in one archive."""
     missing = "the comparison is not written yet", "press “Page, tables and models as zip” again"
-    return archive(session.result(f"comparison.files.{rig}", *missing), "mrdamper-comparison")
+    written = session.result(f"comparison.files.{rig}", *missing)
+    return archive(written, "mrdamper-comparison", "mrdamper-comparison/")
 
 
 def _comparison(session: Session, rig: int) -> Comparison:

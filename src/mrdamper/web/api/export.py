@@ -17,7 +17,7 @@ from mrdamper.report.tables import prediction_rows
 from mrdamper.web.api.data import find_upload
 from mrdamper.web.api.model import Held, PredictionRequest
 from mrdamper.web.held_parameters import as_damper, predict_held
-from mrdamper.web.responses import archive, download, in_units, zipped
+from mrdamper.web.responses import archive, download, in_units
 from mrdamper.web.saved_project import open_saved_project, save_project
 from mrdamper.web.sessions import OpenSession, Session
 from mrdamper.web.tasks import export_damper
@@ -74,7 +74,7 @@ def file(number: int, session: OpenSession) -> FileResponse:
 def all_files(session: OpenSession) -> Response:
     """Return all of them in one archive."""
     session.result("study.files", "no study yet", "run one on the Identify page")
-    return archive(_written(session), "mrdamper-study")
+    return archive(_written(session), "mrdamper-study", "mrdamper-study/")
 
 
 @router.post("/dampers")
@@ -123,7 +123,7 @@ def exported(key: str, session: OpenSession) -> Response:
     paths: list[Path] = session.result(f"exported.{key}", "no such export", "export again")
     if len(paths) == 1:
         return _saved(paths[0])
-    return zipped({path.name: path.read_bytes() for path in paths}, f"{paths[0].parent.name}.zip")
+    return archive(paths, paths[0].parent.name)
 
 
 @router.post("/project.zip")

@@ -166,8 +166,8 @@ def _conclude_identification(
     if isinstance(scored, RecipeResult):
         note = f"validation {_percent(scored.validation)}" if scored.validation.runs else ""
         answer["damper"] = session.add(scored.damper, "identification", note).key
-        answer |= {"title": scored.damper.title, "parameter_count": scored.damper.parameter_count}
-        answer |= {"validation": _median(scored.validation)}
+        answer |= {"title": scored.damper.title, "validation": _median(scored.validation)}
+        answer["parameter_count"] = scored.damper.parameter_count
     if identifications:
         errors, fitted = [i.scores.nrmse_pp for i in identifications], identifications[0]
     else:  # a model of one set of parameters

@@ -19,7 +19,7 @@ from mrdamper.data import Condition, Floats
 from mrdamper.data.encoding import finite
 from mrdamper.physics.motion import Excitation
 from mrdamper.statistics.metrics import dissipated_power, peak_force
-from mrdamper.web.curves import predicted_cycle, screen_arrays
+from mrdamper.web.curves import screen_arrays
 from mrdamper.web.held_parameters import held_loop, held_model, predict_held, sliders
 from mrdamper.web.responses import frame
 from mrdamper.web.rig_table import RigTable, TableRow, describe
@@ -102,7 +102,9 @@ def _predicted(damper: Damper, query: PredictionRequest, session: Session) -> Re
         began = thread_time()  # of this damper alone, however busy the machine is
         prediction = predict_held(damper, condition, query.held)
         times.append(1e3 * (thread_time() - began))
-        arrays |= {f"{name}.{axis}": values for axis, values in predicted_cycle(prediction).items()}
+        arrays |= {
+            f"{name}.{axis}": values for axis, values in screen_arrays(prediction.motion, prediction.force).items()
+        }
         peak, energy = _peak_and_energy(prediction.motion, prediction.force, query.frequency_Hz)
         loops.append({"name": name, "current_A": condition.current_A, "peak_N": peak, "energy_J": energy})
         if name == "now" and query.interval:

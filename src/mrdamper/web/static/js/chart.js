@@ -69,8 +69,7 @@ export class Chart {
 
   /** True if curves stay inside the axes, and there are no more marks than were drawn. */
   fits(traces) {
-    const enough = this.ranges && traces.every((t, i) => t.mode !== "markers" || t.x.length <= this.marks[i]);
-    if (!enough) return false;
+    if (!this.ranges || !traces.every((t, i) => t.mode !== "markers" || t.x.length <= this.marks[i])) return false;
     const { x, y } = axisRanges(traces, this.ranges, this.zero);
     return x === this.ranges.x && y === this.ranges.y;
   }

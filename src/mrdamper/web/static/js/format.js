@@ -1,30 +1,27 @@
-// Numbers as text: four figures at most, engineers' signs.
+// Numbers as text: four significant digits, a minus sign, and units.
 
 import { onScreen } from "./units.js";
 
 const SUPERSCRIPT = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
 
-/** A number with so many significant figures, without trailing noise. */
+/** A number with a number of significant digits, without trailing zeros. */
 export function figures(value, digits = 4) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
   if (size >= 1e5 || size < 1e-3) {
     const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
-    return `${sign(trim(mantissa))}·10${superscript(Number(exponent))}`;
+    return `${sign(String(Number(mantissa)))}·10${superscript(Number(exponent))}`;
   }
   return sign(String(Number(value.toPrecision(digits))));
 }
 
-/** How many of something: `count(1, "run")`. */
+/** A count with its noun: `count(1, "run")`. */
 export function count(number, thing) {
   return `${number} ${thing}${number === 1 ? "" : "s"}`;
 }
 
-/**
- * How the numbers of one column are printed, so that they stand under each other: a power of 1000 for
- * all of them, and as many decimals as give the middle one four figures.
- */
+/** Format of the numbers of a column: one power of 1000, and decimals that give the median four digits. */
 export function column(values) {
   const sizes = values.filter((value) => Number.isFinite(value) && value !== 0).map(Math.abs).sort((a, b) => a - b);
   if (!sizes.length) return { power: 0, print: (value) => figures(value) };
@@ -35,18 +32,18 @@ export function column(values) {
   return { power, print };
 }
 
-/** A name with its unit, and the power its numbers were divided by: "alpha (10⁶ N/m)". */
+/** A name with its unit and the power of ten of the numbers: "alpha (10⁶ N/m)". */
 export function heading(name, itsUnit, power = 0) {
   const inside = [power ? `10${superscript(power)}` : "", unit(itsUnit)].filter(Boolean).join(" ");
   return inside ? `${name} (${inside})` : name;
 }
 
-/** A fraction as per cent. */
+/** A fraction in per cent. */
 export function percent(value, digits = 1) {
   return value === null || value === undefined || !Number.isFinite(value) ? "–" : `${sign((100 * value).toFixed(digits))} %`;
 }
 
-/** A unit as it is printed. */
+/** A unit with superscripts. */
 export function unit(text) {
   if (text === "-") return "";
   return text.replace(/\^(-?\d+)/g, (_, power) => superscript(Number(power))).replace(/\^-n/, "⁻ⁿ");
@@ -72,10 +69,6 @@ export function bytes(count) {
 /** Seconds. */
 export function seconds(value) {
   return value < 100 ? `${value.toFixed(1)} s` : `${Math.floor(value / 60)} min ${Math.round(value % 60)} s`;
-}
-
-function trim(text) {
-  return text.includes(".") ? text.replace(/\.?0+$/, "") : text;
 }
 
 function sign(text) {

@@ -1,21 +1,21 @@
 // Units in which the page shows quantities; the app calculates in SI units.
 
-/** Units to choose from, by quantity; each with its factor from SI. */
+/** Units by quantity, each with its factor from SI. */
 export const UNITS = { force: { N: 1, kN: 1e-3, lbf: 1 / 4.4482216152605 }, length: { mm: 1e3, in: 1 / 0.0254 } };
 const chosen = { force: "N", length: "mm" };
 
-/** Show quantities in these units: {force, length}. */
+/** Set the units of the page: {force, length}. */
 export function setUnits(units) {
   Object.assign(chosen, units);
 }
 
-/** The part of a saved choice that is known here. */
+/** The units of a saved choice, without unknown ones. */
 export function knownUnits(raw) {
   const known = Object.entries(raw ?? {}).filter(([name, unit]) => Object.hasOwn(UNITS, name) && Object.hasOwn(UNITS[name], unit));
   return { force: "N", length: "mm", ...Object.fromEntries(known) };
 }
 
-/** The unit that a quantity has on the screen, and the factor from its own unit: `onScreen("N s/m")`. */
+/** The unit of a quantity on the page, and the factor from its own unit: `onScreen("N s/m")`. */
 export function onScreen(unit) {
   const { force, length } = chosen;
   if (unit === "mm") return { unit: length, factor: UNITS.length[length] / 1000 };
