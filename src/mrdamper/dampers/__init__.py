@@ -1,4 +1,4 @@
-"""Identified dampers: what each kind can do, and how it comes from runs."""
+"""Identified dampers, by kind, and their identification from runs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @cache
 def all_kinds() -> Mapping[str, type[Damper]]:
-    """Every kind of damper that can be saved, by what a saved model calls it."""
+    """Every kind of damper that can be saved, by its name in a saved model."""
     from mrdamper.dampers.base import Damper
 
     for module in pkgutil.iter_modules(__path__):
@@ -25,7 +25,7 @@ def all_kinds() -> Mapping[str, type[Damper]]:
 
 
 def kind_named(name: str) -> type[Damper] | None:
-    """Return the kind that a saved model names; where a module has its name, no other is imported to find it."""
+    """Return the kind that a saved model names; if a module has its name, no other is imported."""
     from mrdamper.dampers.base import Damper
 
     if any(module.name == name for module in pkgutil.iter_modules(__path__)):

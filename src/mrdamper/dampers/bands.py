@@ -20,7 +20,7 @@ from mrdamper.errors import ParameterError
 from mrdamper.identification.intervals import student
 from mrdamper.statistics.metrics import peak_force
 
-_LARGEST_FORCE_N = 1e100  # whose square is a number
+_LARGEST_FORCE_N = 1e100  # whose square is finite
 
 Mask = NDArray[np.bool_]
 
@@ -39,7 +39,7 @@ class Band:
     peak : (float, float)
         Of half the peak-to-peak force [N].
     energy : (float, float)
-        Relative, around the predicted dissipated energy, and not below -1: a damper takes energy up.
+        Relative, around the predicted dissipated energy, and not below -1, because a damper dissipates energy.
     known_session : (float, float)
         Peak force once the session's gain is known [N].
     """
@@ -57,7 +57,7 @@ class Band:
 def band(
     damper: Damper, prediction: Prediction, level: float = 0.9, shown: NDArray[np.bool_] | None = None
 ) -> Band | None:
-    """Prediction intervals in a future test session; None where the runs cannot show how runs differ.
+    """Prediction intervals in a future test session; None if the runs do not determine the scatter between runs.
 
     Where fewer than three sessions are known they hold for sessions like the tested ones (`scope`).
 
@@ -68,14 +68,14 @@ def band(
         Of this damper.
     level : float
     shown : (N,) array of bool, optional
-        Samples the band is of, its peak and its energy among them; default all.
+        Samples of the band, its peak and its energy; default all.
 
     Raises
     ------
     InputError
         E_LEVEL if the level is not between 0 and 1.
     ParameterError
-        If the force is none that has a square.
+        If the square of the force is not finite.
     """
     student(level, 1.0)
     uncertainty: Uncertainty | None = damper.uncertainty
@@ -93,7 +93,7 @@ def band(
     model = (uncertainty.run_gain * force) ** 2 + uncertainty.run_offset**2 + (uncertainty.force * half) ** 2
     own = relative_variances(slopes, uncertainty.covariance, force, motion.velocity, motion.time)
     if distance.motion > 0 and uncertainty.growth.force[2] > 0:
-        # Beyond the tested motions growth holds the whole error that folds showed, that of their parameters with it.
+        # Beyond the tested motions growth contains the whole error of the folds, including that of their parameters.
         nearest = np.minimum(own, _by_parameters(damper, damper.predict(damper.envelope.nearest(prediction.condition))))
         parameter, own = parameter * nearest[0] / (own[0] or 1.0), nearest
     dofs = _degrees_of_freedom(uncertainty, slopes, level)
@@ -108,7 +108,7 @@ def band(
         return factor * student(level, dof) * float(np.sqrt(whole))
 
     def with_growth(at_tests: Any, quantity: Quantity) -> Any:
-        # Calibration is at the tests: not of growth.
+        # The calibration holds at the tests and does not scale growth.
         return np.sqrt(at_tests**2 + uncertainty.growth.half_width(quantity, distance, level) ** 2)
 
     variance: Floats = parameter + session + model
@@ -117,7 +117,7 @@ def band(
     width = half * with_growth(t * np.sqrt(variance) / (half or 1.0), "force")
     of_peak = own[1] + of_run + uncertainty.peak**2
     at_tests = reach("peak", [own[1] + of_session, of_run + uncertainty.peak**2])
-    # A known session leaves its part of the variance out, at the same quantile.
+    # For a known session its part of the variance is omitted, at the same quantile.
     own_session = at_tests * float(np.sqrt(of_peak / ((of_peak + of_session) or 1.0)))
     future, known_session = (half * with_growth(each, "peak") for each in (at_tests, own_session))
     loss = float(with_growth(reach("energy", [own[2] + of_session, of_run + uncertainty.energy**2]), "energy"))
@@ -137,10 +137,11 @@ def _by_parameters(damper: Damper, loop: Prediction) -> Floats:
 
 
 def _degrees_of_freedom(uncertainty: Uncertainty, slopes: Floats, level: float) -> tuple[float, float]:
-    """Behind the variance of parameters and sessions, and of the rest, which calibration counts within its reach.
+    """Degrees of freedom of the variance of parameters and sessions, and of the others, which calibration contains.
 
-    The same few sessions show their scatter and what it moves the parameters by: these two variances are wrong
-    together. Of unknown sessions, those of the parameters are their harmonic mean, each by its variance of the force.
+    Both the scatter between sessions and its effect on the parameters follow from the same few sessions, so these two
+    variances are one part. For unknown sessions, those of the parameters are their harmonic mean, weighted by the
+    variance of the force.
     """
     calibration = uncertainty.calibration
     runs = np.inf if calibration and level <= calibration.reachable else max(uncertainty.run_dof, 1.0)
@@ -152,7 +153,7 @@ def _degrees_of_freedom(uncertainty: Uncertainty, slopes: Floats, level: float) 
 
 
 def scope(damper: Damper, level: float) -> str:
-    """Sessions a band holds for, and how far it is calibrated, as a phrase."""
+    """Sessions for which a band holds, and its calibration, as a phrase."""
     uncertainty: Uncertainty | None = damper.uncertainty
     if uncertainty is None:
         return ""
@@ -194,8 +195,8 @@ class PortableBand:
     level: float
     gain: float  # of the force
     offset_N: float  # [N]
-    of_peak: float  # of half the peak-to-peak force: the model's own error and that of its parameters
-    # in its place at combinations inside the tested ranges that were not tested: that of the farthest one
+    of_peak: float  # of half the peak-to-peak force: model error and that of the parameters
+    # in its place at untested combinations inside the tested ranges: that of the farthest one
     of_peak_untested: float
     scope: str = ""  # sessions it holds for, as a phrase
 

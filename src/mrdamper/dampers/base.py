@@ -1,8 +1,7 @@
-"""An identified damper: something that predicts a force, and knows where it was tested.
+"""An identified damper, which predicts a force with its range of validity.
 
-Whatever the model behind it, a `Damper` answers two questions: the steady loop at a
-condition, and the force along a measured motion. Each answer carries the flags of its
-extrapolation.
+A `Damper` of any model predicts the steady loop at a condition and the force along a measured motion, each with flags
+of extrapolation.
 """
 
 from __future__ import annotations
@@ -32,11 +31,11 @@ from mrdamper.statistics.functions.forms import ParameterFunction
 from mrdamper.statistics.functions.motion_hull import MotionHull
 
 COARSE = "sampling"
-_MIN_YIELD_SAMPLES = 2  # below, the yield displacement falls between samples
+_MIN_YIELD_SAMPLES = 2  # below, the yield displacement is between samples
 
 
 def samples_in_yield_displacement(motion: Excitation, yield_length: float) -> float:
-    """Return samples a motion has, after the median reversal, before it has moved on by `yield_length` [m]."""
+    """Return the number of samples within `yield_length` [m] after the median reversal of a motion."""
     path = motion.path
     inside = np.bincount(path.stroke[path.distance < yield_length], minlength=path.stroke[-1] + 1)
     return float(np.median(inside[1:])) if inside.size > 1 else np.inf
@@ -54,24 +53,24 @@ class Saved:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Damper(Displayable):
-    """An identified damper. Subclasses are frozen dataclasses, found by their file.
+    """An identified damper. Subclasses are frozen dataclasses, found by discovery.
 
     Attributes
     ----------
     kind : str
-        What a saved model calls it.
+        Name in a saved model.
     saved : type of Saved
         Schema of its part of a saved model.
     conditional : bool
-        Whether the model behind it depends on frequency and amplitude; then motion that is no sine
-        is read as a sine that changes, sample by sample.
+        Whether the model depends on frequency and amplitude; other motions than sines are then interpreted as a
+        changing sine, sample by sample.
     streams : bool
-        Whether it can be asked sample by sample.
+        Whether it can be evaluated sample by sample.
     rig : str
     envelope : Envelope
         Ranges of the tests it was identified from.
     provenance : mapping of str to str
-        Dataset, numbers and ways of the identification, versions; texts for the report.
+        Dataset, values and methods of the identification, versions; texts for the report.
     coil : Coil or None
     uncertainty : Uncertainty or None
         Covariance of its parameters and errors of its predictions; None where they are not known.
@@ -141,7 +140,7 @@ class Damper(Displayable):
 
     @property
     def equation(self) -> str:
-        """Its equations as LaTeX, hand-written, with a comma and a quad between them; empty where there are none."""
+        """Its equations as LaTeX, with a comma and a quad between them; empty where there are none."""
         return ""
 
     @property
@@ -151,7 +150,7 @@ class Damper(Displayable):
 
     @property
     def one_model(self) -> Model | None:
-        """The one model behind every condition; None where its parameters follow the condition."""
+        """The one model for every condition; None if its parameters depend on the condition."""
         return None
 
     @property
@@ -161,26 +160,26 @@ class Damper(Displayable):
 
     @property
     def tested_motions(self) -> MotionHull | None:
-        """Motions outside which its functions are held at the nearest one; None where they follow any motion."""
+        """Motions outside which its functions are evaluated at the nearest one; None if they follow any motion."""
         return None
 
     @property
     def followed_amplitudes(self) -> tuple[float, float]:
-        """Amplitudes [m] up to which the parameters follow a motion that is no known sine."""
+        """Amplitudes [m] within which the parameters follow a motion that is no known sine."""
         return self.envelope.amplitude_m
 
     @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:
-        """The numbers determined from the data; none where nobody could name them."""
+        """Parameters determined from the data; empty if they have no meaning."""
         return {}
 
     def with_parameters(self, values: Mapping[str, float]) -> Self:
-        """Return the damper with some of its own numbers changed; only for derivatives and draws."""
+        """Return the damper with some parameters changed, for derivatives and draws."""
         raise not_held(self, values)
 
     @property
     def yield_length(self) -> float | None:
-        """Motion after a reversal in which the force turns over [m], where the model has such a length."""
+        """Displacement after a reversal in which the force changes its sign [m], if the model has such a length."""
         return None
 
     def save(self, path: str | Path) -> None:
@@ -201,28 +200,28 @@ class Damper(Displayable):
         Raises
         ------
         InputError
-            If it is of a kind that lives in one study only.
+            If its kind cannot be saved.
         """
         raise InputError("this kind of damper is not saved", where=self.title, remedy="save another damper")
 
     @classmethod
     def from_saved(cls, saved: Any, **shared: Any) -> Self:
-        """Return the damper of what `to_saved` gave and of the fields that all kinds share.
+        """Return the damper from the result of `to_saved` and the fields of all kinds.
 
         Raises
         ------
         InputError
-            If it does not make a damper.
+            If this is no damper.
         """
-        raise NotImplementedError(cls.kind)  # a kind that cannot be saved is not looked for in files
+        raise NotImplementedError(cls.kind)  # a kind that cannot be saved is not in files
 
     def holding(self, values: Mapping[str, float]) -> Damper:
-        """Return the damper with some of its own numbers held at a value.
+        """Return the damper with some parameters held at a value.
 
         Raises
         ------
         InputError
-            E_HELD if it is not made of them.
+            E_HELD if it has no such parameters.
         """
         raise not_held(self, values)
 
@@ -234,12 +233,12 @@ class Damper(Displayable):
 
     @validate_arguments()
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
-        """Force [N] along a motion about mid-stroke that amounts to a condition."""
+        """Force [N] along a motion about mid-stroke with an equivalent condition."""
         at = replace(condition, current_A=abs(condition.current_A))
         return simulate(self.model_at(at), self.with_field_current(motion)).force
 
     def with_field_current(self, motion: Excitation) -> Excitation:
-        """Return the motion with the current whose field is there: its magnitude, behind the coil's lags."""
+        """Return the motion with the current of the present field: its magnitude, with the lags of the coil."""
         if self.coil is None:
             return motion.with_current(np.abs(motion.current))
         return motion.with_current(self.coil.along(motion.time, motion.current))
@@ -248,9 +247,9 @@ class Damper(Displayable):
     def predict(self, at: Condition | Run | Excitation) -> Prediction:
         """Predict the force at a condition, one steady loop, or along the motion and current of a run.
 
-        The measured force of a run is not used. Parameters that depend on frequency and amplitude get
-        those of the run where it is a sine of one current. Otherwise they follow the sine that the motion
-        has resembled so far: an approximation, flagged as such, and the force that a stream of the damper gives.
+        The measured force of a run is not used. Parameters that depend on frequency and amplitude use those of the run
+        if it is a sine at one current. Otherwise they follow the equivalent sine of the past motion: a flagged
+        approximation, equal to the force of a stream of the damper.
 
         Parameters
         ----------
@@ -289,7 +288,7 @@ class Damper(Displayable):
         return replace(prediction, force=self.force_for(prediction))
 
     def force_for(self, prediction: Prediction) -> Floats:
-        """Return the force of this damper for what another one's prediction was made for."""
+        """Return the force of this damper for the motion of another one's prediction."""
         motion, condition = prediction.motion, prediction.condition
         if prediction.steady:
             return self.loop(condition).force
@@ -299,7 +298,7 @@ class Damper(Displayable):
 
 
 def not_held(damper: Damper, names: Iterable[str]) -> InputError:
-    """Return the refusal of numbers a damper is not made of."""
+    """Return the refusal of parameters that a damper does not have."""
     return InputError(
         f"{', '.join(names)} cannot be held in a saved model of this kind",
         where=damper.title,

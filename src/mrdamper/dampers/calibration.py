@@ -1,12 +1,12 @@
 """Prediction intervals calibrated on runs that were predicted by models identified without them.
 
 The error model gives the shape of an interval: a standard deviation at every sample, of the peak force and of the
-dissipated energy. How many of these standard deviations hold a stated share is read from cross-validated residuals:
-by samples pooled over independent units, each unit counting alike [Dunn, Wasserman and Ramdas 2023, J. Am. Stat.
-Assoc. 118, 2491], and by runs for the peak force and the energy [Vovk, Gammerman and Shafer 2005, between two order
-statistics: Beran and Hall 1993, J. R. Stat. Soc. B 55, 643; with several runs a unit: Lee, Barber and Willett 2023,
-arXiv:2306.06342]. Residuals of cross-validation stand in for those of a calibration
-set [Barber, Candès, Ramdas and Tibshirani 2021, Ann. Stat. 49, 486: the jackknife, whose level holds for stable fits].
+dissipated energy. The number of standard deviations for a stated coverage follows from cross-validated residuals: by
+samples pooled over independent units of equal weight [Dunn, Wasserman and Ramdas 2023, J. Am. Stat. Assoc. 118, 2491],
+and by runs for the peak force and the energy [Vovk, Gammerman and Shafer 2005, between two order statistics: Beran and
+Hall 1993, J. R. Stat. Soc. B 55, 643; with several runs per unit: Lee, Barber and Willett 2023, arXiv:2306.06342].
+Residuals of cross-validation replace those of a calibration set [Barber, Candès, Ramdas and Tibshirani 2021, Ann. Stat.
+49, 486: the jackknife, whose level holds for stable fits].
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ LEVELS = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.975, 0.99)  # at which factors 
 REPORTED_LEVEL = 0.9  # of the coverage that a study states
 _MAX_SAMPLES = 400  # of a run
 _ENOUGH_UNITS = 9  # independent units that reach a level of 90 %
-_MAX_FACTOR = 1e3  # standard deviations; an error beyond is no longer told apart
-_MAX_GROWTH = 10.0  # relative error per unit of distance; one beyond is no longer told apart
+_MAX_FACTOR = 1e3  # standard deviations, to which larger errors are limited
+_MAX_GROWTH = 10.0  # relative error per unit of distance, to which larger ones are limited
 # Growth by each distance that is typical of dampers of known truth (`benchmarks.synthetic_choice`), and the degrees of
 # freedom of its variance, so few because dampers differ: alone where no fold is so far from its tests (one motion, two
 # currents, random records alone), and beside the folds that are, which count as much
@@ -49,7 +49,7 @@ _NORMAL_MEDIAN = 1.4826  # standard deviation of a normal distribution over its 
 
 @dataclass(frozen=True, eq=False)
 class PredictedRun:
-    """A run beside its prediction, inside the steady window.
+    """A run and its prediction, inside the steady window.
 
     Attributes
     ----------
@@ -126,9 +126,8 @@ def _loops(run: Run) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     """Return the samples of each loop whose peak and energy are compared, the window of a sine at one current, and
     where among them its cycles begin.
 
-    A record of another motion, or of changing current, is cut into cycles of its mean frequency: over all of it the
-    errors at its motions and currents cancel, and a prediction is asked for one of them. Cycles of less than half its
-    mean amplitude have no loop.
+    A record of another motion, or of changing current, is cut into cycles of its mean frequency: over the whole record
+    errors at its motions and currents cancel. Cycles of less than half its mean amplitude have no loop.
     """
     sine, at = equivalent_sine(run), np.flatnonzero(run.in_window)
     frequency = sine.condition.frequency_Hz
@@ -149,9 +148,9 @@ def _peaks(run: Run) -> Floats:
 
 
 def measured_peak(run: Run) -> float:
-    """Half the peak-to-peak force [N] in the steady window of a run, which the interval of the peak is compared with.
+    """Half the peak-to-peak force [N] in the steady window of a run, for comparison with the interval of the peak.
 
-    Of a sine of several cycles it is the median: the first may still hold the start of the motion, and one a spike.
+    It is the median over the cycles of a sine, because the first may contain the start of the motion, and one a spike.
     """
     peaks = _peaks(run)
     return float(peaks[0]) if peaks.size == 1 else peak_force(run.force[run.in_window])
@@ -164,7 +163,7 @@ def _peak(force: Floats, cycles: NDArray[np.intp]) -> float:
 
 @dataclass(frozen=True)
 class ModelError:
-    """Standard deviations of what a run's own gain and offset leave, and of these between runs.
+    """Standard deviations of the residuals after gain and offset of a run, and of these between runs.
 
     Attributes
     ----------
@@ -173,7 +172,7 @@ class ModelError:
     peak, energy : float
         Relative.
     gain, offset : float
-        Of all runs about the prediction, sessions in it [-] and [N].
+        Of all runs about the prediction, including sessions [-] and [N].
     """
 
     force: float
@@ -184,7 +183,7 @@ class ModelError:
 
 
 def model_error(runs: Sequence[PredictedRun]) -> ModelError:
-    """Root mean square of what is left after each run's own gain and offset; median spread of these.
+    """Root mean square of the residual after gain and offset of each run; median spread of these.
 
     Parameters
     ----------
@@ -209,7 +208,7 @@ def model_error(runs: Sequence[PredictedRun]) -> ModelError:
 def scatter_between_sessions(runs: Sequence[PredictedRun]) -> tuple[float, float]:
     """Estimate the standard deviations of the gain and of the offset [N] between sessions.
 
-    The mean of a session, predicted by the mean of the S - 1 others, is off by S / (S - 1) of the variance.
+    The mean of a session, predicted by the mean of the S - 1 others, has an error of S / (S - 1) times the variance.
 
     Parameters
     ----------
@@ -234,7 +233,7 @@ class Growth:
         Per unit of `Distance.between`, `beyond` and `motion`: of the force over half its peak-to-peak value, of the
         peak force and of the dissipated energy, relative.
     dof : (float, float, float)
-        Degrees of freedom behind their squares, by distance.
+        Degrees of freedom of their squares, by distance.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -245,7 +244,7 @@ class Growth:
     dof: tuple[float, float, float] = (_NORMAL_DOF, _NORMAL_DOF, _NORMAL_DOF)
 
     def half_width(self, quantity: Quantity, distance: Distance, level: float) -> float:
-        """Half the relative interval that a distance alone gives."""
+        """Half the relative interval by a distance alone."""
         quantiles = [student(level, dof) for dof in self.dof]
         return float(np.sqrt(np.square(np.multiply(getattr(self, quantity), quantiles)) @ distance.squares))
 
@@ -259,8 +258,8 @@ class Growth:
     ) -> Growth:
         """Least squares of the squared errors in excess of those at the tests, by the squared distances.
 
-        The fastest motions, or the highest current, are one fold, and a lucky one would leave no growth. The variance
-        of the typical growth has as many degrees of freedom and is pooled with theirs [moderated variances: Smyth 2004,
+        The fastest motions, or the highest current, are one fold, which may show no growth by chance. The variance of
+        the typical growth has as many degrees of freedom and is pooled with theirs [moderated variances: Smyth 2004,
         Stat. Appl. Genet. Mol. Biol. 3, 3]; a distance that no run has gets the typical growth alone.
 
         Parameters
@@ -292,14 +291,14 @@ class Growth:
 
 
 def _squared_errors(run: PredictedRun) -> Floats:
-    """(3,) squared relative errors of the force, the peak and the energy; what is not finite counts as one."""
+    """(3,) squared relative errors of the force, the peak and the energy; values that are not finite count as one."""
     force = float(np.mean((run.measured - run.predicted) ** 2)) / run.half**2
     of_loops = [np.mean(np.where(np.isfinite(ratio), (ratio - 1) ** 2, 1.0)) for ratio in (run.peak, run.energy)]
     return np.array([force if np.isfinite(force) else 1.0, *of_loops])
 
 
 def _expected(run: PredictedRun, at_tests: ModelError) -> Floats:
-    """(3,) their expectation at the tests."""
+    """(3,) expected squared errors at the tests."""
     gain = at_tests.gain**2
     moved = gain * float(np.mean(run.predicted**2)) / run.half**2 + (at_tests.offset / run.half) ** 2
     return np.array([moved + at_tests.force**2, gain + at_tests.peak**2, gain + at_tests.energy**2])
@@ -307,7 +306,7 @@ def _expected(run: PredictedRun, at_tests: ModelError) -> Floats:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Factors on the standard deviations of the error model, and the coverage found with them.
+    """Factors on the standard deviations of the error model, and their observed coverage.
 
     Attributes
     ----------
@@ -318,7 +317,7 @@ class Calibration:
         Factor on the quantile of a normal distribution at each of `LEVELS` that these units reach.
     coverage : tuple of float, length 3
         Share of samples, peak forces and energies inside their interval of 90 %, or of the level that can be
-        reached, each unit held out of the calibration in turn.
+        reached, each unit omitted from the calibration in turn.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -337,7 +336,7 @@ class Calibration:
 
     @property
     def level(self) -> float:
-        """Of the coverage that was found."""
+        """Level of the observed coverage."""
         return min(REPORTED_LEVEL, self.reachable)
 
     @property
@@ -414,9 +413,9 @@ def _factors(units: Sequence[Sequence[StandardizedErrors]], quantity: Quantity) 
 def _quantile(units: Sequence[Sequence[StandardizedErrors]], quantity: Quantity, level: float) -> float:
     """Quantile of the scores with equal weight of units.
 
-    Where runs have one value each, there is room for a unit to come, and the quantile lies between two order
-    statistics: the larger one alone covers up to 1 / (n + 1) more than the level [Beran and Hall 1993].
-    Samples, and peaks and energies of the loops of long records, are pooled.
+    If runs have one value each, the quantile accounts for a future unit and lies between two order statistics: the
+    larger one alone covers up to 1 / (n + 1) more than the level [Beran and Hall 1993]. Samples, and peaks and energies
+    of the loops of long records, are pooled.
     """
     scores = [scored.samples(quantity) for unit in units for scored in unit]
     weights = [np.full(s.samples(quantity).size, 1 / s.samples(quantity).size / len(u)) for u in units for s in u]
@@ -440,7 +439,7 @@ def _covered(
     quantity: Quantity,
     level: float,
 ) -> float:
-    """Share of scores that factors from the other units cover, each unit counting alike."""
+    """Share of scores that factors from the other units cover, with equal weight of units."""
     shares: list[float] = []
     for unit, rest in zip(units, others, strict=True):
         reached = min(level, len(rest) / (len(rest) + 1)) if rest else 0.0

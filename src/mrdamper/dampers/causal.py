@@ -1,7 +1,7 @@
 """Evaluation of a damper sample by sample: its array code traced on symbols.
 
-What is traced here is streamed, leaves as C and FMU, and predicts motion that is no sine with
-parameters that ask for a frequency and an amplitude: one definition, looking back only.
+The traced program is streamed, exported as C and FMU, and predicts other motions than sines with parameters that depend
+on frequency and amplitude: one definition, which uses past samples only.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from mrdamper.dampers.protocols import DamperLike as Damper
     from mrdamper.physics.motion.excitation import Excitation
 
-_STEADY = 1e-18  # mean square displacement under which nothing moves [m²]
+_STEADY = 1e-18  # mean square displacement below which the damper is at rest [m²]
 
 
 def free_name(number: str) -> str:
@@ -34,11 +34,10 @@ def free_name(number: str) -> str:
 def trace(damper: Damper, free: bool = False) -> Program:
     """Return the program of one sample.
 
-    From displacement [m], velocity [m/s], acceleration [m/s²], current [A] and the step of time [s]
-    to force [N] and a flag of 8 where the frequency was not tested. One model for all conditions keeps
-    its parameters free to be set. Where parameters follow the condition, frequency and amplitude come
-    from the motion so far, averaged over about a cycle of the slowest tested frequency, and stay inside
-    the tested frequencies and `Damper.followed_amplitudes`.
+    From displacement [m], velocity [m/s], acceleration [m/s²], current [A] and the step of time [s] to force [N] and a
+    flag of 8 where the frequency was not tested. One model for all conditions keeps its parameters free to be set.
+    Where parameters depend on the condition, frequency and amplitude follow from the past motion, averaged over about a
+    cycle of the slowest tested frequency, within the tested frequencies and `Damper.followed_amplitudes`.
 
     Raises
     ------
@@ -74,10 +73,10 @@ def trace(damper: Damper, free: bool = False) -> Program:
 
 
 def _running_condition(damper: Damper, motion: TracedMotion) -> tuple[Condition, Any]:
-    """Return the sine the motion has resembled so far, and whether its frequency was not tested.
+    """Return the equivalent sine of the past motion, and whether its frequency was not tested.
 
-    ω² is the mean square velocity over the mean square displacement, A² twice the latter; the
-    means fade in two lags of one slowest period each, and are freed of their start.
+    ω² is the mean square velocity over the mean square displacement, A² twice the latter; the means have two lags of
+    one slowest period each, and are corrected for their start.
     """
     tape, envelope = motion.tape, damper.envelope
     low, high = envelope.frequency_Hz

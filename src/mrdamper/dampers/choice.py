@@ -23,13 +23,13 @@ from mrdamper.models import model_type
 from mrdamper.statistics.functions.selection import Errors, smaller_wins
 from mrdamper.statistics.linear import on_one_blas_thread, solve_linear
 
-_COARSE_TOLERANCE = 1e-4  # relative gain of a step that is enough to tell forms apart
+_COARSE_TOLERANCE = 1e-4  # relative gain of a step that suffices to compare forms
 _NO_ONSET_A = 1e-4  # below the currents of any test: the yield force rises from no current on [A]
 _NO_PLAY_LENGTH_M = 1e-2  # longer than any free play, so that none is left [m]
 _BLOCK_CYCLES = 12.0  # cycles of one block of a record that is no sine, in cross-validation
 MODEL = "play-bypass"
 _PLAIN = "none beyond the plain form"
-SEARCHED = ("leak", "cq", "qb")  # presets free from the first fit on: without them others make up for what they do
+SEARCHED = ("leak", "cq", "qb")  # presets free from the first fit on: without them others compensate for their effects
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ def _with_presets_as_terms(runs: Sequence[Run], model: str) -> JointChoice:
 def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, JointFit, tuple[TermTrial, ...]]:
     """Remove the free play from the model where it predicts as well without it."""
     without = problem.with_free(problem.free, {"e": _NO_PLAY_LENGTH_M})
-    starts = (without.from_point(fit), without.start)  # the play found need not be the way of a seat without play
+    starts = (without.from_point(fit), without.start)  # the minimum without play may be another
     fits = [without.fit(start=start, rounds=1, most_steps=10, settled=_COARSE_TOLERANCE) for start in starts]
     refitted = min(fits, key=lambda each: float(np.sum(each.nrmse_pp)))
     now, scores = (CrossValidation.of(p, f).everything() for p, f in ((problem, fit), (without, refitted)))
@@ -188,7 +188,7 @@ def _lost_motion(problem: JointProblem, fit: JointFit) -> tuple[JointProblem, Jo
 
 
 def _absent(problem: JointProblem, fit: JointFit) -> tuple[Coil | Literal["determined"] | None, tuple[str, ...]]:
-    """Return the coil to look for, and presets, without those that ended where they do nothing."""
+    """Return the coil to determine, and presets, without those that ended without an effect."""
     least = {
         a.name
         for a, u in zip(problem.axes, fit.point, strict=True)
@@ -199,10 +199,10 @@ def _absent(problem: JointProblem, fit: JointFit) -> tuple[Coil | Literal["deter
 
 
 def _level_laws(problem: JointProblem) -> tuple[ModelTerm, ...]:
-    """Forms of the level law that the currents of the tests determine, the shortest first.
+    """Functions of current that the tests determine, the shortest first.
 
-    A law has a parameter fewer than there are levels; a current that changes passes through all. Two levels show no
-    more than a straight line. Three determine a saturation; runs at two of them are fitted without it.
+    A function has a parameter fewer than there are levels; a changing current passes through all. Two levels determine
+    a straight line only. Three determine a saturation; runs at two of them are fitted without it.
     """
     levels = level_count(problem.currents)
     free = {"si"} if levels == 3 else set[str]()
@@ -221,9 +221,9 @@ def _level_law(
 ) -> tuple[ModelTerm, JointFit, tuple[TermTrial, ...], dict[str, Floats]]:
     """Select the form of the yield force over current by cross-validation, the shortest first.
 
-    Inner currents are left out where there are some: one step does not carry a form from current to current, so these
-    are fitted, from starts that never saw them. The search began with every parameter of the law, for the others make
-    up for a form that is too short.
+    Inner currents, if any, are omitted and fitted from independent starts, because one step does not suffice between
+    currents. The search began with every parameter of the function, because the others compensate for a form that is
+    too short.
     """
     levels = levels_of(longest.currents)[1:-1] if len(forms) > 1 else []
     without = FoldFits(longest, levels)
@@ -252,7 +252,7 @@ def _level_law(
 
 
 def _left_out_current(problem: JointProblem, starts: Sequence[JointFit], levels: Sequence[Sequence[int]]) -> Floats:
-    """Errors nrmse_pp of the runs at some currents, each level predicted by a fit without it begun from its start."""
+    """Errors nrmse_pp of the runs at some currents, each level predicted by a fit without it from its start."""
     errors: list[Floats] = []
     for level, start in zip(levels, starts, strict=True):
         rest = [i for i in range(len(problem.parts)) if i not in level]
@@ -388,7 +388,7 @@ def _by_session(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.n
     try:
         sessions = [session_of(run) for run in problem.runs]
     except InputError:
-        return {}  # a clock that is no date: what sessions share is refused where it is asked for
+        return {}  # a clock that is no date is refused where sessions are used
     sessions_of_runs = [session for session in sessions if session is not None]
     rows = dict.fromkeys(sessions_of_runs)
     if not SESSIONS_NEEDED <= len(rows) < len(sessions_of_runs):

@@ -1,8 +1,7 @@
 """Lag of the field, and so of the yield force, behind the coil current, and the current driver.
 
-Flux builds up and decays with different lags: eddy currents hold both back, the driver's
-free-wheeling the decay. The damper's field is symmetric: a current counts by its magnitude, in
-every damper, with a coil or without.
+Flux increases and decreases with different lags, by eddy currents and, for the decrease, by free-wheeling of the
+driver. The field of a damper is symmetric: only the magnitude of the current counts, with a coil or without.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from mrdamper.data.strict_text import STRICT
 from mrdamper.errors import ParameterError
 from mrdamper.tracing import Tape, choose
 
-_MAX_LAG_S = 10.0  # s; a field that needs longer is no coil's
+_MAX_LAG_S = 10.0  # s; the longest lag of a coil
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class Driver:
     Raises
     ------
     ParameterError
-        If a number is no driver's.
+        If a value is not possible.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -84,7 +83,7 @@ class Coil:
     rise_s, fall_s : float
         Time constants [s] while the field grows and while it decays; zero follows at once.
     driver : Driver or None
-        What makes the current, where the input is a voltage.
+        Source of the current, if the input is a voltage.
 
     Raises
     ------
@@ -104,12 +103,12 @@ class Coil:
                 raise ParameterError(f"{name} = {value:g} s", where="coil", remedy=f"give 0 to {_MAX_LAG_S:g} s")
 
     def along(self, time: Floats, current: Floats) -> Floats:
-        """(N,) current [A] whose steady field is there at (N,) times [s]; see `field_current`."""
+        """(N,) current [A] of the present field at (N,) times [s]; see `field_current`."""
         return field_current(time, current, self.rise_s, self.fall_s)
 
 
 def field_current(time: Floats, current: Floats, rise: float, fall: float, signed: bool = False) -> Floats:
-    """Return current that would, held for ever, make the field that is there: the lagged magnitude.
+    """Return the current whose steady field is the present one: the lagged magnitude.
 
     T di/dt + i = |I|, T = `rise` while |I| > i and `fall` while |I| < i, exact for |I| straight
     between samples; settled at the first sample.
@@ -141,7 +140,7 @@ def _gap(gap: float, change: float, step: float, rise: float, fall: float) -> fl
     """Advance the difference between commanded and lagged current by one step: dg/dt = s − g/T, T by the sign of g."""
     upward = gap > 0 or (gap == 0 and change > 0)
     constant, slope = (rise if upward else fall), change / step
-    if gap * change < 0 and constant > 0:  # met on the way, perhaps: then the other lag from there on
+    if gap * change < 0 and constant > 0:  # if they become equal within the step, the other lag holds from there on
         met = constant * math.log1p(-gap / (slope * constant))
         if met < step:
             gap, step, constant = 0.0, step - met, (fall if upward else rise)

@@ -1,7 +1,6 @@
 """Runs concatenated into one motion: samples that are simulated, samples of the least squares, residuals.
 
-All runs are concatenated into one motion: a model with fading memory forgets one run while it
-follows the next, and one long array is followed faster than many short ones.
+The effect of one run on the state decays during the next, and one long array is evaluated faster than many short ones.
 """
 
 from __future__ import annotations
@@ -33,25 +32,25 @@ if TYPE_CHECKING:
 _ROWS = 400  # samples of a steady run that enter the least squares, about
 # Samples of a cycle that are simulated: at a reversal, between reversals, at rest.
 _SAMPLES_TURNING, _SAMPLES_RUNNING, _SAMPLES_RESTING = 400, 60, 15
-_TURNING_VELOCITY_RATIO = 0.4  # of the peak velocity, below which a motion turns
-_REST_CYCLES = 0.05  # cycles of rest around a sample at which nothing turns any more
-_CURRENT_TOLERANCE = 1e-3  # of the largest current; where it changes by more, every sample is followed
+_TURNING_VELOCITY_RATIO = 0.4  # of the peak velocity, below which a motion is near a reversal
+_REST_CYCLES = 0.05  # cycles of rest around a sample without a reversal
+_CURRENT_TOLERANCE = 1e-3  # of the largest current; where it changes by more, every sample is evaluated
 _TRANSIENT_WEIGHT = 0.1  # weight of what lies outside a steady window, ramps and rests, against what lies inside
 _CYCLES = 4  # of a sine that enter: more repeat the same
-_WARM_UP = 1.5  # cycles before the scored samples in which the model forgets its start
+_WARM_UP = 1.5  # cycles before the scored samples in which the effect of the start decays
 _MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight
 _REST_VELOCITY_RATIO = 0.01  # share of the peak velocity below which a damper rests
 _REFIT_ROUNDS = 3  # rounds of weights on derivatives that are known
 _DIFFERENCE_RATIO = 1e-3  # of the box, over which the last slopes are taken
-_RIDGE = 1e-11  # keeps columns apart that are nearly alike
+_RIDGE = 1e-11  # regularises nearly equal columns
 
 
 @dataclass(frozen=True, eq=False)
 class RunRows:
     """Samples of a run that are simulated, those of the least squares, and their weights by the time they represent.
 
-    Of a steady sine the middle cycles are left out: they repeat the last ones. What a record begins
-    with, before it has moved by its amplitude, tells of a state nobody knows.
+    The middle cycles of a steady sine are omitted, because they repeat the last ones. Samples before the first motion
+    by the amplitude are omitted, because the state of the damper is unknown there.
     """
 
     motion: Excitation
@@ -87,9 +86,9 @@ class RunRows:
             information = max(1.0, np.sqrt((time[last] - time[first]) / period))
         at = np.flatnonzero(followed)
         x = motion.displacement
-        moved = np.maximum.accumulate(x) - np.minimum.accumulate(x)  # not the travel: that grows at rest, by noise
+        moved = np.maximum.accumulate(x) - np.minimum.accumulate(x)  # not the travel, which increases at rest by noise
         unknown = min(index_at(moved, sine.condition.amplitude_m), max(first, len(motion) // 4))
-        rows = at[(at >= unknown) & (at < len(motion) - 1)]  # the last sample turns towards the next run
+        rows = at[(at >= unknown) & (at < len(motion) - 1)]  # the last sample has the velocity toward the next run
         before, inside, after = rows[rows < first], rows[(rows >= steady) & (rows <= last)], rows[rows > last]
         inside = inside[:: max(1, int(inside.size / (_ROWS * information)))]
         every = max(1, (before.size + after.size) // _ROWS)
@@ -120,7 +119,7 @@ class RunRows:
         kept = np.flatnonzero((self.picked >= self.steady[0]) & (self.picked <= self.steady[1]))
         kept = kept[-_ROWS if self.is_sine else -max(_ROWS, kept.size // 3) :]
         begin, end = int(self.picked[kept[0]]), int(self.picked[kept[-1]]) + 1
-        begin = max(0, int(begin - 0.4 * (end - begin)))  # to forget the start in
+        begin = max(0, int(begin - 0.4 * (end - begin)))  # for the decay of the start
         return replace(
             self,
             motion=self.motion.part(slice(begin, end)),
@@ -143,10 +142,9 @@ def envelope_of(parts: Sequence[RunRows]) -> Envelope:
 
 
 def _carrying(motion: Excitation, condition: Condition) -> NDArray[np.bool_]:
-    """Return samples without which the motion would be another: dense where it turns, few where it runs on or rests.
+    """Return the samples that represent a motion: many near reversals, few elsewhere and at rest.
 
-    A damper's force changes within a short way after a reversal; between two it changes slowly,
-    however fast the record was sampled.
+    The force of a damper changes within a short distance after a reversal and slowly between reversals.
     """
     size, duration = len(motion), float(motion.time[-1] - motion.time[0])
     cycle = (size - 1) / (duration * condition.frequency_Hz)  # samples
@@ -170,7 +168,7 @@ def _carrying(motion: Excitation, condition: Condition) -> NDArray[np.bool_]:
 
 
 def _lasting(time: Floats) -> Floats:
-    """(N,) time each of some samples stands for: half of the way to its neighbours on either side [s]."""
+    """(N,) time that each sample represents: half the distance to its neighbours on both sides [s]."""
     if time.size < 2:
         return np.ones(time.size)
     steps = np.diff(time)
@@ -202,7 +200,7 @@ class ConcatenatedRuns:
         )
 
     def with_field_current(self, coil: Coil | None) -> Excitation:
-        """Return the motion with the current that the field feels; remembered while the coil stays."""
+        """Return the motion with the current of the field; cached for one coil."""
         if self._lagged_motion[0] != coil:
             current = np.abs(self.measured.current)
             for part, begin in zip(self.parts, self.begins, strict=True):
@@ -231,7 +229,7 @@ class JointResiduals:
         self._solved: tuple[Floats, LinearSolution] | None = None
 
     def only(self, runs: Sequence[int]) -> JointResiduals:
-        """Return the samples of some of the runs, in order; the others are followed all the same, and not looked at."""
+        """Return the samples of some of the runs, in order; the others are evaluated but not used."""
         kept, table = np.isin(self.owner, runs), copy(self)
         for name in ("picked", "target", "share", "unit"):
             setattr(table, name, getattr(self, name)[kept])
@@ -261,9 +259,9 @@ class JointResiduals:
         return self._seen[1], model.state(motion)[self.picked]
 
     def linear_columns(self, point: Floats) -> tuple[Model, Floats, Floats]:
-        """Model at a point without its linear parameters, its force [N], and what one unit of each adds.
+        """Model at a point without its linear parameters, its force [N], and the force per unit of each.
 
-        Remembered for the last point: weights do not touch it.
+        Cached for the last point, independent of weights.
         """
         if self._columns_at is None or not np.array_equal(self._columns_at[0], point):
             reduced = self.problem.without_linear(point)
@@ -271,7 +269,7 @@ class JointResiduals:
         return self._columns_at[1:]
 
     def _linear_table(self, reduced: Model, point: Floats) -> tuple[Floats, Floats]:
-        """Force of a model without linear parameters, and what one unit of each adds: in one pass where it can be."""
+        """Force of a model without linear parameters, and the force per unit of each, in one pass if possible."""
         motion, linear = self.concatenated.with_field_current(self.problem.coil_at(point)), self.problem.linear
         names = [info.name for info in type(reduced).parameters() if info.linear]  # one program for all problems
         rows = force_tangents(reduced, motion, names, self.picked)
@@ -280,7 +278,7 @@ class JointResiduals:
         return rows[0], rows[[1 + names.index(info.name) for info in linear]].T
 
     def solve(self, point: Floats) -> LinearSolution:
-        """Linear parameters of least weighted squares at a point of the search axes; remembered for the last."""
+        """Linear parameters of least weighted squares at a point of the search axes; cached for the last point."""
         if self._solved is not None and np.array_equal(self._solved[0], point):
             return self._solved[1]
         linear, factor = self.problem.linear, self.factor
@@ -300,19 +298,19 @@ class JointResiduals:
         return self.solve(point).residual
 
     def slopes(self, point: Floats) -> Floats:
-        """(N, D) derivatives of the residual at a point, the linear parameters following.
+        """(N, D) derivatives of the residual at a point, with the linear parameters refitted.
 
-        They follow to first order: the gradient is exact, and an axis costs one force instead of a
-        least squares of its own [Kaufman 1975, BIT 15, 49].
+        These follow to first order: the gradient is exact, and an axis costs one force instead of a least-squares
+        problem [Kaufman 1975, BIT 15, 49].
         """
         solved = self.solve(point)
         return project_out(self._moved(point, solved.model, solved.residual), solved.columns)
 
     def gradient(self, point: Floats) -> Floats:
-        """(D,) half the slope of the cost, the linear parameters following.
+        """(D,) half the slope of the cost, with the linear parameters refitted.
 
-        Each derivative is taken across a thousandth of the box: a sample that meets the edge of the play
-        bends its residual, and a slope at the point would jump there.
+        Each derivative is a difference across a thousandth of the box, because the residual has a kink where a sample
+        reaches the end of the play, at which a derivative would jump.
         """
         solved, weights = self.solve(point), self.weights[self.owner]
         lower, upper = self.problem.box()
@@ -363,12 +361,12 @@ class Linearisation:
 
     @cached_property
     def _triangles(self) -> list[Floats]:
-        """Residual and derivatives of each run turned into as many rows as columns: no sum of squares changes."""
+        """Residual and derivatives of each run in as many rows as columns, with equal sums of squares."""
         whole, owner = np.column_stack([self.residual, self.jacobian]), self.table.owner
         return [np.linalg.qr(whole[owner == run], mode="r") / weight for run, weight in enumerate(self.table.weights)]
 
     def extrapolate_refit(self, runs: Sequence[int], box: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-        """Errors of some runs, and where a search of these alone would end, the linear parameters following freely."""
+        """Residual and derivatives of each run in as many rows as columns, with equal sums of squares."""
         triangles, point, own = [self._triangles[i] for i in runs], self.point, slice(1, 1 + self.point.size)
         owner = np.repeat(np.arange(len(runs)), [len(triangle) for triangle in triangles])
         rows, weights = np.concatenate(triangles), self.table.weights[list(runs)]

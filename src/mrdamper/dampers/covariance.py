@@ -1,4 +1,4 @@
-"""Uncertainty of a damper from the runs it was identified from: parameters, sessions, and the model's own error."""
+"""Uncertainty of a damper from its runs: parameters, sessions, and model error."""
 
 from __future__ import annotations
 
@@ -56,17 +56,17 @@ def estimate_uncertainty(
     runs : sequence of Run
         It was identified from.
     cross_validated : sequence of PredictedRun
-        Runs predicted by models identified without their condition: the error of the form itself, and the
-        calibration of prediction intervals. Without them the residuals of the runs stand in, uncalibrated.
+        Runs predicted by models identified without their condition: the model error, and the calibration of prediction
+        intervals. Without them the residuals of the runs are used, uncalibrated.
     away : sequence of PredictedRun
         Runs predicted by models identified without their current, or without the fastest motions: how the error grows
         away from the tests.
     other_sessions : sequence of PredictedRun
         Runs predicted by models identified without their session: the scatter between sessions is not below theirs.
     held : collection of str
-        Parameters that ended at a limit of what was searched, inside their bounds.
+        Parameters that ended at a limit of the search, inside their bounds.
     bounded : bool
-        Parameters at a bound are held there; otherwise they count like the others, as if there were none.
+        Parameters at a bound are held there; otherwise they count like the others.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def estimate_uncertainty(
     Raises
     ------
     InputError
-        E_CLOCK if a session is asked of a clock that is no date.
+        E_CLOCK if the clock of a session is no date.
     """
     if not damper.fitted_parameters or not runs:
         return damper
@@ -150,8 +150,8 @@ class _Spread:
         """Widen the intervals by what the linearisation of the draws omits, of one model of a damper.
 
         Some draws are fitted without linearisation. Each interval is widened by the mean absolute change of its
-        parameter in these fits over that in the linearised fits to the same draws, and never narrowed. Means of
-        absolute values, since one fit far off would determine a mean square.
+        parameter in these fits over that in the linearised fits to the same draws, and never narrowed. One outlier
+        would determine a mean square.
         """
         moved = self.draws.moved
         if damper.one_model is None or not moved.any():
@@ -167,8 +167,8 @@ class _Spread:
     def covariance(self) -> Floats:
         """(P, P) of the parameters, or of their logarithms, linearised.
 
-        Parameters that make up for each other lie on a curve of nearly the same force: a factor on one of them alone
-        would give the force a variance that it does not have.
+        Correlated parameters lie on a curve of nearly the same force: a factor on one of them alone would increase the
+        variance of the force.
         """
         return self.within + self.draws.moved.T @ self.draws.moved / len(self.draws.moved)
 
@@ -190,7 +190,7 @@ class _Spread:
     def interval_factor(self) -> Floats:
         """(P,) factor on standard errors, above one for curved parameters.
 
-        Below one where a normal interval would hold more than its share of the draws.
+        Below one where a normal interval would cover more than its share of the draws.
         """
         variance = np.maximum(np.diag(self.covariance), np.finfo(float).tiny)
         curved = np.diag(self.within) + self.wider**2 * np.mean(self.draws.moved**2, axis=0)
@@ -202,7 +202,7 @@ class _Spread:
         return np.array([dof_of_quantile(float(q), _LEVEL) for q in self.quantiles])
 
     def effective(self, samples: int) -> dict[str, float]:
-        """Return independent samples behind each parameter, of those that there are."""
+        """Return the independent samples of each parameter."""
         variance = np.maximum(self.interval_factor**2 * np.diag(self.covariance), np.finfo(float).tiny)
         return dict(zip(self.names, np.minimum(self.textbook / variance, samples).tolist(), strict=True))
 
@@ -217,8 +217,8 @@ def _identifiable(
 ) -> tuple[_Spread, set[str]]:
     """Return the covariance of parameters whose intervals span less than three decades, and those whose do not.
 
-    One parameter after the other is held, the widest first, until the intervals of the others are bounded; all that
-    were too wide beside free ones are not identifiable. Curvature is not counted here.
+    Parameters are held in sequence, the widest first, until the intervals of the others are bounded; all that were too
+    wide are not identifiable. Curvature is not considered here.
     """
     wide: set[str] = set()
     while True:
@@ -245,7 +245,7 @@ def _width(own: FittedParameter, half: float) -> float:
 def _determined(
     slopes: Sequence[Floats], parts: Sequence[RunResiduals], count: int
 ) -> tuple[list[int], list[int], list[list[int]], Floats]:
-    """Columns to keep, those no run shows, groups that do the same, and the inverse of the kept ones' normal matrix."""
+    """Columns to keep, those not determined, groups with the same effect, and the inverse normal matrix of the kept."""
     normal = normal_matrix(slopes, parts)
     keep: list[int] = [i for i in range(count) if normal[i, i] > 0]
     unseen, alike = [i for i in range(count) if i not in keep], list[list[int]]()
@@ -282,7 +282,7 @@ def _within(
 ) -> tuple[Floats, Floats]:
     """Covariance by noise and model error within the runs, and its relative variance by parameter.
 
-    What gains and offsets of other runs have moved the parameters by is no error of the model.
+    The effect of gains and offsets of other runs on the parameters is no model error.
     """
     total, doubt = np.zeros_like(inverse), np.zeros(len(inverse))
     for part, slope in zip(parts, slopes, strict=True):
@@ -291,7 +291,7 @@ def _within(
             even = part.evenly(slope, stretch)
             rest: Floats = stretch.residual - np.sum(even * by_gains, axis=1)
             rest -= table @ np.linalg.lstsq(table, rest, rcond=None)[0]
-            own = inverse * stretch.weight**2  # what this stretch takes part in
+            own = inverse * stretch.weight**2  # parameters with an effect on this stretch
             score, dof, _ = score_covariance(even, rest, stretch.time, stretch.frequency, own)
             covariance = inverse @ score @ inverse * stretch.weight**4
             total += covariance
@@ -300,7 +300,7 @@ def _within(
 
 
 def _inside(part: RunResiduals) -> PredictedRun:
-    """Return a run beside the force of the fit that saw it."""
+    """Return a run and the force of the fit to all runs."""
     steady = part.stretches[0]
     measured = steady.predicted - steady.residual
     powers = [dissipated_power(f, steady.velocity, steady.time) for f in (measured, steady.predicted)]
@@ -362,7 +362,7 @@ def _with_model_error(
     away: Sequence[PredictedRun],
     other_sessions: Sequence[PredictedRun],
 ) -> Uncertainty:
-    """Error of the form: what is left after each run's own gain and offset; and the calibration on it."""
+    """Model error after gain and offset of each run, and the calibration."""
     own = {
         part.run.id: _by_parameters(part, slope, uncertainty.covariance)
         for part, slope in zip(parts, slopes, strict=True)
@@ -375,7 +375,7 @@ def _with_model_error(
     if other_sessions and uncertainty.of_sessions:
         gain, offset = scatter_between_sessions(other_sessions)
         uncertainty = replace(uncertainty, gain=gain, offset=offset)
-    # A fold that saw other runs of a session has taken part of its gain up: the scatter about the mean is left.
+    # A fold with other runs of a session has absorbed part of its gain: the scatter about the mean remains.
     left = 1 - 1 / max(len({part.session for part in parts}), 1)
     of_sessions = {"gain": left * uncertainty.gain**2, "offset": left * uncertainty.offset**2}
     uncertainty = replace(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from mrdamper.data import current_levels
 from mrdamper.models.base import Model
 
-_PASSED_LEVELS = 5  # levels that a current that changes counts for: it passes through all
+_PASSED_LEVELS = 5  # number of levels of a changing current, which passes through all
 
 
 def levels_of(currents: Sequence[float | None]) -> list[list[int]]:
@@ -23,6 +23,6 @@ def level_count(currents: Sequence[float | None]) -> int:
 
 
 def undetermined(model: type[Model], currents: Sequence[float | None]) -> tuple[str, ...]:
-    """Return the parameters of effects of the current that runs of too few levels cannot tell from others."""
+    """Return the parameters of effects of the current that runs of too few levels do not determine."""
     levels = level_count(currents)
     return tuple(name for name, needed in model.current_levels.items() if levels < needed)

@@ -1,8 +1,8 @@
-"""Distance of a prediction from the tests a damper was identified from.
+"""Distance of a prediction from the tests of a damper.
 
-Three numbers, none of them with a unit: how far a current lies between two tested ones, how far beyond them, and how
-far a motion lies outside the convex hull of the tested motions in log f and log A, where lines of equal peak velocity
-are straight. They are zero at the tests, and the error of a form of model grows with each (`calibration.Growth`).
+Three dimensionless numbers: the distance of a current between two tested ones, the distance beyond them, and the
+distance of a motion from the convex hull of the tested motions in log f and log A, where lines of equal peak velocity
+are straight. They are zero at the tests, and the model error increases with each (`calibration.Growth`).
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from mrdamper.data.conditions import Condition, current_levels
 from mrdamper.statistics.functions.motion_hull import MotionHull
 
 _CURRENT_TOLERANCE = 0.02  # of the largest current: sessions repeat a level to some per cent
-_MAX_SAMPLES = 400  # samples of a current that are looked at
+_MAX_SAMPLES = 400  # samples of a current that are used
 
 
 @dataclass(frozen=True)
 class Distance:
-    """Distance from the tests, by what is away from them."""
+    """Distance from the tests, by quantity."""
 
     # product of the distances of a current from its two tested neighbours, over the square of the largest tested
     # current: the error of interpolation grows with it
@@ -51,7 +51,7 @@ def distance_from(
     tested : sequence of Condition
         Not empty.
     at : Condition
-        That the motion amounts to.
+        Equivalent condition of the motion.
     current : (N,) array
         [A]
     swept_A : (float, float), optional
@@ -78,7 +78,7 @@ def _current_distances(current: Floats, levels: Floats, changing: bool) -> tuple
     outside = np.maximum(np.maximum(levels[0] - current, current - levels[-1]) / largest - _CURRENT_TOLERANCE, 0)
     if changing:  # a record passes through all currents between its ends
         return np.zeros_like(outside), outside**2
-    if levels.size == 1:  # the spacing is the distance of the level from no current
+    if levels.size == 1:  # the spacing is the distance of the level from 0 A
         return np.zeros_like(outside), outside * (outside + 1)
     after = np.clip(np.searchsorted(levels, current), 1, levels.size - 1)
     lower, upper = levels[after - 1], levels[after]

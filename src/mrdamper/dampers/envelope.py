@@ -17,12 +17,12 @@ from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.statistics.functions.motion_hull import MotionHull
 from mrdamper.statistics.linear import nonnegative_least_squares
 
-SLACK = 0.02  # a test bench repeats a condition to a few per cent; within that nothing is extrapolated
-COMBINATION = "combination"  # every quantity was tested, these together were not
+SLACK = 0.02  # relative tolerance within which a condition is not extrapolated: a rig repeats it to a few per cent
+COMBINATION = "combination"  # every quantity was tested, but not their combination
 _SUM_WEIGHT = 10.0  # weight of the sum of shares, which is one, against distances in the hull
 _UNITS = {"current": "A", "frequency": "Hz", "velocity": "m/s"}
 SAME_CURRENT = 1e-3  # A; a current that varies less is one current
-_LOGARITHM_FLOOR = 1e-12  # frequency [Hz] and amplitude [m] that stand for zero in a logarithm
+_LOGARITHM_FLOOR = 1e-12  # frequency [Hz] and amplitude [m] that replace zero in a logarithm
 
 
 class Beyond(NamedTuple):

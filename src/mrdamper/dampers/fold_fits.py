@@ -1,4 +1,4 @@
-"""Fits of one model to parts of the runs, each begun from starts that never saw what it leaves out."""
+"""Fits of one model to parts of the runs, from starts that do not depend on the omitted runs."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 
 from mrdamper.dampers.joint import JointFit, JointProblem, LocalMinimum
 
-_MAX_OMITTED_SHARE = 0.5  # share of the runs that a search may be without
+_MAX_OMITTED_SHARE = 0.5  # largest share of the runs that a search omits
 _START_COUNT = 3  # starts of a search
 _SEARCH_ROUNDS, _SEARCH_STEPS = 1, 10  # of a search on steady ends
 _SEARCH_TOLERANCE = 1e-4  # relative gain of a step at which such a search ends
-_MAX_ERROR_RATIO = 1.05  # times the smallest error on the remaining runs, up to which a start is followed
+_MAX_ERROR_RATIO = 1.05  # times the smallest error on the remaining runs, up to which a start is used
 _FIT_TOLERANCE = 1e-4  # relative gain of a step at which a fit without a fold ends
 
 
 class FoldFits:
     """Fits without folds of runs.
 
-    Folds are gathered into a few blocks. For each block one search goes from the model's own starts over the steady
-    ends of the runs outside it; the fits without the folds of the block begin where it ended.
+    Folds are gathered into a few blocks. For each block one search starts from the model's start values on the steady
+    ends of the runs outside it; the fits without the folds of the block begin at its result.
 
     Parameters
     ----------
@@ -30,8 +30,8 @@ class FoldFits:
     folds : iterable of sequence of int
         Indices of runs that will be omitted together.
     searched : sequence of str
-        Presets that are free in the search as well, as in that over all runs: without them others make up for what
-        they do, and the search ends in another local minimum.
+        Presets that are free in the search as well, as in that over all runs: without them others compensate
+        for their effects, and the search ends in another local minimum.
     """
 
     def __init__(self, problem: JointProblem, folds: Iterable[Sequence[int]], searched: Sequence[str] = ()):
@@ -42,9 +42,9 @@ class FoldFits:
         self._fits: dict[tuple[int, ...], JointFit] = {}
 
     def refit(self, rows: Sequence[int]) -> JointFit:
-        """Fit the runs at some indices: of the ends from the best starts the one that describes these runs best.
+        """Fit the runs at some indices: the result with the smallest error from the best starts.
 
-        A record alone is a condition and a kind of fold: fits are remembered.
+        Fits are cached, because a single record is a condition and a kind of fold.
         """
         if (key := tuple(sorted(rows))) not in self._fits:
             self._fits[key] = self._fit(rows)
@@ -70,7 +70,7 @@ class FoldFits:
         return min((self.problem.refit(start, rows, _FIT_TOLERANCE) for start in able), key=lambda fit: fit.error)
 
     def _search(self, block: frozenset[int]) -> list[JointFit]:
-        """Return ends of the search without a block: the best, and others that come near it with another yield."""
+        """Return ends of the search without a block: the best, and others with similar error and another yield."""
         whole = self.problem
         rows = [i for i in range(len(whole.parts)) if i not in block]
         short = JointProblem(

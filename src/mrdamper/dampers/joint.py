@@ -1,10 +1,9 @@
-"""Joint identification: one model of a whole damper, from all its runs at once.
+"""Global fit of one model of a whole damper to all its runs.
 
-The model takes the current as an input and neither frequency nor amplitude, so every run
-informs every parameter, and the result predicts any motion. Linear parameters are projected
-out; the others are refined by Levenberg–Marquardt from the model's start. Each run counts by
-its own peak-to-peak force, and the sum of the run errors is minimised, not of their squares,
-so that one drifting session cannot bend the model (iteratively reweighted).
+The model takes the current as an input and neither frequency nor amplitude, so every run determines every parameter,
+and the result predicts any motion. Linear parameters are projected out; the others are refined by Levenberg–Marquardt
+from the model's start. Each run counts by its own peak-to-peak force, and the sum of the run errors is minimised, not
+of their squares, to limit the effect of a drifting session (iteratively reweighted).
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ _MAX_COST_RATIO = 0.85  # share of the first start's cost that another one must 
 _MAX_ERROR_RATIO = 0.995  # share of the first end's error that another one must come below
 _CACHED_LINEARISATIONS = 8  # linearisations
 _MIN_YIELD_DIFFERENCE = 0.1  # relative difference from which two yield displacements differ
-_MAX_RUNNER_UP_RATIO = 1.25  # times the error: a local minimum that fits the tests nearly as well
+_MAX_RUNNER_UP_RATIO = 1.25  # ratio of the errors up to which a local minimum is reported
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ class JointDamper(Damper):
 
     @property
     def parameter_count(self) -> int:
-        """Numbers from the tests of this damper, and presets at work: they came from the tests of others."""
+        """Number of parameters from the tests of this damper, and of active presets, which are from other dampers."""
         held = [info.name for info in self.model.parameters() if info.preset and info.name not in self.free]
         return len(self.free) + sum(getattr(self.model, name) != 0 for name in held)
 
@@ -127,7 +126,7 @@ class JointDamper(Damper):
 
 
 def damper_of(given: Damper | Model) -> Damper:
-    """Return a damper as it is; a bare model as a damper of no rig, tested nowhere."""
+    """Return a damper unchanged; a model as a damper without rig and tests."""
     if isinstance(given, Model):
         return JointDamper(given, (), envelope=UNTESTED)
     require(given, Damper, "a damper or a model", "load_model(file) gives one")
@@ -139,9 +138,9 @@ class JointFit:
     """A joint identification."""
 
     damper: JointDamper
-    nrmse_pp: Floats  # (R,) error of each run, on the samples that entered
+    nrmse_pp: Floats  # (R,) error of each run, on the samples of the fit
     at_bounds: tuple[str, ...]
-    point: Floats  # (D,) where the search ended, on its axes
+    point: Floats  # (D,) end of the search, on its axes
     ending: StopReason
     seconds: float
     searched: tuple[str, ...] = ()  # names of the search axes
@@ -182,14 +181,13 @@ class LocalMinimum:
 class JointProblem:
     """Runs of one rig prepared for one model type.
 
-    All runs are concatenated into one motion: a model with fading memory forgets one run while it
-    follows the next from 1.5 cycles before its scored samples, and one long array is followed
-    faster than many short ones.
+    All runs are concatenated into one motion: the effect of one run on the state decays during the next, which begins
+    1.5 cycles before its scored samples, and one long array is evaluated faster than many short ones.
 
     Parameters
     ----------
     runs : sequence of Run
-        Of one rig; any motion, any current. Whole records enter: ramps and rests too.
+        Of one rig; any motion, any current. Whole records are used, including ramps and rests.
     model : str or type of Model
     fixed : mapping, optional
         Parameters held at a value.
@@ -254,7 +252,7 @@ class JointProblem:
         return JointProblem(self.runs, self.model_type, self.fixed, free=self.free, coil=self.given_coil, parts=parts)
 
     def from_point(self, fit: JointFit) -> Floats:
-        """(D,) the end of another problem's fit on these axes; what it did not have begins at its own start."""
+        """(D,) the result of another problem on these axes; further axes have their start values."""
         lags = fit.damper.coil
         axis_values = {RISE: lags.rise_s, FALL: lags.fall_s} if lags else {}
         axis_values |= {name: getattr(fit.damper.model, name) for name in fit.searched if name not in axis_values}
@@ -275,8 +273,8 @@ class JointProblem:
     def promising(self) -> list[Floats]:
         """Points some steps down from the model's starts, the most promising first.
 
-        Each length of lost motion has a local minimum of its own: the best start for each. The first is the
-        likeliest: another must be clearly better.
+        Each length of free play has its own local minimum and its best start. The first is the most probable: another
+        must be clearly better.
         """
         grid = [np.array(u) for u in product(*([axis.coordinate(g) for g in axis.grid] for axis in self.axes))]
         if len(grid) == 1:
@@ -309,7 +307,7 @@ class JointProblem:
         Parameters
         ----------
         start : (D,) array, optional
-            Any point of the search axes; a poor one does no harm.
+            Any point of the search axes.
         rounds, most_steps, settled
             As `fit` takes them.
 
@@ -340,13 +338,13 @@ class JointProblem:
         ----------
         rows : sequence of int, optional
         start : (D,) array, optional
-            Where to begin on the search axes: the result of a fit to more runs, say.
+            Start on the search axes, for example the result of a fit to more runs.
         rounds, most_steps : int
             Rounds of robust weights, and steps of the search in each.
         settled : float
-            Relative gain of a step at which the search ends; below the default its curvature is learnt too.
+            Relative gain of a step at which the search ends; below the default its curvature is estimated, too.
         to_the_last_digit : bool
-            Go on to where the gradient vanishes, which does not hang on rounding.
+            Continue until the gradient vanishes, so that the result does not depend on rounding.
         """
         begin = time.perf_counter()
         parts = self.parts if rows is None else [self.parts[i] for i in rows]
@@ -389,10 +387,9 @@ class JointProblem:
 
     @on_one_blas_thread
     def refit(self, fit: JointFit, rows: Sequence[int], settled: float = _REFIT_TOLERANCE) -> JointFit:
-        """Fit some of the runs, from the fit to all: what leaving out the others asks for.
+        """Fit some of the runs, starting from the fit to all.
 
-        First to where the derivatives known from the fit to all lead, which costs no force; then with
-        its own, until nothing is gained.
+        The search first follows the known derivatives of the fit to all, which needs no force, and then its own.
 
         Parameters
         ----------
@@ -409,13 +406,13 @@ class JointProblem:
         errors, point = linearised.extrapolate_refit(rows, self.box())
         table.weigh(errors)
         costs = [float(np.sum(table.solve(u).residual ** 2)) for u in (fit.point, point)]
-        if costs[1] > costs[0]:  # far from where the derivatives hold
+        if costs[1] > costs[0]:  # outside the range of the derivatives
             point = fit.point
         table.weigh(table.solve(point).nrmse_pp)
         return self._search(table, [self.parts[i] for i in rows], point, 1, _REFIT_STEPS, settled, begin)
 
     def linearised(self, fit: JointFit) -> Linearisation:
-        """All runs linearised at a fit, weighted by the errors it left; remembered for the last fits."""
+        """All runs linearised at a fit, weighted by its errors; cached for the last fits."""
         linearisation = next((each for one, each in self._linearisations if one is fit), None)
         if linearisation is None:
             table = JointResiduals(self, self.parts)
@@ -439,7 +436,7 @@ class JointProblem:
         return Coil(lags[RISE], lags[FALL])
 
     def _at_bounds(self, point: Floats) -> list[str]:
-        """Parameters whose search axis ended at a limit, under their own names."""
+        """Names of parameters whose search axis ended at a limit."""
         own = {info.name for info in self.model_type.parameters()}
         names: list[str] = []
         middle = np.mean(self.box(), axis=0)
@@ -462,12 +459,12 @@ class JointProblem:
     def force_slopes(self, point: Floats, model: Model, motion: Excitation, picked: NDArray[np.intp]) -> Floats | None:
         """(N, D) derivatives of the force at some samples of a motion by the search axes, the linear parameters held.
 
-        At a bound they are those from inside: the force of a model may have a corner there. None where the coil's lags
+        At a bound they are one-sided, because the force of a model may have a kink there. None where the coil's lags
         are searched, or where the model has no tangents.
         """
         if any(axis.name in (RISE, FALL) for axis in self.axes):
             return None
-        # One program for all problems of a model: the tangents of parameters that are held are not looked at.
+        # One program for all problems of a model: the tangents of held parameters are not used.
         names = [info.name for info in self.model_type.parameters() if not info.linear]
         lower, upper = self.box()
         reach = _DIFFERENCE_RATIO * (upper - lower)
@@ -486,7 +483,7 @@ class JointProblem:
 
     @cached_property
     def _entangled_axes(self) -> frozenset[int]:
-        """Axes that move more than the parameter of their name."""
+        """Axes that change further parameters than that of their name."""
         names = [info.name for info in self.model_type.parameters()]
         middle = np.mean(self.box(), axis=0)
         moved = np.array([self._moved_along(i, middle, names) != 0 for i in range(len(self.axes))])

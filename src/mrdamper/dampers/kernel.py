@@ -20,16 +20,16 @@ from mrdamper.physics.motion import Excitation
 _MAX_CENTRES = 200
 _WIDTH = 1.2  # of a kernel, in standard deviations of the inputs
 _RIDGE = 1e-3
-_LINEAR_VELOCITY_M_S = 5e-3  # m/s; below it velocity counts straight, above it by its logarithm
+_LINEAR_VELOCITY_M_S = 5e-3  # m/s; below, the velocity enters linearly, above, by its logarithm
 _SEED = 20240813
 _INPUTS = 4
 
 
 @dataclass(frozen=True, eq=False)
 class KernelLaw:
-    """A force of the instant: Gaussian kernels about centres."""
+    """A memoryless force: Gaussian kernels about centres."""
 
-    centres: Floats  # (K, 4) displacement, bent velocity, acceleration and current, each over its spread
+    centres: Floats  # (K, 4) displacement, scaled velocity, acceleration and current, each over its spread
     weights: Floats  # (K,)
     spread: Floats  # (4,)
     # mean and size: of the force [N]
@@ -37,7 +37,7 @@ class KernelLaw:
     size: float
 
     def parameters(self) -> tuple[ParameterInfo, ...]:
-        """None that anybody could name."""
+        """No parameters with a meaning."""
         return ()
 
     def values(self) -> dict[str, float]:
@@ -68,8 +68,8 @@ class SavedKernel(Saved):
 class KernelDamper(Damper):
     """Gaussian kernels over displacement, velocity, acceleration and current; no model of a damper.
 
-    What a smooth function of the instant can do. A physical model that is no better than this
-    inside the tests has earned nothing there; outside the tests the kernels fade to the mean.
+    Reference for a smooth memoryless function: a physical model should have a smaller error inside the tested range.
+    Outside, the kernels decay to the mean.
 
     References
     ----------
@@ -143,13 +143,13 @@ class KernelDamper(Damper):
 
 
 def _inputs(motion: Excitation) -> Floats:
-    """Displacement, bent velocity, acceleration, current, one row a sample."""
+    """Displacement, scaled velocity, acceleration, current, one row per sample."""
     bent = np.arcsinh(motion.velocity / _LINEAR_VELOCITY_M_S)
     return np.column_stack([motion.displacement, bent, motion.acceleration, motion.current])
 
 
 def _kernel(rows: Floats, centres: Floats) -> Floats:
-    table = 2 * rows @ centres.T  # in place: such a table is larger than the processor's cache
+    table = 2 * rows @ centres.T  # in place, because the table is larger than the processor's cache
     table -= np.sum(rows**2, axis=1)[:, None]
     table -= np.sum(centres**2, axis=1)
     np.minimum(table, 0.0, out=table)

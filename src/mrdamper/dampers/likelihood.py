@@ -27,9 +27,9 @@ from mrdamper.errors import InputError
 from mrdamper.physics.motion import Excitation
 
 CHI_SQUARED_95 = 3.84  # fall of twice the logarithm at which a 95 % interval ends: chi squared of one
-_MEMORY_SAMPLES = 20  # samples before those that count: a run has turned by then
-_PROFILE_POINTS, _PROFILE_RANGE = 12, 4.0  # of a profile to either side, and how many standard errors it goes
-_MAX_STEPS, _TOLERANCE = 12, 1e-3  # steps of the other numbers at one point; gain at which they rest
+_MEMORY_SAMPLES = 20  # samples before the scored ones, which contain a reversal
+_PROFILE_POINTS, _PROFILE_RANGE = 12, 4.0  # points of a profile on each side, and its range in standard errors
+_MAX_STEPS, _TOLERANCE = 12, 1e-3  # steps of the other parameters at one point; gain at which they end
 
 Kind = Literal["bounded", "one-sided", "flat"]
 
@@ -40,7 +40,7 @@ class Likelihood:
 
     damper: Damper  # with its covariance
     names: tuple[str, ...]  # its parameters, including those at a bound
-    start: Floats  # (P,) the estimate; logarithms where the damper has them
+    start: Floats  # (P,) the estimate; logarithms where the damper uses them
     covariance: Floats  # (P, P)
     logs: tuple[bool, ...]
     bounds: Floats
@@ -57,7 +57,7 @@ class Likelihood:
         Raises
         ------
         InputError
-            E_CERTAINTY if the runs determine none of its numbers.
+            E_CERTAINTY if the runs determine none of its parameters.
         """
         whole = estimate_uncertainty(damper, runs, bounded=False)
         uncertainty: Uncertainty | None = whole.uncertainty
@@ -75,7 +75,7 @@ class Likelihood:
         rows = np.concatenate([p.weighted(p.weighted(s)) for s, p in zip(slopes, parts, strict=True)])
         instruments: Floats = np.asarray(np.linalg.solve(root, rows.T), dtype=float)
         measured = np.concatenate([p.predicted - p.residual for p in parts])
-        # What robust weights left of the score belongs to the estimate; what a bound holds back does not.
+        # The remaining score by robust weights is part of the estimate; that by a bound is not.
         score = rows.T @ np.concatenate([p.residual for p in parts])
         score[[name in damper_bounds(damper) for name in names]] = 0.0
         logs = tuple(numbers[n].log for n in names)
@@ -113,7 +113,7 @@ class Likelihood:
 
     @cached_property
     def _concatenated(self) -> tuple[Excitation, NDArray[np.intp], Excitation] | None:
-        """All runs in one motion, followed faster than many short ones; None where one does not forget the other."""
+        """All runs in one motion, which is evaluated faster; None if the state does not decay between runs."""
         if self.damper.one_model is None or min(int(p.picked[0]) for p in self.parts) < _MEMORY_SAMPLES:
             return None
         motions = [self.damper.with_field_current(p.prediction.motion) for p in self.parts]
@@ -124,7 +124,7 @@ class Likelihood:
 
 
 def damper_bounds(damper: Damper) -> set[str]:
-    """Numbers at a bound, by value."""
+    """Parameters at a bound, by value."""
     return {
         name
         for name, own in damper.fitted_parameters.items()
@@ -164,7 +164,7 @@ def profile(likelihood: Likelihood, name: str) -> LikelihoodProfile:
     Raises
     ------
     InputError
-        E_CERTAINTY if the damper has no such number.
+        E_CERTAINTY if the damper has no such parameter.
     """
     own = likelihood.damper.fitted_parameters.get(name)
     if own is None:
@@ -207,7 +207,7 @@ _NO_PARAMETERS = Uncertainty((), (), np.zeros((0, 0)), np.zeros(0))
 
 
 def _others(likelihood: Likelihood, held: int, value: float, start: Floats) -> tuple[Floats, float]:
-    """Fit the other numbers to the runs with one held, by chord steps that are shortened where they overshoot."""
+    """Fit the other parameters with one held, by chord steps that are shortened where they overshoot."""
     free = np.arange(len(start)) != held
     solve = np.linalg.pinv(likelihood.turned[:, free])
     at = start.copy()
@@ -243,7 +243,7 @@ def _crossing(values: Floats, fall: Floats) -> float:
     if not over.size or over[0] == 0:
         return float(np.sign(values[-1] - values[0]) or 1.0) * np.inf if not over.size else float(values[0])
     k = int(over[0])
-    # The fall is a parabola nearly: straight in its root.
+    # The fall is nearly a parabola: linear in its root.
     root = np.sqrt(np.maximum(fall, 0))
     share = (np.sqrt(CHI_SQUARED_95) - root[k - 1]) / (root[k] - root[k - 1])
     return float(values[k - 1] + share * (values[k] - values[k - 1]))

@@ -1,6 +1,6 @@
-"""Saved models: a versioned JSON document, checked on the way in, with no code in it.
+"""Saved models: a versioned JSON document without code, checked when it is read.
 
-Numbers round-trip bit by bit. The document states units and where the model came from.
+Numbers round-trip exactly. The document states units and the origin of the model.
 """
 
 from __future__ import annotations
@@ -69,11 +69,11 @@ class _Envelope(_SavedPart):
     frequency_Hz: Range
     amplitude_m: Range
     peak_velocity_m_s: Range
-    any_motion: bool | None = None  # since 1.2; written where it holds
+    any_motion: bool | None = None  # since 1.2; written where it applies
     conditions: tuple[tuple[float, float, float], ...] | None = None  # tested: [A], [Hz], [m]
 
 
-# Standard deviations whose squares, and whose sums with a force, are numbers.
+# Standard deviations whose squares, and whose sums with a force, are finite.
 Deviation = Annotated[float, Field(ge=0, le=1e12)]
 
 
@@ -118,7 +118,7 @@ class _Document(_SavedPart):
     provenance: dict[str, str]
     coil: Coil | None = None  # since 1.2
     covariance: _Covariance | None = None  # since 1.3
-    damper: dict[str, Any]  # its kind, and what that kind says
+    damper: dict[str, Any]  # its kind, and the data of that kind
 
 
 def model_schema() -> dict[str, Any]:
@@ -135,7 +135,7 @@ def model_schema() -> dict[str, Any]:
 
 
 def save_model(damper: Damper, path: str | Path) -> None:
-    """Write a damper as JSON, whole or not at all.
+    """Write a damper as JSON, atomically.
 
     Parameters
     ----------
@@ -323,7 +323,7 @@ def _describe_uncertainty(uncertainty: Uncertainty | None) -> _Covariance | None
 
 
 def _with_uncertainty(damper: Damper, saved: _Covariance, where: str) -> Damper:
-    """Return the damper with the covariance of its file, once it fits the damper."""
+    """Return the damper with the covariance of its file, if it fits the damper."""
     size, session, model = len(saved.parameters), saved.session, saved.model_error
     square = len(saved.matrix) == size and all(len(row) == size for row in saved.matrix)
     matrix = np.array(saved.matrix, dtype=float).reshape(size, size) if square else np.zeros((0, 0))

@@ -1,7 +1,7 @@
 """Modified model: a model whose parameters are functions of I, f and A.
 
-[Qian et al. 2024, Eq. 23–43], with the functions fitted to identifications that do not count
-the hysteretic force twice, and each form chosen by cross-validation over conditions.
+[Qian et al. 2024, Eq. 23–43], with the functions fitted to identifications that count the hysteretic force once, and
+each form selected by cross-validation over conditions.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class SavedFunction(Saved):
     coefficients: tuple[float, ...]
     rates: tuple[float, ...] = ()
     log: bool = False
-    formula: str = ""  # for the reader; the coefficients count
+    formula: str = ""  # for the reader; the coefficients are used
 
 
 @dataclass(frozen=True)
@@ -164,15 +164,15 @@ class ModifiedModel(Damper):
 
 @dataclass(frozen=True, eq=False)
 class ModifiedFit:
-    """A modified model and how each of its functions was found."""
+    """A modified model and the fits of its functions."""
 
     damper: ModifiedModel
     functions: Mapping[str, FunctionFit]
-    values: Mapping[str, Floats]  # (N,) the identified values behind each function
+    values: Mapping[str, Floats]  # (N,) the identified values of each function
     conditions: tuple[Condition, ...]
-    # coordinates whose function leaves what was looked for, or a bound of the parameter at a test
+    # coordinates whose function leaves the search range, or a bound of the parameter at a test
     at_bounds: tuple[str, ...] = ()
-    # forms that broke a law of physics, by coordinate and name, and which
+    # forms that violate a physical law, by coordinate and name, with the law
     refused: Mapping[str, str] = field(default_factory=dict[str, str])
 
     @property
@@ -186,7 +186,7 @@ def fit_modified(
     forms: Mapping[str, Sequence[str]] | None = None,
     provenance: Mapping[str, str] | None = None,
 ) -> ModifiedFit:
-    """Turn identifications over a test matrix into one model.
+    """Fit a modified model to the identifications of a test matrix.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def fit_modified_jointly(
     ----------
     runs : sequence of Run, length R
     identifications : sequence of Identification, length R
-        Of these runs, in this order: where the shape coordinate starts.
+        Of these runs, in this order: start of the shape coordinate.
     provenance : mapping, optional
     any_motion : bool
         Try functions of frequency and amplitude, too; otherwise laws over the current only.
@@ -257,7 +257,7 @@ def fit_modified_jointly(
     -------
     fit : ModifiedFit
     refit : callable
-        Makes the model from the runs of some indices only, with the same forms.
+        Fits the model to the runs of some indices only, with the same forms.
 
     Raises
     ------

@@ -1,12 +1,11 @@
-"""One identification over all runs at once, for models whose loop has one shape coordinate.
+"""Global fit of parameter functions, for models whose loop has one shape coordinate.
 
-Given the shape coordinate (the yield displacement), a run's squared error is a quadratic
-form in the linear parameters. Each run is therefore condensed once into small Gram matrices
-on a ladder of shape values; after that, fits over all runs, other parameter functions and
-leave-one-condition-out cost milliseconds, because no sample is touched again.
+Given the shape coordinate (the yield displacement), a run's squared error is a quadratic form in the linear parameters.
+Each run is therefore reduced once to small Gram matrices on a grid of shape values; fits to all runs, other parameter
+functions and leave-one-condition-out then take milliseconds, because no sample is evaluated again.
 
 Runs count by their own force scale, and the sum of run RMSEs is minimised, not of squares:
-a run from a drifting session then pulls less (iteratively reweighted least squares).
+a run from a drifting session then has less weight (iteratively reweighted least squares).
 """
 
 from __future__ import annotations
@@ -40,13 +39,13 @@ from mrdamper.statistics.linear import (
 )
 
 _GRID_RATIO = 1500 ** (1 / 40)  # from one yield displacement to the next; between them Gram matrices are interpolated
-_GRID_ORIGIN_M = 2e-6  # m, one of the rungs, whatever the data
+_GRID_ORIGIN_M = 2e-6  # m, a grid point for any data
 _MIN_LENGTH_RATIO = (
     5e-4  # yield displacement looked for, in the smallest amplitude; the longest is the largest amplitude
 )
 _MAX_STATES = 2**17  # states held at a time
 _SEARCH_TOLERANCE = 1e-6  # relative gain of a step at which a search ends
-_WEIGHT_TOLERANCE = 1e-3  # change of the robust weights below which another round changes nothing
+_WEIGHT_TOLERANCE = 1e-3  # change of the robust weights below which the rounds end
 _SEARCH_RANGE = 6.0  # of a search, in units of a function's terms
 _MIN_ERROR_PP = 1e-4  # nrmse_pp below which a run gains no more weight
 _PASSES = 2  # over all coordinates in the choice of forms
@@ -124,7 +123,7 @@ def condense(runs: Sequence[Run], model_type: type[Model], more: Sequence[str] =
     runs : sequence of Run
     model_type : type of Model
     more : sequence of str
-        Preset linear parameters to determine as well: one run may not tell them apart, all together may.
+        Preset linear parameters to determine as well: one run may not separate them, all together may.
 
     Raises
     ------
@@ -249,7 +248,7 @@ class JointFunctionFit:
 
     parameters: ParameterMap
     nrmse_pp: Floats  # (R,) error of each run (of the condensed runs; the linear parameters unbounded)
-    at_bounds: tuple[str, ...] = ()  # the shape coordinate, where its function leaves what was looked for
+    at_bounds: tuple[str, ...] = ()  # the shape coordinate, where its function leaves the search range
 
 
 @on_one_blas_thread
@@ -275,7 +274,7 @@ def fit_jointly(
     reweightings, most_steps : int
         Effort: rounds of robust weights, steps of the search in each.
     polish : bool
-        Settle to the last digits at the end, so that rounding does not show in what is found.
+        Refine to the last digits at the end, so that results do not depend on rounding.
     """
     design = _Design(data, forms)
     if start is None:
@@ -307,7 +306,7 @@ def fit_jointly(
 def leave_out_errors(data: Condensed, fit: JointFunctionFit, forms: Mapping[str, str | Law]) -> dict[str, Floats]:
     """Calculate nrmse_pp of the runs of every fold, cross-validated in the linear coefficients, by kind of fold.
 
-    The shape function stays that of the whole fit: quick, for choosing forms, not a final score.
+    The shape function is that of the fit to all runs: fast enough to select forms, but no final score.
     """
     design = _Design(data, forms)
     shapes = (
@@ -362,7 +361,7 @@ class _Design:
         self.matrix[:, -1, -1] = 1.0
 
     def table(self, gram: Floats) -> tuple[Floats, Floats]:
-        """Rows that stand for a run's samples, and the factors of the Gram matrices they are made with.
+        """Rows that represent a run's samples, and the factors of their Gram matrices.
 
         (R, L+1, P+1), by coefficient and, last, the measured force; (R, L+1, L+1).
         """
@@ -379,13 +378,13 @@ class _ShapeSearch:
         data, self.design, self.start, self.weights = design.data, design, start, weights
         columns = FORMS[start.form].columns(*features(data.conditions), start.rates)
         size = np.linalg.norm(columns, axis=0) / np.sqrt(columns.shape[0])
-        self.scale = np.where(size > 0, size, 1.0)  # of runs at 0 A alone, a column over the current is zero
+        self.scale = np.where(size > 0, size, 1.0)  # with runs at 0 A alone, a column over the current is zero
         self.columns = columns / self.scale
         self._tables: tuple[bytes, Floats, Floats, Floats] = b"", columns, columns, columns
         self._solved: _Solution | None = None
 
     def weighted(self, weights: Floats) -> _ShapeSearch:
-        """Return the same with other weights, which do not touch the tables of the last point."""
+        """Return the same with other weights, which do not change the cached tables."""
         other = copy(self)
         other.weights, other._solved = weights, None
         return other
@@ -417,7 +416,7 @@ class _ShapeSearch:
         return project_out_columns(weighted, jacobian)
 
     def gradient(self, u: Floats) -> Floats:
-        """Of half the squared residual: exact, for the residual does not see the other coefficients move."""
+        """Gradient of half the squared residual: exact, as the residual is stationary in the others."""
         return self.residual(u) @ self.slopes(u)
 
     def _at(self, u: Floats) -> tuple[Floats, Floats, Floats, _Solution]:
@@ -440,7 +439,7 @@ def _factor(gram: Floats) -> Floats:
     """(R, K, K) upper triangles T with Tᵀ T the given ones, or the nearest that have such."""
     try:
         return np.asarray(np.linalg.cholesky(gram).transpose(0, 2, 1), dtype=float)
-    except np.linalg.LinAlgError:  # a model that fits to rounding: interpolation took more than the ridge gave
+    except np.linalg.LinAlgError:  # a model that fits to rounding: the interpolation error exceeds the ridge
         values, vectors = np.linalg.eigh(gram)
         return np.linalg.qr(np.sqrt(np.maximum(values, _RIDGE))[:, :, None] * vectors.transpose(0, 2, 1))[1]
 
@@ -471,16 +470,16 @@ def choose_forms(
 ) -> FormChoice:
     """Choose every coordinate's form by cross-validation over conditions, currents and motions.
 
-    Starting from the shortest forms, one coordinate at a time tries its candidates: of two forms
-    the smaller one is kept unless `selection.smaller_wins` denies it. Two passes.
+    Starting from the shortest forms, one coordinate at a time tries its candidates: the smaller of two forms is kept if
+    `selection.smaller_wins`. Two passes.
 
     Parameters
     ----------
     data : Condensed
     candidates : mapping of str to sequence of str or Law
-        Forms by coordinate, shortest first; those with too many parameters for the tests are passed over.
+        Forms by coordinate, shortest first; those with too many parameters for the tests are skipped.
     shape_values : (R,) array
-        Shape coordinate identified run by run, to start from.
+        Shape coordinate of individual fits, as start.
     dissipating : mapping of str to str, optional
         Unit of the coordinates that must not be negative: forms that break a law of physics are refused.
     """
@@ -498,7 +497,7 @@ def choose_forms(
                 try:
                     trial, other = _tried(data, {**forms, name: law}, start)
                 except IdentificationError:
-                    continue  # the tests cannot tell this form's terms apart
+                    continue  # the tests do not separate the terms of this form
                 larger = _size(law) >= _size(forms[name])
                 better = not smaller_wins(errors, other) if larger else smaller_wins(other, errors)
                 better = _risen(fit, trial, name, data.conditions, dissipating or {}, better)

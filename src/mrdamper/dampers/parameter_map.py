@@ -25,7 +25,7 @@ class ParameterMap:
         object.__setattr__(self, "functions", dict(self.functions))
 
     def at(self, condition: Condition) -> Model:
-        """Return the model at a condition; values a function drives past a parameter's bounds stop there."""
+        """Return the model at a condition; values of a function beyond a parameter's bounds are limited to these."""
         motion = condition.frequency_Hz, condition.amplitude_m
         if self.motions is not None and self.follows_motion:
             motion = self.motions.nearest(*motion)

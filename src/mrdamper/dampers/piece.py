@@ -1,4 +1,4 @@
-"""The last cycle of a run: what a condition-dependent damper is refined on."""
+"""The last cycle of a run, on which a condition-dependent damper is refined."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class Piece:
     scored: slice
     force: Floats
     scale: float
-    # by what of a model shapes them
+    # by the shape parameters of a model
     states: dict[tuple[float, ...], Floats] = field(default_factory=dict[tuple[float, ...], Floats])
 
     @classmethod
     def of(cls, run: Run) -> Piece:
-        """Cut it from a run."""
+        """Take the last cycle of a run."""
         sine = equivalent_sine(run)
         last = int(np.flatnonzero(run.in_window)[-1])
         period = 1 / sine.condition.frequency_Hz
@@ -58,9 +58,9 @@ class Piece:
 
 
 class Pieces:
-    """Last cycles of runs, followed one after the other in one compiled pass, each from rest.
+    """Last cycles of runs, evaluated in one compiled pass, each from rest.
 
-    The dampers they are followed by are condition-dependent: coefficients, a reference, and a model at a condition.
+    The dampers are condition-dependent: coefficients, a reference, and a model at a condition.
     """
 
     def __init__(self, runs: Sequence[Run]):

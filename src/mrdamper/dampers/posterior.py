@@ -1,4 +1,4 @@
-"""Samples of a damper's numbers by Markov chains over their likelihood, refused where they have not converged."""
+"""Samples of a damper's parameters by Markov chains over their likelihood, refused without convergence."""
 
 from __future__ import annotations
 
@@ -13,32 +13,32 @@ from mrdamper.data import Floats
 from mrdamper.errors import InputError, MissingExtraError
 
 _PROPOSAL_DOF = 5.0  # degrees of freedom of the proposals
-_BURN_IN_SHARE = 0.2  # of a chain: where it begins
-_MIN_AUTOCORRELATION_TIMES, _MAX_RHAT = 50, 1.01  # autocorrelation times a chain must hold, and split-R̂ it may have
+_BURN_IN_SHARE = 0.2  # share of a chain that is discarded
+_MIN_AUTOCORRELATION_TIMES, _MAX_RHAT = 50, 1.01  # least length in autocorrelation times; limit of split-R̂
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Draws from the posterior of a damper's numbers, flat priors within their bounds."""
+    """Samples from the posterior of a damper's parameters, with flat priors within their bounds."""
 
     names: tuple[str, ...]  # length P
     values: Floats  # (N, P)
     time: float  # longest autocorrelation time [steps]
-    steps: int  # of each walker, after what was thrown away
-    split_rhat: float  # largest split-R̂ of any number
+    steps: int  # of each walker, after the discarded part
+    split_rhat: float  # largest split-R̂ of any parameter
 
 
 def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed: int = 1) -> Samples:
     """Markov chains over the likelihood, within the bounds.
 
-    Half of the moves propose from the covariance with wider tails, whatever the chain's place, the
-    others are stretch moves [Goodman and Weare 2010].
+    Half of the moves propose from the covariance with wider tails, independent of the chain's position, the others are
+    stretch moves [Goodman and Weare 2010].
 
     Parameters
     ----------
     likelihood : Likelihood
     steps : int
-        Of each walker; the first fifth is thrown away.
+        Of each walker; the first fifth is discarded.
     walkers : int
         Default: 2 P + 2.
     seed : int

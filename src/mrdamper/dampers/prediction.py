@@ -27,7 +27,7 @@ class Prediction(Displayable):
     force : (N,) array
         [N]
     condition : Condition
-        That the prediction was made for, or that the motion amounts to.
+        Of the prediction, or the equivalent condition of the motion.
     extrapolation : tuple of str
         Quantities outside the tested envelope; empty inside.
     steady : bool
@@ -72,7 +72,7 @@ class Prediction(Displayable):
 
     @property
     def table(self) -> Mapping[str, Floats]:
-        """A row a sample, SI."""
+        """One row per sample, SI."""
         motion = self.motion
         return {
             "time_s": motion.time,

@@ -14,7 +14,7 @@ from mrdamper.data.runs import Run
 class DamperLike(Protocol):
     """Properties and methods of a `Damper` that its parts use."""
 
-    __dataclass_fields__: ClassVar[dict[str, Any]]  # what `dataclasses.replace` takes
+    __dataclass_fields__: ClassVar[dict[str, Any]]  # required by `dataclasses.replace`
     streams: ClassVar[bool]  # it has a form for one sample
 
     @property
@@ -74,7 +74,7 @@ class DamperLike(Protocol):
 
 
 class SearchSpace(Protocol):
-    """Coordinates of a global fit, and the model each point stands for."""
+    """Coordinates of a global fit, and the model of each point."""
 
     @property
     def linear(self) -> Sequence[ParameterInfo]:

@@ -1,4 +1,4 @@
-"""Gains and offsets that differ between sessions and between runs, estimated from what a fit leaves over.
+"""Gains and offsets that differ between sessions and between runs, estimated from the residuals of a fit.
 
 A measured force is (1 + g + h) F + o + p and a remainder: g and o are those of its session, h and p those of the
 run. Their four variances follow from quadratic forms of the gains and offsets that the residuals of each run show, of
@@ -33,7 +33,7 @@ _MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight, as in t
 
 @dataclass(frozen=True)
 class Effects:
-    """Standard deviations of gains and offsets; zero degrees of freedom where these runs cannot show them."""
+    """Standard deviations of gains and offsets; zero degrees of freedom if these runs do not determine them."""
 
     # gain and offset: between sessions, of the force as a share and as a shift [N]
     gain: float = 0.0
@@ -51,7 +51,7 @@ class Draws:
 
     shifts: Floats  # (D, R, 2) gains and offsets of the runs [-, N]
     moved: Floats  # (D, P) change of the parameters
-    shown: Floats  # (D, P) variance of the parameters that the residuals of a draw would show, over that of the draws
+    shown: Floats  # (D, P) variance of the parameters by the residuals of a draw, over that of the draws
 
     def representative(self, count: int) -> NDArray[np.intp]:
         """Draws of which the mean change is near zero and the mean square near that of all, by exchanges.
@@ -83,7 +83,7 @@ def _nonnegative(table: Floats, right: Floats) -> Floats:
 
 
 class GainsAndOffsets:
-    """Gains and offsets of runs as the residuals of a fit show them.
+    """Gains and offsets of runs from the residuals of a fit.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class GainsAndOffsets:
         count = len(runs)
         tables = [np.column_stack([r.predicted, np.full(r.picked.size, self.unit)]) for r in runs]
         self.effect = -np.concatenate([i @ t for i, t in zip(influence, tables, strict=True)], axis=1)  # (P, 2R)
-        self._shown = np.zeros((2 * count, 2 * count))  # what each gain and offset shows as in every run
+        self._shown = np.zeros((2 * count, 2 * count))  # effect of each gain and offset on the residuals of every run
         self._read, self._noise = np.zeros(2 * count), np.zeros(2 * count)
         for k, (run, slope, table) in enumerate(zip(runs, slopes, tables, strict=True)):
             own, solve = slice(2 * k, 2 * k + 2), np.linalg.pinv(run.weighted(table)) * run.weight
@@ -113,7 +113,7 @@ class GainsAndOffsets:
         members = [[k for k, run in enumerate(runs) if run.session == name] for name in names]
         self.sessions = members if len(names) >= SESSIONS_NEEDED else []
         turned, sizes, _ = np.linalg.svd(self._shown)
-        self._turned = turned[:, sizes > _MIN_RETAINED].T  # to what the fit has not absorbed
+        self._turned = turned[:, sizes > _MIN_RETAINED].T  # to the part that the fit has not absorbed
 
     def _groups(self, component: int) -> Floats:
         """(2R, G) gains or offsets of the runs by those of sessions (components 0 and 1) or of runs (2 and 3)."""
@@ -129,7 +129,7 @@ class GainsAndOffsets:
         tables = {component: self._groups(component) for component in range(4)}
         shown = {c: self._turned @ self._shown @ table for c, table in tables.items()}
         enough = {c: np.sum(shown[c] ** 2) >= _MIN_RETAINED * max(table.sum(), 1.0) for c, table in tables.items()}
-        designs = {c: shown[c] for c in tables if enough[c] and enough[c - c % 2]}  # offsets only where gains show
+        designs = {c: shown[c] for c in tables if enough[c] and enough[c - c % 2]}  # offsets only with gains
         if 0 in designs and 2 in designs:
             unit = [(z @ z.T).ravel() / np.linalg.norm(z @ z.T) for z in designs.values()]
             if np.linalg.cond(np.inner(unit, unit)) > _MAX_CONDITION:
@@ -184,7 +184,7 @@ class GainsAndOffsets:
         return estimates
 
     def effects(self) -> Effects:
-        """Return the four standard deviations and the degrees of freedom behind them."""
+        """Return the four standard deviations and their degrees of freedom."""
         used, shown = list(self._designs), (self._turned @ self._read)[None]
         variances, dof = np.zeros((2, 4))
         if not used or not (fitted := self._iterated(shown)).any():
@@ -200,12 +200,12 @@ class GainsAndOffsets:
         return Effects(gain, offset, float(dof[0]), run_gain, run_offset, float(dof[2]))
 
     def by_gains(self) -> Floats:
-        """(P,) change of the parameters by the gains and offsets that the residuals show."""
+        """(P,) change of the parameters by the gains and offsets of the residuals."""
         return self.effect @ np.linalg.lstsq(self._shown, self._read, rcond=_MIN_RETAINED)[0]
 
     @cached_property
     def rests(self) -> list[Floats]:
-        """Residuals of each run without all gains and offsets, and without what these moved."""
+        """Residuals of each run without gains and offsets, and without their effect on the parameters."""
         rests, by_gains = list[Floats](), self.by_gains()
         for run, slope in zip(self.runs, self.slopes, strict=True):
             rest, table = run.residual - slope @ by_gains, np.column_stack([run.predicted, np.ones(run.picked.size)])
@@ -216,8 +216,8 @@ class GainsAndOffsets:
     def draws(self, effects: Effects) -> Draws:
         """Draw gains and offsets, and fit each draw as the runs were: linearised, weights and parameters in turn.
 
-        The fit counts a run less the worse it is described, so a run far off moves the parameters less than its gain
-        would say.
+        The fit weights a run less the larger its error, so an outlier changes the parameters less than in proportion to
+        its gain.
         """
         rng, count = np.random.default_rng(_SEED), len(self.runs)
         drawn = rng.standard_normal((_DRAWS, count, 2)) * [effects.run_gain, effects.run_offset]

@@ -1,4 +1,4 @@
-"""Fits of one model of a whole damper to forces with other gains and offsets: what a linearisation leaves out."""
+"""Fits of one model of a whole damper to forces with other gains and offsets, without linearisation."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def refitted(
     shifts : (K, R, 2) array
         Gains [-] and offsets [N] of the runs, of the predicted force.
     moved : (K, P) array
-        Changes that a linearisation leads to, from which the searches begin.
+        Changes by linearisation, as start of the searches.
     """
     model, numbers = damper.one_model, damper.fitted_parameters
     assert model is not None

@@ -1,4 +1,4 @@
-"""Residuals of the runs a damper was identified from, with the weight each sample had in the fit."""
+"""Residuals of the runs of a damper, with the weight of each sample in the fit."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from mrdamper.data import Floats, Run, index_at, session_of
 
 _MAX_SAMPLES = 400  # samples of a run that enter
 _CYCLES = 4  # of a sine that enter, as in the joint fit
-_WARM_UP = 1.5  # cycles before them in which the model forgets its start
+_WARM_UP = 1.5  # cycles before them in which the effect of the start decays
 _MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
-_MIN_STRETCH = 10  # samples in which the spectrum of a residual is looked for
+_MIN_STRETCH = 10  # samples for the spectrum of a residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class Stretch:
 
 @dataclass(frozen=True, eq=False)
 class RunResiduals:
-    """Samples of a run that enter, what the fit left of them, and their weights."""
+    """Samples of a run in the fit, their residuals, and their weights."""
 
     run: Run
     session: str | None  # None where it is not known
@@ -55,7 +55,7 @@ class RunResiduals:
     error: float  # nrmse_pp, by the time that samples represent; at least that from which a run gains no more weight
     information: float  # weight of the run by its length, as in the joint fit
     weight: Floats  # (N,) of each residual in the fit [1/N]
-    stretches: Sequence[Stretch]  # the steady window, then what lies before and after it
+    stretches: Sequence[Stretch]  # the steady window, then the samples before and after it
 
     @classmethod
     def of(cls, damper: Damper, run: Run) -> RunResiduals:

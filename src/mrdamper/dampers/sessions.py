@@ -1,10 +1,9 @@
 """Gains and offsets that the runs of a test session share, estimated from the tests of a damper.
 
-From day to day the same test differs by a few per cent in force, within an hour by less: oil and
-room temperature, preload, zero of the load cell. One run of a day therefore carries information
-on the others. Gain and offset are random, with a covariance of three parts: common to a session (a
-day), decaying with the time between two runs of it, and independent for each run. [Rasmussen and Williams
-2006, Gaussian processes; the three variances by maximum likelihood]
+The force of the same test differs by a few per cent between days and by less within an hour, by temperatures, preload
+and zero of the load cell. One run of a day therefore has information on the others. Gain and offset are random, with a
+covariance of three parts: common to a session (a day), decaying with the time between two runs of it, and independent
+for each run. [Rasmussen and Williams 2006, Gaussian processes; the three variances by maximum likelihood]
 """
 
 from __future__ import annotations
@@ -26,9 +25,9 @@ if TYPE_CHECKING:
     from mrdamper.dampers.protocols import DamperLike as Damper
 
 UNKNOWN, KNOWN = "unknown", "known"  # session of a score: predicted as it is, or corrected by other runs of the day
-_CORRELATION_HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # over which what an hour shares is forgotten
+_CORRELATION_HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # correlation times within a session [h]
 _MIN_RUN_SHARE = (
-    0.2  # of the spread: each run has at least so much of its own, for the model misses every condition anew
+    0.2  # smallest share of the scatter of each run alone, because the model error differs at every condition
 )
 _REMEDY = "repeat a condition on each of three days or more; state recorded_at or session in runs.csv"
 
@@ -65,7 +64,7 @@ class GainOffset:
     # mean and square: mean of p [N] and of p² [N²]
     mean: float
     square: float
-    rest: float  # mean square of what is left [N²]
+    rest: float  # mean square of the residual [N²]
     pp: float  # peak-to-peak measured force [N]
 
     @classmethod
@@ -92,9 +91,9 @@ class RunScatter:
     Attributes
     ----------
     session, hour, run : float
-        Shared by a session, by neighbours in it, by nobody.
+        Shared by a session, by neighbours in it, and of the run alone.
     hours : float
-        In which what neighbours share is forgotten to 1/e [h].
+        Correlation time of neighbours [h].
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -119,7 +118,7 @@ class RunScatter:
         return same * (self.session**2 + self.hour**2 * near)
 
     def given(self, at: RecordingTime, others: Sequence[RecordingTime], values: Floats) -> tuple[float, float]:
-        """Mean and standard deviation of a run's value about zero, those of others being known."""
+        """Mean and standard deviation of a run's value, given those of others."""
         if not len(others) or self.total == 0:
             return 0.0, self.total
         own = max(self.run, _MIN_RUN_SHARE * self.total) ** 2
@@ -131,7 +130,7 @@ class RunScatter:
 
     @classmethod
     def likeliest(cls, when: Sequence[RecordingTime], values: Floats) -> RunScatter:
-        """Of greatest likelihood: the shares by halving steps from many starts, the scale in closed form."""
+        """Maximum likelihood: the shares by halving steps from many starts, the scale in closed form."""
         size = len(values)
         alike = cls(1.0, 0.0, 0.0, np.inf).covariance(when, when)
 
@@ -215,7 +214,7 @@ class Sessions:
         ----------
         runs : sequence of Run, length R
         left_out : sequence of GainOffset, length R
-            Each predicted without its condition: their spread is that of sessions to come.
+            Each predicted without its condition: their scatter is that of future sessions.
         own : sequence of GainOffset, length R
             Against the damper itself.
 
@@ -239,13 +238,13 @@ class Sessions:
         return cls(gain, offset, tuple(run.id for run in runs), when, gains, offsets)
 
     def expected(self, at: RecordingTime, without: str = "") -> SessionCorrection | None:
-        """Gain and offset of a run recorded then; None if nothing is known of its session.
+        """Gain and offset of a run recorded then; None if its session is unknown.
 
         Parameters
         ----------
         at : When
         without : str
-            Run whose own reading is not looked at.
+            Run whose gain and offset are not used.
         """
         rows = [i for i, name in enumerate(self.run_ids) if name != without]
         when = [self.when[i] for i in rows]
@@ -262,7 +261,7 @@ class Sessions:
         ----------
         damper : Damper
         runs : iterable of Run
-            Check runs of a day, say.
+            For example check runs of a day.
         own : bool
         """
         entries = [(run.id, RecordingTime.of(run), gain_offset_of(damper, run)) for run in runs]
@@ -282,7 +281,7 @@ def sessions_known(damper: Damper, runs: Iterable[Run] = (), own: bool = False) 
     Raises
     ------
     InputError
-        E_SESSION if the damper's tests could not tell what a session shares.
+        E_SESSION if the damper's tests do not determine the scatter between sessions.
     """
     sessions = damper.uncertainty.sessions if damper.uncertainty else None
     if sessions is None:

@@ -1,4 +1,4 @@
-"""Derivatives of a damper's force by its own numbers."""
+"""Derivatives of a damper's force by its parameters."""
 
 from __future__ import annotations
 
@@ -13,14 +13,13 @@ from mrdamper.data import Floats
 from mrdamper.identification.columns import linear_table
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 
-_RELATIVE_STEP = 1e-4  # of a number
+_RELATIVE_STEP = 1e-4  # relative step of a parameter
 
 
 def force_slopes(damper: Damper, prediction: Prediction, names: Sequence[str]) -> Floats:
-    """Return derivatives of a predicted force by some of the damper's own numbers, or by their logarithm.
+    """Return derivatives of a predicted force by some of the damper's parameters, or by their logarithm.
 
-    Of the linear parameters of one model they are columns that share one state; by the others the
-    force is predicted again.
+    Those by linear parameters of one model are columns of one state; for the others the force is predicted again.
 
     Parameters
     ----------

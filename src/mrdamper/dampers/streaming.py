@@ -1,7 +1,7 @@
-"""One sample after the other: the force of a damper in closed loop.
+"""Evaluation of a damper sample by sample, for closed loops.
 
-`stepper(damper)` traces the damper's own array code into a program for one sample and runs
-it, in the interpreter or compiled. The same program is what leaves as C.
+`stepper(damper)` traces the damper's array code to a program for one sample and runs it, in the interpreter or
+compiled. The same program is exported as C.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ FLAGS = ("current", "amplitude", "velocity", "frequency")  # bit 0, 1, 2, 3
 class Stream:
     """A damper as programs for one sample."""
 
-    title: str  # what it is, for people
+    title: str  # title for the reader
     # from displacement [m], velocity [m/s], acceleration [m/s²], current [A] and the step of time [s] to force [N]
     # and extrapolation flags (bits in the order of `FLAGS`)
     step: Program
-    drives: Mapping[str, Program]  # how a motion is made of "displacement" or "velocity" alone
-    envelope: Envelope | None  # ranges of the tests behind it
+    drives: Mapping[str, Program]  # motion from "displacement" or "velocity" alone
+    envelope: Envelope | None  # tested ranges
     model: Model | None  # the model whose parameters can be set; None where they are functions
-    damper: Damper  # what was traced
+    damper: Damper  # traced damper
 
     @cached_property
     def band(self) -> PortableBand | None:
@@ -83,11 +83,10 @@ def _from_velocity() -> Program:
 
 
 class Stepper:
-    """A damper that is asked sample by sample.
+    """A damper that is evaluated sample by sample.
 
-    Made by `stepper`. `step` takes the displacement, `step_velocity` the velocity,
-    `step_motion` the whole motion; all return the force [N]. A sample that cannot be used
-    raises an error and leaves the state as it was.
+    Made by `stepper`. `step` takes the displacement, `step_velocity` the velocity, `step_motion` the whole motion; all
+    return the force [N]. A sample that cannot be used raises an error without changing the state.
 
     Parameters
     ----------
@@ -104,7 +103,7 @@ class Stepper:
         self.reset()
 
     def reset(self) -> None:
-        """Back to rest, with no memory of a motion."""
+        """Return to the state at rest."""
         self._memory = tuple(self.stream.step.tape.starts.values())
         self._drive_memory = {name: tuple(d.tape.starts.values()) for name, d in self.stream.drives.items()}
         self._flags = 0
@@ -115,14 +114,14 @@ class Stepper:
         return dict(self._parameters)
 
     def set_parameters(self, **values: float) -> None:
-        """Change parameters between two samples; the state stays.
+        """Change parameters between two samples; the state is kept.
 
         Raises
         ------
         UnknownNameError
             If there is no parameter of that name.
         ParameterError
-            If a value lies outside what its physics allows, or needs another program.
+            If a value is outside its bounds, or needs another program.
         """
         for name in values:
             if name not in self._parameters:
@@ -143,7 +142,7 @@ class Stepper:
 
     @property
     def state(self) -> dict[str, float]:
-        """All that is remembered, by name: set it again to go back to this sample."""
+        """The state by name: set it again to return to this sample."""
         names = dict(zip(self.stream.step.tape.memory, self._memory, strict=True))
         for drive, memory in self._drive_memory.items():
             names |= {f"{drive}.{n}": m for n, m in zip(self.stream.drives[drive].tape.memory, memory, strict=True)}
@@ -183,9 +182,9 @@ class Stepper:
     def step_motion(
         self, displacement: float, velocity: float, acceleration: float, current: float, dt: float
     ) -> float:
-        """Force [N] at the next sample of a motion that is known.
+        """Force [N] at the next sample of a given motion.
 
-        Raises `ExcitationError` if a value is not finite, dt is not positive, or the model has no answer there.
+        Raises `ExcitationError` if a value is not finite, dt is not positive, or the model has no solution there.
         """
         inputs = numbers(displacement, velocity, acceleration, current, dt)
         self._check(inputs)
@@ -223,7 +222,7 @@ class Stepper:
     def run(
         self, time: Floats, displacement: Floats, velocity: Floats, acceleration: Floats, current: Floats
     ) -> Floats:
-        """Force [N] along a sampled motion, from the state at hand; compiled where there is a C compiler.
+        """Force [N] along a sampled motion, from the present state; compiled where there is a C compiler.
 
         Parameters
         ----------

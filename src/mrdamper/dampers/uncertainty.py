@@ -53,21 +53,21 @@ class Uncertainty(Displayable):
         Whether the covariance is that of the logarithm.
     covariance : (P, P) array
     dof : (P,) array
-        Degrees of freedom behind each variance.
+        Degrees of freedom of each variance.
     one_sided : tuple of str
-        Parameters held at a bound: their interval is open to one side.
+        Parameters held at a bound: their interval is one-sided.
     unknown : tuple of str
         Parameters not identifiable from these runs; for those among `names` the variance holds with the
         others fixed.
     gain, offset : float
         Standard deviations between sessions, of the force as a share and as a shift [N].
     session_dof : float
-        Degrees of freedom behind them; zero where fewer than three known sessions show them. Then
+        Their degrees of freedom; zero with fewer than three known sessions. Then
         intervals are for sessions like the tested ones.
     run_gain, run_offset : float
         Standard deviations between runs of one session [-] and [N].
     run_dof : float
-        Degrees of freedom behind them; zero where the runs cannot show them.
+        Their degrees of freedom; zero if the runs do not determine them.
     force, peak, energy : float
         Standard deviations after a gain and an offset are fitted to each run: of the force over half its
         peak-to-peak value, of the peak force and of the dissipated energy, relative.
@@ -84,7 +84,7 @@ class Uncertainty(Displayable):
     information : mapping of str to float
         Share of each run in the information on the parameters.
     effective : mapping of str to float
-        Independent samples that would give each parameter's standard error, without sessions and correlated noise.
+        Independent samples with the same standard error of each parameter, without sessions and correlated noise.
     interval_factor : (P,) array, or float
         Factor on the standard error of each parameter, for curvature (above one) and few sessions (below one).
         Prediction intervals of the force do not use it.
@@ -116,7 +116,7 @@ class Uncertainty(Displayable):
 
     @property
     def headline(self) -> str:
-        """Number of parameters, and what is known of the scatter and of prediction intervals."""
+        """Number of parameters, scatter between sessions and prediction intervals."""
         sessions = f"gain {100 * self.gain:.2g} % between sessions, " if self.of_sessions else "gain "
         coverage = f"; {self.calibration.summary}" if self.calibration else ""
         return (
@@ -250,6 +250,6 @@ def table(damper: Damper, level: float = 0.95) -> list[dict[str, Any]]:
         row["effective_samples"] = uncertainty.effective.get(name, math.nan) if uncertainty and ends else math.nan
         text = written(own.value, ends, own.unit) + ("" if ends else f" ({state})")
         if state == NOT_IDENTIFIABLE:
-            text = state  # the estimate is one of many that fit as well
+            text = state  # the estimate is one of many with the same fit
         rows.append({**row, "state": state, "written": text})
     return rows

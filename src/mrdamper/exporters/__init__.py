@@ -35,7 +35,7 @@ def export(damper: Damper, to: str, out: str | Path, name: str = "") -> list[Pat
     Returns
     -------
     list of Path
-            Written files.
+        Written files.
 
     Raises
     ------

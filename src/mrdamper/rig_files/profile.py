@@ -42,7 +42,7 @@ class FileForm(Table):
     decimal: Literal[".", ","] | None = None
     encoding: NAME | None = None
     header_line: int | None = Field(default=None, ge=0, le=10_000)
-    """0 says that there is none."""
+    """0 if there is none."""
     units_line: int | None = Field(default=None, ge=1, le=10_000)
     data_line: int | None = Field(default=None, ge=1, le=10_000)
     names: tuple[str, ...] = Field(default=(), max_length=1000, strict=False)

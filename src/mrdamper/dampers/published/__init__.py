@@ -1,7 +1,6 @@
-"""Published dampers over current, frequency and amplitude, one file each; there is no list.
+"""Published dampers over current, frequency and amplitude, one file each, found by discovery.
 
-Where the published equations were not seen, the title says "-type": the form is the best
-reading of descriptions, not a reproduction.
+"-type" in a title: the published equations were not available, and the form follows descriptions of them.
 """
 
 from __future__ import annotations

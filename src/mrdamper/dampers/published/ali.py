@@ -1,4 +1,4 @@
-"""Ali-type: Spencer's model, three of its numbers over current, amplitude and frequency."""
+"""Ali-type: Spencer's model, three of its parameters over current, amplitude and frequency."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _VARYING = ("c0", "c1", "yield_force")
 class AliType(ConditionedDamper):
     """Spencer's model with c0, c1 and the hysteretic force as P(I) (X/X_r)^p (f/f_r)^q, P a quadratic.
 
-    k0, k1, x0 (as f0) and the shape of the hysteresis are constant. Identified run by run, then
-    regressed: a joint refinement would integrate every run at every trial.
+    k0, k1, x0 (as f0) and the shape of the hysteresis are constant. Individual fits, then regression: a global
+    refinement would integrate every run at every trial.
 
     References
     ----------
@@ -86,7 +86,7 @@ class AliType(ConditionedDamper):
 
 
 def _power_law(name: str, conditions: Sequence[Condition], values: Floats, reference: Condition) -> dict[str, float]:
-    """Powers from logarithms with a level for every current, then the quadratic of what is left."""
+    """Powers from logarithms with a level for every current, then the quadratic of the remainder."""
     currents = np.array([c.current_A for c in conditions])
     amplitude = np.log([c.amplitude_m / reference.amplitude_m for c in conditions])
     frequency = np.log([c.frequency_Hz / reference.frequency_Hz for c in conditions])

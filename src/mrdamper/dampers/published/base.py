@@ -23,7 +23,7 @@ from mrdamper.statistics.levenberg_marquardt import forward_differences, least_s
 _MAX_STEPS = 8
 AT_BOUNDS = "at a bound of the search"  # entry of the provenance: coefficients whose values are no estimates
 _LOGARITHM = "_log"  # end of the name of a coefficient that is the logarithm of a parameter
-_COEFFICIENT_RANGE = 0.8  # a coefficient may move by this share of its start, or of one
+_COEFFICIENT_RANGE = 0.8  # a coefficient may change by this share of its start, or of one
 Tables = dict[str, list[float] | list[list[float]]]
 
 
@@ -39,7 +39,7 @@ class SavedConditioned(Saved):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ConditionedDamper(Damper):
-    """A damper whose model is written down for every condition. Subclasses are final."""
+    """A damper with an explicit model for every condition. Subclasses are final."""
 
     kind: ClassVar[str] = "conditioned"
     saved: ClassVar[type[Saved]] = SavedConditioned
@@ -48,13 +48,13 @@ class ConditionedDamper(Damper):
     heading: ClassVar[str]
     source: ClassVar[str]  # type: ignore[assignment]
     equation: ClassVar[str]  # type: ignore[assignment]
-    unverified: ClassVar[str] = ""  # what of the form could not be checked against the publication
-    basis: ClassVar[str]  # model identified run by run, from which the coefficients start
+    unverified: ClassVar[str] = ""  # parts of the form that could not be checked against the publication
+    basis: ClassVar[str]  # model of individual fits, from which the coefficients start
     basis_free: ClassVar[tuple[str, ...]] = ()
-    limits: ClassVar[str]  # what it cannot do, for tables
+    limits: ClassVar[str]  # limitations, for tables
 
     coefficients: Mapping[str, float]  # numbers determined from the data, SI
-    reference: Condition  # frequency, amplitude and current that powers and breaks count from
+    reference: Condition  # reference frequency, amplitude and current of powers and breaks
 
     @property
     def title(self) -> str:
@@ -155,7 +155,7 @@ class ConditionedDamper(Damper):
 
     @classmethod
     def from_saved(cls, saved: SavedConditioned, **shared: Any) -> Self:
-        from mrdamper.dampers.published import conditioned_type  # imports every file, this one among them
+        from mrdamper.dampers.published import conditioned_type  # imports every file, including this one
 
         kind = conditioned_type(saved.model)
         reference = Condition(*saved.reference)

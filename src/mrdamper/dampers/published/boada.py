@@ -26,9 +26,9 @@ _WEIGHT_STEP = 1e-6 * (2 * _MAX_WEIGHT)  # of a weight, for derivatives by diffe
 class BoadaType(ConditionedDamper):
     """F = (2/pi) f_y arctan[kappa (v + v0 sgn x)] + c v + k x + f0; the six come from a neural network.
 
-    Inputs are current, frequency and amplitude, standardised; one hidden layer of five tanh
-    units; weights by penalised least squares on the identifications of single runs. There are
-    more weights than runs: the penalty, not the count, limits the freedom.
+    Inputs are current, frequency and amplitude, standardised; one hidden layer of five tanh units; weights by penalised
+    least squares on the identifications of single runs. There are more weights than runs, so the penalty determines
+    them.
 
     References
     ----------
@@ -64,7 +64,7 @@ class BoadaType(ConditionedDamper):
         return {f"{name}{i}": float(value) for name, values in named.items() for i, value in enumerate(values)}
 
     def refined(self, runs: Sequence[Run]) -> Self:
-        """Name the weights at a bound of their search; they are not refined."""
+        """List the weights at a bound of their search; they are not refined."""
         weights = {name: value for name, value in self.coefficients.items() if name.startswith("weight")}
         return self.stating_bounds([n for n, value in weights.items() if abs(value) > (1 - 1e-6) * _MAX_WEIGHT])
 

@@ -12,17 +12,16 @@ from mrdamper.data import Condition, Floats
 from mrdamper.identification import Identification
 from mrdamper.models.bouc_wen import BoucWen
 
-_RISE = 3.0  # 1/A, start of the exponential's rate; few test matrices hold enough currents to see it
-_FLOOR = 1e-3  # share of beta that beta + gamma keeps
+_RISE = 3.0  # 1/A, start of the exponential's rate, which few test matrices determine
+_FLOOR = 1e-3  # smallest share of beta in beta + gamma
 
 
 class DominguezType(ConditionedDamper):
     """F = (f/f_r)^d2 (X/X_r)^d4 [c0(I) v + k0(I) x + alpha(I) z] + f0.
 
-    c0 and alpha rise linearly up to a break current and saturate exponentially above it; k0
-    and gamma are straight in the current; beta is constant, n = 2 and A = 1. Two of the
-    published 16 numbers only scale others, and the frequency and amplitude here count from
-    the middle of the tests; the offset force is added.
+    c0 and alpha rise linearly up to a break current and saturate exponentially above it; k0 and gamma are linear in the
+    current; beta is constant, n = 2 and A = 1. Two of the published 16 parameters only scale others, and frequency and
+    amplitude are relative to the middle of the tests; the offset force is added.
 
     References
     ----------
@@ -106,7 +105,7 @@ def _scale(condition: Condition, reference: Condition, d2: float, d4: float) -> 
 def _powers(
     conditions: Sequence[Condition], reference: Condition, force: Floats, currents: Floats
 ) -> tuple[float, float]:
-    """Powers of frequency and amplitude in the yield force, with a level of its own for every current."""
+    """Powers of frequency and amplitude in the yield force, with a level for every current."""
     levels = np.unique(np.round(currents, 3))
     table = np.column_stack(
         [
