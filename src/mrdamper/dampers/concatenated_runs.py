@@ -366,7 +366,7 @@ class Linearisation:
         return [np.linalg.qr(whole[owner == run], mode="r") / weight for run, weight in enumerate(self.table.weights)]
 
     def extrapolate_refit(self, runs: Sequence[int], box: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-        """Residual and derivatives of each run in as many rows as columns, with equal sums of squares."""
+        """Errors of some runs, and the linearised end of a search on these alone, linear parameters refitted."""
         triangles, point, own = [self._triangles[i] for i in runs], self.point, slice(1, 1 + self.point.size)
         owner = np.repeat(np.arange(len(runs)), [len(triangle) for triangle in triangles])
         rows, weights = np.concatenate(triangles), self.table.weights[list(runs)]
