@@ -30,7 +30,7 @@ _MIN_ADDRESS_SPACE = 2 * 2**30  # address space [bytes]; a study of the bundled 
 def main() -> None:
     """Run the command line."""
     # One thread for linear algebra: the matrices here are small, and the same bits come out
-    # whatever the number of cores.
+    # for any number of cores.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     warnings.showwarning = _show_warning
@@ -109,7 +109,7 @@ def _ended_by_signals() -> Iterator[None]:
 
 
 def _say(text: str) -> None:
-    with suppress(OSError):  # the disk that is full may be the one this goes to
+    with suppress(OSError):  # the full disk may be that of the standard output
         print(f"mrdamper: {text}", file=sys.stderr)
 
 

@@ -19,7 +19,7 @@ Rows = Sequence[Mapping[str, Any]]
 
 
 def put(rows: Rows, out: Path | None, as_json: bool, as_csv: Callable[[Rows], str]) -> None:
-    """Write rows where they were asked for; a file appears whole or not at all."""
+    """Write rows to standard output or, atomically, to a file."""
     from mrdamper.data.encoding import finite
 
     plain = [{k: finite(v) if isinstance(v, float) else v for k, v in row.items()} for row in rows]
@@ -27,7 +27,7 @@ def put(rows: Rows, out: Path | None, as_json: bool, as_csv: Callable[[Rows], st
 
 
 def put_text(text: str, out: Path | None) -> None:
-    """Print a text where no file or "-" is given; else write the file, whole or not at all."""
+    """Print a text if no file or "-" is given; otherwise write the file atomically."""
     if out is None or str(out) == "-":
         print(text, end="")
         return
@@ -49,7 +49,7 @@ def figure_kind(path: Path) -> str:
 
 
 def put_figure(figure: Figure, out: Path) -> None:
-    """Write a figure of the kind that its file's name states, whole or not at all."""
+    """Write a figure of the kind of its file's suffix, atomically."""
     from mrdamper.data.atomic import write_file
 
     kind = figure_kind(out)

@@ -9,12 +9,12 @@ from typing import TypeVar
 
 Item = TypeVar("Item")
 Progress = Callable[[str, float], None]
-_QUICK = 1.0  # seconds in which nothing needs to be said
+_QUICK = 1.0  # seconds without progress
 
 
 @contextmanager
 def progress_on_stderr(quiet: bool = False) -> Iterator[Progress]:
-    """Give a function (what is being done, share done 0...1) that shows progress and the time left on a terminal."""
+    """Give a function of (step, share done 0...1) that shows progress and the remaining time on a terminal."""
     if quiet:
         yield lambda what, share: None
         return

@@ -40,7 +40,7 @@ class ForceLaw(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """A model's answer to an excitation."""
+    """The response of a model to an excitation."""
 
     excitation: Excitation
     # force, state: (N,) force [N] and internal state of the model
@@ -49,7 +49,7 @@ class Response:
 
 
 def simulate(model: ForceLaw, excitation: Excitation) -> Response:
-    """Force of a model along any motion, starting at rest with no memory.
+    """Force of a model along any motion, from rest.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def simulate(model: ForceLaw, excitation: Excitation) -> Response:
     Raises
     ------
     ParameterError
-        If an integrated model is too stiff or runs away.
+        If an integrated model is too stiff or diverges.
 
     Examples
     --------

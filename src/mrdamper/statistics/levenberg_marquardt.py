@@ -1,7 +1,6 @@
 """Bounded Levenberg–Marquardt for one to a few coordinates.
 
-scipy.optimize would do; importing it costs half a second, more than identifying a whole
-test matrix, so the few lines that are needed stand here (docs/decisions/0003).
+Importing scipy.optimize takes half a second, more than the identification of a test matrix (docs/decisions/0003).
 """
 
 from __future__ import annotations
@@ -16,15 +15,15 @@ from mrdamper.statistics.linear import Floats
 from mrdamper.statistics.stop_reason import StopReason
 
 _DIFFERENCE_STEP = 1e-6  # forward difference, relative to the width of the box
-_STIFFEST = 1e12  # damping at which no step is left to try
+_STIFFEST = 1e12  # damping at which the search ends
 _CURVED = 1e-7  # difference of gradients, relative to the width of the box
-_NEIGHBOURHOOD = 2e-2  # of the box: where a search ended, its minimum is nearer
+_NEIGHBOURHOOD = 2e-2  # of the box: largest distance of a minimum from the end of a search
 _STEP_TOLERANCE = 1e-13  # of the box: the end
-_ROUNDING_STEP = 1e-10  # of the box: rounding may keep steps from shrinking on
+_ROUNDING_STEP = 1e-10  # of the box: steps that rounding may prevent from decreasing
 _FLAT_CURVATURE = 1e-12  # share of the largest curvature
 _POLISHING = 25  # steps
-_WORTHLESS = 1e-3  # share of the tolerated gain below which a step is not even tried
-_EXCEEDED = 1.3  # gain over the promised one, from which a step is lengthened
+_WORTHLESS = 1e-3  # share of the tolerated gain below which a step is not tried
+_EXCEEDED = 1.3  # gain over the predicted one, from which a step is lengthened
 _LENGTHENINGS, _MAX_LENGTHENING = 2, 4.0  # of a step, and the factor of each
 
 
@@ -65,12 +64,11 @@ def least_squares(
     slopes : callable, optional
         (D,) point -> (N, D) derivatives of the residual; by forward differences without.
     curved : bool
-        Learn from the change of the gradient what curvature the Jacobian alone leaves out. Where
-        much residual remains, Gauss–Newton's steps shrink by the same factor again and again;
-        these do not [Dennis, Gay and Welsch 1981, ACM Trans. Math. Software 7, 348].
+        Estimate the curvature that the Jacobian omits from changes of the gradient. With large residuals, Gauss–Newton
+        converges linearly, this method faster [Dennis, Gay and Welsch 1981, ACM Trans. Math. Software 7, 348].
     lengthened : bool
-        Lengthen a step that gains more than the Jacobian promised: of residuals with narrow peaks, as those of fronts
-        that must shift, it overestimates the curvature, and a step costs many more operations than a residual.
+        Lengthen a step that gains more than predicted: the Jacobian overestimates the curvature of residuals with
+        narrow peaks, and a step takes many more operations than a residual.
     """
     width = upper - lower
     point = np.clip(start, lower, upper)
@@ -85,7 +83,7 @@ def least_squares(
         if curved and before is not None:
             extra = _learnt_curvature(extra, point - before[0], gradient - before[1], normal)
         held = ((point <= lower) & (gradient > 0)) | ((point >= upper) & (gradient < 0))
-        free = ~held & (np.diag(normal) > 0)  # a coordinate that changes nothing has no step
+        free = ~held & (np.diag(normal) > 0)  # a coordinate without an effect has no step
         if not free.any():
             ending = StopReason.AT_BOUNDS
             break
@@ -128,7 +126,7 @@ def _lengthened(
     lower: Floats,
     upper: Floats,
 ) -> tuple[tuple[Floats, Floats], int]:
-    """Lengthen a step to where the parabola through its gains leads, while it gains: point, residual, evaluations."""
+    """Lengthen a step to the minimum of the parabola through its gains: point, residual, evaluations."""
     length, gain, tried = 1.0, cost - float(reached[1] @ reached[1]), 0
     for tried in range(1, _LENGTHENINGS + 1):
         curvature = max((2 * length * promised - gain) / (length**2 * promised), 1e-3)
@@ -147,10 +145,9 @@ def _lengthened(
 def newton_refine(gradient: Callable[[Floats], Floats], point: Floats, lower: Floats, upper: Floats) -> Floats:
     """Refine the minimum next to a point where a search has stopped, to the last digits.
 
-    The cost tells the place of its minimum to half of the digits only, and a search that ends by it
-    ends where rounding says. The gradient tells all of them: Newton's steps on it alone, the
-    curvature by differences, until they stay below 1e-13 of the box. Where they do not come to rest
-    nearby, at an edge or on a plain, the point stays.
+    The cost determines its minimum to half of the digits only, and the end of a search by the cost depends on rounding.
+    The gradient determines all of them: Newton steps on it, with the curvature by differences, end below 1e-13 of the
+    box. If they do not converge nearby, at a bound or in a flat region, the point is kept.
 
     Parameters
     ----------
@@ -183,7 +180,7 @@ def newton_refine(gradient: Callable[[Floats], Floats], point: Floats, lower: Fl
 
 
 def _is_plain(curvature: Floats) -> bool:
-    """Tell if some direction costs nothing within rounding, or leads down."""
+    """Tell if some direction is flat within rounding, or leads down."""
     values = np.linalg.eigvalsh(curvature)
     return not values[0] > _FLAT_CURVATURE * values[-1]
 
@@ -200,7 +197,7 @@ def forward_differences(
 def _damped_step(
     normal: Floats, extra: Floats | None, gradient: Floats, free: NDArray[np.bool_], damping: float
 ) -> tuple[Floats, float]:
-    """Step of the free coordinates, and what it would gain if the cost were as the matrices say."""
+    """Step of the free coordinates, and its predicted gain."""
     normal = normal[free][:, free]
     stiff = np.diag(damping * np.maximum(np.diag(normal), 1e-300))
     if extra is not None:
@@ -219,7 +216,7 @@ def _is_positive(matrix: Floats) -> bool:
 
 
 def _learnt_curvature(extra: Floats | None, moved: Floats, change: Floats, normal: Floats) -> Floats | None:
-    """Update what the second derivatives of the residual add to the normal matrix."""
+    """Update the contribution of the second derivatives of the residual to the normal matrix."""
     along = float(change @ moved)
     missing = change - normal @ moved
     if not along > 1e-12 * float(np.linalg.norm(change) * np.linalg.norm(moved)):

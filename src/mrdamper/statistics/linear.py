@@ -1,8 +1,7 @@
-"""Linear least squares: equilibrated, bounded, or beside columns that are factored once.
+"""Linear least squares: equilibrated, bounded, or with columns that are factored once.
 
-Many rows and few columns, whose sizes may differ by ten powers of ten. Matrices here are small, so
-threads of the linear algebra gain nothing, wait for each other on a busy machine, and add up sums
-in another order, which changes the last bits of a result: everything runs on one.
+Matrices have many rows and few columns, whose sizes may differ by ten powers of ten. They are small, so further threads
+of the linear algebra save no time and change the last bits of a result by another order of sums: one thread is used.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from typing import Any, ParamSpec, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]  # as in `data`, which this room does without
+Floats = NDArray[np.float64]  # as in `data`, which this package does not import
 _WELL_APART = 1e-4  # smallest pivot of equilibrated columns at which the normal equations keep their digits
 _RANK_LIMIT = 1e-10  # singular value over the largest below which a direction is rounding
 _MIN_RELATIVE_PIVOT = 1e-5  # pivot over the largest below which a column is explained by the others
@@ -30,7 +29,7 @@ T = TypeVar("T")
 
 
 def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None) -> Floats:
-    """Coefficients of least squares; of several solutions the shortest, each column counted by its size.
+    """Coefficients of least squares; of several solutions the shortest, relative to the size of each column.
 
     Parameters
     ----------
@@ -48,7 +47,7 @@ def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None
     scale[~(scale > 0)] = 1.0
     normal = gram / scale / scale[:, None]
     if _pivots(normal).min(initial=1.0) > _WELL_APART:
-        # Normal equations, then once more for what they left: as good as a factorisation of N rows.
+        # Normal equations with one refinement: as accurate as a factorisation of N rows.
         inverse = np.linalg.inv(normal) / scale / scale[:, None]
         solution = inverse @ (right @ columns)
         return solution + inverse @ ((right - columns @ solution) @ columns)
@@ -68,7 +67,7 @@ def solve_weighted(columns: Floats, right: Floats, weights: Floats, rank_limit: 
         return np.array(each).reshape(-1, width)
     inverse: Floats = np.linalg.inv(normal) / scale[:, :, None] / scale[:, None, :]
     solution: Floats = np.zeros(scale.shape)
-    for _ in range(2):  # the second time for what the first left, as in `solve_linear`
+    for _ in range(2):  # the second time for the remainder, as in `solve_linear`
         left: Floats = (squares * (right - solution @ columns.T)) @ columns
         solution += np.matmul(inverse, left[:, :, None])[:, :, 0]
     return solution
@@ -117,7 +116,7 @@ def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) 
 
 
 def robust_weights(errors: Floats, best: float) -> Floats:
-    """Weights under which squares sum up to the errors themselves: one bad run cannot bend what all share.
+    """Weights with which weighted squares sum up to the errors themselves, which limits the effect of one bad run.
 
     Parameters
     ----------
@@ -138,7 +137,7 @@ def _pivots(normal: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class FixedColumns:
-    """Columns that stay while one beside them moves: factored once."""
+    """Constant columns of problems with one further column, factored once."""
 
     basis: Floats  # (N, L) orthonormal, of the columns
     triangle: Floats  # (L, L) columns = basis · triangle · scale
@@ -148,7 +147,7 @@ class FixedColumns:
 
     @classmethod
     def of(cls, columns: Floats, right: Floats) -> Self:
-        """Factor (N, L) columns beside an (N,) right side."""
+        """Factor (N, L) columns with an (N,) right side."""
         scale = np.sqrt(np.einsum("ij,ij->j", columns, columns) / len(columns))
         scale[scale == 0] = 1.0
         basis, triangle = _factored(columns, scale)
@@ -168,14 +167,14 @@ class FixedColumns:
 
     @cached_property
     def inverse(self) -> Floats:
-        """(L, L) matrix that takes what lies along the basis to coefficients of the columns."""
+        """(L, L) matrix from coefficients of the basis to those of the columns."""
         return np.linalg.inv(self.triangle) / self.scale[:, None]
 
 
 def _factored(columns: Floats, scale: Floats) -> tuple[Floats, Floats]:
     """Orthonormal basis and triangle of (N, L) columns over their scale; of many rows block by block, twice.
 
-    A long table is factored without the four copies of it that one factorisation makes.
+    A long table is factored without the four copies of one factorisation.
     """
     size, count = columns.shape
     if size <= _ROWS_PER_BLOCK:
@@ -223,7 +222,7 @@ def nonnegative_least_squares(table: Floats, right: Floats) -> tuple[Floats, flo
 
 
 def inverse_of_triangle(triangle: NDArray[np.floating[Any]]) -> Floats:
-    """Invert a lower triangle, half by half: NumPy takes it for any matrix, and SciPy is slow to import."""
+    """Invert a lower triangle by halves: NumPy has no method for triangles, and SciPy is slow to import."""
     half = len(triangle) // 2
     inverse = np.zeros(triangle.shape)
     inverse[:half, :half], inverse[half:, half:] = (

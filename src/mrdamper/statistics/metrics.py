@@ -35,8 +35,8 @@ def wape(measured: Floats, predicted: Floats) -> float:
 def mean_relative_error(measured: Floats, predicted: Floats) -> float:
     """Mean of |e| / |F|.
 
-    [Qian et al. 2024, Eq. 44] It explodes where the force crosses zero: read it beside `wape`.
-    Samples with a measured force of exactly zero are left out.
+    [Qian et al. 2024, Eq. 44] It is unbounded where the force crosses zero: compare it with `wape`. Samples with a
+    measured force of exactly zero are omitted.
     """
     nonzero = measured != 0
     return float(np.mean(np.abs((predicted - measured)[nonzero] / measured[nonzero])))
@@ -48,7 +48,7 @@ def peak_force(force: Floats) -> float:
 
 
 def dissipated_power(force: Floats, velocity: Floats, time: Floats) -> float:
-    """Mean power F·v taken out of the motion [W]; over whole cycles, dissipated energy × frequency."""
+    """Mean dissipated power F·v [W]; over whole cycles, dissipated energy × frequency."""
     return float(np.trapezoid(force * velocity, time) / (time[-1] - time[0]))
 
 
@@ -61,8 +61,8 @@ class Scores:
     nrmse_pp, nrmse_std, wape, mean_relative_error : float
         See the functions of these names.
     peak_error, energy_error : float
-        Relative error of half the peak-to-peak force and of the dissipated energy; positive
-        when the model has too much.
+        Relative error of half the peak-to-peak force and of the dissipated energy; positive if that of the
+        model is too large.
     """
 
     nrmse_pp: float

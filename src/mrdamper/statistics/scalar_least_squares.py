@@ -1,8 +1,7 @@
 """Least squares in a single parameter whose derivative is known.
 
-One evaluation a step and no matrix: for searches that are run by the thousand. The curvature
-comes from the change of the gradient (secant), at the first step from the Jacobian; a bracket
-of gradients of either sign catches what overshoots.
+One evaluation per step and no matrix, for thousands of searches. The curvature follows from the change of the gradient
+(secant), at the first step from the Jacobian; a bracket of gradients of both signs limits the steps.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from mrdamper.statistics.linear import Floats
 from mrdamper.statistics.stop_reason import StopReason
 
 _MOST_STEPS = 40
-_TOLERANCE = 1e-9  # part of the sum of squares that the last step promises
+_TOLERANCE = 1e-9  # predicted relative gain of the last step
 
 Evaluation = tuple[Floats, Floats]  # residual, its derivative
 
@@ -28,12 +27,12 @@ def least_squares_in_one(
     lower: float,
     upper: float,
 ) -> Minimum | None:
-    """Minimise |residual(u)|² between two bounds, until a step promises next to nothing of it.
+    """Minimise |residual(u)|² between two bounds, until the predicted gain of a step is negligible.
 
     Parameters
     ----------
     evaluate : callable
-        u -> (N,) residual and its derivative; None where it cannot be had.
+        u -> (N,) residual and its derivative; None where it is undefined.
     start, lower, upper : float
     most_steps : int
     tolerance : float
@@ -41,9 +40,9 @@ def least_squares_in_one(
     Returns
     -------
     Minimum or None
-        None where `evaluate` gave up.
+        None if `evaluate` returns None.
     """
-    low, high = -math.inf, math.inf  # places whose gradient points up to, and back to, the minimum
+    low, high = -math.inf, math.inf  # points with gradients of both signs about the minimum
     u, before, best, evaluations = start, None, None, 0
     ending = StopReason.STEPS_SPENT
     for _ in range(_MOST_STEPS):

@@ -1,1 +1,1 @@
-"""One command a module: `register(app)` adds it. Heavy imports stay inside the functions."""
+"""One command per module; `register(app)` adds it. Heavy imports stay inside the functions."""

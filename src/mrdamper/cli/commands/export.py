@@ -55,7 +55,7 @@ def export(
 
 
 def _inverse(damper: Damper, name: str, to: str, exporter: Exporter, out: Path) -> tuple[list[Path], tuple[str, ...]]:
-    """Return the current for a wanted force: files written, and what to know about them."""
+    """Export the current for a required force: written files, and notes."""
     from mrdamper.exporters.c import write_program
     from mrdamper.exporters.fmu import FMUExporter
     from mrdamper.exporters.fmu_program import write_program_fmu

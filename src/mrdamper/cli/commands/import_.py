@@ -179,7 +179,7 @@ def _alternatives(columns: tuple[str, ...]) -> str:
 
 
 def _write_dataset(result: ImportResult, profile: Profile, out: Path, add: bool) -> tuple[int, int]:
-    """Write or add; the number of runs in the dataset then, and of those that were not there."""
+    """Write or add; return the number of runs in the dataset, and of new ones."""
     from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
     from mrdamper.rig_files.profile import Profile, profile_text
     from mrdamper.rig_files.rig_import import to_dataset
@@ -234,7 +234,7 @@ def _by_file(runs: Dataset) -> dict[str, list[Run]]:
 
 
 def _replaced(before: Run, now: Run) -> Run:
-    """Return a run read anew, with the name, split and what runs.csv states of the one before."""
+    """Return a run that was read again, with the name, split and further columns of runs.csv of the old one."""
     anew = ("columns", "sign_changed", "scaled", "time_from", "motion_stated", "findings")
     stated = {key: text for key, text in before.notes.items() if key not in anew}
     return replace(now, id=before.id, split=before.split, rig=now.rig or before.rig, notes={**now.notes, **stated})
@@ -259,7 +259,7 @@ def _print_tree(files: list[Path], settings: Profile) -> None:
 def _asked(
     files: list[Path], settings: Profile, result: ImportResult, tests: Path | None
 ) -> tuple[Profile, ImportResult]:
-    """Ask what the refusals leave open, one question at a time, and read the files again with each answer."""
+    """Ask for missing information, one question at a time, and read the files again with each answer."""
     from mrdamper.rig_files.preview import columns_of, question_of
     from mrdamper.rig_files.profile import profile_text
     from mrdamper.rig_files.rig_import import import_files

@@ -18,7 +18,7 @@ app = typer.Typer()
 def plugins(as_json: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
     """List models, readers and other parts by their package."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PluginWarning)  # the list names what is skipped
+        warnings.simplefilter("ignore", PluginWarning)  # the list contains skipped parts
         parts = all_parts()
     if as_json:
         print(json.dumps([asdict(part) for part in parts], indent=1))

@@ -57,7 +57,7 @@ def predict(
             raise ConditionError(
                 f"{name} {value:g}", remedy="give zero or more; the force depends on the magnitude only"
             )
-    student(level, 1.0)  # refuses a level that is none
+    student(level, 1.0)  # refuses an invalid level
     require_writable(out)
     require_writable(plot)
     damper = _load(model, coil_lag)
@@ -138,12 +138,12 @@ def _said(prediction: Prediction, interval: Band, level: float, where: str) -> s
     parts = ", ".join(
         f"{name} {float((part**2).mean() ** 0.5):.3g} N"
         for name, part in (("parameters", interval.parameter), ("session", interval.session), ("model", interval.model))
-        if part.any()  # without three known sessions nothing is known of the variation between sessions
+        if part.any()  # without three known sessions the variation between sessions is unknown
     )
     motion, c = prediction.motion, prediction.condition
     power = dissipated_power(prediction.force, motion.velocity, motion.time)
     energy = power / c.frequency_Hz if c.frequency_Hz > 0 else math.nan  # of a cycle
-    # Of the linear damper that takes as much out of the same sine: C = E/(π ω X²).
+    # Of the linear damper with the same dissipation on this sine: C = E/(π ω X²).
     damping = 2 * power / c.peak_velocity**2 if c.peak_velocity > 0 else math.nan
     low, high = (1 + share for share in interval.energy)
     corrected = ""

@@ -87,7 +87,7 @@ def study(
 
 
 def _model(name: str | None, gas: str | None, setting: list[str]) -> str | StudyMethod | None:
-    """Return the model asked for; a published method with its options."""
+    """Return the requested model; a published method with its options."""
     from mrdamper.study.recipe import study_method, study_methods
 
     if name in study_methods():

@@ -38,7 +38,7 @@ def uncertainty(
     from mrdamper.data.atomic import require_writable
     from mrdamper.identification.intervals import student
 
-    student(level, 1.0)  # refuses a level that is none
+    student(level, 1.0)  # refuses an invalid level
     if steps < 10:
         raise InputError(f"--steps {steps}", remedy="give at least 10, usually some thousands")
     require_writable(out)
@@ -73,7 +73,7 @@ def uncertainty(
 
 
 def _write(out: Path, rows: Rows, curves: list[LikelihoodProfile], drawn: Samples | None, level: float) -> None:
-    """Write the table of parameters, and the figures that were asked for."""
+    """Write the table of parameters, and the requested figures."""
     from mrdamper.data.atomic import write_result
     from mrdamper.data.encoding import csv_text
     from mrdamper.report.plots.style import save_figure

@@ -50,7 +50,7 @@ def validate(
 
     if split not in (None, "train", "validate"):
         raise UnknownNameError.of("split", str(split), ("train", "validate"))
-    student(level, 1.0)  # refuses a level that is none
+    student(level, 1.0)  # refuses an invalid level
     require_writable(out)
     damper = load_model(model)
     whole = _rig(load_dataset(data), rig, damper.rig)
@@ -82,7 +82,7 @@ def validate(
 
 
 def _rig(dataset: Dataset, asked: str | None, of_model: str) -> Dataset:
-    """Return the runs of the rig asked for, of the model's rig, or of the only one."""
+    """Return the runs of the requested rig, of the model's rig, or of the only one."""
     if asked is None and of_model not in dataset.rigs and len(dataset.rigs) == 1:
         asked = dataset.rigs[0]
         names = [f"rig {rig!r}" if rig else "a rig without a name" for rig in (of_model, asked)]

@@ -1,25 +1,23 @@
 """Bouc–Wen hysteresis, exactly: no differential equation is solved.
 
-The model dz/dt = A v − beta |v| |z|^(n−1) z − gamma v |z|^n does not know time: along a
-monotone stroke z is a closed function of the distance travelled. So a sampled motion is cut
-at its reversals once (`motion.Path.of`); the few reversal states follow one from another; all
-samples between them are evaluated at once (`follow`).
+The model dz/dt = A v − beta |v| |z|^(n−1) z − gamma v |z|^n is rate independent: along a monotone stroke z is a closed
+function of the distance. A sampled motion is therefore divided at its reversals once (`motion.Path.of`); the few
+reversal states are sequential; all samples between them are evaluated at once (`follow`).
 
-Everything here is in units that leave three numbers (`Shape`): zeta = z/z_max with
-z_max = (A/(beta + gamma))^(1/n), kappa = A/z_max, rho = (gamma − beta)/(gamma + beta) and n.
-In the direction of motion, w = zeta · sgn v and s the distance,
+All quantities are in units that leave three parameters (`Shape`): zeta = z/z_max with z_max = (A/(beta + gamma))^(1/n),
+kappa = A/z_max, rho = (gamma − beta)/(gamma + beta) and n. In the direction of motion, w = zeta · sgn v and s the
+distance,
 
     dw/ds = kappa (1 − w^n) for w >= 0,    dw/ds = kappa (1 − rho |w|^n) for w < 0.
 
-beta multiplies |v|, gamma multiplies v; Spencer and co-workers use the letters the other way
-round.
+beta multiplies |v|, gamma multiplies v; Spencer and co-workers exchange the two symbols.
 
 References
 ----------
 Bouc (1967), "Forced vibration of mechanical systems with hysteresis"; Wen (1976), "Method for
 random vibration of hysteretic systems", J. Eng. Mech. Div. 102; Ikhouane and Rodellar (2007),
-"Systems with Hysteresis". The literature is recalled, not seen in print; what carries
-"derived" was derived for this package.
+"Systems with Hysteresis". The literature is recalled; "derived" marks results
+derived for this package.
 """
 
 from mrdamper.physics.hysteresis.response import follow, step

@@ -1,9 +1,8 @@
 """Least squares with a hysteretic column, for many shapes at once.
 
-A force that is linear in everything but the shape of the hysteresis, F = columns · p + a zeta,
-costs a search only a few sums for each shape: zeta times every column, zeta times zeta.
-`products` takes the sums beside columns that are factored once (`FixedColumns`); costs follow
-from them without touching a sample.
+A force that is linear in everything but the shape of the hysteresis, F = columns · p + a zeta, needs only a few sums
+for each shape in a search: zeta times every column, zeta times zeta. `products` computes the sums with columns that are
+factored once (`FixedColumns`); costs follow from them without the samples.
 """
 
 from __future__ import annotations
@@ -36,8 +35,8 @@ class Products:
 def batch_cost(path: Path, fixed: FixedColumns, shapes: Shape) -> Floats:
     """(P,) sums of squared force errors [N²] of P shapes, by their best coefficients, that of zeta not below zero.
 
-    Nothing of shapes × samples is kept. The columns are fixed at the last M samples of the path; the ones before only
-    set the state.
+    No array of shapes × samples is kept. The columns are those of the last M samples of the path; earlier samples only
+    determine the state.
     """
     sums = products(path, fixed, shapes)
     left = sums.square - np.sum(sums.along**2, axis=1)  # squared zeta that no column explains
@@ -123,7 +122,7 @@ def _starts(n: float, rho: float, kappa: Floats, path: Path) -> Floats:
     lengths = np.array(path.lengths)
     if not lengths.size:
         return starts
-    # Shapes that every stroke takes from saturation to saturation need no recursion.
+    # Shapes that saturate in every stroke need no recursion.
     full = curve.release_distance(1.0, rho, math) + curve.full
     stepped = np.flatnonzero(kappa * lengths.min() < full)
     kappa, w = kappa[stepped], np.zeros(stepped.size)

@@ -1,4 +1,4 @@
-"""The one curve that every Bouc–Wen stroke is a piece of, for n = 1, n = 2 and any other n >= 1.
+"""The curve of which every Bouc–Wen stroke is a part, for n = 1, n = 2 and any other n >= 1.
 
 In a monotone stroke, with w the state in the direction of motion in units of z_max and phi
 the distance in units of the yield displacement,
@@ -9,14 +9,12 @@ n = 1 and n = 2 have closed forms. Any other n is tabulated, once for each n: th
 |rho|^(1/n) scales every release onto dy/dphi = 1 ∓ y^n, so three curves without a parameter
 besides n serve all rho (rising to 1, growing without bound, falling to 1 from above).
 
-The tables hold r = −ln|1 − y| (or ln(1 + y) on the growing curve) over distance. In r the
-curves are nearly straight, also where y is within rounding of 1, and dr/dphi and its
-derivative are known exactly; quintic Hermite cells then reach 1e-11. Nodes crowd towards 0
-because y^n is not smooth there.
+The tables hold r = −ln|1 − y| (or ln(1 + y) on the growing curve) over distance. In r the curves are nearly straight,
+also where y is within rounding of 1, and dr/dphi and its derivative are known exactly; quintic Hermite cells then reach
+1e-11. Nodes are dense near 0 because y^n is not smooth there.
 
-This is a file of its own because it is the numerics of a function; `hysteresis` is the
-mechanics and knows only the methods of `MasterCurve`. Each takes floats with `xp=math`, or
-arrays and symbols with `xp=numpy`, and a single rho.
+This file contains the numerics of the function; `hysteresis` uses the methods of `MasterCurve` only. Each takes floats
+with `xp=math`, or arrays and symbols with `xp=numpy`, and a single rho.
 """
 
 from __future__ import annotations
@@ -36,12 +34,12 @@ from mrdamper.data.arrays import Floats
 from mrdamper.tracing.expression import Expression, choose, settled
 
 CEILING = 11.0  # largest |w| a motion may start from
-STEEPEST = 1e6  # largest |rho| |w|^n: a shorter release than this drowns in rounding
+STEEPEST = 1e6  # largest |rho| |w|^n: a shorter release is below rounding
 SATURATED = 38.0  # in r: 1 − e^−38 rounds to 1
-_BELOW_ONE = 1 - 2**-50  # holds a state of 1 off the pole of a logarithm; moves it by a rounding error
+_BELOW_ONE = 1 - 2**-50  # keeps a state of 1 from the pole of a logarithm, by a rounding error
 _CELL = Struct("7d")  # six coefficients and one over the width
 
-Value = Any  # float or array, as `xp` says
+Value = Any  # float or array, by `xp`
 
 
 def master_curve(n: float) -> MasterCurve:
@@ -73,7 +71,7 @@ def approach_rate(r: Floats, n: float) -> Floats:
 class MasterCurve(ABC):
     """Climb and release for one exponent n."""
 
-    full: float = math.inf  # distance past zero at which the state rounds to 1; infinite where no closed form says so
+    full: float = math.inf  # distance past zero at which the state rounds to 1; infinite without a closed form
 
     @abstractmethod
     def rise(self, phi: Value, xp: ModuleType) -> Value:
@@ -126,7 +124,7 @@ class _Tangent(MasterCurve):
         return xp.tanh(phi)
 
     def climb(self, w: Value, phi: Value, xp: ModuleType) -> Value:
-        # The addition theorem of tanh is also that of coth, so w > 1 needs no case of its own.
+        # The addition theorem of tanh is also that of coth, so w > 1 needs no separate case.
         t = xp.tanh(phi)
         return (w + t) / (1.0 + w * t)
 
@@ -165,7 +163,7 @@ class _Tabulated(MasterCurve):
     def climb(self, w: Value, phi: Value, xp: ModuleType) -> Value:
         if xp is math:
             return self._fall_from(w, phi, xp) if w > 1 else self._climb_from(w, phi, xp)
-        if isinstance(phi, Expression):  # a stream starts at rest and never gets above 1
+        if isinstance(phi, Expression):  # a stream starts at rest and stays below 1
             return self._climb_from(w, phi, xp)
         above = w > 1
         reached = np.empty_like(phi)
@@ -238,7 +236,7 @@ class _Tabulated(MasterCurve):
 
 
 def crowded_nodes(end: float) -> Floats:
-    """Nodes of a table from 0 to an end, close together at 0 where y^n is hardest."""
+    """Nodes of a table from 0 to an end, dense at 0 where y^n is not smooth."""
     return end * np.linspace(0, 1, 769) ** 4
 
 
@@ -276,8 +274,8 @@ def _evaluate(table: _Quintics, x: Value, xp: ModuleType) -> Value:
 class _Quintics:
     """Piecewise quintic with given values and two derivatives at its nodes; constant beyond them.
 
-    It is one way to read the `points` (phi, r, dr/dphi, its derivative with respect to r), which
-    it shares with the other way.
+    It is one direction of the table of `points` (phi, r, dr/dphi, its derivative with respect to r), which both
+    directions share.
     """
 
     def __init__(self, x: Floats, y: Floats, slope: Floats, bend: Floats, points: Floats, *, backwards: bool = False):

@@ -32,9 +32,8 @@ def follow_step(tape: Tape, shape: Shape, path: Any, zeta0: ArrayLike = 0.0) -> 
 def follow(shape: Shape, path: Path, zeta0: float = 0.0) -> Floats:
     """(N,) hysteretic state z/z_max [-] of one shape along a motion, from the state zeta0 before its first sample.
 
-    Exact for any motion that is monotone between its samples and reversals; the distance of samples does not matter.
-    Accurate to 1e-12 for n = 1 and 2, to 1e-8 for other n. Raises `ParameterError` if zeta0 lies where the state
-    would run away.
+    Exact for any motion that is monotone between its samples and reversals; the sampling has no effect. Accurate to
+    1e-12 for n = 1 and 2, to 1e-8 for other n. Raises `ParameterError` if the state diverges from zeta0.
     """
     _check_start(float(shape.rho), shape.n, float(zeta0))
     return follow_one(float(shape.kappa), float(shape.rho), shape.n, path, zeta0=float(zeta0))
@@ -43,7 +42,7 @@ def follow(shape: Shape, path: Path, zeta0: float = 0.0) -> Floats:
 def step(shape: Shape, zeta: Any, dx: Any) -> Any:
     """State [z_max] after a monotone displacement dx [m] from the state zeta [z_max]: `follow` for one number.
 
-    Plain or traced. The caller vouches for the start: nothing is checked here.
+    Plain or traced, without checks of the start.
     """
     curve, back = master_curve(shape.n), dx < 0
     xp = math if isinstance(back, bool) else np
@@ -53,9 +52,9 @@ def step(shape: Shape, zeta: Any, dx: Any) -> Any:
 
 
 def follow_one(kappa: float, rho: float, n: float, path: Path, part: slice = slice(None), zeta0: float = 0.0) -> Floats:
-    """States of one shape at a part of the samples, nothing checked: for inner loops.
+    """States of one shape at a part of the samples, without checks, for inner loops.
 
-    One state follows from the other at the reversals only: plain floats there, arrays for the samples.
+    Only the states at reversals are sequential: plain floats there, arrays for the samples.
     """
     curve = master_curve(n)
     starts = np.array(starts_of_strokes(curve, kappa, rho, path, path.first_direction * zeta0))
@@ -67,7 +66,7 @@ def starts_of_strokes(curve: MasterCurve, kappa: float, rho: float, path: Path, 
     starts = [w]
     full = (curve.release_distance(1.0, rho, math) + curve.full) / kappa
     for length in path.lengths:
-        if w != -1.0 or length < full:  # else the stroke leads from saturation to saturation
+        if w != -1.0 or length < full:  # otherwise the stroke saturates
             w = -advance(curve, rho, w, kappa * length)
         starts.append(w)
     return starts

@@ -1,4 +1,4 @@
-"""Shape of the hysteresis: three numbers, how they follow from Bouc–Wen parameters, and what bounds them."""
+"""Shape of the hysteresis: three parameters, their conversion from Bouc–Wen parameters, and their bounds."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Shape:
 
     kappa: float | Floats  # (P,) initial slope dzeta/dx = A/z_max [1/m]
     # (P,) (gamma − beta)/(gamma + beta) [-], at most 1. 0: beta = gamma; −1: gamma = 0; 1: beta = 0, an elastic spring,
-    # which forgets where it is once zeta rounds to 1. Above 0, gamma > beta: still dissipating, but bounded only for
+    # whose state is lost once zeta rounds to 1. Above 0, gamma > beta: still dissipating, but bounded only for
     # states that start within rho^(−1/n).
     rho: float | Floats
     n: float = 2.0  # sharpness of the yield [-], from 1 to 20
@@ -73,7 +73,7 @@ class Shape:
 
     @property
     def yield_displacement(self) -> float | Floats:
-        """1/kappa = z_max/A: distance in which the initial slope would spend z_max [m]."""
+        """1/kappa = z_max/A: distance at which the initial slope reaches z_max [m]."""
         return 1 / self.kappa
 
     @property

@@ -54,14 +54,14 @@ class _SteadyLoop:
     curve: MasterCurve
     rho: float
     reach: float  # kappa · amplitude: amplitude in yield displacements
-    saturation: float  # r = −ln(1 − Z), which keeps its digits where Z is 1 to rounding
+    saturation: float  # r = −ln(1 − Z), accurate where Z is 1 to rounding
 
     @classmethod
     def of(cls, kappa: float, rho: float, n: float, amplitude: float) -> Self:
         """Solve for the peak.
 
-        Distance −Z → 0 plus distance 0 → Z is the stroke. Both grow ever slower with r, so
-        Newton's steps from the left never overshoot, and no bracket is needed.
+        Distance −Z → 0 plus distance 0 → Z is the stroke. Both are concave in r, so Newton steps from the left do not
+        overshoot, and no bracket is needed.
         """
         if not (amplitude > 0 and math.isfinite(amplitude)):
             raise ExcitationError(f"the amplitude is {amplitude:g} m", remedy="give a positive amplitude")
@@ -87,10 +87,10 @@ class _SteadyLoop:
         return on_curve(self.curve, self.rho, 2 * self.reach * share - self.to_zero)
 
     def harmonics(self, orders: np.ndarray) -> tuple[Floats, Floats]:
-        """Fourier coefficients, by Gauss points on pieces of the phase on which the loop is smooth.
+        """Fourier coefficients, by Gauss points on parts of the phase on which the loop is smooth.
 
-        The pieces crowd where the loop bends: after the reversal, about zeta = 0, where a
-        power n loses its higher derivatives, and in the approach to saturation.
+        The parts are short where the curvature is large: after the reversal, about zeta = 0, where a power n loses its
+        higher derivatives, and in the approach to saturation.
         """
         distance = np.concatenate([self.to_zero * _RELEASE_PIECES, self.to_zero + _CLIMB_PIECES])
         share = np.clip(np.append(distance, 2 * self.reach) / (2 * self.reach), 0.0, 1.0)
@@ -115,7 +115,7 @@ def _share_of_stroke(since_reversal: Floats) -> Floats:
 
 
 def _to_zero(curve: MasterCurve, rho: float, r: float) -> float:
-    # An elastic spring (rho = 1) goes back the way it came; the logarithm would lose it near Z = 1.
+    # An elastic spring (rho = 1) is reversible; the logarithm is inaccurate near Z = 1.
     return curve.climb_distance(r) if rho == 1 else curve.release_distance(-math.expm1(-r), rho, math)
 
 

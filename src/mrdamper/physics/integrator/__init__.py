@@ -1,9 +1,8 @@
 """Error-controlled integration of a model's state along a sampled motion.
 
-For models that are not rate independent and so have no closed form between reversals. The
-method is linearly implicit and L-stable, so a knee a thousand times shorter than a sample
-costs a few steps and not an explosion; every step's error is estimated and kept below the
-tolerance, and what cannot be kept below it is refused, never returned.
+For models that are not rate independent and so have no closed form between reversals. The method is linearly implicit
+and L-stable, so a time scale a thousand times shorter than a sample needs a few steps and causes no instability; the
+error of every step is estimated and kept below the tolerance, else the result is refused.
 """
 
 from __future__ import annotations
@@ -37,17 +36,17 @@ def integrate(
 ) -> Floats:
     """(N, S) state along a motion: (N,) time [s], displacement [m], velocity [m/s], current [A]; from a start (S,).
 
-    Between samples the displacement is the cubic with the given values and slopes, the velocity its derivative, and
-    the current straight. Raises `ExcitationError` if time does not increase. Raises `ParameterError` if the tolerance
-    cannot be kept: the parameters make the model too stiff, or it runs away.
+    Between samples the displacement is the cubic with the given values and slopes, the velocity its derivative, and the
+    current straight. Raises `ExcitationError` if time does not increase. Raises `ParameterError` if the tolerance
+    cannot be kept: the model is too stiff, or it diverges.
 
     Parameters
     ----------
     rate : function (x, v, current, state, parameters, out)
         Writes d(state)/dt into `out`, with operators and NumPy's functions. It runs once on symbols
-        (`mrdamper.tracing`); what comes out is compiled.
+        (`mrdamper.tracing`), and the program is compiled.
     scale : S numbers
-        A usual size of each state; errors are measured against the larger of it and the state.
+        Typical size of each state; errors are measured against the larger of it and the state.
     tolerance : float
         Error allowed per step, relative.
 
@@ -82,7 +81,7 @@ def integrate(
 
 
 def _record(rate: Rate, states: int, given: tuple[float, ...]) -> tuple[RecordProgram, tuple[float, ...]]:
-    """Return the program of a rate that holds for some parameters, and the constants that follow from them."""
+    """Return the program of a rate for some parameters, and the constants derived from them."""
     programs = _programs(rate, states, len(given))
     for record in programs:
         if (derived := record.prepare(given)) is not None:
@@ -96,7 +95,7 @@ def _record(rate: Rate, states: int, given: tuple[float, ...]) -> tuple[RecordPr
 
 @lru_cache(maxsize=64)
 def _programs(rate: Rate, states: int, given: int) -> list[RecordProgram]:
-    """Programs of a rate so far, one for each answer to what it asks of its parameters."""
+    """Return the cached programs of a rate, one for each result of its conditions on parameters."""
     return []
 
 

@@ -1,7 +1,7 @@
 """`integrate` for one sample: the same linearly implicit steps, written on a tape.
 
-The sample interval is walked in steps whose error is estimated and kept below the tolerance,
-at most a fixed number of them; what is left over then is refused by a guard.
+The sample interval is divided into at most a fixed number of steps whose error is estimated and kept below the
+tolerance; a guard refuses an incomplete interval.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from mrdamper.tracing import Tape
 from mrdamper.tracing.tangent import derivatives
 
 Rate = Callable[[Any, Any, Any, Any, Any, Any], None]
-MOST_STEPS = 400  # between two samples; a sound model takes a handful
+MOST_STEPS = 400  # steps between two samples; few are usual
 _AHEAD = 1e-5  # of a step, for the derivative by time
 
 
 class _Columns(list[Any]):
-    """States by column, as `state[:, j]` asks for them."""
+    """States by column, for `state[:, j]`."""
 
     def __getitem__(self, index: Any) -> Any:
         return super().__getitem__(index[1] if hasattr(index, "__len__") else index)
@@ -41,7 +41,7 @@ def integrate_step(
     held = [tape.remember(f"state{i}", value) for i, value in enumerate(start)]
     size = tape.remember("substep", 1.0)
     time, *channels = motion
-    width = tape.select(tape.first, 1.0, time.step)  # the first sample has no interval; what is walked there is dropped
+    width = tape.select(tape.first, 1.0, time.step)  # the first sample has no interval, and its steps are not used
     ends = [(tape.previous(channel, name), channel) for channel, name in zip(channels, "xvi", strict=True)]
     between = _between(ends, width)
 
@@ -94,8 +94,8 @@ def _rodas3(
 ) -> tuple[list[Any], Any]:
     """One step, and its error over the tolerance. [Sandu et al. 1997]
 
-    A step may not change a state by more than itself: the method would else step over a pole. The derivative by time
-    looks ahead, for a step often begins where the velocity, and with it a rate, turns.
+    A step may not change a state by more than itself, because the method could step over a pole. The derivative by time
+    is a forward difference, because a step often begins at a reversal, where the rate is not smooth.
     """
     order = range(len(y))
     f = slopes(t, y)
@@ -118,7 +118,7 @@ def _rodas3(
         size = 1 / np.maximum(abs(y[i]), scale[i])
         error = np.maximum(abs(k3[i]) * (1 / tolerance), abs(new[i] - y[i])) * size
         worst = error if isinstance(worst, float) else np.maximum(worst, error)
-    # A number that is none compares false: such a step is never good.
+    # Comparisons with NaN are false: such a step is rejected.
     return new, worst
 
 

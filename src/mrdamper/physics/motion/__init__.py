@@ -1,4 +1,4 @@
-"""Motion and current in time: measured, or made, cut into strokes, taken for a sine."""
+"""Motion and current in time: measured or synthetic, divided into strokes, equivalent sines."""
 
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.made import random_motion, sine, sweep, triangle

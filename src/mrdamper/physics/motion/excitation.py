@@ -13,7 +13,7 @@ from mrdamper.data.arrays import Floats
 from mrdamper.errors import ExcitationError, validate_arguments
 from mrdamper.physics.motion.path import Path
 
-_STILL, _REST = 0.01, 0.1  # share of the peak speed below which a motion stands still, and for how long [s]
+_STILL, _REST = 0.01, 0.1  # share of the peak speed below which a motion is at rest, and its shortest duration [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class Excitation:
 
     @cached_property
     def resting(self) -> NDArray[np.bool_]:
-        """(N,) where the motion, once it has begun, stands still for a tenth of a second or longer."""
+        """(N,) where the motion, after its begin, is at rest for a tenth of a second or longer."""
         speed = np.abs(self.velocity)
         moving = np.flatnonzero(speed > _STILL * speed.max()) if len(self) else np.zeros(0, dtype=int)
         still = np.zeros(len(self), dtype=bool)
@@ -84,7 +84,7 @@ class Excitation:
         """Return the same motion at another current [A], a scalar or one value per sample."""
         motion = replace(self, current=np.asarray(current, dtype=float))
         if "path" in self.__dict__:
-            motion.__dict__["path"] = self.path  # the current does not bend it
+            motion.__dict__["path"] = self.path  # the path does not depend on the current
         return motion
 
     @validate_arguments()

@@ -19,7 +19,7 @@ _HARMONICS = 3  # by which a frequency is found, from three cycles on
 _FEW = 250  # samples on which a frequency is found to begin with
 _SAMPLES_PER_BLOCK = 50_000  # samples whose waves are held at a time
 _SAMPLES_PER_HALF_PERIOD = 16  # between two changes of sign, with which the strongest line of a long record is found
-_MAX_SPECTRUM_SAMPLES = 2**20  # samples of a spectrum, at most, for the sake of finer lines
+_MAX_SPECTRUM_SAMPLES = 2**20  # largest number of samples of a zero-padded spectrum
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +64,9 @@ class HarmonicSeries:
 
 
 def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float, drift: bool = True) -> HarmonicSeries:
-    """Least-squares harmonic series of a signal (N,) at a known fundamental frequency [Hz], maybe with a linear drift.
+    """Least-squares harmonic series of a signal (N,) at a known fundamental frequency [Hz], with a drift if asked.
 
-    The number of harmonics is lowered where the record cannot resolve them.
+    The number of harmonics is reduced to those that the record resolves.
     """
     origin = float(time[0])
     nyquist = 0.5 * (time.size - 1) / float(time[-1] - time[0])
@@ -86,13 +86,13 @@ def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float
 def fundamental_frequency(time: Floats, signal: Floats) -> float:
     """Fundamental frequency [Hz] of a record of about one cycle or more.
 
-    The strongest spectral line is where a search of the best single sine begins; Gauss–Newton
-    on frequency and coefficients then finds it to rounding. Harmonics join only from three
-    cycles on: a shorter record could be explained by the harmonics of a slower motion.
+    The search of the best single sine begins at the strongest spectral line; Gauss–Newton on frequency and coefficients
+    then converges to rounding. Harmonics are included from three cycles on, because harmonics of a slower motion could
+    describe a shorter record.
     """
     t = time - time[0]
     guess = _spectral_line(time, signal)
-    few = slice(None, None, max(1, t.size // 150))  # for the ladder, of under four cycles
+    few = slice(None, None, max(1, t.size // 150))  # for the grid, with less than four cycles
     if guess * t[-1] < 4:
         ladder = guess * np.geomspace(0.4, 2.5, 45)
         guess = ladder[int(np.argmin(_single_sine_costs(t[few], signal[few], ladder)))]
@@ -152,7 +152,7 @@ def _single_sine_costs(t: Floats, signal: Floats, frequencies: Floats) -> Floats
 def _spectral_line(time: Floats, signal: Floats) -> float:
     """Find the strongest line of the detrended, zero-padded spectrum [Hz].
 
-    A long record is thinned to the samples its changes of sign need.
+    A long record is thinned to the samples that its changes of sign require.
     """
     if time.size > _SAMPLES_PER_BLOCK:
         often = _crossings(signal - float(np.mean(signal)))

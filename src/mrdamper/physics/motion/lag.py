@@ -1,4 +1,4 @@
-"""First-order memories along a sampled motion: a lag, and a load that builds up with distance and leaks with time."""
+"""First-order memories along a sampled motion: a lag, and a load that increases with distance and relaxes with time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mrdamper.data import Floats
 from mrdamper.physics.motion.path import LONG, Path, memoize_per_path
 from mrdamper.tracing import Tape, choose, streamed
 
-_SHORT = 1e-4  # step over time constant below which a series loses fewer digits
+_SHORT = 1e-4  # step over time constant below which a series is more accurate
 _FORGOTTEN = 1e-18  # share of the past below which it is rounding
 
 
@@ -35,8 +35,8 @@ def lag_step(tape: Tape, time: Any, signal: Any, time_constant: Any) -> Any:
 def first_order_lag(time: Floats, signal: Floats, time_constant: float) -> Floats:
     """Y with T dy/dt + y = signal, from y = 0 at the first sample.
 
-    y_i = p_i y_(i−1) + g_i with p = exp(−Δt/T). No loop over samples: a few passes over the array. The signal counts as
-    straight between the times (N,) [s]; a time constant T [s] of 0 passes it on.
+    y_i = p_i y_(i−1) + g_i with p = exp(−Δt/T). A few passes over the array replace a loop over samples. The signal is
+    linear between the times (N,) [s]; with a time constant T [s] of 0 it is returned.
     """
     if time_constant <= 0:
         return signal.copy()
@@ -48,7 +48,7 @@ def first_order_lag(time: Floats, signal: Floats, time_constant: float) -> Float
 
 
 def _weights(time: Floats, time_constant: float) -> Iterator[Floats]:
-    """(N,) weights of the two ends of the straight pieces, then of the past, span by span."""
+    """(N,) weights of the two ends of the linear pieces, then of the past, by span."""
     step = np.diff(time) / time_constant
     keep = np.concatenate([[0.0], np.exp(-step)])
     # The series where the difference of the two would cancel.
@@ -105,10 +105,10 @@ def load_step(tape: Tape, time: Any, path: Any, length: Any, leak: Any) -> Any:
 
 @streamed(load_step)
 def leaking_load(time: Floats, path: Path, length: float, leak: float) -> Floats:
-    """G with dG/dt = (|v|/length)(1 − G) − leak G, from G = 1: a load built up by motion that leaks away at rest.
+    """G with dG/dt = (|v|/length)(1 − G) − leak G, from G = 1: a load that increases with motion and relaxes at rest.
 
-    The speed counts as constant between two times (N,) [s] of the path. `length` is the motion in which the load builds
-    up [m], `leak` the share of it lost in a second [1/s]; 0 keeps it for ever.
+    The speed is constant between two times (N,) [s] of the path. `length` is the displacement over which the load
+    increases [m], `leak` its relaxation rate [1/s], 0 for none.
     """
     return np.ones(time.size) if leak <= 0 else _loaded(path, time, length, leak)
 

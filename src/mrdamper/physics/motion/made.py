@@ -1,4 +1,4 @@
-"""Motions that are made: sine, triangle, sweep, random."""
+"""Synthetic motions: sine, triangle, sweep, random."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The motion of a recorded run: smooth displacement, velocity and acceleration at the right phase.
 
-Everything is computed from the motion that was measured, never from the one that was commanded.
+Calculations use the measured motion and not the commanded one.
 """
 
 from __future__ import annotations
@@ -16,19 +16,18 @@ from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.path import memoize_per_path
 
 _UNIFORM = 1e-8  # spread of the sampling interval, relative, up to which it counts as one
-_ROUNDING = 4 * float(np.finfo(float).eps)  # of the largest value: a slope per sample below is made of rounding
-_CELLS = 4_000_000  # numbers of all windows that are held at a time
-_CACHED_CELLS = 8_000  # the same, where they are to stay in the processor's cache
+_ROUNDING = 4 * float(np.finfo(float).eps)  # of the largest value: a smaller slope per sample is rounding
+_CELLS = 4_000_000  # largest number of values of all windows in memory
+_CACHED_CELLS = 8_000  # the same for the processor's cache
 
 
 @once_per_run
 def measured_motion(run: Run) -> Excitation:
     """Smooth motion of a run, from its measured displacement.
 
-    A quadratic is fitted around each sample over a fortieth of the motion's period (at least
-    five samples); its value, slope and curvature are displacement, velocity and
-    acceleration. The fit is centred, so no phase is lost; it never reaches across a gap in
-    time. A constant current comes without the noise of its channel.
+    A quadratic is fitted around each sample over a fortieth of the motion's period (at least five samples); its value,
+    slope and curvature are displacement, velocity and acceleration. The fit is centred, without a phase shift, and does
+    not cross a gap in time. A constant current has no noise.
     """
     if len(run.segments) == 1:
         x, v, a = smooth(run.time, run.displacement)
@@ -53,7 +52,7 @@ def smooth(time: Floats, signal: Floats, span: float | None = None) -> Floats:
     uniform = width == 2 * half + 1 and np.ptp(np.diff(time)) < _UNIFORM * spacing
     c = _fits_uniform(signal, half) if uniform else _fits(time, signal, half, width, spacing)
     slope = c[:, 1]
-    slope[np.abs(slope) <= _ROUNDING * np.max(np.abs(signal), initial=0.0)] = 0.0  # else its sign is the machine's
+    slope[np.abs(slope) <= _ROUNDING * np.max(np.abs(signal), initial=0.0)] = 0.0  # else its sign is rounding
     return np.stack([signal + c[:, 0], slope / spacing, 2 * c[:, 2] / spacing**2])
 
 
@@ -79,10 +78,10 @@ def _blocks(size: int, width: int, cells: int = _CELLS) -> Iterator[slice]:
 
 
 def whole_clock(time: Floats) -> Floats:
-    """Time stamps without their rounding, where the whole record shows an even clock behind them.
+    """Time stamps without their rounding, if the whole record has constant steps.
 
-    Stamps written to 0.1 ms make 3004.8 samples a second look like 3333 from one to the next; from
-    the first to the last they do not. A clock that really is uneven stays as it is.
+    With stamps to 0.1 ms, 3004.8 samples per second appear as 3333 between two of them, but not over the record. An
+    uneven clock is unchanged.
     """
     steps = np.diff(time)
     rounding = float(np.ptp(steps))
@@ -93,7 +92,7 @@ def whole_clock(time: Floats) -> Floats:
 
 
 def _fits_uniform(signal: Floats, half: int) -> Floats:
-    """Fit windows that are all alike (Savitzky and Golay).
+    """Fit equal windows (Savitzky and Golay).
 
     Windows are taken relative to their sample and the two sides in pairs, so that a signal at rest, or
     one that turns symmetrically about a sample, has a slope of exactly zero there.
@@ -110,7 +109,7 @@ def _fits_uniform(signal: Floats, half: int) -> Floats:
         c[half:last][rows, 1] = (ahead - behind) @ odd
     ends = (signal[: tau.size], slice(0, half)), (signal[-tau.size :], slice(last, None))
     for window, away in ends:
-        d0, d1, d2 = ((window - signal[away, None]) @ fit).T  # seen away from the middle of the window
+        d0, d1, d2 = ((window - signal[away, None]) @ fit).T  # outside the middle of the window
         at = tau[:half] if away.start == 0 else tau[half + 1 :]
         c[away] = np.stack([d0 + at * (d1 + at * d2), d1 + 2 * at * d2, d2], axis=1)
     return c
@@ -135,7 +134,7 @@ def _characteristic_period(time: Floats, signal: Floats) -> float:
 
     # Slopes over about 1/200 of the record keep sample noise out of the estimate.
     step = max(1, time.size // 2000)
-    # Of hundreds of cycles that is no part of one: seen from single samples up, noise ends before the motion does.
+    # For hundreds of cycles the step is reduced from single samples up, where noise ends before the motion.
     fine = 1
     while fine < step and fine * spacing < period(fine) / 40:
         fine *= 2

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from mrdamper.data.arrays import Floats
 from mrdamper.errors import ExcitationError, is_a
 
-LONG = 200_000  # samples from which what could be remembered is not worth its memory
+LONG = 200_000  # samples from which results are not cached
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +29,12 @@ class Path:
 
     @classmethod
     def of(cls, displacement: ArrayLike, *, peaks: Literal["parabola", "samples"] = "parabola") -> Self:
-        """Cut a motion of displacements (N,) [m] at its reversals, about which the samples count as even in time.
+        """Divide a motion of displacements (N,) [m] at its reversals, about which the samples count as even in time.
 
-        A smooth motion turns between two samples, beyond both. "parabola" puts the peak where the parabola through the
-        three samples at the reversal has its vertex, "samples" at the outermost sample. At 1000 samples a cycle that is
-        an error of zeta of 1e-9 against 1e-4. Raises `ExcitationError` if the array is no channel of finite numbers.
+        A smooth motion reverses between two samples, beyond both. "parabola" puts the peak where the parabola through
+        the three samples at the reversal has its vertex, "samples" at the outermost sample. At 1000 samples per cycle
+        the error of zeta is 1e-9 instead of 1e-4. Raises `ExcitationError` if the array is no channel of finite
+        numbers.
         """
         x = np.asarray(displacement, dtype=float)
         if x.ndim != 1 or x.size == 0:
@@ -71,7 +72,7 @@ class Path:
     def moves(self) -> tuple[Floats, Floats, Floats]:
         """(N,) signed moves [m] from sample to sample: to a reversal between the two, to another, and the rest.
 
-        Where the motion turns between two samples it goes on to the reversal first; noise turns it twice at most.
+        If the motion reverses between two samples it continues to the reversal first; noise reverses it twice at most.
         """
         signed = self.direction * self.distance
         turn, back, move = np.zeros(signed.size), np.zeros(signed.size), np.zeros(signed.size)
@@ -87,10 +88,10 @@ class Path:
 
 
 def memoize_per_path(function: Callable[..., Floats]) -> Callable[..., Floats]:
-    """Remember what a function of a path or of samples, and of some numbers, gave the last two times.
+    """Cache the last two results of a function of a path or of samples, and of some numbers.
 
-    A search moves one parameter at a time, to and fro: what the others lead to stays. It is forgotten
-    with the path. Symbols, and records whose numbers are not worth their memory, are computed every time.
+    A search changes one parameter at a time, so results for the others are reused. The cache ends with the path.
+    Symbols and very long records are computed every time.
     """
     memory: dict[int, tuple[ref[Any], list[tuple[tuple[Any, ...], Floats]]]] = {}
 
@@ -129,17 +130,17 @@ def _reversals(x: Floats) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def _vertex(x: Floats, arrival: np.ndarray, departure: np.ndarray) -> tuple[Floats, np.ndarray]:
-    """Calculate how far beyond the outermost sample the motion turned (signed), and if before that sample.
+    """Calculate the distance of the reversal beyond the outermost sample (signed), and if it is before that sample.
 
-    The vertex of the parabola through the sample and its neighbours, at most an eighth of the larger
-    neighbouring move beyond the sample. Two equal outermost samples straddle the peak, and the parabola
-    knows; three or more are a rest or the resolution of the sensor, and the motion turned there.
+    The vertex of the parabola through the sample and its neighbours, at most an eighth of the larger neighbouring move
+    beyond the sample. Two equal outermost samples are on both sides of the peak, as in the parabola; three or more are
+    a rest or the resolution of the sensor, and the reversal is there.
     """
     before, here, after = x[arrival - 1], x[arrival], x[arrival + 1]
     came, leaves = here - before, here - after  # of one sign; `leaves` may be 0
-    slope = came - leaves  # twice the velocity at the sample, in moves a sample
+    slope = came - leaves  # twice the velocity at the sample, in displacement per sample
     beyond = slope**2 / (8 * (came + leaves))
     beyond[departure > arrival + 1] = 0.0
-    # Still slower on the far side means the motion turned after the sample.
+    # If it is slower on the far side, the reversal is after the sample.
     is_early = (slope * came < 0) & (beyond != 0)
     return beyond, is_early

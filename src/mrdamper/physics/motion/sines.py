@@ -13,13 +13,13 @@ from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.harmonics import HarmonicSeries, fit_harmonics, fundamental_frequency
 from mrdamper.physics.motion.measured import measured_motion
 
-SINE_DISTORTION_LIMIT = 0.05  # above it a motion is no sine for harmonic balance
-STRAY_LIMIT = 0.3  # of the RMS displacement; what no harmonic explains: above it another motion runs beside the sine
-_MEASURED_HARMONICS = 7  # harmonics a measured motion is described by
+SINE_DISTORTION_LIMIT = 0.05  # limit of the distortion of a sine for harmonic balance
+STRAY_LIMIT = 0.3  # of the RMS displacement: remainder above which another motion is added to the sine
+_MEASURED_HARMONICS = 7  # number of harmonics of a measured motion
 _MIN_STROKES = 4  # of a record, below which they show no range
 _MIN_STROKE_SAMPLES = 8  # of a stroke whose duration is counted
 _MIN_STROKE_RATIO = 0.02  # of a stroke that is no noise over the longest [-]
-_MIN_DISPLACEMENT_M = 1e-9  # a displacement that moves less does not move [m]
+_MIN_DISPLACEMENT_M = 1e-9  # smallest motion [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class MotionAnalysis:
     cycles: float  # length of the record in cycles
     distortion: float  # RMS of harmonics 2 and up over the RMS of the first (THD)
     drift: float  # slow movement of the mean position [m/s]
-    residual: float  # RMS of what the series does not explain [m]
+    residual: float  # RMS of the remainder of the series [m]
     stray: float  # that RMS over the RMS displacement: a second tone, a random part, a sweep
 
     @property
@@ -77,11 +77,11 @@ def analyse_motion(run: Run) -> MotionAnalysis:
 
 @dataclass(frozen=True)
 class EquivalentSine:
-    """The sine a motion amounts to."""
+    """The equivalent sine of a motion."""
 
     condition: Condition
     centre: float  # mean position [m]
-    is_sine: bool  # whether the motion is that sine, or only shares its RMS displacement and velocity
+    is_sine: bool  # whether the motion is that sine, or only has its RMS displacement and velocity
 
 
 @once_per_run
@@ -98,7 +98,7 @@ def equivalent_sine(run: Run) -> EquivalentSine:
         if np.ptp(centred) < _MIN_DISPLACEMENT_M:
             raise
         analysis = None
-    # A ramp leaves no residual either: its drift explains it all, and the swing is nothing.
+    # A ramp has no residual either: it is a drift without a sine.
     spread = float(np.std(centred))
     if analysis is not None and analysis.stray < STRAY_LIMIT and analysis.condition.amplitude_m > 0.5 * spread:
         return EquivalentSine(analysis.condition, analysis.series.mean, True)

@@ -1,1 +1,1 @@
-"""Forms of parameter functions p(I, f, A), and fitting them; they know no model."""
+"""Forms of parameter functions p(I, f, A), and their fits, independent of models."""

@@ -17,7 +17,7 @@ from mrdamper.statistics.functions.selection import broken_law, fold_groups, ris
 from mrdamper.statistics.levenberg_marquardt import least_squares, newton_refine
 from mrdamper.statistics.linear import project_out_columns, solve_linear
 
-# Below this share of the largest singular value the tests cannot tell the terms apart: a rig repeats a motion to 1e-6.
+# Below this share of the largest singular value the tests do not separate the terms: a rig repeats a motion to 1e-6.
 _RANK_LIMIT = 1e-5
 
 
@@ -36,7 +36,7 @@ class FunctionFit:
 
 @dataclass(frozen=True, eq=False)
 class _Fitted:
-    """A fitted function with what its errors at omitted values follow from."""
+    """A fitted function with the data for its cross-validation."""
 
     fit: FunctionFit
     basis: Floats  # (N, terms), orthonormal, of the weighted columns
@@ -67,14 +67,13 @@ def fit_function(
     log : bool
         Fit the logarithm.
     uncertainty : (N,) array, optional
-        Standard errors of the values (of the logarithm, with `log`): certain values count more,
-        up to those of the most certain quarter.
+        Standard errors of the values (of the logarithm, with `log`): values with smaller errors have more weight, up
+        to those of the best quarter.
 
     Raises
     ------
     IdentificationError
-        If the conditions cannot tell the form's terms apart: too few currents, frequencies or
-        amplitudes.
+        If the conditions do not separate the terms of the form: too few currents, frequencies or amplitudes.
     """
     return _fitted(form, conditions, values, log, _weights(uncertainty, len(conditions))).fit
 
@@ -111,19 +110,19 @@ def choose_function(
 ) -> FunctionFit:
     """Choose the form by cross-validation over conditions, currents and motions (`selection.smaller_wins`).
 
-    Other parameters are those of `fit_function`; forms the conditions cannot determine are passed
-    over, and those with too many parameters for the tested currents and motions.
+    Other parameters are those of `fit_function`; forms that the conditions do not determine are skipped, and so are
+    those with too many parameters for the tested currents and motions.
 
     Parameters
     ----------
     dissipating : str
-        Unit of a parameter that must not be negative; forms that break a law of physics are refused
+        Unit of a parameter that must not be negative; forms that violate a physical law are refused
         (`selection.broken_law`).
 
     Raises
     ------
     IdentificationError
-        If they can determine none.
+        If they determine none.
     """
     able: list[_Fitted] = []
     refusal: IdentificationError | None = None
@@ -169,7 +168,7 @@ def _errors(fits: Sequence[_Fitted], conditions: tuple[Condition, ...]) -> list[
 
 
 def assess(function: ParameterFunction, conditions: Sequence[Condition], values: ArrayLike) -> FunctionFit:
-    """Calculate how well a function from a global fit describes values identified run by run."""
+    """Calculate the errors of a function from a global fit for values of individual fits."""
     target, fitted = np.asarray(values, dtype=float), function(*features(conditions))
     if function.log:
         target, fitted = np.log(target), np.log(fitted)
@@ -178,12 +177,12 @@ def assess(function: ParameterFunction, conditions: Sequence[Condition], values:
 
 
 def require_determined(form: str, conditions: Sequence[Condition]) -> None:
-    """Refuse a form without rates whose terms the conditions cannot tell apart.
+    """Refuse a form without rates whose terms the conditions do not separate.
 
     Raises
     ------
     IdentificationError
-        Also where the form has rates, which only a fit can settle.
+        Also if the form has rates, which need a fit.
     """
     chosen = form_named(form)
     I, f, A = features(conditions)
@@ -211,7 +210,7 @@ def _best_rates(
     last: tuple[Floats, Floats, Floats] = (np.empty(0), np.empty(0), np.empty(0))
 
     def fitted(u: Floats) -> tuple[Floats, Floats]:
-        """Columns and coefficients at some rates; remembered for the last, which residual and slopes share."""
+        """Columns and coefficients at some rates; cached for the last, which residual and slopes share."""
         nonlocal last
         if not np.array_equal(last[0], u):
             columns = form.columns(I, f, A, tuple(np.exp(u))) * weight[:, None]
@@ -239,7 +238,7 @@ def _best_rates(
 
 @lru_cache(maxsize=128)
 def _fixed_columns(form: Form, conditions: tuple[Condition, ...]) -> Floats | None:
-    """Terms of a form without rates, the same for every parameter; None where they cannot be told apart."""
+    """Terms of a form without rates, the same for every parameter; None if they are not separable."""
     columns = form.columns(*features(conditions), ())
     columns.flags.writeable = False
     return columns if _determined(columns) else None
@@ -252,9 +251,9 @@ def _solved(columns: Floats, target: Floats, weight: Floats, rates: int) -> tupl
     q, triangle = np.linalg.qr(weighted / scale)
     along = q.T @ right
     residual = right - q @ along
-    spare = 1.0 - np.sum(q**2, axis=1)  # share of a value that the others know
+    spare = 1.0 - np.sum(q**2, axis=1)  # share of a value that the others determine
     left_out = float("inf")
-    if spare.min() > _RANK_LIMIT:  # else some value alone says what a term is: without it the form knows nothing
+    if spare.min() > _RANK_LIMIT:  # otherwise one value alone determines a term
         penalty = target.size / (target.size - rates)
         left_out = float(np.sqrt(np.sum((residual / spare) ** 2) / np.sum(weight**2)) * penalty)
     return np.linalg.solve(triangle, along) / scale, left_out, q, residual

@@ -2,8 +2,8 @@
 
 A form is a sum of terms, each a product of powers and decaying exponentials of the three
 features. Its coefficients are linear and solved for; at most two rates inside exponentials
-or powers are searched, bounded, from many starts. Logarithmic parameters (the yield
-displacement spans decades) are fitted in the logarithm and stay positive.
+or powers are searched, bounded, from many starts. Logarithmic parameters (the yield displacement spans decades)
+are fitted in the logarithm and stay positive.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class Form:
 
     @property
     def current_terms(self) -> int:
-        """Parameters of its law over the current, the constant included."""
+        """Parameters over the current, including the constant."""
         terms = [term for term in self.terms if not term.follows_motion]
         return len(terms) + len({term.decay_I for term in terms} - {None})
 

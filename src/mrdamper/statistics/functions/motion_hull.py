@@ -21,7 +21,7 @@ from mrdamper.data.conditions import Condition, same_motion
 
 _where: Callable[..., Any] = np.where  # of arrays and of traced numbers
 _SLEEK = 0.05  # width of a hull in the logarithm below which it is a segment: tests repeat a motion to some per cent
-_ZERO_IN_LOGARITHM = 1e-12  # frequency [Hz] and amplitude [m] that stand for zero in the logarithm
+_ZERO_IN_LOGARITHM = 1e-12  # frequency [Hz] and amplitude [m] that replace zero in the logarithm
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class MotionHull:
         return _hull(tuple(conditions))
 
     def nearest(self, frequency: Any, amplitude: Any) -> tuple[Any, Any]:
-        """Frequency [Hz] and amplitude [m] of the nearest motion of the hull; arrays and traced numbers alike."""
+        """Frequency [Hz] and amplitude [m] of the nearest motion of the hull; for arrays and traced numbers."""
         if len(self.corners) == 1:
             return self.corners[0]
         u, w = (np.log(np.maximum(value, _ZERO_IN_LOGARITHM)) for value in (frequency, amplitude))

@@ -1,13 +1,12 @@
-"""One rule for every choice between a smaller and a larger model, the folds it rests on, and the laws of physics.
+"""Rule for the selection between a smaller and a larger model, its folds, and physical laws.
 
-A model, a form of a parameter function or a term of a model is chosen by cross-validation: the
-smaller one wins within one standard error of the difference [Breiman et al. 1984, §3.4.3; Hastie,
-Tibshirani and Friedman 2009, §7.10], provided that it is no worse in the kind of fold in which it
-is worst, and worse by more than two standard errors in no kind: a kind of few, scattered units must
-not hide what another kind shows clearly. A form is no candidate where the tests cannot support
-it: at most one parameter fewer than current levels in a law over the current, and two fewer than
-distinct motions over the motion; nor where it breaks a law of physics within the tested box or
-20 % beyond it.
+A model, a form of a parameter function or a term of a model is selected by cross-validation: the smaller one is
+selected within one standard error of the difference [Breiman et al. 1984, §3.4.3; Hastie, Tibshirani and Friedman 2009,
+§7.10], provided that it is no worse in the kind of fold in which it is worst, and worse by more than two standard
+errors in no kind, so that a kind of few, scattered units does not hide a clear difference in another. A form is no
+candidate if the tests do not determine it: at most one parameter fewer than current levels in a law over the current,
+and two fewer than distinct motions over the motion; nor if it violates a physical law within the tested ranges or 20 %
+beyond.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from mrdamper.statistics.functions.forms import Form, ParameterFunction
 from mrdamper.statistics.functions.motion_hull import MotionHull
 
 Errors = Mapping[str, Floats]  # by kind of fold: the error of every omitted unit, in one order for all models
-BEYOND = 1.2  # largest current [of the largest tested] up to which a function obeys physics
+BEYOND = 1.2  # largest current [of the largest tested] up to which a function obeys physical laws
 _CLEAR = 2.0  # standard errors of a difference that no other kind of fold outweighs
 _ROUNDING = 1e-12  # relative difference of errors below which they are equal
 _SEVERAL = 5  # units of a kind from which its standard error is its own
@@ -72,7 +71,7 @@ def smaller_wins(smaller: Errors, larger: Errors) -> bool:
 
 
 def _mean_and_variance(values: Floats) -> tuple[float, float]:
-    """Mean, and its squared standard error; of a single value there is none to tell, and zero stands for it."""
+    """Mean, and its squared standard error; zero for a single value."""
     mean = float(np.mean(values))
     apart = values - mean
     return mean, float(apart @ apart) / (values.size - 1) / values.size if values.size > 1 else 0.0
@@ -81,8 +80,8 @@ def _mean_and_variance(values: Floats) -> tuple[float, float]:
 def fold_groups(conditions: Sequence[Condition]) -> dict[str, list[list[int]]]:
     """Group the indices of conditions omitted together, by kind of fold: a condition, an inner current, a motion.
 
-    A form is chosen for what lies between the tested currents: a fold without the lowest or the
-    highest one would ask for an extrapolation that no law over two remaining levels supports.
+    A form is selected for interpolation: a fold without the lowest or the highest current would need an extrapolation
+    that two remaining levels do not support.
     """
     groups = {"condition": same_condition(conditions)}
     levels = np.array(current_levels([abs(c.current_A) for c in conditions]))
@@ -98,8 +97,8 @@ def fold_groups(conditions: Sequence[Condition]) -> dict[str, list[list[int]]]:
 def supported(form: Form, conditions: Sequence[Condition]) -> bool:
     """Tell if a form has few enough parameters for the current levels and distinct motions that were tested.
 
-    Two levels carry a straight line: a law over the current has a parameter fewer than there are
-    levels, but two at least where the current changes at all.
+    Two levels determine a straight line: a function of current has a parameter fewer than there are levels, but at
+    least two if there are several.
     """
     levels = len(set(current_levels([abs(c.current_A) for c in conditions])))
     over_current = 1 if levels < 2 else max(levels - 1, 2)
@@ -109,7 +108,7 @@ def supported(form: Form, conditions: Sequence[Condition]) -> bool:
 
 
 def broken_law(function: ParameterFunction, conditions: Sequence[Condition], unit: str) -> str:
-    """Say which law of physics a function of a dissipating parameter breaks within the tests and 20 % beyond.
+    """Return the physical law that a function of a dissipating parameter violates within the tests and 20 % beyond.
 
     Parameters
     ----------
@@ -124,7 +123,7 @@ def broken_law(function: ParameterFunction, conditions: Sequence[Condition], uni
     Returns
     -------
     str
-        Empty where it breaks none.
+        Empty if it violates none.
     """
     tested = np.unique(current_levels([abs(c.current_A) for c in conditions]))
     currents = np.unique(np.concatenate([np.linspace(0.0, BEYOND * float(tested[-1]), 61), tested]))
