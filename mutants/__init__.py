@@ -1,1 +1,1 @@
-"""Planted faults: does a test notice when a judgement is turned over?"""
+"""Planted faults (mutants): tests of the tests."""

@@ -1,10 +1,9 @@
-"""`python -m mutants`: plant faults, run the tests that run through them, say what survives.
+"""`python -m mutants`: plant faults, run the tests that execute them, print the survivors.
 
-Room by room: the room's tests are collected once and run once without a fault, which shows the
-functions each of them runs through. A fault is then tried in a fork of that process, in which the
-changed code replaces that of the living functions, by those tests alone, the quickest first, up to
-the first that fails. Before all others a fault is planted that no test can miss; where it survives, the
-program itself is at fault, and ends with 2. Ends with 0 where at most 5 % of the faults survive.
+The tests of a group are collected once and run once without a fault, which records the functions that each executes. A
+fault is then tried in a fork of that process, in which the changed code replaces that of the functions, by those tests
+alone, the fastest first, up to the first failure. First a fault that every test detects is planted; if it survives, the
+exit status is 2. The exit status is 0 if at most 5 % of the faults survive.
 """
 
 from __future__ import annotations
@@ -21,17 +20,17 @@ from pathlib import Path
 from mutants.explained import reason
 from mutants.faults import SOURCE, Fault, faults_of
 from mutants.fork import in_fork
-from mutants.rooms import CERTAIN, CERTAIN_FAULT, ROOMS, Room
+from mutants.groups import CERTAIN, CERTAIN_FAULT, GROUPS, Group
 
 ROOT = Path(__file__).parent.parent
-MOST = 0.05  # of the faults may survive
-PATIENCE = 2.0  # a fault may make tests this much slower [s], beyond five times and the longest test
+MOST = 0.05  # share of the faults that may survive
+PATIENCE = 2.0  # additional time of tests by a fault [s], beyond five times and the longest test
 LIBRARIES = ("numpy", "scipy.optimize", "scipy.special", "scipy.signal", "scipy.stats", "polars", "matplotlib.figure",
              "pydantic", "typer.testing", "jinja2", "pytest")  # fmt: skip
 
 
 def main() -> int:
-    """Plant, run, print."""
+    """Plant the faults, run the tests, print the survivors."""
     parser = argparse.ArgumentParser(prog="python -m mutants", description=__doc__)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--only", default="", help="Modules whose name holds this.")
@@ -55,14 +54,14 @@ def main() -> int:
     survivors: list[Fault] = []
     planted: list[Fault] = []
     begin = time.perf_counter()
-    for room in ROOMS:
-        modules = [module for module in room.modules if given.only in module]
+    for group in GROUPS:
+        modules = [module for module in group.modules if given.only in module]
         faults = [fault for module in modules for fault in _share(module, given.share, given.explained)]
         if not faults:
             continue
-        alive, why = _try_room(room, faults, given.jobs)
+        alive, why = _try_group(group, faults, given.jobs)
         if why:
-            print(f"{' '.join(room.tests)}: {why}")
+            print(f"{' '.join(group.tests)}: {why}")
             return 1
         planted += faults
         survivors += alive
@@ -78,7 +77,7 @@ def main() -> int:
     for fault in survivors:
         print(f"survives: {_line(fault)}")
     total = sum(counts.values())
-    names = [module for room in ROOMS for module in room.modules if given.only in module]
+    names = [module for group in GROUPS for module in group.modules if given.only in module]
     equal = sum(bool(reason(fault)) for module in names for fault in faults_of(module))
     print(
         f"{time.perf_counter() - begin:.0f} s; {equal} changes that change nothing are not tried: mutants/explained.py"
@@ -88,7 +87,7 @@ def main() -> int:
 
 
 def _wrongly_explained(planted: list[Fault], survivors: list[Fault]) -> int:
-    """Name the changes that a test notices although explained.py says that none can."""
+    """List the changes that a test detects although explained.py lists them."""
     noticed = [fault for fault in planted if fault not in survivors]
     for fault in noticed:
         print(f"noticed: {_line(fault)}: not true that {reason(fault)}")
@@ -106,9 +105,9 @@ def _package(module: str) -> str:
 
 
 def _blind() -> str:
-    """Why no result counts: a fault that must be noticed was not; empty where it was."""
+    """Reason why results are invalid, if the fault that must be detected was not; otherwise empty."""
     (fault,) = (f for f in faults_of(CERTAIN.modules[0]) if (f.text, f.change) == CERTAIN_FAULT)
-    alive, why = _try_room(CERTAIN, [fault], 1)
+    alive, why = _try_group(CERTAIN, [fault], 1)
     if why:
         return f"{' '.join(CERTAIN.tests)}: {why}"
     if alive:
@@ -122,8 +121,8 @@ def _share(module: str, share: float, explained: bool) -> list[Fault]:
     return [faults[int(k * len(faults) / count)] for k in range(count)]
 
 
-def _try_room(room: Room, faults: list[Fault], jobs: int) -> tuple[list[Fault], str]:
-    """Survivors among the faults of a room, or why they could not be tried; in a process of its own."""
+def _try_group(group: Group, faults: list[Fault], jobs: int) -> tuple[list[Fault], str]:
+    """Survivors among the faults of a group, or why they could not be tried; in a separate process."""
 
     def work() -> tuple[list[Fault], str]:
         from mutants.trial import Trial
@@ -135,8 +134,8 @@ def _try_room(room: Room, faults: list[Fault], jobs: int) -> tuple[list[Fault], 
         import pytest
 
         plain = ["-q", "-m", "not slow", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "no:benchmark", "--tb=no"]
-        words = ["-k", " and ".join(f"not {word}" for word in room.without)] if room.without else []
-        pytest.main([*plain, *words, *room.tests], plugins=[trial])
+        words = ["-k", " and ".join(f"not {word}" for word in group.without)] if group.without else []
+        pytest.main([*plain, *words, *group.tests], plugins=[trial])
         return trial.survivors, trial.why
 
     return in_fork(work) or ([], "the tests could not be collected")

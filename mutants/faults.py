@@ -1,8 +1,8 @@
-"""Faults that are planted, module by module: small changes to what the code computes, made by rule.
+"""Planted faults of a module: small changes of the computation, by rule.
 
-A rule changes one place inside a function: an operator, a limit, a number, an index, a function
-for its opposite, a name for its twin (train for validate, first for last), two columns of a table,
-two arguments. Docstrings, annotations and messages are left alone. The list is the same every time.
+A rule changes one place inside a function: an operator, a limit, a number, an index, a function to its opposite, a name
+to a similar one (train to validate, first to last), two columns of a table, two arguments. Docstrings, annotations and
+messages are not changed. The list is the same every time.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ _SYMMETRIC = {"max", "min", "maximum", "minimum", "hypot", "rmse", "isclose", "d
               "clip", "dissipated_power"}  # fmt: skip
 _TEXTS = {"train": "validate", "validate": "train", "below": "above", "above": "below",
           "nrmse_pp": "nrmse_std", "energy_error": "peak_error", "peak_error": "energy_error"}  # fmt: skip
-_BUDGETS = {"linspace", "geomspace"}  # how finely is looked: their third argument, and the order of the ends
-_GUARD = 1e-6  # a number below it only keeps a division or a step alive
+_BUDGETS = {"linspace", "geomspace"}  # resolution: their third argument, and the order of the ends
+_GUARD = 1e-6  # a smaller number is only a guard of a division or a step
 _STEPS = "most_steps"  # of a search
-_TELLS = {"progress", "round", "isclose"}  # words for whoever waits, and how near is the same
+_TELLS = {"progress", "round", "isclose"}  # progress texts, and tolerances of equality
 _TWIN = {a: b for a, b in _TWINS} | {b: a for a, b in reversed(_TWINS)}
 
 
@@ -47,14 +47,14 @@ class Fault:
     ----------
     module : str
     place : int
-        Which of the module's places, counted through its tree.
+        Index of the place in the module's tree.
     line : int
     text : str
-        The line it stands in.
+        Text of its line.
     change : str
         In words.
     of : str
-        The expression that is changed.
+        The changed expression.
     """
 
     module: str
@@ -93,7 +93,7 @@ _Place = tuple[ast.expr | ast.stmt, str, Callable[[], None]]
 
 
 def _places(tree: ast.Module) -> Iterator[_Place]:
-    """Places inside functions where a rule applies, what it does there, and how."""
+    """Places inside functions where a rule applies, with the description and the change."""
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name not in ("__repr__", "__str__"):
             for statement in node.body:
@@ -104,14 +104,14 @@ def _places(tree: ast.Module) -> Iterator[_Place]:
 
 def _inside(node: ast.AST) -> Iterator[_Place]:
     if isinstance(node, ast.Raise | ast.JoinedStr | ast.FunctionDef | ast.Assert):
-        return  # messages, and functions that are walked themselves
+        return  # messages, and nested functions, which are visited separately
     if (isinstance(node, ast.Call) and _called(node) in _TELLS) or (
         isinstance(node, ast.keyword) and node.arg == _STEPS
     ):
         return
     if isinstance(node, ast.Call) and _called(node) == "reshape":
         for argument in node.args:
-            if ast.unparse(argument) != "-1":  # any other negative number says the same
+            if ast.unparse(argument) != "-1":  # any other negative number has the same meaning
                 yield from _inside(argument)
         yield from _inside(node.func)
         return
@@ -139,7 +139,7 @@ def _children(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
 
 
 def _changes(node: ast.expr | ast.stmt) -> Iterator[tuple[str, Callable[[], None]]]:
-    """What the rules change in one node."""
+    """Changes of the rules in one node."""
     match node:
         case ast.BinOp(op=op, left=left, right=right) if type(op) in _SWAPS and not _text(left) and not _text(right):
             new = _SWAPS[type(op)]()
@@ -195,7 +195,7 @@ def _call_changes(node: ast.Call, func: ast.expr) -> Iterator[tuple[str, Callabl
 def _exchanges(
     what: str, among: list[ast.expr], items: list[ast.expr] | None = None
 ) -> Iterator[tuple[str, Callable[[], None]]]:
-    """The first two that are no texts, the next two, and so on, for one another."""
+    """Exchange the first two that are no texts, the next two, and so on."""
     items = among if items is None else items
     places = [i for i, item in enumerate(items) if item in among and not _text(item) and not _starred(item)]
     for a, b in zip(places[::2], places[1::2], strict=False):
@@ -227,7 +227,7 @@ def _backwards() -> ast.keyword:
 
 
 def _become(node: ast.UnaryOp, operand: ast.expr) -> None:
-    """A sign or a `not` that is not there."""
+    """Remove a sign or a `not`."""
     node.op, node.operand = (ast.UAdd(), operand) if isinstance(node.op, ast.USub) else (
         ast.Not(), ast.UnaryOp(ast.Not(), operand))  # fmt: skip
 

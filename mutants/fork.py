@@ -1,4 +1,4 @@
-"""Work in a fork of this process: what it changes is gone with it, what it found comes back."""
+"""Work in a fork of this process, of which only the result returns."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 
 def in_fork(work: Callable[[], Any], limit: int = 0) -> Any:
-    """What the work returns; None where it broke off. A limit in seconds ends it, 0 does not."""
+    """Result of the work; None if it did not end. A limit in seconds ends it; 0 is no limit."""
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:

@@ -1,4 +1,4 @@
-"""One room: its tests are collected once, then every fault is tried in a fork."""
+"""One group: its tests are collected once, then every fault is tried in a fork."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ import pytest
 from mutants.faults import Fault, path_of, planted
 from mutants.fork import in_fork
 
-_UNKNOWN = 255  # exit status of a fork whose test has no number that fits in one
+_UNKNOWN = 255  # exit status of a fork whose test number does not fit
 
 
 class Trial:
-    """A pytest plugin that runs the collected tests once healthy and then once a fault.
+    """A pytest plugin that runs the collected tests once without a fault and then once per fault.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Trial:
     jobs : int
         Forks at a time.
     patience : float
-        Seconds of processor time a fault may add.
+        Additional processor time by a fault [s].
     console : int
         File descriptor for progress.
     """
@@ -41,20 +41,20 @@ class Trial:
         self.survivors: list[Fault] = []
         self.why = ""
         self.seconds: dict[str, float] = {}
-        self.through: dict[tuple[str, str, int], set[str]] = {}  # function → tests and fixtures that run through it
+        self.through: dict[tuple[str, str, int], set[str]] = {}  # function → tests and fixtures that execute it
         self.running: list[str] = []
         self.functions: list[FunctionType] = []
-        self.kills: Counter[str] = Counter()  # faults a test has noticed
-        self.made: dict[str, Any] = {}  # values of shared fixtures that run through no planted function
+        self.kills: Counter[str] = Counter()  # faults that a test has detected
+        self.made: dict[str, Any] = {}  # values of shared fixtures that execute no planted function
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Instead of running the tests once."""
+        """Run the trials instead of the tests once."""
         if session.testsfailed or not session.items:
             self.why = "no test could be collected"
             return True
         for module in {fault.module for fault in self.faults}:
-            importlib.import_module(module)  # what is found and loaded later would be loaded whole again
+            importlib.import_module(module)  # modules loaded later would be loaded again in every fork
         files = {str(path_of(fault.module)) for fault in self.faults}
         answer = in_fork(lambda: self._healthy(session, files), 600)
         if not isinstance(answer, tuple):
@@ -62,16 +62,16 @@ class Trial:
             return True
         self.seconds, self.through = answer
         self._make_fixtures(session)
-        gc.unfreeze()  # what the tests' conftest froze is not among the objects otherwise
+        gc.unfreeze()  # objects frozen by the tests' conftest are not listed otherwise
         alive = (f for f in gc.get_objects() if isinstance(f, FunctionType))
         self.functions = [f for f in alive if f.__code__.co_filename in files]
-        gc.freeze()  # forks then share the pages of what is there
+        gc.freeze()  # forks then share the memory pages
         self._try_all(session)
         return True
 
     @pytest.hookimpl(wrapper=True)
     def pytest_fixture_setup(self, fixturedef: Any, request: Any) -> Generator[None, Any, Any]:
-        """A shared fixture's calls and time count for every test that uses it."""
+        """Count a shared fixture's calls and time for every test that uses it."""
         begin = time.process_time()
         self.running.append(_fixture(fixturedef))
         try:
@@ -81,7 +81,7 @@ class Trial:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.process_time() - begin
 
     def _make_fixtures(self, session: pytest.Session) -> None:
-        """Make what forks share: fixtures of modules and of the session that are made of one another alone."""
+        """Make shared fixtures of modules and of the session that depend on one another alone."""
         planted = set().union(*self.through.values())
         for item in session.items:
             definitions = {name: found[-1] for name, found in _definitions(item).items()}
@@ -153,9 +153,9 @@ class Trial:
     def _noticed(
         self, session: pytest.Session, changed: list[tuple[CodeType, CodeType]], tests: list[pytest.Item]
     ) -> int:
-        """Number of the first test, from 1, that fails with the fault planted; 0 where none does."""
+        """Number of the first test, from 1, that fails with the fault; 0 if none does."""
         number, new = 0, dict(changed)
-        # Any test may have to make what another made and kept in the healthy run.
+        # A test may have to make results that another one cached in the run without a fault.
         limit = self.patience + max(map(self._cost, tests))
         try:
             for function in self.functions:
@@ -163,8 +163,8 @@ class Trial:
                     function.__code__ = new[function.__code__]
             for number, (item, nextitem) in enumerate(_in_turn(tests), 1):
                 limit += 5 * self._cost(item)
-                signal.setitimer(signal.ITIMER_PROF, limit - time.process_time())  # a busy machine notices nothing
-                signal.alarm(10 * int(limit) + 10)  # one that waits for ever uses none
+                signal.setitimer(signal.ITIMER_PROF, limit - time.process_time())  # independent of the load
+                signal.alarm(10 * int(limit) + 10)  # for a test that waits without processor time
                 item.config.hook.pytest_runtest_protocol(item=item, nextitem=nextitem)
                 if session.testsfailed:
                     return min(number, _UNKNOWN)
@@ -173,7 +173,7 @@ class Trial:
         return 0
 
     def _answering(self, session: pytest.Session, changed: list[tuple[CodeType, CodeType]]) -> list[pytest.Item]:
-        """Tests that run through a function the fault changes; the quick ones that noticed other faults first."""
+        """Tests that execute a function with the fault; first the fast ones that detected other faults."""
         names = set().union(*(self.through.get(_key(old), set()) for old, _ in changed))
         found = [i for i in session.items if i.nodeid in names or not names.isdisjoint(_fixtures(i))]
         return sorted(found, key=lambda item: self._cost(item) / (1 + self.kills[item.nodeid]))
@@ -183,7 +183,7 @@ class Trial:
 
 
 def _in_turn(items: list[pytest.Item]) -> Iterator[tuple[pytest.Item, pytest.Item | None]]:
-    """Every test and the next, for which pytest keeps the fixtures they share."""
+    """Pairs of successive tests, for which pytest keeps shared fixtures."""
     return zip(items, [*items[1:], None], strict=True)
 
 
@@ -197,7 +197,7 @@ def _changed_code(fault: Fault) -> list[tuple[CodeType, CodeType]]:
 
 def _differing(old: CodeType, new: CodeType) -> Iterator[tuple[CodeType, CodeType]]:
     inner = ([c for c in code.co_consts if isinstance(c, CodeType)] for code in (old, new))
-    # Arguments that change places take their lambdas along: then only the function around them counts.
+    # Exchanged arguments move their lambdas: then only the enclosing function counts.
     pairs = zip(*inner, strict=False)
     for a, b in pairs:
         yield from _differing(a, b)
@@ -214,7 +214,7 @@ def _fixtures(item: pytest.Item) -> set[str]:
 
 
 def _definitions(item: Any) -> dict[str, list[Any]]:
-    """Fixtures of a test by their names, the nearest last; pytest has no public way to them."""
+    """Fixtures of a test by their names, the nearest last; pytest has no public interface for them."""
     return item._fixtureinfo.name2fixturedefs
 
 

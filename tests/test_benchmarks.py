@@ -17,7 +17,7 @@ from benchmarks.timing import growth, race
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.physics.hysteresis import Shape, follow
 from mrdamper.physics.motion import Path as Strokes
-from mutants.rooms import ROOMS
+from mutants.groups import GROUPS
 
 
 def test_growth_is_the_exponent():
@@ -135,8 +135,8 @@ def test_the_page_of_tests_takes_the_last_lines_of_a_command():
     assert testing.with_output(changed, first, "done") == testing.with_output(page, first, "done")
 
 
-@pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.modules[0])
-def test_faults_are_planted_in_modules_that_exist(room):
+@pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.modules[0])
+def test_faults_are_planted_in_modules_that_exist(group):
     root = Path(__file__).parent.parent
-    assert all((root / test).exists() for test in room.tests)
-    assert all((root / "src" / f"{module.replace('.', '/')}.py").is_file() for module in room.modules)
+    assert all((root / test).exists() for test in group.tests)
+    assert all((root / "src" / f"{module.replace('.', '/')}.py").is_file() for module in group.modules)

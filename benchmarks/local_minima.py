@@ -1,8 +1,8 @@
-"""Which ends the search for one set of parameters finds: `python -m benchmarks.valleys [--starts 50]`.
+"""Local minima of global fits: `python -m benchmarks.local_minima [--starts 50]`.
 
-Wide starts are drawn over the whole box of every axis. From each goes one descent; from every fifth the search,
-which looks from the model's own starts besides. Found is what ends within half a per cent of the least error of
-all. On the steady ends of train runs of the bundled rigs, and of a made damper.
+Random starts are drawn over the whole search box. One descent runs from each, and from every fifth the search, which
+also uses the model's own starts. A result within half a per cent of the least error of all counts as found. The data
+are the steady ends of the identification runs of the bundled rigs and of a synthetic damper.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ def ends(problem: JointProblem, starts: int) -> tuple[list[JointFit], list[Joint
 
 
 def main() -> None:
-    arguments = argparse.ArgumentParser(prog="python -m benchmarks.valleys", description=__doc__)
+    arguments = argparse.ArgumentParser(prog="python -m benchmarks.local_minima", description=__doc__)
     arguments.add_argument("--starts", type=int, default=50)
     arguments.add_argument("--only", default="", help="rigs whose name holds this")
     given = arguments.parse_args()
     made = DAMPERS[0]
     rigs: dict[str, list[Run]] = {name: list(load_dataset().rig(name).split("train")) for name in load_dataset().rigs}
     rigs[f"made: {made.name}"] = made.runs()
-    print("| rig | least error | one descent finds it | the search finds it | second valley | CPU s |")
+    print("| rig | least error | one descent finds it | the search finds it | second minimum | CPU s |")
     print("|---|---|---|---|---|---|")
     for name, runs in rigs.items():
         if given.only not in name:
