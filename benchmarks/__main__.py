@@ -1,6 +1,6 @@
-"""`make bench`: ours beside each peer that is installed, all in one run.
+"""`make bench`: comparison of mrdamper with each installed peer, in one run.
 
-`python -m benchmarks --quick` takes about a minute of an idle machine; `--write docs/benchmarks.md` keeps the page.
+`python -m benchmarks --quick` takes about a minute on an idle machine; `--write docs/benchmarks.md` stores the page.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What each ingredient of the play-and-bypass model is worth: `python -m benchmarks.ablation`.
+"""Effect of each element of the play-and-bypass model: `python -m benchmarks.ablation`.
 
-Each row refits both bundled rigs with one ingredient switched off, on train runs only, and
-scores conditions left out (refitted, from the full fit) and interior currents left out.
+Each row refits both bundled rigs without one element, on identification runs only, and scores them by cross-validation
+over conditions and interior currents.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Largest error of the state against twenty-five digits, along a motion with reversals of every size."""
+"""Largest error of the state compared with a calculation of 25 digits, along a motion with reversals of every size."""
 
 from __future__ import annotations
 

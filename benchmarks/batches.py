@@ -1,4 +1,4 @@
-"""Many parameter sets, many conditions: samples a second, and how cost grows."""
+"""Many parameter sets, many conditions: samples per second, and the growth of the cost."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def growth_rows(quick: bool) -> list[Growth]:
 
 
 def loop(samples: int, cycles: int) -> tuple[Path, FixedColumns]:
-    """A sine of some cycles, three columns, and a force that they and a state explain in part."""
+    """A sine of some cycles, three columns, and a force that they and a state describe in part."""
     phase = 2 * np.pi * cycles * np.arange(samples) / samples + 0.3
     x, v = 0.02 * np.sin(phase), 0.02 * np.cos(phase)
     force = np.tanh(50 * v) + v + 0.1 * x

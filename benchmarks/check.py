@@ -1,7 +1,7 @@
 """`make bench-check`: processor seconds of this tree against those of a stored commit, in turns, in one run.
 
-Not part of the tests: a busy machine moves times by more than a change does. Both trees run the same work one after
-the other, so that what disturbs one disturbs the other; the ratio of the medians counts.
+Not part of the tests, because the load of a machine changes times by more than a change of the code. Both trees run the
+same work in turns, under the same load; the ratio of the medians is compared.
 """
 
 from __future__ import annotations

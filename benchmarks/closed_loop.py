@@ -1,7 +1,7 @@
-"""Closed loops: an earthquake on three storeys and a road under a quarter car, beside solve_ivp and openseespy.
+"""Closed loops: an earthquake on three storeys and a road under a quarter car, compared with solve_ivp and openseespy.
 
-`python -m benchmarks.closed_loop`. Peers solve the same frame without a damper's memory, which they
-do not know: a linear dashpot. Ours with its own dampers is listed with it.
+`python -m benchmarks.closed_loop`. Peers solve the same frame with a linear viscous damper, because they have no damper
+with memory. Results of mrdamper with its dampers are listed, too.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Whole processes: what a user waits for, from an empty cache and from a filled one, and their memory."""
+"""Time and memory of whole processes, with empty and filled caches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Synthetic conditions with a known truth: one recorded cycle of 1,000 samples each, with noise."""
+"""Synthetic conditions with known parameters: one recorded cycle of 1,000 samples each, with noise."""
 
 from __future__ import annotations
 

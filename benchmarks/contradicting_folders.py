@@ -1,8 +1,8 @@
-"""Synthetic folders of tests, sound ones and ones in which runs contradict each other.
+"""Synthetic folders of tests, sound ones and ones with contradicting runs.
 
-The dampers are integrated here, without the project's models, so that the search for contradictions is tried on
-dampers of several kinds: elastic-plastic loops with exponential approach (Dahl, LuGre with Stribeck effect), a
-hyperbolic tangent with hysteresis, and a biviscous damper with leakage; each with gas force and moving mass.
+The dampers are integrated here, without the models of the package, to try the search for contradictions on dampers of
+several kinds: elastic-plastic loops with exponential approach (Dahl, LuGre with Stribeck effect), a hyperbolic tangent
+with hysteresis, and a biviscous damper with leakage; each with gas force and moving mass.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Which contradicting runs are named with their cause: `python -m benchmarks.contradictions [--sound N] [--seed S]`.
+"""Detection of contradicting runs and their causes: `python -m benchmarks.contradictions [--sound N] [--seed S]`.
 
-Every kind of contradicting folder with each synthetic damper, and sound folders of which none may be accused. With
-`--models` a model is fitted to the runs that are left of every folder, and its peak forces at every condition of the
-folder are compared with those of two models: of the folder's right runs alone, which shows what the comparison of runs
-did wrong, and of all runs as they ought to be, which shows also what the runs set aside would have added.
+Every kind of contradicting folder with each synthetic damper, and sound folders, in which no run may be excluded. With
+`--models` a model is fitted to the remaining runs of every folder, and its peak forces at every condition of the folder
+are compared with those of two models: of the folder's correct runs alone, which shows errors of the comparison of runs,
+and of all runs without faults, which also shows the information of the excluded runs.
 """
 
 from __future__ import annotations

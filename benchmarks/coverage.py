@@ -1,9 +1,9 @@
-"""Share of nominal 95 % intervals that hold the truth, ours beside the textbook's: `python -m benchmarks.coverage`.
+"""Coverage of nominal 95 % intervals, compared with the textbook formula: `python -m benchmarks.coverage`.
 
-Run by run, through `identify`: correlated noise, and model error that repeats with every cycle.
-Jointly, on the motions of the bundled rigs: noise, a gain of every session and an offset, through
-the joint fit; the 90 % band of the peak force and of the force measured in a future session beside them.
-Parameters outside 92–98 % and bands outside 85–95 % are listed, with the standard error of a coverage.
+Individual fits with `identify`: correlated noise, and model error that repeats with every cycle. Global fits on the
+motions of the bundled rigs: noise, and a gain and an offset of every session; also the 90 % prediction intervals of the
+peak force and of the force in a future session. Parameters outside 92–98 % and bands outside 85–95 % are listed, with
+the standard error of a coverage.
 """
 
 from __future__ import annotations

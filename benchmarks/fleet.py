@@ -1,4 +1,4 @@
-"""`python -m benchmarks.fleet`: what a fleet costs, whether it survives being killed, whether it tells the truth.
+"""`python -m benchmarks.fleet`: processor time of a fleet, results after kills, detection of planted faults and drifts.
 
 Virtual dampers, four records each. Processor time is that of the command and of all it started, ended
 or orphaned, start-up and libraries included. `--folder` keeps the records for the next time.

@@ -2,8 +2,8 @@
 
     python -m benchmarks.foreign_labs
 
-Right: every true test is a run with its current, its stroke and its force. Wrong in silence: imported,
-but not so. Goals: 75 % right at the first command, none wrong in silence. Seeded. Exit status 1 if a goal is missed.
+Correct: every true test is a run with its current, its stroke and its force. Silently wrong: imported, but not correct.
+Goals: 75 % correct at the first command, none silently wrong. Seeded. Exit status 1 if a goal is missed.
 """
 
 from __future__ import annotations

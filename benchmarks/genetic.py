@@ -1,4 +1,4 @@
-"""A plain genetic algorithm with the paper's settings, as one would write it in NumPy.
+"""A plain genetic algorithm with the paper's settings in NumPy.
 
 Population 100, 500 generations, stochastic uniform selection, 0.8 crossed over (scattered), the
 others mutated with probability 0.2 a number, elite 5, linear bounds [Qian et al. 2024, section 4.3].

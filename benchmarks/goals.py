@@ -1,4 +1,4 @@
-"""The goals of speed and accuracy the project set itself, each with what this run measured."""
+"""Goals of speed and accuracy of the project, with the measured values of this run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Goal:
-    """One goal: `measured` should be at most `limit`, or at least, if `at_least`; `why` it is not, if it is not."""
+    """A goal: `measured` should be at most `limit`, or at least with `at_least`; `why` states why not."""
 
     name: str
     limit: float
@@ -49,7 +49,7 @@ def _of_accuracy(results: Any) -> list[Goal]:
 
 
 def _of_the_main_job(results: Any) -> list[Goal]:
-    # Processor time, children included, which is what a busy machine disturbs least.
+    # Processor time, including children, which depends least on the load.
     process = {row.name: row.seconds for row in results.processes}
     memory = {row.name: row.megabytes for row in results.processes}
     many = {row.name: 1e3 * row.seconds for row in results.many}
@@ -108,7 +108,7 @@ def _of_peers(results: Any) -> list[Goal]:
 
 
 def _against(ratios: dict[str, float], ours: str, peer: str) -> float | None:
-    """How much longer a peer takes than all a user of ours waits for."""
+    """Ratio of a peer's time to the whole time of mrdamper."""
     own, other = _least(ratios, ours), _least(ratios, "GA", peer)
     return other / own if own and other else None
 

@@ -1,9 +1,9 @@
-"""The field's hysteretic benchmark: `python -m benchmarks.hysteretic`.
+"""The hysteretic benchmark of Noël and Schoukens: `python -m benchmarks.hysteretic`.
 
-The system of Noël and Schoukens (2016), integrated here: a multisine of 5 to 150 Hz to identify from, another one
-and a sweep from 20 to 50 Hz to predict, with and without a delay of one sample between the channels, and noise of
-1 % of the displacement. The structure of the system is known to this identification; black-box methods of the
-literature do not know it, and the best published one has 7.2e-6 m on the multisine [recalled].
+The system of Noël and Schoukens (2016), integrated here: a multisine of 5 to 150 Hz to identify from, another one and a
+sweep from 20 to 50 Hz to predict, with and without a delay of one sample between the channels, and noise of 1 % of the
+displacement. This identification uses the structure of the system; black-box methods of the literature do not, and the
+best published one has 7.2e-6 m on the multisine [recalled].
 """
 
 from __future__ import annotations

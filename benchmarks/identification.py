@@ -1,4 +1,4 @@
-"""One condition identified by every way that is installed: how long, and how often the optimum is reached."""
+"""Identification of one condition by every installed method: time, and how often the optimum is reached."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Task:
 
     @cached_property
     def box(self) -> tuple[np.ndarray, np.ndarray]:
-        """Twice what the largest force would take, parameter by parameter."""
+        """Twice the value for the largest force, for each parameter."""
         peak, seen = 2 * float(np.max(np.abs(self.problem.force))), self.problem.seen
         X, speed = float(np.max(np.abs(seen.displacement))), float(np.max(np.abs(seen.velocity)))
         return (
@@ -84,7 +84,7 @@ class Task:
         dt, costs = float(motion.time[1] - motion.time[0]), np.empty(len(points))
         for i, (c, k1, f0, fz, length) in enumerate(points.tolist()):
             beta = 0.5 / length**2
-            with np.errstate(over="ignore", invalid="ignore"):  # it runs away where the knee is shorter than a sample
+            with np.errstate(over="ignore", invalid="ignore"):  # diverges if the yield is shorter than a sample
                 zeta = rk4(motion.velocity, dt, 1.0, beta, beta, 2.0)[self.problem.scored] / length
                 error = self.columns @ np.array([c, k1, f0]) + fz * zeta - self.problem.force
                 costs[i] = np.nan_to_num(error @ error, nan=1e300, posinf=1e300)

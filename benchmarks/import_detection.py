@@ -2,9 +2,9 @@
 
     python -m benchmarks.import_detection
 
-Goals: force sign and exchanged columns 100 of 100; clipping 95 %; freezing 99 %; the lag of a
-velocity channel within one sample; clean records accused at most 1 in 100, bundled runs never.
-Seeded: the same records every time. Under two minutes on one core. Exit status 1 if a goal is missed.
+Goals: force sign and exchanged columns 100 of 100; clipping 95 %; freezing 99 %; the lag of a velocity channel within
+one sample; false findings in at most 1 of 100 clean records, in no bundled run. Seeded: the same records every time.
+Under two minutes on one core. Exit status 1 if a goal is missed.
 """
 
 from __future__ import annotations

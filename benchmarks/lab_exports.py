@@ -1,14 +1,13 @@
-"""Laboratories' exports to models: every kind, locale, unit and noise, imported as the how-to page does it.
+"""Laboratories' exports to models: every kind, locale, unit and noise, imported as in the how-to page.
 
     python -m benchmarks.lab_exports
     python -m benchmarks.lab_exports --labs 200 --models 10
 
-Each laboratory is written by code that shares nothing with the readers. Right: every true test is a run,
-its channels are true. Wrong in silence: imported, but not so. Of `--models` of them a study is made; its
-damper is asked at the tested motions and at an untested current, against the true damper. Accused: a
-quality check reports more of a test than empty cells, though all are clean. Goals: 99 % right, none wrong in silence,
-99 % of the models within 3 % of the peak-to-peak force, at most 0.5 % of the tests accused. Seeded.
-Exit status 1 if a goal is missed.
+Each laboratory is written by code that is independent of the readers. Correct: every true test is a run with true
+channels. Silently wrong: imported, but not correct. For `--models` of them a study is made; its damper is compared with
+the true one at the tested motions and at an untested current. False finding: a quality check reports more than empty
+cells of a clean test. Goals: 99 % correct, none silently wrong, 99 % of the models within 3 % of the peak-to-peak
+force, false findings in at most 0.5 % of the tests. Seeded. Exit status 1 if a goal is missed.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Errors of the joint model on what was left out of train runs: `python -m benchmarks.left_out [RIG ...]`.
+"""Cross-validation of the global model: `python -m benchmarks.left_out [RIG ...]`.
 
-A condition (every run of it), an interior current (every run at it) and a whole record, ramps and rests included, are
-each predicted by a fit to the other train runs, with starting values from these runs alone; medians of nrmse_pp.
-Held-out runs are not looked at.
+A condition (every run of it), an interior current (every run at it) and a whole record, including ramps and rests, are
+each predicted by a fit to the other identification runs, with start values from these runs alone; medians of nrmse_pp.
+Validation runs are not used.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""How often a logger's code for a missing value is found, and how often a clean channel is accused of one.
+"""Detection rate of loggers' codes for missing values, and false findings in clean channels.
 
     python -m benchmarks.missing_codes --channels 10000
 
-Goals: at most 1 clean channel in 1000 accused, at least 99 of 100 with codes refused, as such or as spikes.
+Goals: false findings in at most 1 of 1000 clean channels, at least 99 of 100 with codes refused, as such or as spikes.
 Seeded. Exit status 1 if a goal is missed.
 """
 

@@ -1,9 +1,9 @@
-"""Numbers of the documents beside those that come out: `python -m benchmarks.numbers [--write]`.
+"""Comparison of the numbers in documents with computed ones: `python -m benchmarks.numbers [--write]`.
 
-Without options the bundled study is made anew (README.md, docs/play-and-bypass.md). `--compare DIR` and
-`--reproduce DIR` take folders that these commands wrote (docs/models.md, docs/paper-method.md). A table
-is a table of the document from its first cells on; a number in a sentence stands where its pattern says.
-Ends with 1 where a number is off by more than its tolerance; `--write` puts what came out.
+Without options the bundled study is repeated (README.md, docs/play-and-bypass.md). `--compare DIR` and `--reproduce
+DIR` read folders that these commands wrote (docs/models.md, docs/paper-method.md). A table is found by its first cells,
+a number in a sentence by its pattern. The exit status is 1 if a number differs by more than its tolerance; `--write`
+writes the computed numbers.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Open benchmark of hysteretic dampers: every model of `compare` and predictions of others, scored alike.
+"""Open benchmark of hysteretic dampers: scores of every model of `compare` and of submissions.
 
 `python -m benchmarks.open` evaluates the models and writes docs/benchmark.md; `--data FOLDER` writes the records to
 identify from and the inputs to predict; `--score FOLDER` scores the predictions in a folder.

@@ -1,8 +1,7 @@
-"""Plans beside what an engineer would do without one, on a virtual rig with drift: `python -m benchmarks.planning`.
+"""Comparison of test plans with other designs, on a virtual rig with drift: `python -m benchmarks.planning`.
 
-The same rig time for all, setting sessions up counted: the plan, which chooses their number; records
-drawn at random; the factorial grid from its corners inward; and the plan of somebody who believes that
-sessions are alike.
+All have the same rig time, including set-up of sessions: the plan, which optimises their number; random records; the
+factorial grid from its corners inward; and a plan without differences between sessions.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ TRUTH = PlayBypass(
 )  # fmt: skip
 LIMITS = Limits((0.0, 1.0), (0.5, 4.0), (2.0, 20.0), velocity_m_s=0.2)
 GAIN, NOISE = 0.045, 3.0  # of a session; of a sample [N]
-FORM = 0.05  # what the form is wrong by, over half the peak-to-peak force: as on the second bundled rig
+FORM = 0.05  # model error over half the peak-to-peak force, as on the second bundled rig
 _DAYS = 3
 _FIRST = [Condition(i, f, a) for i in (0.0, 0.5, 1.0) for f, a in ((0.5, 0.02), (2.0, 0.005))]
 
@@ -55,14 +54,14 @@ def rig(seed: int) -> Damper:
 
 
 def reckoned(seed: int) -> ExperimentDesign:
-    """What records on that rig would tell."""
+    """Information of records on that rig."""
     return ExperimentDesign.of(rig(seed), LIMITS, LIMITS.candidates(1.0))
 
 
 def designs(reckoning: ExperimentDesign, hours: float, seed: int) -> dict[str, float]:
     """Expected standard deviation of the force after each design, and before.
 
-    Who makes no plan mounts the damper once; the same in as many sessions as the plan takes stands beside.
+    Designs without a plan have one session; they are also evaluated with the number of sessions of the plan.
     """
     conditions = list(reckoning.conditions)
 

@@ -1,4 +1,4 @@
-"""The bundled rigs: every sine run identified, and all train runs of a rig at once."""
+"""The bundled rigs: individual fits of every sine run, and a global fit to all identification runs of a rig."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Timings to keep an eye on, with pytest-benchmark: `python -m pytest benchmarks/regressions.py`.
+"""Timings with pytest-benchmark: `python -m pytest benchmarks/regressions.py`.
 
-`--benchmark-autosave` keeps a run, `--benchmark-compare` compares with the last one kept. The
-test suite does not collect this file: a test that is timed fails on a busy machine.
+`--benchmark-autosave` stores a run, `--benchmark-compare` compares with the last one. The test suite does not collect
+this file, because times depend on the load of the machine.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One motion, one hysteresis: the state at 3,000 samples by every way that is installed."""
+"""State of a hysteresis along one motion at 3,000 samples, by every installed method."""
 
 from __future__ import annotations
 

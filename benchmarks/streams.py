@@ -1,4 +1,4 @@
-"""One sample after the other: in the interpreter, compiled here, and as generated C."""
+"""Time per sample in the interpreter, compiled, and as generated C."""
 
 from __future__ import annotations
 

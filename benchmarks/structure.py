@@ -1,10 +1,9 @@
 """Size and structure of the package: `python -m benchmarks.structure` prints what the architecture tests limit.
 
-Lines of code, docstring and blank by top-level name (comments count as code); circles and the
-longest chain of imports, those under TYPE_CHECKING and inside functions included; long functions;
-class names with several meanings; docstrings that open with a question word; local variables
-named after a participle. A layer is a line of pyproject.toml. An isinstance over dampers tests a
-damper for its kind, which its methods should decide.
+Lines of code, docstring and blank by top-level name (comments count as code); cycles and the longest chain of imports,
+including those under TYPE_CHECKING and inside functions; long functions; class names with several meanings; docstrings
+that open with a question word; local variables named after a participle. A layer is a line of pyproject.toml. An
+isinstance over dampers tests for the kind of a damper, which its methods should decide.
 """
 
 from __future__ import annotations

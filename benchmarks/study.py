@@ -1,4 +1,4 @@
-"""Where the time of a study of the bundled data goes, part by part."""
+"""Processor time of a study of the bundled data, by part."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
 """Choice of the model and its intervals at untested conditions: `python -m benchmarks.synthetic_choice`.
 
-Dampers of six families and known truth (`benchmarks.synthetic_dampers`), each tested by four designs and studied as a
-user studies it. Scored are untested corners of frequency and amplitude, currents between the tested ones and beyond
-them, and tested conditions: the error of the model that was handed over against that of the best candidate (errors
-below 1 % count as 1 %), the share of peak forces and energies of runs of future sessions that lie in the 90 %
-prediction interval, and the median of half the interval, relative.
+Dampers of six families and known truth (`benchmarks.synthetic_dampers`), each tested by several designs and studied.
+Scores are for untested corners of frequency and amplitude, currents between the tested ones and beyond them, and tested
+conditions: the error of the selected model relative to that of the best candidate (errors below 1 % count as 1 %), the
+share of peak forces and energies of runs of future sessions that lie in the 90 % prediction interval, and the median of
+half the interval, relative.
 """
 
 from __future__ import annotations
@@ -65,13 +65,13 @@ class Case:
     seconds: float
 
     def ratio(self, what: str) -> float:
-        """Error of the model handed over against the best candidate's."""
+        """Error of the selected model over that of the best candidate."""
         errors = {name: max(error, _NEGLIGIBLE) for name, error in self.errors[what].items()}
         return errors[self.chosen] / min(errors.values())
 
 
 def studied(damper: SyntheticDamper, design: Design, seed: int = 0) -> Case:
-    """Study a damper and ask for what was not tested."""
+    """Study a damper and score it at untested conditions."""
     rng = np.random.default_rng((sum(map(ord, damper.name)), DESIGNS.index(design), seed))
     runs = tests_of(damper, design, rng)
     begin = time.process_time()

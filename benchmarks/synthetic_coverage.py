@@ -1,11 +1,11 @@
 """Share of future runs inside their 90 % prediction intervals: `python -m benchmarks.synthetic_coverage`.
 
 Twelve synthetic rigs, twelve identification runs in six sessions each, with a gain and an offset of every session, a
-gain of every run, and noise. One form is fitted to all of them, Bouc–Wen over the current: four rigs are of that form,
-eight of others, where the interval has to widen by the error of the form. Counted are samples, peak forces and energies
-of forty runs, each at a condition between the tested ones and in a session of its own. Runs of one repeat share a
-fit, so the standard error of a share is that of a mean of repeats. The three rigs of a form differ by the scale of
-their forces alone: forms outside 85–95 % are listed.
+gain of every run, and noise. One form is fitted to all of them, Bouc–Wen over the current; rigs of other forms have a
+model error, which the interval has to contain. Counted are samples, peak forces and energies of forty runs, each at a
+condition between the tested ones and in a session of its own. Runs of one repeat share a fit, so the standard error of
+a share is that of a mean of repeats. The three rigs of a form differ by the scale of their forces alone: forms outside
+85–95 % are listed.
 """
 
 from __future__ import annotations

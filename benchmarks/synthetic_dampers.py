@@ -1,7 +1,7 @@
 """Synthetic dampers of six families, integrated here without the models of the package, and four designs of tests.
 
-Every damper has seal friction, a gas spring and a moving mass beside its controllable force. Its sizes are drawn: 200 N
-to 20 kN, strokes of 8 to 60 mm, full currents of 0.5 to 4 A.
+Every damper has seal friction, a gas spring and a moving mass in addition to its controllable force. Its sizes are
+random: 200 N to 20 kN, strokes of 8 to 60 mm, full currents of 0.5 to 4 A.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _RECORDS, _LENGTH = 4, 30  # of the random design; cycles of the middle frequenc
 
 @dataclass(frozen=True)
 class Motions:
-    """Motions side by side, on the fine grid of the integration.
+    """Several motions, on the fine grid of the integration.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Motions:
 
 @dataclass(frozen=True)
 class SyntheticDamper:
-    """A damper of known truth.
+    """A damper with known parameters.
 
     Attributes
     ----------

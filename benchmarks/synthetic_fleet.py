@@ -1,7 +1,6 @@
-"""A fleet that was never made: dampers of one line on a virtual rig, each with a truth that can be read.
+"""A synthetic fleet: dampers of one population on a virtual rig with known parameters.
 
-Production spread, ageing, session drift, planted faults, golden dampers. Nothing it gives is a
-measurement; it feeds the example, the tests and the benchmark.
+Production scatter, ageing, session drift, planted faults, master dampers. It is used by tests and benchmarks.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Results of the project's own tests on one page: `python -m benchmarks.testing` runs each command and writes them.
 
-`--only NAME` runs some of them anew and keeps what the page shows of the others.
+`--only NAME` runs some of them again and keeps the results of the others.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Timing on a machine that does other things too.
+"""Timing on a loaded machine.
 
-Contestants take turns, the least of many counts, and the clock is that of the processor's time
-spent on this process: all that is timed here runs on one thread.
+The functions run in turns, the minimum counts, and the clock is the processor time of this process: all functions run
+on one thread.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _SHORTEST = 2e-3  # a call is repeated until one measurement takes this long [s]
 
 
 def race(contestants: Mapping[str, Callable[[], object]], seconds: float = 1.0) -> dict[str, float]:
-    """Least seconds a call of each contestant; they take turns, so that a busy machine hurts all alike.
+    """Least seconds per call of each function, in turns, so that the load affects all equally.
 
     Parameters
     ----------

@@ -1,10 +1,9 @@
-"""Dampers of every size, made up, identified without hand-tuning: `python -m benchmarks.virtual_dampers [NAME ...]`.
+"""Identification of synthetic dampers of every size: `python -m benchmarks.virtual_dampers [NAME ...]`.
 
-Twenty-four dampers from 20 N to 200 kN, tested as laboratories test: few or many currents, sines,
-random motion, ramps and stops, a switched current, slow and fast clocks, noisy channels. Each is
-identified from its tests alone. What is printed: the error on conditions left out, on a random
-record with a switched current that nobody saw, the noise no model can beat, and which parameters
-ended at a bound where the truth does not lie.
+Twenty-four dampers from 20 N to 200 kN, tested as laboratories test: few or many currents, sines, random motion, ramps
+and stops, a switched current, slow and fast clocks, noisy channels. Each is identified from its tests alone. The output
+contains the cross-validated error, the error on a random record with a switched current that was not used, the noise,
+and parameters that ended at a bound although the true value is none.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from mrdamper.study.validation import score_run
 
 @dataclass(frozen=True)
 class Virtual:
-    """A made damper and the way it is tested.
+    """A synthetic damper and its tests.
 
     Attributes
     ----------
@@ -42,7 +41,7 @@ class Virtual:
     current : float
         Full current [A].
     lost : float
-        Lost motion 2 (d − e) [m]; zero: none.
+        Free play 2 (d − e) [m]; zero: none.
     rebound : float
         Force in extension over that in compression, of viscosity, yield and bypass alike.
     coil : Coil or None
@@ -57,7 +56,7 @@ class Virtual:
     onset, saturation : float
         Ic and si I_max of the level law.
     leak : float
-        Share of the seat's load lost in a second at rest [1/s].
+        Relaxation rate at rest [1/s].
     """
 
     name: str
@@ -102,7 +101,7 @@ class Virtual:
         return [self.record(rng, f"{self.tests}{i}", m) for i, m in enumerate(self._motions(rng))]
 
     def unseen(self) -> Run:
-        """A random record with a switched current, for nobody to identify from."""
+        """A random record with a switched current, not used for identification."""
         rng = np.random.default_rng(99)
         return self.record(rng, "unseen", self._switched(self._random(rng, 25), rng))
 
@@ -201,14 +200,14 @@ DAMPERS = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a made damper was identified.
+    """Result of the identification of a synthetic damper.
 
     Attributes
     ----------
     left_out, unseen, noise : float
         nrmse_pp.
     astray : tuple of str
-        Parameters at a bound where the truth is not.
+        Parameters at a bound whose true value is none.
     choice : JointChoice
     seconds : float
         Processor time.
@@ -223,7 +222,7 @@ class Outcome:
 
 
 def identified(virtual: Virtual) -> Outcome:
-    """Identify a made damper from its tests."""
+    """Identify a synthetic damper from its tests."""
     runs = virtual.runs()
     begin = time.process_time()
     choice = identify_jointly([piece for run in runs for piece in stretches(run)])
