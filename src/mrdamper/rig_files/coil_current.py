@@ -32,6 +32,7 @@ from mrdamper.rig_files.record import Finding, Record
 _FEWEST_SLOW = 5  # samples of a current that is recorded more rarely than the force
 NO_CHANNEL = "the current channel is "  # beginning of the finding on a column of no current
 CURRENT_TOO = "and give the current of each test"  # within the remedy of a refusal of units
+_CALIBRATION = 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
 _FOLDERS = 3  # above a file, whose names may state its current
 
 
@@ -122,11 +123,7 @@ def require_current(record: Record, path: Path = Path()) -> Record:
     value, first = '"test1*" = 0.5', ""
     if reasons and "may both" not in reasons[0]:
         reasons[0], mark, line = reasons[0].partition(": if so, ")
-        first = (
-            mark[2:] + line
-            or 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
-        )
-        first = f"{first}; else "
+        first = f"{mark[2:] + line or _CALIBRATION}; else "
     elif match and not reasons:
         reasons = [f"{match[0]!r} in its name can be read as {match[2]} A or as {match[1]}.{match[2]} A"]
         stars = ("*", "*") if match.string in places[:2] else ("*/*", "*/*")

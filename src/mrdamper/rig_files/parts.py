@@ -162,12 +162,12 @@ def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
     titles = {key: (table.over[min(roles.values())] if table.over else "") or key for key, roles in members.items()}
     if not table.over:  # titles whose cells stand askew, by a comma in them: as many as groups, in their order
         askew = [[cell for cell in re.split(r"[\t;,|]", line) if currents_in(cell)] for line in table.remarks]
-        own = next((cells for cells in askew if len(cells) in (len(members), len(table.names))), [])
-        places = sorted(members, key=lambda key: min(members[key].values()))
-        if len(own) == len(table.names):  # one over every column
-            alike = all(len({own[i] for i in roles.values()}) == 1 for roles in members.values())
-            own = [own[min(members[key].values())] for key in places] if alike else []
-        titles |= dict(zip(places, own, strict=False))
+        over = next((cells for cells in askew if len(cells) == len(table.names)), None)  # or one over every column
+        own = next((cells for cells in askew if len(cells) == len(members)), ())
+        titles |= dict(zip(sorted(members, key=lambda key: min(members[key].values())), own, strict=False))
+        titles |= (
+            {key: " ".join(sorted({over[i] for i in roles.values()})) for key, roles in members.items()} if over else {}
+        )
     stated = all(currents_in(title) for title in titles.values())
     if not (own_time or stated or form.blocks == "split"):
         return []

@@ -36,9 +36,7 @@ _CODE = re.compile(  # I1 = 0.3 A or test01-test04: 0.5 A
     r"\s*([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?\s*(?:=|:|->)"
     r"\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$"
 )
-_NAMED = re.compile(
-    r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)[\s.]*$"
-)  # a.dat: 0.5 A
+_NAMED = re.compile(r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")  # a.dat: 1 A
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
 _ALIKE = 0.1  # relative difference of frequency and amplitude within which two motions are one
 _ALIKE_A = 0.03  # difference of the current within which two tests have the same [A]
@@ -216,9 +214,8 @@ def currents_beside(
     }
     files = [{file.name.casefold(), file.stem.casefold()} for file, _ in tests]
     whole = [m for line in lines if (m := _NAMED.match(line)) and not (_CODE.match(line) or RATING.search(line))]
-    stated |= {
-        (m[1].casefold(), amperes(m[2], m[3])) for m in whole if any(m[1].casefold() in names for names in files)
-    }
+    named = set().union(*files)
+    stated |= {(m[1].casefold(), amperes(m[2], m[3])) for m in whole if m[1].casefold() in named}
     codes = dict(stated)
     if len(codes) < 2 or len(codes) < len(stated):
         return None
