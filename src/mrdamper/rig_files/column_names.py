@@ -162,6 +162,7 @@ _DEVICE = re.compile(r"\\[\w.-]{1,30}:[0-9]{1,3}$")  # F_rod\ES650:1
 _FUSED = re.compile(r"[ _.:-]+")
 
 
+_SMALL = MappingProxyType({"a": "current", "n": "force"})  # units of one letter in names in small letters
 _BY_UNIT = MappingProxyType({"length": "displacement", "force": "force", "current": "current"})
 
 
@@ -222,6 +223,9 @@ def split_name(header: str, unit: str = "") -> Header:
         tail = text[place.end() :]
         if place.start() and is_unit(tail) and not text[: place.start()].endswith(" of"):  # time of day
             return Header(text[: place.start()].strip(), tail)
+    head, _, letter = text.rpartition("_")
+    if letter in _SMALL and text.islower() and role_of(head) == _SMALL[letter]:
+        return Header(head, letter.upper())
     name, slash, tail = text.partition("/")
     if slash and name and is_unit(tail) and not is_unit(text):
         return Header(name.strip(), tail.strip())
