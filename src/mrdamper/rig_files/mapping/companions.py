@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -32,11 +32,8 @@ from mrdamper.rig_files.rig_record import records_of
 
 _FEWEST_ROWS = 50  # of a record
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")  # short ones
-_CODE = re.compile(  # I1 = 0.3 A or test01-test04: 0.5 A
-    r"\s*([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?\s*(?:=|:|->)"
-    r"\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$"
-)
-_NAMED = re.compile(r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")  # a.dat: 1 A
+_LEGEND = re.compile(r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")  # I1 = 0.3 A
+_CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
 _ALIKE = 0.1  # relative difference of frequency and amplitude within which two motions are one
 _ALIKE_A = 0.03  # difference of the current within which two tests have the same [A]
@@ -200,22 +197,16 @@ def currents_beside(
     lines = short_lines(path) if path.suffix.lower() in TEXTS else []
     rows = zip(results.cells, results.current, strict=True) if results else ()  # Level, Current (A): L1, 0.35
     lines += [f"{cells[1]}: {value:g} A" for cells, value in rows if len(cells) > 1]
-    matches, ratings = [], False
+    files = [{file.name.casefold(), file.stem.casefold()} for file, _ in tests]
+    known = set().union(*files)
+    stated, ratings = set(), False
     for line in lines:
         parts = re.split(r"\s*[;|]\s*|,\s+|[.:]\s+(?=\w+ ?=)", line)
-        codes, heading = [match for part in parts if (match := _CODE.match(part))], line.rstrip().endswith(":")
-        rating = bool(codes or heading) and RATING.search(line) is not None
-        matches += [] if rating or ratings else codes
-        ratings = bool(ratings and codes) or (rating and not codes and heading)  # Fuses: and a list
-    stated = {
-        (f"{match[1].casefold()}{number}", amperes(match[4], match[5]))
-        for match in matches
-        for number in range(int(match[2]), int(match[3] or match[2]) + 1)
-    }
-    files = [{file.name.casefold(), file.stem.casefold()} for file, _ in tests]
-    whole = [m for line in lines if (m := _NAMED.match(line)) and not (_CODE.match(line) or RATING.search(line))]
-    named = set().union(*files)
-    stated |= {(m[1].casefold(), amperes(m[2], m[3])) for m in whole if m[1].casefold() in named}
+        legends = [(name, amperes(m[2], m[3])) for m in map(_LEGEND.match, parts) if m for name in _meant(m[1], known)]
+        heading = line.rstrip().endswith(":")
+        rating = bool(legends or heading) and RATING.search(line) is not None
+        stated |= {*legends} if not (rating or ratings) else set()
+        ratings = bool(ratings and legends) or (rating and not legends and heading)  # Fuses: and a list
     codes = dict(stated)
     if len(codes) < 2 or len(codes) < len(stated):
         return None
@@ -226,6 +217,14 @@ def currents_beside(
     if any(len(of_test) != 1 for of_test in own):
         return None
     return [(codes[code], f"{path.name}, {code.upper()}") for (code,) in own]
+
+
+def _meant(key: str, files: Collection[str]) -> list[str]:
+    """Return the codes that the key of a legend names, or the file: I1, test01-test04, a.dat."""
+    code = _CODE.fullmatch(key)
+    if code is None:
+        return [key.casefold()] if key.casefold() in files else []
+    return [f"{code[1].casefold()}{number}" for number in range(int(code[2]), int(code[3] or code[2]) + 1)]
 
 
 def within_times(tests: Sequence[tuple[Path, Record]], results: Results | None) -> list[tuple[Path, Record]]:
