@@ -162,21 +162,21 @@ def _conclude_identification(
 ) -> dict[str, Any]:
     table = session.table(choice.rig)
     session.results["identified"] = table, identifications, scored
-    answer: dict[str, Any] = dict.fromkeys(("damper", "title", "parameter_count", "validation", "joint"))
+    result: dict[str, Any] = dict.fromkeys(("damper", "title", "parameter_count", "validation", "joint"))
     if isinstance(scored, RecipeResult):
         note = f"validation {_percent(scored.validation)}" if scored.validation.runs else ""
-        answer["damper"] = session.add(scored.damper, "identification", note).key
-        answer |= {"title": scored.damper.title, "validation": _median(scored.validation)}
-        answer["parameter_count"] = scored.damper.parameter_count
+        result["damper"] = session.add(scored.damper, "identification", note).key
+        result |= {"title": scored.damper.title, "validation": _median(scored.validation)}
+        result["parameter_count"] = scored.damper.parameter_count
     if identifications:
         errors, fitted = [i.scores.nrmse_pp for i in identifications], identifications[0]
     else:  # a model of one set of parameters
         assert isinstance(scored, RecipeResult)
         assert isinstance(scored.fit, JointFit)
-        errors, fitted, answer["joint"] = scored.fit.nrmse_pp.tolist(), scored.fit.damper, _joint(scored, scored.fit)
+        errors, fitted, result["joint"] = scored.fit.nrmse_pp.tolist(), scored.fit.damper, _joint(scored, scored.fit)
     parameters = [info for info in fitted.model.parameters() if info.name in fitted.free]
     return {
-        **answer,
+        **result,
         "rig": table.dataset.rigs[0],
         "no_damper": scored if isinstance(scored, str) else "",
         "median": finite(float(np.median(errors))),

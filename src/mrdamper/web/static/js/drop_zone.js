@@ -25,7 +25,7 @@ export class DropZone {
       input.addEventListener("change", () => {
         const files = [...input.files].map((file) => ({ file, name: name(file) }));
         input.value = "";
-        this.take(files);
+        this.open(files);
       });
       return input;
     };
@@ -52,7 +52,7 @@ export class DropZone {
     document.addEventListener("drop", async (event) => {
       event.preventDefault();
       classList.remove("over");
-      this.take(await droppedFiles(event.dataTransfer).catch((error) => this.showError(error) ?? []));
+      this.open(await droppedFiles(event.dataTransfer).catch((error) => this.showError(error) ?? []));
     });
   }
 
@@ -61,7 +61,8 @@ export class DropZone {
     this.bundled.hidden = !this.app.overview || this.app.overview.source === "bundled";
   }
 
-  async take(files) {
+  /** Open files: a saved state, model or project, or data. */
+  async open(files) {
     const { app } = this;
     if (!files.length) return;
     if (app.loading) return app.notify(note("warn", "Other files are still being read. Drop these again in a moment."));

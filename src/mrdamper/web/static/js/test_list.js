@@ -56,7 +56,7 @@ export class TestList {
 
   list(tests) {
     const columns = [
-      { title: "Test", value: (t) => [t.test || t.name, t.name && t.name !== t.test ? h("div", { class: "small faint" }, t.name) : null] },
+      { title: "Test", value: (t) => [t.test || t.name, t.test && t.name !== t.test ? h("div", { class: "small faint" }, t.name) : null] },
       { title: "Motion", value: (t) => t.motion || "–" },
       { title: "Current (A)", number: true, value: (t) => this.current(t) },
       { title: "Split", value: (t) => (t.run ? this.split(t, tests) : "–") },

@@ -85,7 +85,7 @@ export class CompareView extends View {
   /** After a reload of the page: follow the last job, or show its result. */
   resume(jobs) {
     const last = jobs.find((job) => job.kind === "compare");
-    if (last?.state === "done") this.take(last.result);
+    if (last?.state === "done") this.setResult(last.result);
     else if (last && last.state !== "cancelled") this.app.run(this.follow(this.progress.resume(last)));
   }
 
@@ -97,11 +97,11 @@ export class CompareView extends View {
     this.comparing = false;
     this.updateForm();
     if (result) await this.app.refreshDampers();
-    if (result) this.take(result);
+    if (result) this.setResult(result);
     else if (!this.result) this.show();
   }
 
-  take(result) {
+  setResult(result) {
     this.results.set(result.number, result);
     if (result === this.result) this.show();
   }
