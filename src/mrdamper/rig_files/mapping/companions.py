@@ -198,11 +198,11 @@ def currents_beside(
     rows = zip(results.cells, results.current, strict=True) if results else ()  # Level, Current (A): L1, 0.35
     lines += [f"{cells[1]}: {value:g} A" for cells, value in rows if len(cells) > 1]
     files = [{file.name.casefold(), file.stem.casefold()} for file, _ in tests]
-    known = set().union(*files)
+    called = set().union(*files)
     stated, ratings = set(), False
     for line in lines:
         parts = re.split(r"\s*[;|]\s*|,\s+|[.:]\s+(?=\w+ ?=)", line)
-        legends = [(name, amperes(m[2], m[3])) for m in map(_LEGEND.match, parts) if m for name in _meant(m[1], known)]
+        legends = [(name, amperes(m[2], m[3])) for m in map(_LEGEND.match, parts) if m for name in _meant(m[1], called)]
         heading = line.rstrip().endswith(":")
         rating = bool(legends or heading) and RATING.search(line) is not None
         stated |= {*legends} if not (rating or ratings) else set()
