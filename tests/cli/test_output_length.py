@@ -21,18 +21,18 @@ def lines_of(*arguments):
     return done.output.splitlines()
 
 
-def every_fourth(run):
-    channels = {name: getattr(run, name)[::4] for name in ("time", "displacement", "force", "current")}
+def every_eighth(run):
+    channels = {name: getattr(run, name)[::8] for name in ("time", "displacement", "force", "current")}
     return replace(run, velocity=None, segments=(), **channels)
 
 
 @pytest.fixture(scope="module")
 def records(bundled, tmp_path_factory):
-    """More tests than lines are printed, as rig files of every fourth sample, the current in their names."""
+    """More tests than lines are printed, as rig files of every eighth sample, the current in their names."""
     folder = tmp_path_factory.mktemp("records")
     for number, run in enumerate(bundled.rig("utfsm").runs[: MAX_LINES + 6]):
         if not run.current_changes:
-            (folder / f"{number:02d} {run.current_A:g}A.csv").write_bytes(csv_of(every_fourth(run)))
+            (folder / f"{number:02d} {run.current_A:g}A.csv").write_bytes(csv_of(every_eighth(run)))
     return folder
 
 
