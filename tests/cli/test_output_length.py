@@ -64,7 +64,9 @@ def test_compare(few_runs, tmp_path):
     assert len(lines_of("compare", tmp_path / "rig", "--out", tmp_path / "c", "--jobs", 1, *models)) <= MAX_LINES
 
 
-@pytest.mark.parametrize("system", ["quarter-car", pytest.param("half-car", marks=pytest.mark.slow), "dyke1996"])
+@pytest.mark.parametrize(
+    "system", ["quarter-car", *(pytest.param(name, marks=pytest.mark.slow) for name in ("half-car", "dyke1996"))]
+)
 def test_simulate(system, tmp_path, pytestconfig):
     source = "elcentro" if system == "dyke1996" else "bump"
     damper = ["--damper", pytestconfig.rootpath / DAMPER, "--current", 1]

@@ -31,16 +31,14 @@ LIMITS = Limits((0.0, 1.0), (0.5, 4.0), (2.0, 20.0), velocity_m_s=0.2, force_N=1
 @pytest.mark.parametrize(
     ("make", "runs", "stated"),
     [
-        *((joint_damper, 9, stated) for stated in STATED),
-        *(
-            pytest.param(make, runs, stated, marks=[] if stated in fast else SLOW)
-            for make, runs, fast in (
-                (joint_damper, 1, ("one a run",)),
-                (joint_damper, 2, ("one", "one a run")),
-                (modified_damper, 9, ("three",)),
-            )
-            for stated in STATED
-        ),
+        pytest.param(make, runs, stated, marks=[] if stated in fast else SLOW)
+        for make, runs, fast in (
+            (joint_damper, 9, ("one", "three", "unknown", "one a run")),
+            (joint_damper, 1, ("one a run",)),
+            (joint_damper, 2, ("one", "one a run")),
+            (modified_damper, 9, ("three",)),
+        )
+        for stated in STATED
     ],
 )
 def test_intervals_are_bounded_or_refused(make, runs, stated):

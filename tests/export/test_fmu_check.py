@@ -6,7 +6,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from support.fmu_files import COMPILERS, DAMPERS, FEW, fmu_bytes, unpacked
+from support.fmu_files import COMPILERS, DAMPERS, fmu_bytes, unpacked
 from support.forked import forked
 
 from mrdamper.errors import MissingExtraError
@@ -70,7 +70,7 @@ def in_function(name, code):
 @pytest.mark.parametrize(
     ("name", "fmi"),
     [
-        (n, fmi) if (fmi == 3 and n in FEW) or n == "joint" else pytest.param(n, fmi, marks=pytest.mark.slow)
+        pytest.param(n, fmi, marks=() if (n, fmi) in (("joint", 2), ("modified", 3)) else pytest.mark.slow)
         for n in DAMPERS
         for fmi in FMIS
     ],

@@ -37,7 +37,7 @@ def preview():
 
 @pytest.mark.parametrize(
     "name",
-    [n if n in ("skyhook", "hybrid", "clipped-optimal") else pytest.param(n, marks=pytest.mark.slow) for n in LAWS],
+    [n if n in ("hybrid", "clipped-optimal") else pytest.param(n, marks=pytest.mark.slow) for n in LAWS],
 )
 def test_nothing_beats_the_preview(name, preview):
     done = SystemLoop(CAR, ROAD, {"damper": joint_damper()}, controller_type(name)()).run(1e-3, machine=False)
