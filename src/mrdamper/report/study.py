@@ -72,7 +72,7 @@ def write_study(
     paper : str
         Size of the pages of report.pdf: "a4" or "letter".
     processes : Processes
-        Processes that draw the figures.
+        Processes that draw the figures where they are written in more formats than SVG.
 
     Returns
     -------
@@ -88,7 +88,9 @@ def write_study(
     """
     head = _head(about)
     limits = load_limits(limits) if isinstance(limits, (str, Path)) else tuple(limits)
-    drawn = processes.map(partial(_draw, also=tuple(also), limits=limits), study.rigs, progress)
+    # Figures as SVG alone cost less here than sending the study to a process, with what this one knows of its runs.
+    painters = processes if also else IN_PROCESS
+    drawn = painters.map(partial(_draw, also=tuple(also), limits=limits), study.rigs, progress)
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
