@@ -25,16 +25,19 @@ def gains_energy(damper: Damper) -> str:
     if not tested.tested:
         return ""
     lowest, highest = tested.current_A
-    for condition in (c for c in tested.farthest if c.frequency_Hz > 0 and c.amplitude_m > 0):
-        if condition.current_A not in (lowest, highest):
-            continue
-        for current in {condition.current_A, BEYOND * highest}:
-            for share in (1.0, BEYOND):
-                at = replace(condition, current_A=current, amplitude_m=share * condition.amplitude_m)
-                try:
-                    loop = damper.predict(at)
-                except InputError as error:
-                    return f"no force at {at}: {error.found}"
-                if dissipated_power(loop.force, loop.motion.velocity, loop.motion.time) <= 0:
-                    return f"a loop that gains energy at {at}"
+    corners = [c for c in tested.farthest if c.frequency_Hz > 0 and c.amplitude_m > 0]
+    looked_at = [
+        replace(corner, current_A=current, amplitude_m=share * corner.amplitude_m)
+        for corner in corners
+        if corner.current_A in (lowest, highest)
+        for current in {corner.current_A, BEYOND * highest}
+        for share in (1.0, BEYOND)
+    ]
+    for at in dict.fromkeys(looked_at):
+        try:
+            loop = damper.predict(at)
+        except InputError as error:
+            return f"no force at {at}: {error.found}"
+        if dissipated_power(loop.force, loop.motion.velocity, loop.motion.time) <= 0:
+            return f"a loop that gains energy at {at}"
     return ""
