@@ -61,3 +61,17 @@ def test_a_search_frees_no_effect_of_the_current_that_its_runs_do_not_determine(
     assert [axis.name for axis in problem.axes] == ["vy", "shift", "si"]
     (start, *_) = FoldFits(problem, [[4, 5]])._search(frozenset([4, 5]))
     assert start.searched == ("vy", "shift")
+
+
+def test_a_search_of_the_same_runs_and_parameters_is_made_once(bundled, monkeypatch):
+    """Fits without an effect of the current search the blocks of those with it anew, and often the same."""
+    runs = [run for run in bundled.rig("utfsm").split("train") if run.excitation == "sine"]
+    levels = levels_of(JointProblem(runs, "tanh").currents)
+    problem = JointProblem([runs[i] for level in levels[:3] for i in level[:2]], "tanh", free=("si",))
+    searched, fit = [], JointProblem.fit
+    monkeypatch.setattr(JointProblem, "fit", lambda self, *given, **how: searched.append(self.free) or fit(self, **how))
+    fits = FoldFits(problem, [[4, 5], [4]])
+    assert fits.refit([0, 1, 2, 3]).searched == ("vy", "shift")  # two levels are left
+    count = len(searched)
+    assert fits.refit([0, 1, 2, 3, 5]).searched == ("vy", "shift", "si")  # begun from the same search
+    assert len(searched) == count

@@ -40,6 +40,7 @@ class FoldFits:
         self._without_effects: dict[tuple[str, ...], FoldFits] = {}
         self._starts: dict[frozenset[int], list[JointFit]] = {}
         self._fits: dict[tuple[int, ...], JointFit] = {}
+        self._ends: dict[tuple[object, ...], list[JointFit]] = {}  # of searches, also of fits without some effects
 
     def refit(self, rows: Sequence[int]) -> JointFit:
         """Fit the runs at some indices: the result with the smallest error from the best starts.
@@ -57,9 +58,8 @@ class FoldFits:
         """
         if (problem := self.problem.determined(rows)) is not self.problem:
             if problem.free not in self._without_effects:
-                self._without_effects[problem.free] = FoldFits(
-                    problem, [sorted(block) for block in self.blocks], self.searched
-                )
+                fits = FoldFits(problem, [sorted(block) for block in self.blocks], self.searched)
+                self._without_effects[problem.free], fits._ends = fits, self._ends
             return self._without_effects[problem.free].refit(rows)
         left = frozenset(range(len(self.problem.parts))) - set(rows)
         block = next((block for block in self.blocks if left <= block), left)
@@ -81,11 +81,14 @@ class FoldFits:
             coil=whole.given_coil,
             parts=[whole.parts[i].steady_end() for i in rows],
         ).determined()
-        ends = [
-            short.fit(start=start, rounds=_SEARCH_ROUNDS, most_steps=_SEARCH_STEPS, settled=_SEARCH_TOLERANCE)
-            for start in short.promising[:_START_COUNT]
-        ]
-        ends.sort(key=lambda end: end.error)
+        key = block, short.free, *sorted(short.fixed.items())
+        if key not in self._ends:
+            ends = [
+                short.fit(start=start, rounds=_SEARCH_ROUNDS, most_steps=_SEARCH_STEPS, settled=_SEARCH_TOLERANCE)
+                for start in short.promising[:_START_COUNT]
+            ]
+            self._ends[key] = sorted(ends, key=lambda end: end.error)
+        ends = self._ends[key]
         kept = [ends[0], *(end for end in ends[1:] if LocalMinimum.beside(ends[0], [end]))]
         return [self._in_whole(end) for end in kept[:_START_COUNT]]
 
