@@ -345,7 +345,7 @@ def test_a_slow_answer_dims_the_picture_and_extrapolation_is_said(on_model, shoo
     page.unroute("**/predict")
     page.get_by_text("Calculating …").wait_for(state="detached")
     type_number(page, "current_A", "1.2")
-    page.locator(".message.warn").filter(has_text="current 1.2 A, tested 0–0.5 A").wait_for()
+    page.locator(".message.warn").filter(has_text="current 1.2 A, tested 0–1 A").wait_for()
     shoot(page, "8-extrapolation")
 
 
