@@ -1,10 +1,12 @@
 """Names, signs and clocks of the channels: what contradicts is refused, a current counts by its magnitude."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mrdamper.rig_files.conditions import motions_in
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import import_files
 
@@ -157,4 +159,28 @@ def test_a_digit_before_the_current_is_part_of_a_label_where_the_other_names_sho
     assert re.search(r"can be read as \d A or as \d\.\d A", error.found)
     assert written
     answered = import_files([tmp_path], parse_profile(f"[current]\nvalues = {written[1]}"))
-    assert len(answered.records) == 1
+    number = float(written[1].partition("=")[2].strip(" }"))
+    assert answered.records
+    assert {float(np.mean(record.current)) for record in answered.records} == {number}
+
+
+def test_folders_of_a_profile_may_be_all_that_a_path_has(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    files = []
+    for folder in ("a", "b"):
+        path = Path(folder, "test1.csv")
+        path.parent.mkdir()
+        table = np.column_stack([TIME, 15 * np.sin(PHASE), (1 + 0.1 * len(files)) * force(PHASE)])
+        np.savetxt(path, table, "%.6g", ",", header="time [s],displacement [mm],force [N]", comments="")
+        files.append(path)
+    values = parse_profile('[current]\nvalues = {"*/a/test1.csv" = 0.5, "*/b/test1.csv/test1" = 1.0}')
+    assert [np.mean(record.current) for record in import_files(files, values).records] == [0.5, 1.0]
+    for folder, level in (("a", "lvl0.5"), ("b", "lvl1.0")):
+        Path(folder).rename(level)
+    pattern = parse_profile('[current]\npattern = "*/lvl{current}/*"\nunit = "A"')
+    records = import_files(sorted(Path().glob("lvl*/*")), pattern).records
+    assert [np.mean(record.current) for record in records] == [0.5, 1.0]
+
+
+def test_a_clock_of_megahertz_is_no_frequency_of_the_motion():
+    assert motions_in("base clock: 2 MHz, 500 mHz, 3HZ", "Hz") == {0.5, 3.0}

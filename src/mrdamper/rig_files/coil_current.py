@@ -52,11 +52,12 @@ def current_of(
         _refuse_contradiction(source.value, channel, statements, where)
         return source.value, {"current_from": "profile"}
     if source is not None and source.pattern is not None:
-        places = (path.name, table.label, f"{path.name}/{table.label}", f"{path.as_posix()}/{table.label}".rstrip("/"))
+        places = [path.name, table.label, f"{path.name}/{table.label}", f"{path.as_posix()}/{table.label}".rstrip("/")]
+        places.append(f"/{places[-1]}")  # the folders of */lvl{current}/* may be all there are
         current = next((v for place in places if place and (v := current_in_name(place, profile)) is not None), None)
         if current is None and channel is None:
             raise ColumnError(
-                printable(f"the pattern {source.pattern!r} does not match {places[-2].rstrip('/')!r}"), where=where,
+                printable(f"the pattern {source.pattern!r} does not match {places[2].rstrip('/')!r}"), where=where,
                 remedy="correct [current] pattern of the profile", code="E_CURRENT_MISSING",
             )  # fmt: skip
         statements = [] if current is None else [Statement(current, "name by the profile's pattern")]
@@ -127,7 +128,7 @@ def require_current(record: Record, path: Path = Path()) -> Record:
     elif match and not reasons:
         reasons = [f"{match[0]!r} in its name can be read as {match[2]} A or as {match[1]}.{match[2]} A"]
         stars = ("*", "*") if match.string in places[:2] else ("*/*", "*/*")
-        value = f'"{stars[0]}{match[0]}{stars[1]}" = {match[2]}'
+        value = f'"{stars[0]}[0-9]{match[0][1:]}{stars[1]}" = {match[2]}'
     raise ColumnError(
         (reasons or ["no coil current in a column, or in the name of the file or of its folder"])[0],
         where=Path(record.provenance.get("file", record.id)).name,

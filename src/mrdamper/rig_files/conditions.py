@@ -70,8 +70,8 @@ _LABELLED_RATING = re.compile(
     "|".join([r"fuse|suppl|amplif|rated|range|clamp|(?<![a-z])(?:max|limit)(?![a-z])", *words("probe")]), re.IGNORECASE
 )
 _MOTIONS = {
-    unit: re.compile(rf"(?i)(?<![\d.,x])(?<!\dp)(\d{{1,4}}(?:[.,xp]\d{{1,4}})?)[ _]?{behind}")
-    for unit, behind in (("Hz", "(m?)hz(?![a-z])"), ("mm", "mm()(?![a-z/]|[ _]?s)"))
+    unit: re.compile(rf"(?<![\d.,xX])(?<!\d[pP])(\d{{1,4}}(?:[.,xpXP]\d{{1,4}})?)[ _]?{behind}")
+    for unit, behind in (("Hz", "(m?)(?i:hz(?![a-z]))"), ("mm", "(?i:mm)()(?![A-Za-z/]|[ _]?[sS])"))  # MHz: a clock
 }
 _SAMPLING = "|".join(words("sampling"))
 _RATE = re.compile(rf"{_SAMPLING}|messrate|^(?:data )?rate$|scan|acquisition|^fs$|^f_s$", re.IGNORECASE)

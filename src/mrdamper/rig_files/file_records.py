@@ -1,4 +1,4 @@
-"""The files of folders and archives that may hold tests, and the records of one file, not yet judged."""
+"""The files of folders and archives that may hold tests, and the records of one file, not yet checked."""
 
 from __future__ import annotations
 

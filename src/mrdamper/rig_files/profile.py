@@ -138,7 +138,8 @@ class CurrentSource(Table):
     def fitting(self, path: Path, test: str) -> list[str]:
         """Return the patterns of `values` that match a file, or a test of it, whatever the case."""
         names = [name.casefold() for name in (path.name, path.stem, test) if name]
-        whole = [path.as_posix().casefold()]
+        files = [f"{start}{path.as_posix()}".casefold() for start in ("", "/")]  # */a/test1.csv is a/test1.csv, too
+        whole = [*files, *(f"{file}/{test.casefold()}" for file in files if test)]
         return [p for p in self.values if any(fnmatchcase(n, p.casefold()) for n in (whole if "/" in p else names))]
 
 

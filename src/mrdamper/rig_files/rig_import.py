@@ -408,7 +408,7 @@ def _with_folders(tests: Sequence[tuple[Path, Record]]) -> list[Record]:
 
 
 def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
-    """Return the runs of judged records, with their provenance as notes.
+    """Return the runs of checked records, with their provenance as notes.
 
     Raises `InputError` if a record has no current, or there is no record.
     """

@@ -80,7 +80,7 @@ def _tests_of(channels: dict[str, Floats], profile: Profile) -> tuple[list[slice
 
 
 def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
-    """Return the records a table of one test holds, not yet judged: several where its time starts again and again.
+    """Return the records a table of one test holds, not yet checked: several where its time starts again and again.
 
     Raises `InputError` if a channel is missing, has no unit, or holds something else than numbers, or if two places
     contradict each other about the current.

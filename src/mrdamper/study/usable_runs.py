@@ -17,6 +17,7 @@ from mrdamper.study.contradictions import Contradiction, find_contradictions
 _MIN_SAMPLES_PER_CYCLE = 8  # below, velocity and loop are not determined
 _MAX_DISTORTION = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
 _DUPLICATE_TOLERANCE = 1e-4  # share of the range within which two runs are copies
+_UNIT_RATIO = 50  # to the other runs' size, from which another unit explains it
 _MIN_RUNS = 4  # runs from which a usual value is known
 
 
@@ -128,7 +129,7 @@ def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
             too_large = size > quantity.largest_ratio * usual
             too_small = bool(quantity.if_smaller) and size < usual / quantity.largest_ratio
             if too_large or too_small:
-                other = quantity.if_smaller if too_small else quantity.if_larger
+                other = quantity.if_smaller if too_small else quantity.if_larger * (size > _UNIT_RATIO * usual)
                 reasons[name] = (
                     f"{quantity.name} of {size:.3g} {unit}, {usual:.3g} {unit} in the other runs"
                     f"{f', as if in {other}' if other else ''}; "

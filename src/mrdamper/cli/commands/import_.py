@@ -149,14 +149,14 @@ def _missing_currents(files: list[Path], guess: Profile, columns: tuple[str, ...
         return ""
     lines = []
     reasons = ["" if r.error.code != "E_CURRENT_MISSING" else r.error.found for r in missing]  # else of units
-    column = next((name for name in columns if name and f"column {name!r}" in reasons[0]), None)
+    column = next((name for name in columns if name and any(f"column {name!r}" in why for why in reasons)), None)
     if column is not None:
         shown = json.dumps(column, ensure_ascii=False)
         lines = ["# Calibration of the current: A for 1 of the column:", "#[channels.current]", f"#column = {shown}"]
         lines += ['#unit = "A"', "#scale =", ""]
     runs = [r.run or Path(r.file).stem for r in missing]
     names = [
-        escape(run) if runs.count(run) == 1 else "*/" + "/".join(Path(r.file).parts[-2:])
+        escape(run) if runs.count(run) == 1 else "*/" + escape("/".join(Path(r.file).parts[-2:]).replace(": ", "/"))
         for run, r in zip(runs, missing, strict=True)
     ]
     lines += ["# Tests without a current: remove the #, and write each current [A] behind its =:", "#[current.values]"]

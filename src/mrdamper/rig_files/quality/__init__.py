@@ -2,7 +2,7 @@
 
 A check is a function of a `View` that yields findings or raises `QualityError`. The order
 matters: a check relies on those before it. A further module of this folder with a function
-`check` is run last. A record that does not fit into memory is judged part by part.
+`check` is run last. A record that does not fit into memory is checked part by part.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ PART = 2**19  # samples: a minute of a test at 10 kHz, some megabytes a channel
 _AT_ONCE = 2  # parts: their checks are sums and sorts of long arrays, which need no turn of the interpreter
 _MAY_REST = ("E_NO_EXCITATION",)  # a long test may pause; it may not be one long pause
 _OF_THE_WHOLE = ("W_SHORT", "W_DRIFT")
-_ONCE = ("W_CURRENT_VARIES",)  # judged over the whole record: parts may each hold another current
+_ONCE = ("W_CURRENT_VARIES",)  # checked over the whole record: parts may each hold another current
 _Verdict = tuple[tuple[Finding, ...], tuple[tuple[int, int], ...], InputError | None]
 CHECKS: tuple[Check, ...] = (
     samples.long_enough,
@@ -142,7 +142,7 @@ def check_long_record(record: Record) -> Record:
 
 
 def _checked_parts(record: Record) -> Iterator[tuple[int, _Verdict]]:
-    """Start of every part and what came of it, in order, two judged at once."""
+    """Start of every part and what came of it, in order, two checked at once."""
 
     def one(part: Record) -> _Verdict:
         try:
@@ -295,7 +295,7 @@ def _quality(record: Record) -> Quality:
 
 
 def to_run(record: Record) -> Run:
-    """Return the run a record holds; one that was not judged is judged first.
+    """Return the run a record holds; one that was not checked is checked first.
 
     Missing samples are left out, as are segments of under five samples. Where the motion is
     periodic, the steady window is the largest whole number of its last steady cycles. The

@@ -1,6 +1,6 @@
 """The view of a record that the checks use: its channels without holes, the motion in them, and its reversals.
 
-Physics is judged on at most `MOST_SAMPLES` samples of a record, so that a long record takes
+Physics is checked on at most `MOST_SAMPLES` samples of a record, so that a long record takes
 no longer than a short one; counts (missing, repeated, frozen) are of all samples.
 """
 
