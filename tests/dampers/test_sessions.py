@@ -88,6 +88,7 @@ def test_gains_that_do_not_scatter_have_no_spread():
     assert RunScatter.likeliest(when, np.zeros(12)).total == 0.0
 
 
+@pytest.mark.slow
 def test_the_three_spreads_are_found_from_many_days():
     rng = np.random.default_rng(0)
     truth = RunScatter(0.03, 0.02, 0.01, 2.0)

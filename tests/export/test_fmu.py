@@ -85,7 +85,7 @@ def test_fmpy_computes_what_the_stepper_does_to_the_last_bit(folder, name, fmi):
 
 
 @needs_compiler
-@pytest.mark.parametrize("fmi", FMIS)
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
 def test_parameters_set_in_fmpy_are_those_set_in_the_stepper(folder, fmi):
     changed = {"c": 900.0, "beta": 3e5, "gamma": 1e5}
     result = simulated(written(folder, "bouc-wen", fmi), "bouc-wen", fmi, start_values=changed)

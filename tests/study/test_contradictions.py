@@ -57,7 +57,8 @@ def test_no_run_of_a_sound_folder_is_accused(number):
     assert find_contradictions(sound_folder(number)) == []
 
 
-@pytest.mark.parametrize("number", [3, pytest.param(21, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [3, 21])
 def test_a_motion_that_the_comparison_describes_badly_accuses_no_run(number):
     """The loops of these dampers at the slowest motion are none that elastic-plastic elements make."""
     damper = synthetic_dampers.drawn(number + 1)[number]
