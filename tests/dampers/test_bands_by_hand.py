@@ -42,9 +42,7 @@ KNOWN = Uncertainty(
 
 def damper(known=KNOWN):
     model = Bingham(c=2000.0, fy=100.0, f0=25.0)
-    envelope = SimpleNamespace(
-        distance=lambda condition, current: AWAY, nearest=lambda condition: condition, flags=lambda condition: ()
-    )
+    envelope = SimpleNamespace(nearest=lambda condition: condition, flags=lambda condition: ())
     return JointDamper(model, ("c", "fy"), rig="rig", envelope=envelope, uncertainty=known)  # type: ignore[arg-type]
 
 
@@ -68,6 +66,7 @@ def _slopes(monkeypatch):
 
     monkeypatch.setattr(bands, "force_slopes", slopes)
     monkeypatch.setattr(bands, "_by_parameters", always(np.full(3, np.inf)))
+    monkeypatch.setattr(Prediction, "distance", lambda prediction, damper: AWAY)
 
 
 def reach(level, *parts, known=True, at=slice(None)):
@@ -241,9 +240,10 @@ def test_a_portable_band_is_that_of_loops_at_three_currents(monkeypatch):
 
     monkeypatch.setattr(JointDamper, "predict", predict)
     monkeypatch.setattr(bands, "band", found)
+    away = {1.5: AWAY}
+    monkeypatch.setattr(Prediction, "distance", lambda asked, damper: away.get(asked.condition.current_A, AT_TESTS))
     tested = SimpleNamespace(tested=True, middle=CONDITION, current_A=(0.0, 2.0), peak_velocity_m_s=(0.0, 0.9),
-        farthest=[CONDITION, replace(CONDITION, current_A=1.5)],
-        distance=lambda condition, current: AWAY if list(current) == [1.5] else AT_TESTS)  # fmt: skip
+        farthest=[CONDITION, replace(CONDITION, current_A=1.5)])  # fmt: skip
     portable = portable_band(replace(made, envelope=tested), 0.8)
     t = np.mean([30.0, 60.0, 130.0]) / 13
     own = np.mean([9 * np.mean([0.04, 0.16, 5.76]) / (100 + 50 * I) ** 2 for I in widths])
@@ -251,12 +251,12 @@ def test_a_portable_band_is_that_of_loops_at_three_currents(monkeypatch):
         0.8, pytest.approx(np.hypot(0.03, 0.012) * t), pytest.approx(np.hypot(4, 2.5) * t),
     )  # fmt: skip
     assert portable.of_peak == pytest.approx(t * np.sqrt(0.02**2 + own))
-    away = np.sqrt(stdtrit(GROWN_DOF, 0.9) ** 2 @ GROWN["force"])
-    assert portable.of_peak_untested == pytest.approx(np.hypot(portable.of_peak, away))
-    assert asked == [replace(CONDITION, current_A=I) for I in widths]
+    grown = np.sqrt(stdtrit(GROWN_DOF, 0.9) ** 2 @ GROWN["force"])
+    assert portable.of_peak_untested == pytest.approx(np.hypot(portable.of_peak, grown))
+    assert asked == [replace(CONDITION, current_A=I) for I in (*widths, 1.0, 1.5)]
     slow = SimpleNamespace(**(vars(tested) | {"peak_velocity_m_s": (0.0, 0.05)}))  # slower than the middle of all
     portable_band(replace(made, envelope=slow), 0.8)
-    assert asked[-1].peak_velocity == pytest.approx(0.05)
+    assert asked[-3].peak_velocity == pytest.approx(0.05)
     monkeypatch.setattr(bands, "band", lambda *_: None)
     assert portable_band(replace(made, envelope=slow), 0.8) is None
     assert portable_band(replace(made, envelope=SimpleNamespace(tested=False))) is None

@@ -369,7 +369,7 @@ def test_the_scatter_at_the_tests_is_no_growth():
         assert getattr(found, quantity) == pytest.approx((*TYPICAL[:2], TYPICAL[2] / np.sqrt(2)))
 
 
-TYPICAL = np.array([0.25, 0.25, 0.026])
+TYPICAL = np.array([0.25, 0.25, 0.2])
 
 
 def test_the_error_that_the_parameters_account_for_is_no_growth():
@@ -381,6 +381,19 @@ def test_the_error_that_the_parameters_account_for_is_no_growth():
         motion = np.sqrt(((1 - share) * error**2 / 0.5**2 + TYPICAL[2] ** 2) / 2)
         for quantity in ("force", "peak", "energy"):
             assert getattr(found, quantity)[2] == pytest.approx(motion)
+
+
+def test_the_curvature_over_the_velocity_counts_as_much_as_the_folds():
+    """Of the typical growth, that of the folds and that by curvature the squares have their mean."""
+    nothing = ModelError(force=0.0, peak=0.0, energy=0.0, gain=0.0, offset=0.0)
+    fold = [replace(run("r", 0.1 * np.ptp(SWING) / 2, peak=1.1, energy=0.9), distance=Distance(0.0, 0.0, 0.5))]
+    curvature = np.array([0.3, 0.4, 0.5])
+    for runs, shown in ((fold, [0.2]), ([], [])):
+        found = Growth.of(runs, nothing, curvature=curvature)
+        for quantity, own in zip(("force", "peak", "energy"), curvature, strict=True):
+            motion = np.sqrt(np.mean(np.square([TYPICAL[2], own, *shown])))
+            assert getattr(found, quantity) == pytest.approx((*TYPICAL[:2], motion))
+        assert found.dof == (1.0, 1.0, 2.0 + len(shown))
 
 
 def beside_typical(growth):

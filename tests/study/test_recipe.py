@@ -166,6 +166,8 @@ def test_by_the_paper_only_identifications_of_kept_runs_count_where_some_runs_ha
     refitted = fit_paper_functions(runs, some).refit(rows)
     alone = fit_paper_functions(runs, [i for i in some if i.run_id != runs[5].id]).damper
     assert refitted.model_at(Condition(0.7, 0.7, 0.02)).values() == alone.model_at(Condition(0.7, 0.7, 0.02)).values()
+    with pytest.raises(IdentificationError, match="none of the runs"):
+        fit_paper_functions(runs, some).refit([0, 1])
 
 
 def noise_record(seconds, rate=200):

@@ -84,7 +84,7 @@ def band(
     seen_at = slice(None) if shown is None else shown
     force, motion = prediction.force[seen_at], prediction.motion.part(seen_at)
     slopes = force_slopes(damper, prediction, uncertainty.names)[seen_at]
-    distance = prediction.distance(damper.envelope)
+    distance = prediction.distance(damper)
     half = peak_force(force)
     if not half < _LARGEST_FORCE_N:
         raise ParameterError(f"the predicted force reaches {half:.3g} N", remedy="check the parameters of the model")
@@ -230,7 +230,7 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
         own.append(float(np.mean(interval.parameter**2)) / peak_force(prediction.force) ** 2)
         quantile.append(float(np.mean(interval.high - prediction.force)) / (float(np.mean(parts)) or 1.0))
     t = float(np.mean(quantile))
-    away = [tested.distance(c, np.array([c.current_A])) for c in tested.farthest]
+    away = [damper.predict(condition).distance(damper) for condition in tested.farthest]
     grown = max((uncertainty.growth.half_width("force", distance, level) for distance in away), default=0.0)
     of_peak = t * float(np.sqrt(uncertainty.force**2 + np.mean(own)))
     untested = float(np.hypot(of_peak, grown))

@@ -36,10 +36,10 @@ _MAX_SAMPLES = 400  # of a run
 _ENOUGH_UNITS = 9  # independent units that reach a level of 90 %
 _MAX_FACTOR = 1e3  # standard deviations, to which larger errors are limited
 _MAX_GROWTH = 10.0  # relative error per unit of distance, to which larger ones are limited
-# Growth by each distance that is typical of dampers of known truth (`benchmarks.synthetic_choice`), and the degrees of
-# freedom of its variance, so few because dampers differ: alone where no fold is so far from its tests (one motion, two
-# currents, random records alone), and beside the folds that are, which count as much
-_TYPICAL_GROWTH, _TYPICAL_DOF = (0.25, 0.25, 0.026), 1.0
+# Growth by each distance that is typical of dampers of known truth (`benchmarks.synthetic_choice`): alone where no fold
+# is so far from its tests (one motion, two currents, random records alone), and beside the folds that are, which count
+# as much, because dampers differ
+_TYPICAL_GROWTH = (0.25, 0.25, 0.2)
 _NORMAL_DOF = 1e9  # of a normal distribution
 _SHOWN = (0.01, 0.05, 0.1)  # distances of a fold from its tests from which it shows growth
 _NONE: Mapping[str, Floats] = {}  # relative variances of runs by the parameters, where none are known
@@ -254,13 +254,17 @@ class Growth:
 
     @classmethod
     def of(
-        cls, runs: Sequence[PredictedRun], at_tests: ModelError, by_parameters: Mapping[str, Floats] = _NONE
+        cls,
+        runs: Sequence[PredictedRun],
+        at_tests: ModelError,
+        by_parameters: Mapping[str, Floats] = _NONE,
+        curvature: Floats | None = None,
     ) -> Growth:
         """Least squares of the squared errors in excess of those at the tests, by the squared distances.
 
-        The fastest motions, or the highest current, are one fold, which may show no growth by chance. The variance of
-        the typical growth has as many degrees of freedom and is pooled with theirs [moderated variances: Smyth 2004,
-        Stat. Appl. Genet. Mol. Biol. 3, 3]; a distance that no run has gets the typical growth alone.
+        The fastest motions, or the highest current, are one fold, which may show no growth by chance. The variances of
+        the folds, of the typical growth and of the curvature have one degree of freedom each and are pooled
+        [moderated variances: Smyth 2004, Stat. Appl. Genet. Mol. Biol. 3, 3]; a distance that no run has has no fold.
 
         Parameters
         ----------
@@ -270,24 +274,26 @@ class Growth:
         by_parameters : mapping of str to (3,) array
             Relative variances of the force, the peak and the energy of a run by the parameters, which an interval
             counts beside growth.
+        curvature : (3,) array, optional
+            Growth of the force, the peak and the energy by motion that the curvature over the velocity shows
+            (`growth_by_curvature`).
         """
-        away = [run for run in runs if run.distance.squares.any()]
-        if not away:
-            dof = (_TYPICAL_DOF, _TYPICAL_DOF, _TYPICAL_DOF)
-            return cls(_TYPICAL_GROWTH, _TYPICAL_GROWTH, _TYPICAL_GROWTH, dof)
-        table = np.array([run.distance.squares for run in away])
-        size = np.sqrt(np.mean(table**2, axis=0))
-        size[size == 0] = 1.0
-        shown = table.max(axis=0) > np.square(_SHOWN)
-        excess = np.array(
-            [_squared_errors(r) - _expected(r, at_tests) - by_parameters.get(r.run_id, np.zeros(3)) for r in away]
-        )
-        fits = [nonnegative_least_squares(table / size, column)[0] for column in excess.T]
-        slopes = np.array(fits) / size
-        typical = np.square(_TYPICAL_GROWTH)
-        growth = np.sqrt(np.where(shown, (np.minimum(slopes, _MAX_GROWTH**2) + typical) / 2, typical))
-        dof = _TYPICAL_DOF * (1 + shown)
-        return cls(*(tuple(values) for values in [*growth.tolist(), dof.tolist()]))
+        evidence, dof = np.tile(np.square(_TYPICAL_GROWTH), (3, 1)), np.ones(3)
+        if away := [run for run in runs if run.distance.squares.any()]:
+            table = np.array([run.distance.squares for run in away])
+            size = np.sqrt(np.mean(table**2, axis=0))
+            size[size == 0] = 1.0
+            shown = table.max(axis=0) > np.square(_SHOWN)
+            excess = np.array(
+                [_squared_errors(r) - _expected(r, at_tests) - by_parameters.get(r.run_id, np.zeros(3)) for r in away]
+            )
+            slopes = np.array([nonnegative_least_squares(table / size, column)[0] for column in excess.T]) / size
+            evidence += np.where(shown, np.minimum(slopes, _MAX_GROWTH**2), 0.0)
+            dof += shown
+        if curvature is not None:
+            evidence[:, 2] += curvature**2
+            dof[2] += 1
+        return cls(*(tuple(values) for values in [*np.sqrt(evidence / dof).tolist(), dof.tolist()]))
 
 
 def _squared_errors(run: PredictedRun) -> Floats:

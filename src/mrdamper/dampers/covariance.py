@@ -18,6 +18,7 @@ from mrdamper.dampers.calibration import (
     model_error,
     scatter_between_sessions,
 )
+from mrdamper.dampers.curvature import growth_by_curvature
 from mrdamper.dampers.random_effects import Draws, Effects, GainsAndOffsets
 from mrdamper.dampers.refits import refitted
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
@@ -108,7 +109,7 @@ def estimate_uncertainty(
         information=dict(zip([p.run.id for p in parts], _shares(spread.information), strict=True)),
         effective=spread.effective(samples), interval_factor=spread.interval_factor,
     )  # fmt: skip
-    uncertainty = _with_model_error(uncertainty, parts, spread.slopes, cross_validated, away, other_sessions)
+    uncertainty = _with_model_error(uncertainty, damper, parts, spread.slopes, cross_validated, away, other_sessions)
     return replace(damper, uncertainty=uncertainty)
 
 
@@ -356,6 +357,7 @@ def _without_their_condition(
 
 def _with_model_error(
     uncertainty: Uncertainty,
+    damper: Damper,
     parts: Sequence[RunResiduals],
     slopes: Sequence[Floats],
     cross_validated: Sequence[PredictedRun],
@@ -378,13 +380,14 @@ def _with_model_error(
     # A fold with other runs of a session has absorbed part of its gain: the scatter about the mean remains.
     left = 1 - 1 / max(len({part.session for part in parts}), 1)
     of_sessions = {"gain": left * uncertainty.gain**2, "offset": left * uncertainty.offset**2}
+    curvature = growth_by_curvature(damper, parts, slopes, uncertainty.names)
     uncertainty = replace(
         uncertainty,
         left_out=len(cross_validated),
         run_gain=float(np.sqrt(max(error.gain**2 - of_sessions["gain"], 0.0))),
         run_offset=float(np.sqrt(max(error.offset**2 - of_sessions["offset"], 0.0))),
         run_dof=max(len(cross_validated) - 1.0, 1.0),
-        growth=Growth.of([*cross_validated, *away], error, own),
+        growth=Growth.of([*cross_validated, *away], error, own, curvature),
     )
     fits = _without_their_condition(parts, slopes, uncertainty.covariance)
     usual = _WithoutCondition(

@@ -30,7 +30,9 @@ class Distance:
     between: float = 0.0
     # the same product from the two nearest tested currents on one side: the error of extrapolation grows with it
     beyond: float = 0.0
-    motion: float = 0.0  # Euclidean distance from the hull of tested motions in ln f and ln A
+    # Euclidean distance from the hull of tested motions in ln f and ln A; of a prediction, that of its velocity and of
+    # its force, too (`Prediction.distance`)
+    motion: float = 0.0
 
     @property
     def squares(self) -> Floats:

@@ -8,13 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.dampers.distance import Distance
-from mrdamper.dampers.envelope import Envelope
+from mrdamper.dampers.protocols import DamperLike
 from mrdamper.data.conditions import Condition
 from mrdamper.data.displayable import Displayable
 from mrdamper.data.runs import Floats
 from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.statistics.metrics import peak_force
 
 NOT_A_SINE = "not a sine"
+_NO_DISTANCE = 1e-6  # from the hull of tested motions, by rounding
+_OF_HULL, _OF_VELOCITY = 0.1, 0.3  # of the distance from it, and of the logarithm of the velocity over the nearest's
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,9 +57,21 @@ class Prediction(Displayable):
         """Return the prediction with another gain and offset [N] of the force."""
         return replace(self, force=gain * self.force + offset)
 
-    def distance(self, tested: Envelope) -> Distance:
-        """Distance from tests."""
-        return tested.distance(self.condition, self.motion.current)
+    def distance(self, damper: DamperLike) -> Distance:
+        """Distance from the tests of the damper that the prediction is of.
+
+        A motion outside the tested ones counts by how much faster it is than the nearest of them, and by how much of
+        its peak force exceeds that of the nearest: what is unknown of the law of the force over the velocity grows
+        with the force that the law adds.
+        """
+        away = damper.envelope.distance(self.condition, self.motion.current)
+        if away.motion < _NO_DISTANCE:
+            return away
+        here, there = self.condition, damper.envelope.nearest(self.condition)
+        faster = np.log(here.peak_velocity / there.peak_velocity)
+        rise = 1 - peak_force(damper.predict(there).force) / (peak_force(damper.predict(here).force) or np.inf)
+        parts = [_OF_HULL * away.motion, max(_OF_VELOCITY * faster, 0.0), max(rise, 0.0)]
+        return replace(away, motion=float(np.linalg.norm(parts)))
 
     @property
     def is_sine(self) -> bool:

@@ -64,7 +64,9 @@ def fit_paper_functions(
 
     def refit(rows: Sequence[int]) -> Damper:
         ids = {runs[i].id for i in rows}
-        return fitted(tuple(n for n, one in enumerate(identifications) if one.run_id in ids))
+        if not (kept := tuple(n for n, one in enumerate(identifications) if one.run_id in ids)):
+            raise IdentificationError("none of the runs is a pure sine", where="paper", remedy="test more pure sines")
+        return fitted(kept)
 
     return FitResult(fit.damper, refit, fit)
 

@@ -180,7 +180,7 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> Run
     prediction = damper.predict(run)
     inside = run.in_window
     reading = GainOffset.of(run.force[inside], prediction.force[inside])
-    away = prediction.distance(damper.envelope)
+    away = prediction.distance(damper)
     beside = PredictedRun.of(run, prediction.force, prediction.motion.velocity, away)
     expected = sessions.expected(RecordingTime.of(run), without=run.id) if sessions else None
     if expected is not None:
