@@ -15,9 +15,11 @@ from mrdamper.dampers.protocols import DamperLike as Damper
 from mrdamper.dampers.run_residuals import RunResiduals
 from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.data import Condition, Floats
+from mrdamper.physics.motion.made import sine
 from mrdamper.statistics.linear import solve_linear
 
 _FASTER = 2.0  # times the largest tested velocity
+_CYCLES = 2  # of a sine from rest
 _MAX_GROWTH = 1.0  # error over the distance of a motion: all of the force that the velocity adds
 _RANK_LIMIT = 1e-6  # singular value over the largest below which a direction is not determined
 
@@ -51,12 +53,12 @@ def growth_by_curvature(
     errors, distance = np.zeros(3), 0.0
     frequency = _FASTER * tested.peak_velocity_m_s[1] / (2 * np.pi * fastest.amplitude_m)
     for current in sorted({*tested.current_A, tested.middle.current_A}):
-        loop = damper.predict(Condition(current, frequency, fastest.amplitude_m))
-        there = _with_squares(force_slopes(damper, loop, names), loop.motion.velocity)
+        faster = damper.predict(sine(Condition(current, frequency, fastest.amplitude_m), _CYCLES))
+        there = _with_squares(force_slopes(damper, faster, names), faster.motion.velocity)
         errors += relative_variances(
-            there, np.outer(change, change), loop.force, loop.motion.velocity, loop.motion.time
+            there, np.outer(change, change), faster.force, faster.motion.velocity, faster.motion.time
         )
-        distance += loop.distance(damper).motion ** 2
+        distance += faster.distance(damper).motion ** 2
     return np.minimum(np.sqrt(errors / distance), _MAX_GROWTH)
 
 

@@ -13,10 +13,12 @@ from mrdamper.data.conditions import Condition
 from mrdamper.data.displayable import Displayable
 from mrdamper.data.runs import Floats
 from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.physics.motion.made import sine
 from mrdamper.statistics.metrics import peak_force
 
 NOT_A_SINE = "not a sine"
 _NO_DISTANCE = 1e-6  # from the hull of tested motions, by rounding
+_CYCLES, _SAMPLES = 2, 100  # of a sine from rest, and of each cycle: a steady loop may not close
 _OF_HULL, _OF_VELOCITY = 0.1, 0.3  # of the distance from it, and of the logarithm of the velocity over the nearest's
 
 
@@ -69,7 +71,8 @@ class Prediction(Displayable):
             return away
         here, there = self.condition, damper.envelope.nearest(self.condition)
         faster = np.log(here.peak_velocity / there.peak_velocity)
-        rise = 1 - peak_force(damper.predict(there).force) / (peak_force(damper.predict(here).force) or np.inf)
+        tested, peak = (peak_force(damper.force_along(sine(at, _CYCLES, _SAMPLES), at)) for at in (there, here))
+        rise = 1 - tested / peak if peak > 0 else 0.0
         parts = [_OF_HULL * away.motion, max(_OF_VELOCITY * faster, 0.0), max(rise, 0.0)]
         return replace(away, motion=float(np.linalg.norm(parts)))
 

@@ -64,6 +64,10 @@ class DamperLike(Protocol):
         """Return the steady loop at a condition."""
         ...
 
+    def force_along(self, motion: Any, condition: Condition) -> Floats:
+        """Force along a motion that amounts to a condition [N]."""
+        ...
+
     def with_field_current(self, motion: Any) -> Any:
         """Return the motion with the current whose field is there."""
         ...
