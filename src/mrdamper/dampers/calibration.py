@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -293,7 +293,8 @@ class Growth:
         if curvature is not None:
             evidence[:, 2] += curvature**2
             dof[2] += 1
-        return cls(*(tuple(values) for values in [*np.sqrt(evidence / dof).tolist(), dof.tolist()]))
+        columns: list[Any] = np.vstack([np.sqrt(evidence / dof), dof]).tolist()
+        return cls(*map(tuple, columns))
 
 
 def _squared_errors(run: PredictedRun) -> Floats:

@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Protocol
 from mrdamper.data.arrays import Floats
 from mrdamper.data.conditions import Condition
 from mrdamper.data.parameters import ParameterInfo
-from mrdamper.data.runs import Run
 
 
 class DamperLike(Protocol):
@@ -72,7 +71,7 @@ class DamperLike(Protocol):
         """Return the motion with the current whose field is there."""
         ...
 
-    def predict(self, at: Condition | Run) -> Any:
+    def predict(self, at: Any) -> Any:
         """Predict the steady loop at a condition, or the force along a run."""
         ...
 
