@@ -631,3 +631,33 @@ def test_lines_of_words_below_the_rows_may_begin_with_one_letter(tmp_path, last)
     (record,) = import_files([tmp_path]).records
     assert record.time.size == T.size
     assert "W_FOOTER" in [finding.code for finding in record.findings]
+
+
+@pytest.mark.parametrize(
+    "metadata",
+    [
+        {"coil_current_A": "0.5", "units": '{"t": "s", "x": "mm", "F": "kN"}'},
+        {"I": "0.5 A", "t_unit": "s", "x_unit": "mm", "F_unit": "kN", "r": "A\n3\n262657"},
+        {"rig": '{"current_A": 0.5, "units": {"t": "s", "x": "mm", "F": "kN"}}', "note": "{broken"},
+        {"pandas": '{"columns": [], "attributes": {"current_A": 0.5, "units": {"t": "s", "x": "mm", "F": "kN"}}}'},
+    ],
+    ids=["units of columns", "a key a unit", "one object", "attributes of pandas"],
+)
+def test_the_footer_of_a_parquet_file_states_units_and_current(tmp_path, metadata):
+    frame = pytest.importorskip("polars").DataFrame({"t": T, "x": X, "F": 1e-3 * force(0.5)})
+    frame.write_parquet(tmp_path / "test.parquet", metadata=metadata)
+    (record,) = import_files([tmp_path]).records
+    assert float(np.mean(record.current)) == 0.5
+    np.testing.assert_allclose(record.force, force(0.5), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("separator", ["\t", ";"])
+def test_a_decimal_comma_in_a_row_over_every_column_parts_no_cells(tmp_path, separator):
+    levels = ("0 A", "0,5 A", "1,5 A")
+    head = [["Zeit", "Weg", "Kraft"] * 3, ["s", "mm", "N"] * 3, [f"I = {level}" for level in levels for _ in range(3)]]
+    columns = [column for amperes in (0.0, 0.5, 1.5) for column in (T, X, force(amperes))]
+    text = "".join(separator.join(cells) + "\n" for cells in head) + rows(*columns, separator=separator).replace(
+        ".", ","
+    )
+    (tmp_path / "session.txt").write_text(text)
+    assert currents(import_files([tmp_path]).records) == [0.0, 0.5, 1.5]

@@ -143,10 +143,15 @@ def _part(
             own[:] = own if np.isfinite(own[1:]).any() else own[0]
         return Content(values, None if content.lines is None else content.lines[inside], content.findings)
 
-    cells = {line: re.split(r"[\t;,|]", line) for line in table.remarks}
+    cells = {line: _title_cells(line) for line in table.remarks}
     several = tuple(line for line, own in cells.items() if len({value for c in own for value in currents_in(c)}) > 1)
     name = "_".join(part for part in (table.label, label) if part)
     return replace(table.picked(columns, part), titles=several, label=name)
+
+
+def _title_cells(line: str) -> list[str]:
+    """Return the cells of a line over columns; a comma parts them where nothing else does: I = 0,5 A has a decimal."""
+    return re.split(r"[\t;|]" if re.search(r"[\t;|]", line) else ",", line)
 
 
 def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
@@ -161,7 +166,7 @@ def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
     own_time = all("time" in roles for roles in members.values())
     titles = {key: (table.over[min(roles.values())] if table.over else "") or key for key, roles in members.items()}
     if not table.over:  # titles whose cells stand askew, by a comma in them: as many as groups, in their order
-        askew = [[cell for cell in re.split(r"[\t;,|]", line) if currents_in(cell)] for line in table.remarks]
+        askew = [[cell for cell in _title_cells(line) if currents_in(cell)] for line in table.remarks]
         over = next((cells for cells in askew if len(cells) == len(table.names)), None)  # or one over every column
         own = next((cells for cells in askew if len(cells) == len(members)), ())
         titles |= dict(zip(sorted(members, key=lambda key: min(members[key].values())), own, strict=False))

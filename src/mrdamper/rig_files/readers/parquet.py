@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import math
+import re
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from mrdamper.data.strict_text import parse_json
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_arrays, zipped_names
 from mrdamper.rig_files.readers.arrays import (
@@ -26,8 +28,8 @@ from mrdamper.rig_files.readers.arrays import (
     stated_array,
     value_of,
 )
-from mrdamper.rig_files.readers.base import RawTable, Reader, Source, Words
-from mrdamper.rig_files.readers.nested import nested_tables
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source, Words
+from mrdamper.rig_files.readers.nested import MOST_TEXT, nested_tables
 from mrdamper.rig_files.readers.several_tests import MOST_ITEMS
 
 if TYPE_CHECKING:
@@ -49,6 +51,10 @@ class _Frame(Reader):
         """Start the threads and their allocators."""
         _warm()
 
+    def metadata(self, content: bytes) -> Mapping[str, str]:
+        """Return what the file states beside its columns."""
+        return {}
+
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """Return the one table."""
         import polars as pl
@@ -62,6 +68,7 @@ class _Frame(Reader):
         with refusing_damage(source, self.title):
             schema = schema_of(self.given(content))
             rows = scan(self.given(content)).select(pl.len()).collect().item() if len(schema) else 0
+            stated, units = _stated(self.metadata(content), schema)
 
         def loaded(name: str) -> pl.Series:
             return read(self.given(content), columns=[name], **self.options)[name]
@@ -73,7 +80,8 @@ class _Frame(Reader):
                 check_unpacked(source, sum(8 * int(frame[name].list.len().sum()) for name in lists))
                 tests = [{k: _of_test(frame[k][i]) for k in schema} for i in range(rows)]
             return nested_tables(source, {"": tests}, self.title)
-        return [_table(source, self.title, schema, rows, loaded)]
+        table = _table(source, self.title, schema, rows, loaded, units)
+        return [replace(table, remarks=stated)]
 
 
 class Parquet(_Frame):
@@ -85,6 +93,12 @@ class Parquet(_Frame):
     marks, least, given = (b"PAR1",), 12, bytes
     options = MappingProxyType({"use_statistics": False})
 
+    def metadata(self, content: bytes) -> Mapping[str, str]:
+        """Return the keys and values of the file's footer."""
+        import polars as pl
+
+        return pl.read_parquet_metadata(content)
+
 
 class Feather(_Frame):
     """Feather and Arrow files: tables of columns as pandas, R and others hand them on."""
@@ -93,6 +107,34 @@ class Feather(_Frame):
     title = "Feather"
     suffixes = (".feather", ".arrow", ".ipc")
     marks, least, given = (b"ARROW1",), 24, io.BytesIO
+
+
+def _stated(metadata: Mapping[str, str], names: Iterable[str]) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Return lines of keys and values, also of objects of JSON, and the units that they give columns."""
+    stated, units = list[str](), dict[str, str]()
+
+    def take(key: str, value: Any) -> None:
+        column = re.sub("[._ ]units?$", "", key)
+        if isinstance(value, dict) and "unit" in key.casefold() and {*value} <= {*names}:
+            units.update({name: unit for name, unit in value.items() if isinstance(unit, str)})
+        elif isinstance(value, dict):
+            for name, item in value.items():
+                take(name, item)
+        elif column != key and column in names and isinstance(value, str):
+            units[column] = value
+        elif isinstance(value, str | float | int):
+            stated.append(f"{key}: {value}"[:MOST_TEXT])
+
+    for key, text in metadata.items():
+        try:
+            value = parse_json(text) if text.startswith("{") else text
+        except ValueError:
+            continue  # no object of JSON, though it begins as one
+        if key == "pandas" and isinstance(value, dict):  # its own description of the columns, and the user's attributes
+            value = value.get("attributes")
+        if key not in ("ARROW:schema", "r"):  # of Arrow and of R, for themselves
+            take(key, value)
+    return tuple(stated[:MOST_COLUMNS]), units
 
 
 @cache
@@ -106,7 +148,12 @@ def _warm() -> None:
 
 
 def _table(
-    source: Source, title: str, schema: Mapping[str, pl.DataType], rows: int, loaded: Callable[[str], pl.Series]
+    source: Source,
+    title: str,
+    schema: Mapping[str, pl.DataType],
+    rows: int,
+    loaded: Callable[[str], pl.Series],
+    stated: Mapping[str, str],
 ) -> RawTable:
     """Return a table of typed columns, each loaded by its name when it is asked for."""
     import polars as pl
@@ -128,7 +175,8 @@ def _table(
         with refusing_damage(source, title):
             return words_in(loaded(names[column]))
 
-    units = ["s" if isinstance(kind, (pl.Datetime, pl.Duration)) else "" for kind in schema.values()]
+    clocks = pl.Datetime, pl.Duration
+    units = ["s" if isinstance(kind, clocks) else stated.get(name, "") for name, kind in schema.items()]
     return replace(array_table(source, names, units, column_of, title), words=words)
 
 
