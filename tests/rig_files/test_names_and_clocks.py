@@ -131,12 +131,16 @@ def test_nanoseconds_since_1970_need_no_unit_and_smaller_counts_do(tmp_path):
     [
         (["MRD-7_0A", "MRD-7_0.75A", "MRD-7_1A"], [0.0, 0.75, 1.0]),  # no decimal has two points
         (["run9_2A", "run10_1A"], [2.0, 1.0]),
-        (["S2_1A_2Hz", "S2_0A_2Hz", "S2_2A_2Hz"], [1.0, 0.0, 2.0]),
         (["run1_1A", "run2_1A", "run3_0A", "run4_2A"], [1.0, 1.0, 0.0, 2.0]),  # counts the tests
         (["MRD-7_0A/a", "MRD-7_1A/a", "MRD-7_500mA/a"], [0.0, 1.0, 0.5]),
         (["t2_5A", "t0_5A", "t1_0A", "t2_0A"], None),
         (["I1_0A", "I1_1A", "I1_2A"], None),
         (["t_1_0A", "t_1_1A", "t_1_2A"], None),
+        (["S2_1A_2Hz", "S2_0A_2Hz", "S2_2A_2Hz"], None),
+        (["sine_at1_0A/a", "sine_at1_1A/a", "sine_at1_2A/a"], None),
+        (["level1_0A", "level2_1A", "level3_2A"], None),
+        (["cur1_5A", "cur10_5A"], None),
+        (["at1_5A", "at10_5A"], None),
         (["run1_0A", "run1_5A"], None),
     ],
 )
@@ -156,7 +160,7 @@ def test_a_digit_before_the_current_is_part_of_a_label_where_the_other_names_sho
     assert not result.records
     error = result.refusals[0].error
     written = re.search(r"values = (\{.*?\})", error.remedy)
-    assert re.search(r"can be read as \d A or as \d\.\d A", error.found)
+    assert re.search(r"can be read as \d A or as \d+\.\d A", error.found)
     assert written
     answered = import_files([tmp_path], parse_profile(f"[current]\nvalues = {written[1]}"))
     number = float(written[1].partition("=")[2].strip(" }"))

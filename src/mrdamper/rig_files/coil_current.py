@@ -16,9 +16,9 @@ from mrdamper.data.arrays import chunks
 from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.column_names import RATING, names_condition, split_name
 from mrdamper.rig_files.conditions import (
-    BEHIND_DIGIT,
     LARGEST_STATED,
     Statement,
+    behind_digits,
     contradicts,
     current_behind_label,
     currents_in,
@@ -119,7 +119,7 @@ def require_current(record: Record, path: Path = Path()) -> Record:
     if record.current is not None:
         return record
     places = _places(record, path)
-    match = next(filter(None, map(BEHIND_DIGIT.search, places)), None)
+    match = next(filter(None, map(behind_digits, places)), None)
     reasons = [f.text for f in record.findings if f.text.startswith(NO_CHANNEL)]
     value, first = '"test1*" = 0.5', ""
     if reasons and "may both" not in reasons[0]:
@@ -179,7 +179,7 @@ def with_current_behind_label(record: Record, path: Path, names: Collection[str]
 
     The first of its names that states a current at all counts.
     """
-    place = next(filter(BEHIND_DIGIT.search, _places(record, path)), "")
+    place = next(filter(behind_digits, _places(record, path)), "")
     current = current_behind_label(place, names)
     if current is None:
         return record

@@ -10,7 +10,6 @@ import re
 import unicodedata
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -34,10 +33,13 @@ _IN_NAME = re.compile(
     r"([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(m?)(?:A(?:mp(?:ere)?s?)?|amp(?:ere)?s?|(?<=m)a)"
     r"(?![A-Za-z0-9]|\s?/\s?(?:m?V|%|div|s)\b)"
 )
-BEHIND_DIGIT = re.compile(r"(?<![0-9])([0-9])_([0-9]+)[ _]?A(?![A-Za-z0-9])")  # MRD-7_0A: 0 or 7.0 A
-_BEHIND_LABEL = re.compile(  # MRD-7_0.5A, run12_1A: no decimal is written so
-    r"(?<![0-9])(?:[0-9]+_[0-9]+(?:[.,xp][0-9]+[ _]?m?|[ _]?m)|[0-9]{2,}_[0-9]+[ _]?)A(?![A-Za-z0-9])"
+_BEHIND_DIGITS = re.compile(r"(?<![0-9])([0-9]|1[0-4])_([0-9]+)[ _]?A(?![A-Za-z0-9])")  # MRD-7_0A: 0 or 7.0 A
+_BEFORE = re.compile("([A-Za-z]+)[-_ =]?$")  # letters before a label
+_LEVELS, _RUNS = words("current_level"), words("run")
+_BEHIND_LABEL = re.compile(  # MRD-7_0.5A: no decimal is written so
+    r"(?<![0-9])[0-9]+_[0-9]+(?:[.,xp][0-9]+[ _]?m?|[ _]?m)A(?![A-Za-z0-9])"
 )
+_BEHIND_LONG_LABEL = re.compile(r"(?<![0-9])[0-9]{2,}_[0-9]+[ _]?A(?![A-Za-z0-9])")  # run12_1A
 _LARGEST_STEP = 5  # [A] of tests at whole amperes, from 0 A on
 _NEXT_NUMBER = re.compile(r"_A_[0-9.]+(?:_|\.[a-z]{2,4}$|$)")  # 2_A_20: the name of the next number
 _NEGATIVE = re.compile(r"[=:]\s*[-−]$")  # a dash elsewhere may stand between two parts of a name
@@ -109,7 +111,7 @@ def currents_in(text: str) -> tuple[float, ...]:
     none, nor does what stands beside a fuse, a supply or a limit.
     """
     text = unicodedata.normalize("NFKC", text[:255]).replace("−", "-")
-    if BEHIND_DIGIT.search(text) or _LABELLED_RATING.search(text):
+    if behind_digits(text) or _LABELLED_RATING.search(text):
         return ()
     # 04A may be four or 0.4 amperes; 0400mA is padded.
     stated = [match for match in _IN_NAME.finditer(text) if match[2] or not re.fullmatch("0[1-9]+", match[1])]
@@ -122,15 +124,34 @@ def currents_in(text: str) -> tuple[float, ...]:
     return tuple(dict.fromkeys(currents))
 
 
+def behind_digits(name: str) -> re.Match[str] | None:
+    """Return the digits of a name that are a current or, with those before them, a decimal: MRD-7_0A, 0 or 7.0 A.
+
+    Two digits before them begin a decimal only behind a word for a current: at10_5A, but not run10_1A.
+    """
+    matches = _BEHIND_DIGITS.finditer(name)
+    return next((m for m in matches if len(m[1]) == 1 or _means_current(_letters(name[: m.start()]))), None)
+
+
+def _letters(before: str) -> str:
+    match = _BEFORE.search(before)
+    return match[1].casefold() if match else ""
+
+
+def _means_current(letters: str) -> bool:
+    return letters in _LEVELS or role_of(letters) == "current"
+
+
 def current_behind_label(name: str, names: Collection[str]) -> float | None:
     """Return the current [A] behind a digit of a label by the other names: MRD-7_0A; None where it may not.
 
-    Another name has a number with a point behind such a label, or a label of two digits; or whole amperes from 0 A on
-    stand behind every label, or behind labels that count the tests.
+    Another name has a number with a point behind such a label; or the label is a word for a test with its number, and
+    another has two digits or all count the tests, at whole amperes from 0 A on. A word for a current has no label.
     """
-    match = BEHIND_DIGIT.search(name)
+    match = behind_digits(name)
     stated = () if match is None else currents_in(f"{name[: match.end(1)]} {name[match.start(2) :]}")
-    if match is None or len(stated) != 1 or stated[0] > LARGEST_STATED:
+    letters = "" if match is None else _letters(name[: match.start()])
+    if match is None or len(stated) != 1 or stated[0] > LARGEST_STATED or _means_current(letters):
         return None
 
     def alike(pattern: re.Pattern[str]) -> list[re.Match[str]]:
@@ -138,14 +159,13 @@ def current_behind_label(name: str, names: Collection[str]) -> float | None:
         form, matches = re.sub("[0-9]+", "0", name[: match.start()]), map(pattern.search, {*names})
         return [m for m in matches if m and re.sub("[0-9]+", "0", m.string[: m.start()]) == form]
 
-    if alike(_BEHIND_LABEL):
+    if alike(_BEHIND_LABEL) or (letters in _RUNS and alike(_BEHIND_LONG_LABEL)):
         return stated[0]
-    both, letters = {(m[1], m[2]) for m in alike(BEHIND_DIGIT)}, re.search("([A-Za-z]+)-?$", name[: match.start()])
+    both = {(m[1], m[2]) for m in alike(_BEHIND_DIGITS)}
     labels, numbers = ({*of} for of in zip(*both, strict=True))
-    whole = numbers == {*map(str, range(len(numbers)))} and 3 <= len(numbers) <= _LARGEST_STEP + 1 and "0" not in labels
+    whole = numbers == {*map(str, range(len(numbers)))} and 3 <= len(numbers) <= _LARGEST_STEP + 1
     counted = len(labels) == len(both) and labels == {*map(str, range(1, len(labels) + 1))}
-    complete = whole and (counted or both == {*product(labels, numbers)})
-    return stated[0] if complete and letters and role_of(letters[1]) != "current" else None
+    return stated[0] if whole and counted and letters in _RUNS else None
 
 
 def motions_in(text: str, unit: str) -> set[float]:
