@@ -63,7 +63,18 @@ def test_units_that_the_items_of_a_readme_give_its_columns(tmp_path, item, last)
     require_the_tests(tmp_path)
 
 
-@pytest.mark.parametrize("item", ["F: range of the load cell (N)", "F: oil temperature [degC]", "F: force (N)\nF: kN"])
+@pytest.mark.parametrize(
+    "item",
+    [
+        "F: range of the load cell (N)",
+        "F: oil temperature [degC]",
+        "F: force (N)\nF: kN",
+        "Full scale: F [kN]",
+        "F: load cell no. 4711, N\nF: kN",
+        "F: kN (until 2020), N (since 2021)",
+        "Figure 3, labels: F: kN",
+    ],
+)
 def test_an_item_of_a_readme_about_something_else_gives_no_unit(tmp_path, item):
     write(tmp_path, "t,x,F\n")
     (tmp_path / "README.md").write_text(f"t: time (s)\nx: displacement (mm)\n{item}\n")
@@ -78,6 +89,12 @@ def test_columns_without_names_that_a_sentence_lists_and_currents_of_the_names_o
     require_the_tests(tmp_path)
     (tmp_path / "README.md").write_text(f"{text}m09.csv: 1 A\n")
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
+
+
+def test_ranges_of_sensors_do_not_name_columns_without_names(tmp_path):
+    write(tmp_path, "")
+    (tmp_path / "README.md").write_text("Sensor ranges: time (s), displacement (mm), force (kN)\n")
+    assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_UNITS_MISSING"}
 
 
 def test_fields_and_a_description_of_a_data_package(tmp_path):

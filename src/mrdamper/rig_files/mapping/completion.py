@@ -55,6 +55,8 @@ _SI_UNITS = re.compile(rf"\bSI[- ](?:base[- ])?{_UNITS_IN}|{_UNITS_IN}\W*(?:(?:i
 _EXCEPT = re.compile(r"(?i)\b(?:except|but|not|no|non|außer|nicht|kein\w*|sauf|salvo|excepto|tranne)\b")
 _LABVIEW = ("Delta_X", "X_Dimension")
 _BEHIND_NAME = re.compile(r"\s*[:=|,]\s*|\s[-–—]\s|$")  # in front of what a name means: t - time
+_FIGURE = re.compile("(?i)" + "|".join(words("figure")))  # in a line that is not about the columns
+_ASIDE = re.compile(r"\s*\([^()]*\)$")  # (tension positive)
 _MARK = re.compile(r"^(?:[\s#>•*|–-]|[0-9]{1,2}[.)]\s)+|[\s.|]+$")  # of a list or a table
 _COLON = re.compile(r"^([^:=]+)(?::\s+|\s*=\s*)([^\s:=]{1,12})$")  # force: N; force=N
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
@@ -211,8 +213,10 @@ def _with_listed_names(table: RawTable) -> RawTable:
 
 def _row_of_names(line: str, width: int) -> tuple[Header, ...]:
     """Return the names and units of as many columns that a line lists, columns: time (s), stroke (mm), load (N)."""
-    listed = line.rpartition(": ")[2].strip(" |")
-    row = tuple(map(item_of, re.split(r"[,;|\t]\s*|\s(?:and|und|et|y|e)\s", listed)))
+    heading, _, listed = line.rpartition(": ")
+    if RATING.search(heading) or _FIGURE.search(line):
+        return ()
+    row = tuple(map(item_of, re.split(r"[,;|\t]\s*|\s(?:and|und|et|y|e)\s", listed.strip(" |"))))
     roles = {header.role for header in row if header.role and header.dimension == DIMENSION[header.role]}
     return row if len(row) == width == len(roles) and {"displacement", "force"} <= roles else ()
 
@@ -285,10 +289,12 @@ def _with_listed_units(table: RawTable) -> RawTable:
     wanted |= {name.strip(): i for i, name in names.items()}  # t is no T
     behind: dict[int, set[str]] = {}
     listed: dict[int, set[str]] = {}
+    doubtful: dict[int, set[str]] = {}  # of a range, a figure or a numbered device: may contradict the others
     for line in table.lines if names else ():
         cells = [cell.strip(' "') for cell in re.split(r"[,;|\t]", line.lstrip("#%/ "))]
         behind_colon = [cell.partition(": ")[2] for cell in cells]  # rig 7, columns: time [s], load [N]
-        for header in map(item_of, (*cells, *behind_colon, line)):
+        for text, whole in zip((*cells, *behind_colon, line), (*cells, *cells, line), strict=True):
+            header = item_of(text)
             name, meaning = (part.strip("`* ") for part in _BEHIND_NAME.split(header.name, maxsplit=1))
             both = {*map(role_of, name.split())} == {role_of(name)} - {None}  # time t
             own = name.rpartition(" ")[2] if both else name
@@ -297,8 +303,13 @@ def _with_listed_units(table: RawTable) -> RawTable:
             i = int(number[1]) - 1 if number else i
             role = (role_of(names[i]) or header.role or "") if i in names else ""
             fits = role_of(meaning) in (role, None) and header.dimension == DIMENSION.get(role, "")
-            if i is not None and fits and not RATING.search(meaning) and not re.search("[0-9]", meaning):
-                behind.setdefault(i, set()).add(header.unit)
+            if i is None or not fits or re.search(rf"[0-9]\s*(?:[|;\t]\s*|,)?{re.escape(header.unit)}\W*$", text):
+                continue  # load cell, 25 kN: a value
+            headings = " ".join(part.partition(": ")[0] for part in (line, whole))
+            doubt = RATING.search(f"{headings} {meaning}") or _FIGURE.search(line) or re.search("[0-9]", meaning)
+            (doubtful if doubt else behind).setdefault(i, set()).add(header.unit)
+            units = {unit for cell in cells if is_unit(unit := _ASIDE.sub("", cell))}  # kN (until 2020), N (since 2021)
+            doubtful.setdefault(i, set()).update(u for u in units if split_name("", u).dimension == header.dimension)
         match = _TIME_UNIT.match(line)
         if match and len(times) == 1 and times[0] in bare and split_name("", match["unit"]).dimension == "time":
             behind.setdefault(times[0], set()).add(match["unit"])
@@ -309,7 +320,7 @@ def _with_listed_units(table: RawTable) -> RawTable:
             units = [unit for unit in units if role is None or split_name("", unit).dimension == DIMENSION[role]]
             listed.setdefault(named[0], set()).update(units[:1])
     stated = {**(listed if sum(map(bool, listed.values())) > 1 else {}), **behind}
-    units = {i: own.pop() for i, own in stated.items() if len(own) == 1}
+    units = {i: own.pop() for i, own in stated.items() if len(own | doubtful.get(i, set())) == 1}
     of_name = {names[i]: unit for i, unit in units.items()}
     constants = {f"{name} [{of_name[name]}]" if name in of_name else name: v for name, v in table.constants.items()}
     return replace(table, constants=constants).named({i: (names[i], units[i]) for i in bare if i in units})
@@ -320,7 +331,7 @@ def item_of(text: str) -> Header:
     text = _MARK.sub("", text)
     match = _COLON.match(text)
     header = Header(match[1], match[2]) if match and parse_unit(match[2]) else split_name(text)
-    return header if header.unit else split_name(re.sub(r"\s*\([^()]*\)$", "", text))  # (tension positive)
+    return header if header.unit else split_name(_ASIDE.sub("", text))
 
 
 def _with_si_units(table: RawTable) -> RawTable:
