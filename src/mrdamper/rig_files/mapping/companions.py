@@ -203,10 +203,10 @@ def currents_beside(
     for line in lines:
         parts = re.split(r"\s*[;|]\s*|,\s+|[.:]\s+(?=\w+ ?=)", line)
         legends = [(name, amperes(m[2], m[3])) for m in map(_LEGEND.match, parts) if m for name in _meant(m[1], called)]
-        heading = line.rstrip().endswith(":")
-        rating = bool(legends or heading) and RATING.search(line) is not None
+        rating = RATING.search(line) is not None
         stated |= {*legends} if not (rating or ratings) else set()
-        ratings = bool(ratings and legends) or (rating and not legends and heading)  # Fuses: and a list
+        if line.strip() and not legends:  # a heading: Fuses
+            ratings = rating
     codes = dict(stated)
     if len(codes) < 2 or len(codes) < len(stated):
         return None
