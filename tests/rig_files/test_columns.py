@@ -2,7 +2,7 @@
 
 import pytest
 
-from mrdamper.rig_files.column_names import DIMENSION, is_unit, parse_unit, role_of, split_name
+from mrdamper.rig_files.column_names import DIMENSION, headers_of, is_unit, parse_unit, role_of, split_name
 
 
 @pytest.mark.parametrize(
@@ -24,10 +24,6 @@ from mrdamper.rig_files.column_names import DIMENSION, is_unit, parse_unit, role
         ("Weg [µm]", "Weg", "\u03bcm"),
         ("force_kn", "force", "kn"),
         ("current_ma", "current", "ma"),
-        ("coil_current_a", "coil_current", "A"),
-        ("force_n", "force", "N"),
-        ("channel_a", "channel_a", ""),
-        ("load_a", "load_a", ""),
         ("freq_hz", "freq", "hz"),
         ("Force (filtered)", "Force", ""),
         ("force", "force", ""),
@@ -37,6 +33,19 @@ from mrdamper.rig_files.column_names import DIMENSION, is_unit, parse_unit, role
 )
 def test_name_and_unit_of_a_header(header, name, unit):
     assert split_name(header) == (name, unit)
+
+
+@pytest.mark.parametrize(
+    ("names", "units"),
+    [
+        (("force_n", "coil_current_a"), ("N", "A")),
+        (("channel_a", "load_a", "current_b"), ("", "", "")),
+        (("coil_current_a", "coil_current_b"), ("", "")),
+        (("force_n", "force_t", "current_ma"), ("", "", "ma")),
+    ],
+)
+def test_a_small_letter_behind_a_name_is_its_unit_where_no_other_name_has_another(names, units):
+    assert tuple(header.unit for header in headers_of(names, ("",) * len(names))) == units
 
 
 def test_a_row_of_units_leaves_the_names_alone():

@@ -430,7 +430,9 @@ def test_tests_from_one_number_to_another_have_the_current_of_their_line(tmp_pat
     assert [float(np.mean(record.current)) for record in result.records] == pytest.approx([0.0, 0.0, 0.9, 0.9])
 
 
-@pytest.mark.parametrize("heading", ["Fuses: ", "Fuses:\n", "Fuses\n\n", "Leakage before each test\n", "Supply limits. ", "Messbereich: "])
+@pytest.mark.parametrize(
+    "heading", ["Fuses: ", "Fuses:\n", "Fuses\n\n", "Leakage before each test\n", "Supply limits. ", "Messbereich: "]
+)
 def test_codes_below_a_heading_of_ratings_are_no_currents(heading, tmp_path):
     write(tmp_path, "time [s],stroke [mm],load [N]\n")
     codes = [f"{name} = {amperes} A" for name, amperes in CURRENTS.items()]

@@ -223,15 +223,27 @@ def split_name(header: str, unit: str = "") -> Header:
         tail = text[place.end() :]
         if place.start() and is_unit(tail) and not text[: place.start()].endswith(" of"):  # time of day
             return Header(text[: place.start()].strip(), tail)
-    head, _, letter = text.rpartition("_")
-    if letter in _SMALL and text.islower() and role_of(head) == _SMALL[letter]:
-        return Header(head, letter.upper())
     name, slash, tail = text.partition("/")
     if slash and name and is_unit(tail) and not is_unit(text):
         return Header(name.strip(), tail.strip())
     match = _BRACKETED.match(text)
     own = parse_unit(text) if len(text) > 3 and is_unit(text) else None  # Amps, Newtons
     return Header(match["name"].strip() or text if match else text, text if own and own.dimension in _BY_UNIT else "")
+
+
+def headers_of(names: Sequence[str], units: Sequence[str]) -> tuple[Header, ...]:
+    """Return the headers of a table's columns; a tail of one small letter is a unit where no other name has a like one.
+
+    Thus `current_a` is in A, but not beside `current_b`.
+    """
+    headers = [split_name(name, unit) for name, unit in zip(names, units, strict=True)]
+    heads = [name[:-2] for name in names if name[-2:-1] == "_"]
+    for i, header in enumerate(headers):
+        head, _, letter = header.name.rpartition("_")
+        small = not header.unit and letter in _SMALL and header.name.islower() and heads.count(head) == 1
+        if small and role_of(head) == _SMALL[letter]:
+            headers[i] = Header(head, letter.upper())
+    return tuple(headers)
 
 
 def words_of(name: str) -> list[str]:

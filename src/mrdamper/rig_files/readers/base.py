@@ -19,7 +19,7 @@ import numpy as np
 
 from mrdamper.data.arrays import Floats
 from mrdamper.errors import InputError, printable
-from mrdamper.rig_files.column_names import Header, split_name
+from mrdamper.rig_files.column_names import Header, headers_of
 from mrdamper.rig_files.conditions import LONGEST_LINE, Quantity, stated_quantities
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.record import Finding
@@ -136,7 +136,7 @@ class RawTable:
     @cached_property
     def headers(self) -> tuple[Header, ...]:
         """Header of every column."""
-        return tuple(split_name(name, unit) for name, unit in zip(self.names, self.units, strict=True))
+        return headers_of(self.names, self.units)
 
     @property
     def decimal(self) -> str | None:
