@@ -168,3 +168,21 @@ def test_counts_with_scale_offset_and_unit_are_converted_and_their_units_may_sta
     (record,) = import_files([tmp_path]).records
     np.testing.assert_allclose(record.force, force(0.5), atol=0.26)
     assert np.ptp(record.displacement) == pytest.approx(0.02, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("line", "currents"),
+    [
+        ("# 0.5 A;0.5 A;0.5 A;1 A;1 A;1 A", [0.5, 1.0]),
+        ("# 0.5 A;0.5 A;1 A;1 A;1 A;1 A", []),
+        ("# Ranges;2 A;5 A", []),
+        ("# maximum currents today;2 A;5 A", []),
+    ],
+)
+def test_titles_over_every_column_agree_within_a_test_and_are_no_ranges(tmp_path, line, currents):
+    names = ";".join(f"time{i} [s];stroke{i} [mm];load{i} [N]" for i in (1, 2))
+    (tmp_path / "a.csv").write_text(f"{line}\n{names}\n" + rows(T, X, force(0.5), T, 1.1 * X, force(1.0)))
+    result = import_files([tmp_path / "a.csv"])
+    assert [float(np.mean(record.current)) for record in result.records] == currents
+    assert [record.id for record in result.records] == [f"a_{current:g}_A" for current in currents]
+    assert {refusal.error.code for refusal in result.refusals} <= {"E_CURRENT_MISSING"}

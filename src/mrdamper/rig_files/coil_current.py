@@ -62,7 +62,8 @@ def current_of(
             )  # fmt: skip
         statements = [] if current is None else [Statement(current, "name by the profile's pattern")]
     elif not statements and channel is None:
-        statements = _set_points(table, rows) or stated_in_titles(table.remarks) or _folders(table, path)
+        lines = [line for line in table.remarks if line not in table.titles]
+        statements = _set_points(table, rows) or stated_in_titles(lines) or _folders(table, path)
     stated = _agreed(statements, where)
     mean = None if channel is None or stated is None else contradicted(channel, stated.amperes)
     if stated is not None and mean is not None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from mrdamper.data.arrays import odd_steps
 from mrdamper.errors import InputError
-from mrdamper.rig_files.column_names import DIMENSION, is_unit, role_of, split_name, words, words_of
+from mrdamper.rig_files.column_names import DIMENSION, RATING, is_unit, role_of, split_name, words, words_of
 from mrdamper.rig_files.columns import column_called
 from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.profile import FileForm
@@ -166,13 +166,14 @@ def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
     own_time = all("time" in roles for roles in members.values())
     titles = {key: (table.over[min(roles.values())] if table.over else "") or key for key, roles in members.items()}
     if not table.over:  # titles whose cells stand askew, by a comma in them: as many as groups, in their order
-        askew = [[cell for cell in _title_cells(line) if currents_in(cell)] for line in table.remarks]
-        over = next((cells for cells in askew if len(cells) == len(table.names)), None)  # or one over every column
-        own = next((cells for cells in askew if len(cells) == len(members)), ())
-        titles |= dict(zip(sorted(members, key=lambda key: min(members[key].values())), own, strict=False))
-        titles |= (
-            {key: " ".join(sorted({over[i] for i in roles.values()})) for key, roles in members.items()} if over else {}
-        )
+        lines = [_title_cells(line) for line in table.remarks if not RATING.search(line)]
+        askew = [[cell.strip(' "#%/') for cell in cells if currents_in(cell)] for cells in lines]
+        own = next((cells for cells in askew if len(cells) in (len(members), len(table.names))), [])
+        places = sorted(members, key=lambda key: min(members[key].values()))
+        if len(own) == len(table.names):  # one over every column
+            distinct = [{own[i] for i in members[key].values()} for key in places]
+            own = [cell for (cell,) in distinct] if all(len(cells) == 1 for cells in distinct) else []
+        titles |= dict(zip(places, own, strict=False))
     stated = all(currents_in(title) for title in titles.values())
     if not (own_time or stated or form.blocks == "split"):
         return []
