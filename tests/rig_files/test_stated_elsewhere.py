@@ -625,3 +625,16 @@ def test_voltage_and_resistance_of_the_coil_are_offered_as_its_current_and_not_t
     profile = parse_profile(f"{line[1]}\n{line[2]}".replace(", unit", "\nunit").replace(" and scale", "\nscale"))
     (record,) = import_files([tmp_path], profile).records
     assert np.mean(record.current) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["# bridge: 350 ohm\n# coil voltage: 5 V\n", "# shunt: 0.1 ohm\n# coil voltage: 5 V\n",
+     "# coil resistance: 5 ohm\n# shunt voltage: 0.05 V\n", "# coil resistance: 0.1 ohm\n# coil voltage: 5 V\n"],
+)  # fmt: skip
+def test_no_current_is_offered_by_another_resistance_or_voltage_or_above_those_of_dampers(tmp_path, head):
+    rows = "".join(f"{t:.5f},{x:.5f},{f:.5f}\n" for t, x, f in zip(T, X, force(0.5), strict=True))
+    (tmp_path / "a.csv").write_text(f"{head}time [s],stroke [mm],force [N]\n{rows}")
+    (refusal,) = import_files([tmp_path]).refusals
+    assert refusal.error.code == "E_CURRENT_MISSING"
+    assert "ohm" not in str(refusal.error)

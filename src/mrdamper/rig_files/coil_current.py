@@ -14,7 +14,7 @@ import numpy as np
 from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import chunks
 from mrdamper.errors import ColumnError, InputError, printable
-from mrdamper.rig_files.column_names import RATING, names_condition, split_name
+from mrdamper.rig_files.column_names import COIL, RATING, holds, names_condition, split_name
 from mrdamper.rig_files.conditions import (
     LARGEST_STATED,
     Statement,
@@ -33,6 +33,7 @@ _FEWEST_SLOW = 5  # samples of a current that is recorded more rarely than the f
 NO_CHANNEL = "the current channel is "  # beginning of the finding on a column of no current
 CURRENT_TOO = "and give the current of each test"  # within the remedy of a refusal of units
 _CALIBRATION = 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
+_OF_ANOTHER = re.compile("(?i)shunt|bridge|brücke")  # resistance or voltage
 _FOLDERS = 3  # above a file, whose names may state its current
 
 
@@ -157,9 +158,11 @@ def current_by_resistance(table: RawTable, record_id: str) -> tuple[Finding, ...
     The inductance of the coil delays the current behind a voltage that varies.
     """
     stated = [q for q in table.quantities if q.value > 0 or q.unit.dimension == "voltage"]
-    ohms = {q.value for q in stated if q.unit.dimension == "resistance" and not RATING.search(q.key)}
+    stated = [q for q in stated if not RATING.search(q.key) and not _OF_ANOTHER.search(q.key)]
+    coils = [q for q in stated if holds(q.key, COIL) or q.key.strip() == "R"]
+    ohms = {q.value for q in coils if q.unit.dimension == "resistance"}
     volts = {q.value for q in stated if q.unit.dimension == "voltage" and names_condition(q.key, "voltage")}
-    columns = table.columns("voltage", "voltage")
+    columns = [i for i in table.columns("voltage", "voltage") if not _OF_ANOTHER.search(table.headers[i].name)]
     if len(ohms) != 1 or len(columns or volts) != 1:
         return ()
     (ohm,) = ohms
@@ -169,6 +172,8 @@ def current_by_resistance(table: RawTable, record_id: str) -> tuple[Finding, ...
         line = f'[channels.current] column = {json.dumps(name, ensure_ascii=False)}, unit = "A" and scale = {scale:.6g}'
     else:
         (volt,) = volts
+        if abs(volt / ohm) > LARGEST_STATED:
+            return ()
         what = f"the coil's {volt:g} V over {ohm:g} ohm = {volt / ohm:.4g} A"
         line = f"[current] values = {{{json.dumps(record_id)} = {volt / ohm:.4g}}}"
     text = f"{NO_CHANNEL}missing: {what} is the current only at constant voltage: if so, set {line} in a profile"
