@@ -651,10 +651,15 @@ def test_the_footer_of_a_parquet_file_states_units_and_current(tmp_path, metadat
     np.testing.assert_allclose(record.force, force(0.5), rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("over", [(0, 1, 2), (1, 2)], ids=["every column", "dependent columns"])
 @pytest.mark.parametrize("separator", ["\t", ";"])
-def test_a_decimal_comma_in_a_row_over_every_column_parts_no_cells(tmp_path, separator):
+def test_a_decimal_comma_in_a_row_over_columns_parts_no_cells(tmp_path, separator, over):
     levels = ("0 A", "0,5 A", "1,5 A")
-    head = [["Zeit", "Weg", "Kraft"] * 3, ["s", "mm", "N"] * 3, [f"I = {level}" for level in levels for _ in range(3)]]
+    head = [
+        ["Zeit", "Weg", "Kraft"] * 3,
+        ["s", "mm", "N"] * 3,
+        [f"I = {level}" * (i in over) for level in levels for i in range(3)],
+    ]
     columns = [column for amperes in (0.0, 0.5, 1.5) for column in (T, X, force(amperes))]
     text = "".join(separator.join(cells) + "\n" for cells in head) + rows(*columns, separator=separator).replace(
         ".", ","

@@ -166,14 +166,16 @@ def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
     own_time = all("time" in roles for roles in members.values())
     titles = {key: (table.over[min(roles.values())] if table.over else "") or key for key, roles in members.items()}
     if not table.over:  # titles whose cells stand askew, by a comma in them: as many as groups, in their order
-        lines = [_title_cells(line) for line in table.remarks if not RATING.search(line)]
-        askew = [[cell.strip(' "#%/') for cell in cells if currents_in(cell)] for cells in lines]
-        own = next((cells for cells in askew if len(cells) in (len(members), len(table.names))), [])
         places = sorted(members, key=lambda key: min(members[key].values()))
-        if len(own) == len(table.names):  # one over every column
-            distinct = [{own[i] for i in members[key].values()} for key in places]
-            own = [cell for (cell,) in distinct] if all(len(cells) == 1 for cells in distinct) else []
-        titles |= dict(zip(places, own, strict=False))
+        for line in table.remarks:
+            cells = [cell.strip(' "#%/') for cell in _title_cells(line)]
+            own = [cell for cell in cells if currents_in(cell)]
+            if len(own) > len(members) and len(cells) == len(table.names):  # over several columns of each group, alike
+                distinct = [{cells[i] for i in members[key].values() if currents_in(cells[i])} for key in places]
+                own = [next(iter(cells)) for cells in distinct if len(cells) == 1]
+            if len(own) == len(members) and not RATING.search(line):
+                titles |= dict(zip(places, own, strict=True))
+                break
     stated = all(currents_in(title) for title in titles.values())
     if not (own_time or stated or form.blocks == "split"):
         return []
