@@ -17,7 +17,7 @@ from mrdamper import Condition, run_study
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.physics.motion import sine
 from mrdamper.physics.simulation import simulate
-from mrdamper.rig_files.quality import quality_table
+from mrdamper.rig_files.quality.table import quality_table
 from mrdamper.rig_files.rig_import import import_files, to_dataset
 
 

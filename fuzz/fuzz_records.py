@@ -30,7 +30,8 @@ from mrdamper import load_dataset
 from mrdamper.errors import InputError, QualityError
 from mrdamper.physics.motion.harmonics import fundamental_frequency
 from mrdamper.physics.motion.measured import smooth
-from mrdamper.rig_files.quality import View, check_record, record_of
+from mrdamper.rig_files.quality import View, check_record
+from mrdamper.rig_files.quality.table import record_of
 from mrdamper.rig_files.record import Record
 
 LARGE, MODERATE = 0.10, 0.05  # effects from which on faults are counted

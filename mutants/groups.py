@@ -90,10 +90,7 @@ GROUPS = (
         "paper.paper_method identification.harmonic_balance",
         "identification/test_harmonic_balance.py paper/test_functions.py",
     ),
-    _group(
-        "rig_files.quality.loop",
-        "rig_files/test_loop_check.py rig_files/test_silent_faults.py rig_files/test_quality.py",
-    ),
+    _group("rig_files.quality.loop", "rig_files/test_loop_check.py rig_files/test_silent_faults.py"),
 )
 
 # A fault that every valid trial detects: the sign in the root mean square error.

@@ -13,7 +13,7 @@ from mrdamper.cli import application
 from mrdamper.data import Dataset
 from mrdamper.report.plots.quality import LoopPanel, quality_figure
 from mrdamper.rig_files.dataset_folder import save_dataset
-from mrdamper.rig_files.quality import to_run
+from mrdamper.rig_files.quality.table import to_run
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from mrdamper import register
 from mrdamper.discovery import _registries
 from mrdamper.errors import InputError
 from mrdamper.rig_files.profile import Channel, FileForm, Profile
-from mrdamper.rig_files.readers.delimited import ColumnList
+from mrdamper.rig_files.readers.laboratories import ColumnList
 from mrdamper.rig_files.rig_import import import_files, read_run, read_runs
 
 

@@ -38,7 +38,7 @@ def test_a_current_in_a_name_is_compared_by_magnitude(tmp_path, name, current, a
 
 def test_a_current_of_either_sign_is_reported_by_magnitude_and_validates_at_either(tmp_path):
     from mrdamper.data import Dataset
-    from mrdamper.rig_files.quality import quality_table, row, to_run
+    from mrdamper.rig_files.quality.table import quality_table, row, to_run
     from mrdamper.study.split import hold_out
 
     heads = ("time [s]", "displacement [mm]", "force [N]", "current [A]")

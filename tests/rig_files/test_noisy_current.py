@@ -12,8 +12,8 @@ from mrdamper import identify
 from mrdamper.data import Run
 from mrdamper.errors import RunError
 from mrdamper.physics.motion import measured_motion
-from mrdamper.rig_files.quality import to_run
 from mrdamper.rig_files.quality.sentinel import COARSEST, code_in
+from mrdamper.rig_files.quality.table import to_run
 
 COUNT = 300  # `benchmarks/import_detection.py` takes more
 

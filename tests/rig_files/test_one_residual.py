@@ -12,11 +12,11 @@ from mrdamper.errors import QualityError
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.physics.motion import sine
 from mrdamper.physics.simulation import simulate
-from mrdamper.rig_files.quality import check_run, record_of
 from mrdamper.rig_files.quality.cycles import POINTS, damping, elastic_plastic, steady_cycles
 from mrdamper.rig_files.quality.disturbance import noise_by_octave
 from mrdamper.rig_files.quality.lag import force_lag
 from mrdamper.rig_files.quality.motion import agrees_with_its_name
+from mrdamper.rig_files.quality.table import check_run, record_of
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Record
 

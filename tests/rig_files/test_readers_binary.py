@@ -33,7 +33,7 @@ from mrdamper.rig_files import sandbox
 from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.readers import all_readers
-from mrdamper.rig_files.readers.hdf5_matlab import Hdf5
+from mrdamper.rig_files.readers.hdf5 import Hdf5
 from mrdamper.rig_files.rig_import import read_run, read_runs
 
 CLEAN = text()

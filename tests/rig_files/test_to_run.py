@@ -11,7 +11,8 @@ from mrdamper.errors import ColumnError, ExcitationError, QualityError
 from mrdamper.identification import identify
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
-from mrdamper.rig_files.quality import check_record, quality_table, record_of, row, to_run, view
+from mrdamper.rig_files.quality import check_record, view
+from mrdamper.rig_files.quality.table import quality_table, record_of, row, to_run
 
 
 @pytest.fixture

@@ -10,7 +10,8 @@ import numpy as np
 
 from mrdamper.errors import QualityError
 from mrdamper.physics.motion import analyse_motion
-from mrdamper.rig_files.quality import check_record, record_of, to_run
+from mrdamper.rig_files.quality import check_record
+from mrdamper.rig_files.quality.table import record_of, to_run
 from mrdamper.rig_files.record import Record
 from support.rig_records import clean_record, codes_of, with_channel
 

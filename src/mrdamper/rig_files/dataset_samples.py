@@ -21,7 +21,7 @@ from mrdamper.errors import ColumnError, DatasetError, RunError, UnitError
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import opened
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, RigFileError, Source
-from mrdamper.rig_files.readers.parquet_numpy import Parquet, words_in
+from mrdamper.rig_files.readers.parquet import Parquet, words_in
 from mrdamper.rig_files.sandbox import guarded_tables
 
 if TYPE_CHECKING:

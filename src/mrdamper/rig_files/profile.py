@@ -78,7 +78,7 @@ class Channel(Table):
     offset: float = Field(default=0.0, allow_inf_nan=False)
     """Not for zeroing: the zero of force and displacement is data."""
     delay_ms: float = Field(default=0.0, ge=-1e4, le=1e4, allow_inf_nan=False)
-    """How late the channel is, where it is known [ms]."""
+    """Delay of the channel behind the others, if known [ms]."""
     file: NAME | None = None
     """Files that hold it, {run} for what names the test, * for anything: `C1--*--{run}.csv`, `{run}/force.csv`."""
     integrate: bool = False

@@ -37,7 +37,8 @@ from mrdamper.rig_files.mapping.description import is_description, is_readme
 from mrdamper.rig_files.mapping.proposals import is_integrated
 from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.profile import Profile, profile_of
-from mrdamper.rig_files.quality import check_long_record, to_run
+from mrdamper.rig_files.quality import check_long_record
+from mrdamper.rig_files.quality.table import to_run
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
 from mrdamper.rig_files.record import Record, Refusal, unique_names
 from mrdamper.rig_files.sequences import follows, goes_on, tests_of_files

@@ -111,7 +111,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     remarks = {key: text for key, text in remarks.items() if text}
     findings += [Finding("W_CHOSEN", text) for text in measured_beside_others(table, profile, assigned)]
     left_out_channels = left_out(table, profile, assigned).items()
-    findings += [Finding("W_COLUMN", f"the {name} channel is left out: {why}") for name, why in left_out_channels]
+    findings += [Finding("W_COLUMN", f"the {name} channel is not used: {why}") for name, why in left_out_channels]
     records = []
     for number, stretch in enumerate(stretches, 1):
         part = {name: values[stretch] for name, values in channels.items()}
@@ -158,12 +158,12 @@ def _read(table: RawTable, assigned: dict[str, Assigned], profile: Profile):
             raw[assigned[name].column] = table.read([assigned[name].column]).values[assigned[name].column]
         except InputError as error:
             code = "W_ENCODING" if error.code == "E_ENCODING" else "W_COLUMN"
-            findings.append(Finding(code, f"the {name} channel is left out: {error.found}"))
+            findings.append(Finding(code, f"the {name} channel is not used: {error.found}"))
             del assigned[name]
     for name in [name for name in assigned if name in OPTIONAL]:
         if any(np.isfinite(piece).any() for _, piece in chunks(raw[assigned[name].column])):
             continue
-        findings.append(Finding("W_COLUMN", f"the {name} channel is left out: its column is empty"))
+        findings.append(Finding("W_COLUMN", f"the {name} channel is not used: its column is empty"))
         del assigned[name]
     return raw, findings, content.lines
 

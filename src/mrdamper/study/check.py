@@ -10,7 +10,7 @@ from typing import Any, Concatenate, Literal, ParamSpec
 from mrdamper import identification
 from mrdamper.data import Dataset, Displayable, Run
 from mrdamper.errors import InputError, is_a, validate_arguments
-from mrdamper.rig_files.quality import check_run, with_findings
+from mrdamper.rig_files.quality.table import check_run, with_findings
 from mrdamper.study.contradictions import ContradictionError, find_contradictions
 from mrdamper.study.usable_runs import accepted_runs
 

@@ -11,7 +11,7 @@ from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import refuse_unusable
 from mrdamper.physics.motion import analyse_motion, equivalent_sine
-from mrdamper.rig_files.quality import check_run, with_findings
+from mrdamper.rig_files.quality.table import check_run, with_findings
 from mrdamper.study.contradictions import Contradiction, find_contradictions
 
 _MIN_SAMPLES_PER_CYCLE = 8  # below, velocity and loop are not determined

@@ -16,7 +16,7 @@ from mrdamper.data.encoding import finite
 from mrdamper.errors import InputError
 from mrdamper.identification.loop_analysis import LoopAnalysis, analyse_loop
 from mrdamper.physics.motion import equivalent_sine
-from mrdamper.rig_files.quality import Quality, quality_table, record_of
+from mrdamper.rig_files.quality.table import Quality, quality_table, record_of
 from mrdamper.study.usable_runs import usable_sines
 
 MM = 1e3

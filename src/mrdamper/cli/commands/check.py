@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mrdamper.cli.output import Rows
-    from mrdamper.rig_files.quality import Quality
+    from mrdamper.rig_files.quality.table import Quality
 
 _HEADINGS = {
     "run_id": "run",
@@ -51,7 +51,7 @@ def check(
     """
     from mrdamper.data.atomic import require_writable
     from mrdamper.rig_files.dataset_folder import load_dataset
-    from mrdamper.rig_files.quality import quality_table, record_of, row
+    from mrdamper.rig_files.quality.table import quality_table, record_of, row
 
     if data is not None and data.suffix.lower() == ".fmu":
         if figure is not None:

@@ -6,7 +6,7 @@ motion does not explain lowers the damping by its share of the velocity's power,
 The colour of its noise shows a channel behind a low-pass filter. A filter rounds the corners of a loop as hysteresis
 does, so the loop itself does not show it. But noise that passed it falls octave by octave from the filter's corner
 on, and noise that did not is white. Noise is what a sample differs by from the one a period earlier, corners of the
-loop left out. The motion itself differs from cycle to cycle, and less the faster, so that a channel counts as
+loop omitted. The motion itself differs from cycle to cycle, and less the faster, so that a channel counts as
 filtered only if its noise falls below what a load cell or a converter has.
 """
 
@@ -42,7 +42,7 @@ _NO_NOISE = -160.0  # [dB] of the peak-to-peak value: less is rounding, of singl
 _CORNER = 20.0  # times the frequency of the motion; a filter above it is late by under 0.8 % of the period
 _LOWEST = 3.0  # times that frequency: below, cycles differ by more than noise
 _FEWEST = 2  # cycles
-_CORNER_BENDS, _BESIDE = 8.0, 3  # times the median third difference: a corner, and the samples left out beside it
+_CORNER_BENDS, _BESIDE = 8.0, 3  # times the median third difference: a corner, and the samples omitted beside it
 _UNEVEN = 0.4  # of a step that a stamp may be off, as rounded ones are
 _TINY = 1e-30  # of the peak-to-peak value squared
 _COLOURED = ("W_LAG", "W_CLIPPED", "W_FROZEN", "W_DRIFT", "W_DISTURBED", "W_HELD", "W_UNSTEADY", "W_REPEATABILITY")

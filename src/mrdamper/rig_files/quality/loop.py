@@ -9,7 +9,7 @@ import numpy as np
 from mrdamper.data import Floats, once_per_run
 from mrdamper.errors import QualityError
 from mrdamper.identification.loop_analysis import damping_share as share_of_damping
-from mrdamper.rig_files.quality.cycles import POINTS, Cycles, Folded, every_cycle, percent, steady_cycles
+from mrdamper.rig_files.quality.cycles import POINTS, Folded, every_cycle, steady_cycles
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, held_in, steady_window
 from mrdamper.rig_files.quality.view import MOST_SAMPLES, View, runs_of, sample_noise
 from mrdamper.rig_files.record import SIGNED, Finding, SteadyPart
@@ -31,15 +31,6 @@ _NO_ENERGY = 0.002  # share of the force that opposes the velocity: a spring's
 _STILL, _GOES_ON = 0.01, 0.5  # of the steady stroke and of the steady force, peak to peak
 _FEWEST_AT_REST = 5  # samples
 _UNLIKE = 0.25  # scatter from cycle to cycle over the peak-to-peak force; beyond, it is no answer to the motion
-# Changes over the record up to which a channel is steady. Bundled rigs reach 0.041 in gain, 0.023 in
-# offset and 0.009 of the period in timing; clean synthetic records less.
-GAIN = 0.05  # of the force
-OFFSET = 0.04  # of its peak-to-peak value
-LATE = 0.012  # of the period
-STROKE = 0.06  # of the amplitude: a step that the force does not follow
-_EVEN_STROKES = 0.02  # strokes before and after a step differ by at most so much
-_FOLLOWS = 0.1  # of such a step, by which the force follows
-_FEWEST_CYCLES = 3  # cycles
 
 
 def dissipates(view: View) -> None:
@@ -287,102 +278,3 @@ def _force_rests_with_the_motion(view: View) -> None:
         if still and float(np.ptp(run.force[rest])) > _GOES_ON * swing:
             problem = f"the force goes on from {time[rest.start]:.4g} s on while the displacement rests"
             raise view.refused("E_UNRELATED", problem, "check the displacement channel there, or cut the record")
-
-
-def force_is_steady(view: View) -> Iterator[Finding]:
-    """Report a force whose gain, offset or timing changes over the cycles of one motion."""
-    cycles = steady_cycles(view)
-    if cycles is None or len(cycles.starts) < _FEWEST_CYCLES:
-        return
-    force, motion = cycles.force, cycles.displacement
-    gain = _largest(np.log(np.maximum(1 + force.gain, 1e-3)) - _followed(cycles))
-    offset = _largest(force.offset) / force.span
-    late = _largest(force.late - motion.late)
-    if abs(gain) > GAIN:
-        yield Finding(
-            "W_UNSTEADY",
-            f"the force changes by {100 * np.expm1(gain):+.3g} % over the record at one motion: damping and force are "
-            f"uncertain by {percent(abs(gain) / 2)}; warm the damper up, or check the amplifier and the current",
-        )
-    if abs(offset) > OFFSET:
-        yield Finding(
-            "W_UNSTEADY",
-            f"the mean force changes by {force.span * offset:+.3g} N over the record, {percent(abs(offset))} of its "
-            "peak-to-peak value: check the load cell's zero and its temperature",
-        )
-    if abs(late) > LATE:
-        yield Finding(
-            "W_UNSTEADY",
-            f"the force shifts by {1e3 * late * cycles.period:+.3g} ms ({100 * late:+.2g} % of the period) against the "
-            "motion over the record: the channels have clocks of their own, or samples of one are lost",
-        )
-
-
-def stroke_steps(view: View) -> Iterator[Finding]:
-    """Report strokes of two lengths at one force: the displacement's gain was changed."""
-    strokes, force = view.strokes, view.run.force
-    if strokes.lengths.size < 5 or view.noticed("W_FROZEN", "W_CLIPPED"):
-        return
-    if np.ptp(strokes.lengths) < STROKE * float(np.min(strokes.lengths)):
-        return
-    forces = np.maximum.reduceat(force, strokes.reversals)[:-1] - np.minimum.reduceat(force, strokes.reversals)[:-1]
-    for at in range(2, strokes.lengths.size - 2):
-        before, after = strokes.lengths[:at], strokes.lengths[at + 1 :]
-        after = after[1:] if after.size > 2 else after  # a stroke or two hold the step
-        step = float(np.mean(after) / np.mean(before)) - 1
-        if max(np.ptp(before) / np.mean(before), np.ptp(after) / np.mean(after)) > _EVEN_STROKES or abs(step) < STROKE:
-            continue
-        change = float(np.mean(forces[-after.size :]) / np.mean(forces[:at])) - 1
-        if abs(change) < _FOLLOWS * abs(step):
-            yield Finding(
-                "W_UNSTEADY",
-                f"the stroke changes by {100 * step:+.3g} % at {view.run.time[strokes.reversals[at]]:.4g} s and the "
-                f"force does not: damping is uncertain by {percent(abs(step))}; check the displacement sensor",
-            )
-        return
-
-
-def motion_is_steady(view: View) -> Iterator[Finding]:
-    """Report an amplitude that changes while the force does not, and a motion that is not in time with its clock."""
-    cycles = steady_cycles(view)
-    if cycles is None or len(cycles.starts) < _FEWEST_CYCLES:
-        return
-    motion = cycles.displacement
-    stroke = _largest(motion.gain)
-    if abs(stroke) > STROKE and abs(_largest(cycles.force.gain)) < 0.2 * abs(stroke) and not view.noticed("W_DRIFT"):
-        yield Finding(
-            "W_UNSTEADY",
-            f"the amplitude changes by {100 * stroke:+.3g} % over the record and the force does not: damping is "
-            f"uncertain by {percent(abs(stroke) / 2)}; check the displacement sensor",
-        )
-    jump = _step(motion.late)
-    if abs(jump) > LATE:
-        yield Finding(
-            "W_UNSTEADY",
-            f"the motion shifts by {1e3 * jump * cycles.period:+.3g} ms ({100 * jump:+.2g} % of the period) against "
-            "its clock within the record: samples are lost, or the clock does not run evenly",
-        )
-
-
-def _followed(cycles: Cycles) -> Floats:
-    """(K,) change of the force's logarithm that the change of the amplitude explains: at most in proportion."""
-    stroke, gain = cycles.displacement.gain, cycles.force.gain
-    size = float(stroke @ stroke)
-    share = float(np.clip(stroke @ gain / size, 0.0, 1.0)) if size > 1e-6 * stroke.size else 0.0
-    return share * stroke
-
-
-def _largest(values: Floats) -> float:
-    """Change over the record: of a line through the cycles, or of a step between two of them, whichever is more."""
-    count = np.arange(values.size) - 0.5 * (values.size - 1)
-    line = float(count @ values / (count @ count)) * (values.size - 1)
-    return max(line, _step(values), key=abs)
-
-
-def _step(values: Floats) -> float:
-    """Largest step: the mean of the cycles after it less that of the cycles before, two or more of each."""
-    least = 2 if values.size > 3 else 1
-    at = np.arange(least, values.size - least + 1)
-    total = np.concatenate([[0.0], np.cumsum(values)])
-    steps = (total[-1] - total[at]) / (values.size - at) - total[at] / at
-    return float(max(steps, key=abs, default=0.0))

@@ -265,7 +265,7 @@ def missing(view: View) -> Iterator[Finding]:
             if share > _IN_TURN and longest < absent.size / 10:
                 remedy = "export the channels with one clock: each has rows of its own"
             raise view.refused("E_MISSING", f"{text}, {view.place(start)}", remedy)
-        yield Finding("W_MISSING", f"{text}; they are left out, not filled")
+        yield Finding("W_MISSING", f"{text}; they are omitted, not filled")
     longest, start = longest_run(~view.record.present)
     if longest > MOST_IN_A_ROW:
         problem = f"{longest} samples in a row of which one channel or another is missing, {view.place(start)}"

@@ -1,4 +1,4 @@
-"""Formats of rig files: modules of related formats, found by discovery."""
+"""Formats of rig files: one module a format, found by discovery."""
 
 from __future__ import annotations
 

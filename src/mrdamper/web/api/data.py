@@ -11,7 +11,7 @@ from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
 from mrdamper.errors import UnknownNameError
-from mrdamper.rig_files.quality import Quality
+from mrdamper.rig_files.quality.table import Quality
 from mrdamper.web.curves import measured_cycle, measured_window, raw_record
 from mrdamper.web.imported_data import bundled, bundled_dampers, read_upload
 from mrdamper.web.responses import frame

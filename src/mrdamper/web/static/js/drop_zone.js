@@ -1,4 +1,4 @@
-// Upload of files: dropped anywhere on the page or chosen, sent one by one, and read.
+// Upload of files: dropped anywhere on the page or chosen, sent in turn, and read.
 
 import { ApiError } from "./api.js";
 import { errorMessage, h, note, render } from "./dom.js";

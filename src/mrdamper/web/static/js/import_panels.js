@@ -26,7 +26,7 @@ export function profilePanel(overview, zone) {
         button(verdicts.length === 1 ? "Read again" : "Read all again", false))));
 }
 
-/** Refused files one by one; the same finding in several files once, with their names folded. */
+/** List the refused files; a finding that several files have is stated once, with their names folded. */
 function byFinding(verdicts) {
   const groups = new Map();
   for (const verdict of verdicts) {

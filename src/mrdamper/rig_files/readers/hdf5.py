@@ -1,9 +1,9 @@
-"""HDF5, classic netCDF, MATLAB files, which are HDF5 inside from 7.3 on, and Octave's texts, as nested structures."""
+"""HDF5, and MATLAB files from 7.3 on, which are HDF5 inside: groups as nested structures."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,19 +15,14 @@ from mrdamper.rig_files.readers.arrays import (
     Stored,
     check_unpacked,
     counts_of,
-    damaged,
     load,
-    refuse_twice,
     refusing_damage,
     text_of,
     texts_in,
     unpacked,
-    value_of,
-    whole,
 )
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import DEEPEST, MOST_TEXT, nested_tables
-from mrdamper.rig_files.text.stream import decoded
 
 # pyright: reportMissingImports=false, reportAttributeAccessIssue=false
 
@@ -36,9 +31,6 @@ _MOST_OBJECTS = 10_000
 MOST_STRUCTS = 2000  # of an array of structs
 _UNIT_NAMES = ("units", "unit", "Units", "Unit", "UNIT", "UNITS", "unit_string")
 _OF_MATLAB = ("#refs#", "#subsystem#")  # what lies there is met where its reference stands
-_NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
-_OBJECTS = ("object", "opaque", "function", "unknown")
-_MARKS = (b"# Created by Octave", b"# name: ")
 
 
 class Hdf5(Reader):
@@ -213,163 +205,3 @@ def _attributes(item: Any) -> dict[str, Any]:
         elif words := texts_in(value):
             says[name] = words
     return says
-
-
-class NetCdf(Reader):
-    """Variables as columns."""
-
-    name = "netcdf"
-    title = "classic netCDF"
-    suffixes = (".nc", ".cdf")
-    library = "scipy.io"
-    marks = (b"CDF\x01", b"CDF\x02")
-
-    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """Return one table, or one a test where rows are tests: single numbers and attributes stand beside it."""
-        with refusing_damage(source, self.title):
-            from scipy.io import netcdf_file
-
-            source.file.seek(0)
-            file = netcdf_file(source.file, mmap=False)
-            arrays = {name: variable for name, variable in file.variables.items() if np.prod(variable.shape) > 1}
-            check_unpacked(source, 8 * sum(int(np.prod(variable.shape)) for variable in arrays.values()))
-            single = {
-                f"{name} [{_unit_of(variable)}]": float(np.reshape(variable[...], -1)[0])
-                for name, variable in file.variables.items()
-                if variable.shape == () and np.asarray(variable.data).dtype.kind in "iuf"
-            }
-            says = {name: text_of(value) for name, value in file._attributes.items()}
-            columns = {
-                name: unpacked(v._attributes, np.array(v[:]).astype(v[:].dtype.newbyteorder("=")))
-                for name, v in arrays.items()
-            }
-        units = {name: _unit_of(variable) for name, variable in arrays.items()}
-        return nested_tables(source, {**says, **columns, **single, "units": units}, self.title)
-
-
-def _unit_of(variable: Any) -> str:
-    """Return the unit of a variable: that of a time is followed by the date it counts from."""
-    return text_of(getattr(variable, "units", "")).partition(" since ")[0]
-
-
-class Matlab(Reader):
-    """Variables and fields of structs as columns; 7.3 is handed on."""
-
-    name = "mat"
-    title = "MATLAB file"
-    suffixes = (".mat", ".mat73")
-    library = "scipy.io"
-
-    def recognises(self, source: Source) -> bool:
-        """By the text at the start; version 4 has none, so the name must say it."""
-        head = source.head(520)
-        return (
-            head.startswith(b"MATLAB") or head[512:] == HDF5_MARK or (source.suffix == ".mat" and _is_version_4(head))
-        )
-
-    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """Return the variables as one table, and one more a struct."""
-        if source.head(520)[512:] == HDF5_MARK:
-            return hdf5_tables(source, self.title)
-        with refusing_damage(source, self.title):
-            from scipy.io import loadmat, whosmat
-
-            source.file.seek(0)
-            variables = whosmat(source.file)
-            names = [name for name, _, _ in variables]
-            refuse_twice(source, names)
-            check_unpacked(source, 8 * sum(int(np.prod(shape, dtype=object)) for _, shape, _ in variables))
-            wanted = [name for name, _, kind in variables if kind in (*_NUMERIC, "struct", "char", "cell")]
-            source.file.seek(0)
-            values = loadmat(
-                source.file, variable_names=wanted, struct_as_record=True, verify_compressed_data_integrity=True
-            )
-        others = [name for name, _, kind in variables if kind in _OBJECTS]
-        tree = {name: _tree(values[name]) for name in wanted if name in values}
-        objects = {name: np.empty(2, dtype=object) for name in others}  # refused if one is asked for
-        return nested_tables(source, {**tree, **objects}, self.title)
-
-
-def _tree(value: Any, depth: int = 0) -> Any:
-    """Return a variable as a nested structure: mappings for structs, lists for arrays of them and for cells."""
-    array = np.asarray(value)
-    kind, size = array.dtype.kind, array.size
-    if array.dtype.names:
-        names = array.dtype.names
-        items = array.reshape(-1)[:MOST_STRUCTS] if depth < DEEPEST else []
-        members = [{name: _tree(item[name], depth + 1) for name in names} for item in items]
-        return members[0] if len(members) == 1 else members
-    if words := texts_in(array):
-        return words
-    if kind == "O" and size and depth < DEEPEST:
-        cells = [np.asarray(cell) for cell in array.flat]
-        if size == 1:
-            return _tree(cells[0], depth + 1)
-        if all(cell.dtype.names for cell in cells) or all(cell.dtype.kind in "iuf" and cell.size > 1 for cell in cells):
-            trees = [_tree(cell, depth + 1) for cell in cells[:MOST_STRUCTS]]
-            if cells[0].dtype.names or array.ndim != 2 or min(array.shape) < 2 or size > MOST_STRUCTS:
-                return trees
-            return [trees[i : i + array.shape[1]] for i in range(0, size, array.shape[1])]
-        return array
-    return value_of(array) if size else ""
-
-
-def _is_version_4(head: bytes) -> bool:
-    if len(head) < 21:
-        return False
-    for order in "<>":
-        kind, rows, columns, imaginary, length = np.frombuffer(head[:20], dtype=f"{order}i4").tolist()
-        if 0 <= kind < 5000 and rows > 0 and columns > 0 and imaginary in (0, 1) and 1 < length < 200:
-            return head[20 : 20 + length][:-1].isascii()
-    return False
-
-
-class Octave(Reader):
-    """Numbers, matrices and texts by their names; a field of a struct is a variable."""
-
-    name = "octave"
-    title = "Octave text"
-    suffixes = (".octave",)
-    binary = False
-
-    def recognises(self, source: Source) -> bool:
-        """By its first line, whatever it is called."""
-        return source.head(32).startswith(_MARKS)
-
-    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """Return the variables as one table."""
-        variables: dict[str, Any] = {}
-        for name, kind, lines in _variables(decoded(whole(source, self.title)).splitlines()):
-            try:
-                value = _value(kind, lines)
-            except ValueError as error:
-                raise damaged(source, self.title, str(error)) from error
-            variables |= {} if value is None else {name: value}
-        return nested_tables(source, variables, self.title)
-
-
-def _variables(lines: list[str]) -> Iterator[tuple[str, str, list[str]]]:
-    """Yield the name of each variable, its type, and the lines that follow."""
-    starts = [i for i, line in enumerate(lines) if line.startswith("# name: ")]
-    for start, stop in zip(starts, [*starts[1:], len(lines)], strict=True):
-        if start + 1 < stop and lines[start + 1].startswith("# type: "):
-            yield lines[start][8:].strip(), lines[start + 1][8:].strip(), lines[start + 2 : stop]
-
-
-def _value(kind: str, lines: list[str]) -> Any:
-    """Return a number, a matrix or a text; None of another type. ValueError if it is not whole."""
-    stated = {
-        key[1:].strip(): number for key, colon, number in (x.partition(":") for x in lines if x[:1] == "#") if colon
-    }
-    body = [line for line in lines if line.strip() and not line.startswith("#")]
-    if kind == "scalar":
-        return float(body[0]) if body else None
-    if kind in ("string", "sq_string"):
-        return body[0].strip() if body else ""
-    if kind != "matrix" or not {"rows", "columns"} <= set(stated):
-        return None
-    shape = int(stated["rows"]), int(stated["columns"])
-    values = np.array([float(cell) for line in body for cell in line.split()])
-    if values.size != shape[0] * shape[1]:
-        raise ValueError(f"end of file after {values.size} of {shape[0] * shape[1]} values")
-    return values.reshape(shape)

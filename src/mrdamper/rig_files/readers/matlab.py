@@ -1,0 +1,94 @@
+"""MATLAB files: up to 7.2 by SciPy; those from 7.3 on are HDF5 inside."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mrdamper.rig_files.profile import FileForm
+from mrdamper.rig_files.readers.arrays import (
+    check_unpacked,
+    refuse_twice,
+    refusing_damage,
+    texts_in,
+    value_of,
+)
+from mrdamper.rig_files.readers.base import RawTable, Reader, Source
+from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, MOST_STRUCTS, hdf5_tables
+from mrdamper.rig_files.readers.nested import DEEPEST, nested_tables
+
+_NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
+_OBJECTS = ("object", "opaque", "function", "unknown")
+
+
+class Matlab(Reader):
+    """Variables and fields of structs as columns; 7.3 is handed on."""
+
+    name = "mat"
+    title = "MATLAB file"
+    suffixes = (".mat", ".mat73")
+    library = "scipy.io"
+
+    def recognises(self, source: Source) -> bool:
+        """By the text at the start; version 4 has none, so the name must say it."""
+        head = source.head(520)
+        return (
+            head.startswith(b"MATLAB") or head[512:] == HDF5_MARK or (source.suffix == ".mat" and _is_version_4(head))
+        )
+
+    def tables(self, source: Source, form: FileForm) -> list[RawTable]:
+        """Return the variables as one table, and one more a struct."""
+        if source.head(520)[512:] == HDF5_MARK:
+            return hdf5_tables(source, self.title)
+        with refusing_damage(source, self.title):
+            from scipy.io import loadmat, whosmat
+
+            source.file.seek(0)
+            variables = whosmat(source.file)
+            names = [name for name, _, _ in variables]
+            refuse_twice(source, names)
+            check_unpacked(source, 8 * sum(int(np.prod(shape, dtype=object)) for _, shape, _ in variables))
+            wanted = [name for name, _, kind in variables if kind in (*_NUMERIC, "struct", "char", "cell")]
+            source.file.seek(0)
+            values = loadmat(
+                source.file, variable_names=wanted, struct_as_record=True, verify_compressed_data_integrity=True
+            )
+        others = [name for name, _, kind in variables if kind in _OBJECTS]
+        tree = {name: _tree(values[name]) for name in wanted if name in values}
+        objects = {name: np.empty(2, dtype=object) for name in others}  # refused if one is asked for
+        return nested_tables(source, {**tree, **objects}, self.title)
+
+
+def _tree(value: Any, depth: int = 0) -> Any:
+    """Return a variable as a nested structure: mappings for structs, lists for arrays of them and for cells."""
+    array = np.asarray(value)
+    kind, size = array.dtype.kind, array.size
+    if array.dtype.names:
+        names = array.dtype.names
+        items = array.reshape(-1)[:MOST_STRUCTS] if depth < DEEPEST else []
+        members = [{name: _tree(item[name], depth + 1) for name in names} for item in items]
+        return members[0] if len(members) == 1 else members
+    if words := texts_in(array):
+        return words
+    if kind == "O" and size and depth < DEEPEST:
+        cells = [np.asarray(cell) for cell in array.flat]
+        if size == 1:
+            return _tree(cells[0], depth + 1)
+        if all(cell.dtype.names for cell in cells) or all(cell.dtype.kind in "iuf" and cell.size > 1 for cell in cells):
+            trees = [_tree(cell, depth + 1) for cell in cells[:MOST_STRUCTS]]
+            if cells[0].dtype.names or array.ndim != 2 or min(array.shape) < 2 or size > MOST_STRUCTS:
+                return trees
+            return [trees[i : i + array.shape[1]] for i in range(0, size, array.shape[1])]
+        return array
+    return value_of(array) if size else ""
+
+
+def _is_version_4(head: bytes) -> bool:
+    if len(head) < 21:
+        return False
+    for order in "<>":
+        kind, rows, columns, imaginary, length = np.frombuffer(head[:20], dtype=f"{order}i4").tolist()
+        if 0 <= kind < 5000 and rows > 0 and columns > 0 and imaginary in (0, 1) and 1 < length < 200:
+            return head[20 : 20 + length][:-1].isascii()
+    return False
