@@ -666,3 +666,17 @@ def test_a_decimal_comma_in_a_row_over_columns_parts_no_cells(tmp_path, separato
     )
     (tmp_path / "session.txt").write_text(text)
     assert currents(import_files([tmp_path]).records) == [0.0, 0.5, 1.5]
+
+
+@pytest.mark.parametrize("began", [False, True], ids=["a time", "a time and when each test began"])
+@pytest.mark.parametrize("across", [False, True], ids=["tests in rows", "tests in columns"])
+def test_samples_of_tests_stand_in_rows_or_columns_of_matrices(tmp_path, across, began):
+    levels = [0.0, 0.5, 1.5]
+    matrices = {"disp_mm": np.array([X] * 3), "force_N": np.array([force(amperes) for amperes in levels])}
+    channels = {name: of.T if across else of for name, of in matrices.items()} | {"time_s": T, "current_A": levels}
+    channels |= {"start_time_s": [0.0, 60.0, 120.0]} if began else {}
+    pytest.importorskip("scipy.io").savemat(tmp_path / "tests.mat", channels)
+    records = import_files([tmp_path]).records
+    assert currents(records) == levels
+    for record, amperes in zip(records, levels, strict=True):
+        np.testing.assert_allclose(record.force, force(amperes), rtol=0, atol=1e-9)

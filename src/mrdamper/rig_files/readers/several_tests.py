@@ -117,10 +117,10 @@ def _tests_of_arrays(tree: Mapping[str, Any]) -> Mapping[str, Any]:
     shapes = {key: tuple(n for n in array.shape if n != 1) for key, array in numeric.items()}
     shape = max(shapes.values(), key=len, default=())
     times = {own for key, own in shapes.items() if split_name(key).role == "time"}
-    times -= {shape[:1]} if len(shape) == 2 else set()  # when each test began
+    times -= {(min(shape),)} if len(shape) == 2 and len(times) > 1 else set()  # when each test began
     if len(shape) < 2 or len({*shape}) < len(shape) or len(times) != 1 or not {*max(times)} <= {*shape}:
         return tree
-    samples = shape[-1] if len(shape) == 2 else max(max(times))
+    samples = max(max(times))
     outer = [n for n in shape if n != samples]
     tables = [key for key, own in shapes.items() if len(own) > 1 and samples in own and {*own} <= {*shape}]
     clocks = {key: numeric[key] for key, own in shapes.items() if own == (samples,)}
