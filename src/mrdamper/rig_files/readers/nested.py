@@ -90,7 +90,7 @@ def document_tables(source: Source, tree: Mapping[str, Any], title: str) -> list
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
     inner: list[tuple[str, Any]] = []
-    tree = _with_functions({key: _object_in(value) for key, value in tree.items()})
+    tree = _with_functions({key: object_in(value) for key, value in tree.items()})
     texts = [value for value in tree.values() if isinstance(value, _JsonText)]
     lists = {f"{key} ": own.pop(key) for own in texts for key in list(own) if isinstance(own[key], list)}
     tree |= {key: own for key, own in lists.items() if all(isinstance(item, str) for item in own)}
@@ -98,13 +98,7 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     channels = {key: value for key, value in tree.items() if isinstance(value, Mapping) and {*value} == keys}
     arrays = {**tree, **{key: value["data"] for key, value in channels.items()}}
     tree = _with_own_axes(with_tests_apart(tree, arrays))
-    stated = next((v for key, v in tree.items() if key.casefold() in KEYS["unit"] and isinstance(v, Mapping)), {})
-    pairs = next((v for k, v in tree.items() if k.casefold() in KEYS["unit"] and isinstance(v, list)), [])
-    pairs = pairs if all(isinstance(item, str) for item in pairs) and {*pairs[::2]} <= {*tree} else []
-    stated = stated or dict(zip(pairs[::2], pairs[1::2], strict=False))
-    own = {key[:-5]: unit for key, unit in tree.items() if key.casefold().endswith("_unit")} | dict(stated)
-    own |= {key: channel["unit"] for key, channel in channels.items()}
-    node.units = {**node.units, **{key: u for key, u in own.items() if isinstance(u, str) and is_unit(u)}}
+    node.units = {**node.units, **_stated_units(tree), **_units({key: of["unit"] for key, of in channels.items()})}
     sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= FEWEST_SAMPLES}
     texts = [_LISTING.sub("", value) for value in tree.values() if isinstance(value, str)]
     node.lists += [re.split(r"\s*[,;]\s*", text.strip()) for text in texts if len(text) < MOST_TEXT]
@@ -140,6 +134,29 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
         )
 
 
+def stated_beside(stated: Mapping[str, Any]) -> tuple[dict[str, str], dict[str, float], tuple[str, ...]]:
+    """Return the units of columns, the numbers and the lines that keys of a file state, some by objects of JSON."""
+    node, units = _Node(""), _stated_units(stated)
+    for key, value in ((key, object_in(value)) for key, value in stated.items()):
+        own = value if isinstance(value, Mapping) else {key: value}
+        units |= _stated_units(own) | _stated_units({key: value})
+        _tell(node, own, key if own is value else "")
+    return units, node.constants, tuple(node.remarks)
+
+
+def _stated_units(tree: Mapping[str, Any]) -> dict[str, str]:
+    """Return the units of columns that a node states: in a mapping, a list of names and units, or a key a column."""
+    stated = next((v for key, v in tree.items() if key.casefold() in KEYS["unit"] and isinstance(v, Mapping)), {})
+    pairs = next((v for k, v in tree.items() if k.casefold() in KEYS["unit"] and isinstance(v, list)), [])
+    pairs = pairs if all(isinstance(item, str) for item in pairs) and {*pairs[::2]} <= {*tree} else []
+    stated = stated or dict(zip(pairs[::2], pairs[1::2], strict=False))
+    return _units({key[:-5]: unit for key, unit in tree.items() if key.casefold().endswith("_unit")} | dict(stated))
+
+
+def _units(stated: Mapping[str, Any]) -> dict[str, str]:
+    return {key: unit for key, unit in stated.items() if isinstance(unit, str) and is_unit(unit)}
+
+
 def _matrices_of_tests(tree: Mapping[str, Any]) -> list[str]:
     """Return the keys of matrices that hold a test each: several, each a column a channel, whose names tell none."""
     shapes = {k: sorted(v.shape) for k, v in tree.items() if isinstance(v, Array) and v.ndim == 2}
@@ -154,7 +171,7 @@ class _JsonText(dict[str, Any]):
     """An object that a text beside arrays holds: its lists of words are those of the arrays."""
 
 
-def _object_in(value: Any) -> Any:
+def object_in(value: Any) -> Any:
     """Return the object that a text holds as JSON; any other value as it is."""
     if not isinstance(value, str) or not value.lstrip().startswith("{"):
         return value

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import io
-import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
@@ -12,7 +11,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from mrdamper.data.strict_text import parse_json
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import (
     array_table,
@@ -20,8 +18,8 @@ from mrdamper.rig_files.readers.arrays import (
     damaged,
     refusing_damage,
 )
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source, Words
-from mrdamper.rig_files.readers.nested import MOST_TEXT, nested_tables
+from mrdamper.rig_files.readers.base import RawTable, Reader, Source, Words
+from mrdamper.rig_files.readers.nested import nested_tables, object_in, stated_beside
 from mrdamper.rig_files.readers.several_tests import MOST_ITEMS
 
 if TYPE_CHECKING:
@@ -43,7 +41,7 @@ class _Frame(Reader):
         """Start the threads and their allocators."""
         _warm()
 
-    def metadata(self, content: bytes) -> Mapping[str, str]:
+    def metadata(self, content: bytes) -> Mapping[str, Any]:
         """Return what the file states beside its columns."""
         return {}
 
@@ -60,7 +58,7 @@ class _Frame(Reader):
         with refusing_damage(source, self.title):
             schema = schema_of(self.given(content))
             rows = scan(self.given(content)).select(pl.len()).collect().item() if len(schema) else 0
-            stated, units = _stated(self.metadata(content), schema)
+            units, constants, remarks = stated_beside(self.metadata(content))
 
         def loaded(name: str) -> pl.Series:
             return read(self.given(content), columns=[name], **self.options)[name]
@@ -73,7 +71,7 @@ class _Frame(Reader):
                 tests = [{k: _of_test(frame[k][i]) for k in schema} for i in range(rows)]
             return nested_tables(source, {"": tests}, self.title)
         table = _table(source, self.title, schema, rows, loaded, units)
-        return [replace(table, remarks=stated)]
+        return [replace(table, constants=constants, remarks=remarks)]
 
 
 class Parquet(_Frame):
@@ -85,11 +83,15 @@ class Parquet(_Frame):
     marks, least, given = (b"PAR1",), 12, bytes
     options = MappingProxyType({"use_statistics": False})
 
-    def metadata(self, content: bytes) -> Mapping[str, str]:
-        """Return the keys and values of the file's footer."""
+    def metadata(self, content: bytes) -> Mapping[str, Any]:
+        """Return the keys of the footer that a user wrote, among them the attributes of a table of pandas."""
         import polars as pl
 
-        return pl.read_parquet_metadata(content)
+        stated = pl.read_parquet_metadata(content)
+        table = object_in(stated.get("pandas"))
+        attributes = table.get("attributes") if isinstance(table, Mapping) else None
+        own = {key: text for key, text in stated.items() if key not in ("ARROW:schema", "pandas", "r")}
+        return own | ({"attributes": attributes} if isinstance(attributes, Mapping) else {})
 
 
 class Feather(_Frame):
@@ -99,34 +101,6 @@ class Feather(_Frame):
     title = "Feather"
     suffixes = (".feather", ".arrow", ".ipc")
     marks, least, given = (b"ARROW1",), 24, io.BytesIO
-
-
-def _stated(metadata: Mapping[str, str], names: Iterable[str]) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Return lines of keys and values, also of objects of JSON, and the units that they give columns."""
-    stated, units = list[str](), dict[str, str]()
-
-    def take(key: str, value: Any) -> None:
-        column = re.sub("[._ ]units?$", "", key)
-        if isinstance(value, dict) and "unit" in key.casefold() and {*value} <= {*names}:
-            units.update({name: unit for name, unit in value.items() if isinstance(unit, str)})
-        elif isinstance(value, dict):
-            for name, item in value.items():
-                take(name, item)
-        elif column != key and column in names and isinstance(value, str):
-            units[column] = value
-        elif isinstance(value, str | float | int):
-            stated.append(f"{key}: {value}"[:MOST_TEXT])
-
-    for key, text in metadata.items():
-        try:
-            value = parse_json(text) if text.startswith("{") else text
-        except ValueError:
-            continue  # no object of JSON, though it begins as one
-        if key == "pandas" and isinstance(value, dict):  # its own description of the columns, and the user's attributes
-            value = value.get("attributes")
-        if key not in ("ARROW:schema", "r"):  # of Arrow and of R, for themselves
-            take(key, value)
-    return tuple(stated[:MOST_COLUMNS]), units
 
 
 @cache
@@ -145,7 +119,7 @@ def _table(
     schema: Mapping[str, pl.DataType],
     rows: int,
     loaded: Callable[[str], pl.Series],
-    stated: Mapping[str, str],
+    units: Mapping[str, str],
 ) -> RawTable:
     """Return a table of typed columns, each loaded by its name when it is asked for."""
     import polars as pl
@@ -168,8 +142,8 @@ def _table(
             return words_in(loaded(names[column]))
 
     clocks = pl.Datetime, pl.Duration
-    units = ["s" if isinstance(kind, clocks) else stated.get(name, "") for name, kind in schema.items()]
-    return replace(array_table(source, names, units, column_of, title), words=words)
+    given = ["s" if isinstance(kind, clocks) else units.get(name, "") for name, kind in schema.items()]
+    return replace(array_table(source, names, given, column_of, title), words=words)
 
 
 def words_in(values: pl.Series) -> Words:
