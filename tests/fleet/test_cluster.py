@@ -27,12 +27,20 @@ class Cluster:
         ]  # fmt: skip
         host = "127.0.0.1" if tls is None else "tls://127.0.0.1"
         self.scheduler = self._start("scheduler", "--host", host, "--port", "0", *options)
+        # The file is created before it is filled, so workers start when it can be read.
+        self.address = self._announced()
         nanny = ["--nworkers", "1", "--nthreads", "1", "--local-directory", str(folder)]
         self.workers = [self._start("worker", *nanny, *options) for _ in range(2)]
+
+    def _announced(self):
         until = time.monotonic() + 60
-        while not self.file.exists() and time.monotonic() < until:
+        while not (self.file.exists() and self.file.read_text().rstrip().endswith("}")):
+            if time.monotonic() > until:
+                self.scheduler.kill()
+                self.scheduler.wait()
+                raise TimeoutError("the scheduler has not written its address within 60 s")
             time.sleep(0.05)
-        self.address = json.loads(self.file.read_text())["address"]
+        return json.loads(self.file.read_text())["address"]
 
     def _start(self, what, *options):
         command = [sys.executable, "-m", f"distributed.cli.dask_{what}", "--no-dashboard"]
