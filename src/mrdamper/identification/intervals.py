@@ -11,7 +11,6 @@ import numpy as np
 from mrdamper.data.arrays import Floats
 from mrdamper.data.conditions import Condition
 from mrdamper.errors import InputError
-from mrdamper.physics.hysteresis.master_curve import gauss_legendre
 
 _STRONG_CORRELATION = 0.98  # correlation from which two parameters are strongly correlated
 _SAME_MOTION = 0.03  # frequencies and amplitudes this close are one
@@ -19,7 +18,7 @@ _MAX_RATIO = 1e3  # of an interval's half width to its estimate, or of its ends:
 NOT_IDENTIFIABLE = "not identifiable from these runs"
 _SERIES_DEGREES_OF_FREEDOM = 1000.0  # degrees of freedom from which the series of the quantile is exact to rounding
 _MOST_DEGREES_OF_FREEDOM, _HALVINGS = 1e6, 30  # that a quantile is looked for in, and steps of bisection
-_NODES = 80  # of Gauss and Legendre's rule
+_RULE_END, _NODES = 3.2, 81  # of the tanh-sinh rule: the weights beyond its end are below rounding
 _MAX_NEWTON_STEPS = 200  # of Newton's method
 _EXPONENT = 1e6  # from this number on, numbers are written with an exponent
 _LOPSIDED = 0.1  # share of an interval's half width: less asymmetric, it is written with ±
@@ -49,7 +48,7 @@ def _student(level: float, dof: float) -> float:
         first, second = (z**3 + z) / 4, (5 * z**5 + 16 * z**3 + 3 * z) / 96
         return z + first / dof + second / dof**2 + (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384 / dof**3
     whole = 0.5 * math.sqrt(math.pi) * math.exp(math.lgamma(dof / 2) - math.lgamma((dof + 1) / 2))
-    nodes, weights = gauss_legendre(_NODES)
+    nodes, weights = _tanh_sinh()
     angle = 0.0
     for _ in range(_MAX_NEWTON_STEPS):  # the integral is concave: Newton's method converges from below
         reached = angle / 2 * float(weights @ np.cos(angle / 2 * (nodes + 1)) ** (dof - 1))
@@ -58,6 +57,14 @@ def _student(level: float, dof: float) -> float:
         if step <= 1e-15:
             break
     return math.sqrt(dof) * math.tan(angle)
+
+
+@lru_cache
+def _tanh_sinh() -> tuple[Floats, Floats]:
+    """Return nodes and weights on −1...1; those of Gauss and Legendre would load NumPy's polynomials."""
+    at = np.linspace(-_RULE_END, _RULE_END, _NODES)
+    inner = np.pi / 2 * np.sinh(at)
+    return np.tanh(inner), (at[1] - at[0]) * np.pi / 2 * np.cosh(at) / np.cosh(inner) ** 2
 
 
 def dof_of_quantile(quantile: float, level: float) -> float:
