@@ -7,11 +7,11 @@ matters: a check relies on those before it. A further module of this folder with
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 
 import numpy as np
 
@@ -105,20 +105,17 @@ def check_long_record(record: Record) -> Record:
     """
     if record.time.size <= 2 * PART:
         return check_record(record)
-    finding_of: dict[str, tuple[Finding, int]] = {}
+    found: dict[str, list[Finding]] = {}
     segments: list[tuple[int, int]] = []
-    moving, resting, count = 0, None, 0
+    resting: list[InputError | None] = []
     for start, (noticed, inside, error) in _checked_parts(record):
-        count += 1
-        moving += error is None
-        resting = resting or error
+        resting.append(error)
         for finding in noticed:
-            first, times = finding_of.get(finding.code, (finding, 0))
-            finding_of[finding.code] = first, times + 1
+            found.setdefault(finding.code, []).append(finding)
         _extend(segments, inside, start)
-    if resting is not None and not moving:
-        raise resting
-    findings = (*record.findings, *_summed(finding_of, count, moving), *motion.change_of(record, None))
+    if all(resting) and resting[0] is not None:
+        raise resting[0]
+    findings = (*record.findings, *_summed(found, len(resting), resting.count(None)), *motion.change_of(record, None))
     return replace(record, findings=findings, segments=tuple(segments))
 
 
@@ -135,15 +132,10 @@ def _checked_parts(record: Record) -> Iterator[tuple[int, _Verdict]]:
                 raise
             return (), ((0, part.time.size),), error
 
-    waiting: deque[tuple[int, Future[_Verdict]]] = deque()
+    parts = _parts(record)
     with ThreadPoolExecutor(_AT_ONCE) as pool:
-        for start, part in _parts(record):
-            waiting.append((start, pool.submit(one, part)))
-            if len(waiting) >= _AT_ONCE:
-                at, done = waiting.popleft()
-                yield at, done.result()
-        for at, done in waiting:
-            yield at, done.result()
+        while together := list(islice(parts, _AT_ONCE)):
+            yield from zip((at for at, _ in together), pool.map(one, (part for _, part in together)), strict=True)
 
 
 def _parts(record: Record) -> Iterator[tuple[int, Record]]:
@@ -164,9 +156,10 @@ def _extend(segments: list[tuple[int, int]], new: tuple[tuple[int, int], ...], s
             segments.append((start + a, start + b))
 
 
-def _summed(findings: dict[str, tuple[Finding, int]], parts: int, moving: int) -> Iterator[Finding]:
-    for finding, times in findings.values():
-        if finding.code in _ONCE or (finding.code in _OF_THE_WHOLE and times < moving):
-            continue
-        more = f" (first of {times} parts out of {parts})" if times > 1 else ""
-        yield Finding(finding.code, finding.text + more)
+def _summed(found: dict[str, list[Finding]], parts: int, moving: int) -> Iterator[Finding]:
+    """Yield the first finding of every code, with the number of parts that have it, some only if all parts have it."""
+    for code, findings in found.items():
+        times = len(findings)
+        if code not in _ONCE and (code not in _OF_THE_WHOLE or times >= moving):
+            more = f" (first of {times} parts out of {parts})" if times > 1 else ""
+            yield Finding(code, findings[0].text + more)

@@ -61,9 +61,8 @@ class Folded(NamedTuple):
 @once_per_run
 def every_cycle(view: View) -> Folded | None:
     """Fold the cycles of a record without a gap, up to its end; None under one cycle of a periodic motion."""
-    motion = view.motion
-    count = 0 if motion is None else int(motion.cycles + 0.02)
-    if motion is None or count < 1:
+    motion, count = view.motion, view.whole_cycles
+    if motion is None or not count:
         return None
     run, period = view.steady, 1 / motion.condition.frequency_Hz
     grid = float(run.time[-1]) - count * period + period * np.arange(count * POINTS) / POINTS
@@ -86,8 +85,7 @@ def steady_cycles(view: View) -> Cycles | None:
     if folded is None:
         return None
     count = round((float(view.steady.time[-1]) - folded.starts[0]) / folded.period)
-    assert view.motion is not None
-    first = int(count > 2 and count == int(view.motion.cycles + 0.02))
+    first = int(count > 2 and count == view.whole_cycles)
     if view.record.window is not None:
         before = folded.starts < view.record.window[0] - _EARLY * folded.period
         first = max(first, int(np.count_nonzero(before)))

@@ -64,8 +64,7 @@ def motion_is_one(view: View) -> Iterator[Finding]:
     motion = view.motion
     if motion is None or view.noticed("W_DRIFT", "W_CLIPPED", "W_FROZEN") or len(view.segments) > 1:
         return
-    start, stop = view.strokes.steady or (0, view.run.time.size)
-    velocity = view.moving.velocity[start:stop]
+    velocity = view.moving.velocity[view.steady_samples]
     rest = velocity - _periodic_velocity(view, velocity)
     inside = slice(velocity.size // 40, -(velocity.size // 40) or None)  # fits at the ends are wider of the mark
     size = float(np.var(velocity[inside]))

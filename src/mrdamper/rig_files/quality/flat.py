@@ -25,7 +25,7 @@ import numpy as np
 
 from mrdamper.data import Floats, once_per_run
 from mrdamper.rig_files.quality.cycles import NOTED, POINTS, CycleChannel, percent, steady_cycles
-from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
+from mrdamper.rig_files.quality.view import View, runs_of, sample_noise, shown
 from mrdamper.rig_files.record import Finding
 
 FLAT = 5  # samples in a row that make a flat top or a frozen stretch
@@ -37,7 +37,6 @@ _NEAR = 100  # samples on either side from which the noise is taken
 _ROUNDING = 1e-9  # of the channel's range: less is no noise
 _CHANCE = 1e-4  # that noise repeats itself as often anywhere in the record
 _MOST = 20_000  # stretches looked at
-_CHUNK = 1_000_000  # samples looked at together
 _OTHER = {"displacement": "force", "force": "displacement"}
 _DEPTH = 0.006  # of the peak-to-peak value; at four times this depth the width is measured again
 _DEEPEST = 0.02  # of it: deeper, where noise asks for that, the steep sides of hysteresis are no wider either
@@ -57,10 +56,10 @@ _GOES_ON = 0.04  # of the peak-to-peak force, while a displacement that is cut o
 
 def clipped(view: View) -> Iterator[Finding]:
     """Report displacement or force that reach the end of their range."""
-    for name, unit, scale in (("displacement", "mm", 1e3), ("force", "N", 1.0)):
+    for name in _OTHER:
         tops = flat_tops(view, name)
         if tops:
-            levels = " and ".join(f"{scale * level:.5g} {unit}" for level in tops)
+            levels = " and ".join(shown(name, level, ".5g") for level in tops)
             first = min(int(top[0, 0]) for top in tops.values())
             yield Finding(
                 "W_CLIPPED",
@@ -90,14 +89,10 @@ def flat_tops(view: View, name: str) -> dict[float, np.ndarray]:
     channel = _channels(view)[name]
     kinks = channel.smooth or _scatters(view)  # else plateaus may be the damper's own, or `flattened` finds corners
     tops = {}
-    if not len(channel.equal):
-        return tops
     for level in (channel.high, channel.low):
         at = channel.equal[(channel.values[channel.equal[:, 0]] == level) & ~channel.leaps(channel.equal)]
-        if len(at) and channel.piled_up(level):
-            at = at[channel.odd(at, kinks=kinks) | ((at[:, 0] > 0) & (at[:, 1] < channel.values.size))]
-        else:
-            at = at[channel.odd(at, kinks=kinks)]
+        inner = (at[:, 0] > 0) & (at[:, 1] < channel.values.size)
+        at = at[channel.odd(at, kinks=kinks) | (inner & channel.piled_up(level) if len(at) else inner)]
         if len(at):
             tops[level] = at
     return tops
@@ -114,8 +109,6 @@ def _scatters(view: View) -> bool:
 def frozen_stretches(view: View, name: str) -> np.ndarray:
     """Find stretches in which a channel repeats one sample inside its range while the other channel moves."""
     channel, other, time = _channels(view)[name], view.channels[_OTHER[name]], view.record.time
-    if not len(channel.equal):
-        return channel.equal
     at_end = np.isin(channel.values[channel.equal[:, 0]], (channel.low, channel.high))
     stretches = channel.equal[~at_end | channel.leaps(channel.equal)]
     bounds = stretches.reshape(-1)
@@ -236,23 +229,10 @@ class _Channel:
 
 
 def _equal_stretches(values: Floats) -> np.ndarray:
-    """Stretches of at least five equal samples, found a piece at a time to keep memory small."""
-    stretches: list[list[int]] = []
-    for start in range(0, values.size, _CHUNK):
-        equal = np.diff(values[start : start + _CHUNK + FLAT - 1]) == 0
-        size = equal.size - FLAT + 2
-        if size <= 0:
-            break
-        begins = np.all([equal[i : i + size] for i in range(FLAT - 1)], axis=0)  # a stretch begins or goes on here
-        for a, b in zip(*runs_of(begins), strict=True):
-            a, b = int(start + a), int(start + b + FLAT - 1)
-            if stretches and a <= stretches[-1][1] - FLAT + 1:
-                stretches[-1][1] = b
-            else:
-                stretches.append([a, b])
-        if len(stretches) > _MOST:
-            break
-    return np.array(stretches, dtype=int).reshape(-1, 2)
+    """(K, 2) stretches of at least five equal samples."""
+    starts, stops = runs_of(values[1:] == values[:-1])
+    stretches = np.column_stack([starts, stops + 1])
+    return stretches[stretches[:, 1] - starts >= FLAT][:_MOST]
 
 
 def _resolution(values: Floats) -> float:
@@ -289,13 +269,11 @@ def cut_off_before_noise(view: View) -> Iterator[Finding]:
     count = len(cycles.starts)
     ends = ends_of(force, count, view.force_noise)
     one_sided = any(top.wider > _ROUND for top in ends)
-    tops = [top for top in ends if _is_cut_off(top, speed, one_sided)]
-    yield from _finding("force", "N", 1.0, tops, force.span)
+    yield from _finding("force", force.span, [top for top in ends if _is_cut_off(top, speed, one_sided)])
     ends = ends_of(motion, count, sample_noise(view.steady.displacement))
-    one_sided = any(top.wider > _ROUND for top in ends)
-    limit = _WIDER_ONE_SIDED if one_sided else _WIDER
+    limit = _WIDER_ONE_SIDED if any(top.wider > _ROUND for top in ends) else _WIDER
     tops = [top for top in ends if top.wider < limit and _force_goes_on(top, force)]
-    yield from _finding("displacement", "mm", 1e3, tops, motion.span)
+    yield from _finding("displacement", motion.span, tops)
 
 
 def rests_at_its_ends(view: View) -> Iterator[Finding]:
@@ -327,10 +305,10 @@ def _rest(speed: Floats, force: CycleChannel, extreme: int) -> float:
     return (before + after) / POINTS - np.arcsin(_REST) / np.pi
 
 
-def _finding(name: str, unit: str, scale: float, tops: list[Top], span: float) -> Iterator[Finding]:
+def _finding(name: str, span: float, tops: list[Top]) -> Iterator[Finding]:
     tops = [top for top in tops if _WIDTH[0] < top.width < _WIDTH[1] and top.beyond > 0.5 * NOTED * span]
     if tops:
-        levels = " and ".join(f"{scale * top.level:.4g} {unit}" for top in tops)
+        levels = " and ".join(shown(name, top.level) for top in tops)
         beyond = max(top.beyond for top in tops)
         yield Finding(
             "W_CLIPPED",

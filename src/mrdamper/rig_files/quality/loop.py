@@ -9,9 +9,9 @@ import numpy as np
 from mrdamper.data import Floats, once_per_run
 from mrdamper.errors import QualityError
 from mrdamper.identification.loop_analysis import damping_share as share_of_damping
-from mrdamper.rig_files.quality.cycles import POINTS, Folded, every_cycle, steady_cycles
+from mrdamper.rig_files.quality.cycles import POINTS, every_cycle, steady_cycles
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, held_in, steady_window
-from mrdamper.rig_files.quality.view import MOST_SAMPLES, View, runs_of, sample_noise
+from mrdamper.rig_files.quality.view import MOST_SAMPLES, View, longest_run, sample_noise
 from mrdamper.rig_files.record import SIGNED, Finding, SteadyPart
 
 _SLOW, _FAST = 0.1, 0.5  # of the largest velocity: samples near the reversals, and away from them
@@ -103,7 +103,8 @@ def keeps_its_sign(view: View) -> None:
     if cycles is None or len(cycles.starts) < 2 or cycles.period < _FEWEST * view.step or view.noticed("W_FROZEN"):
         return  # a force that stands still opposes its own other half cycle
     starts, force = cycles.starts, cycles.force
-    shares = _shares(cycles)
+    ends = np.searchsorted(view.run.time, [starts, starts + cycles.period])
+    shares = np.array([_damping_share(view, start, stop) for start, stop in ends.T])
     flipped = np.flatnonzero(shares < -_CLEARLY)
     if flipped.size and float(np.max(shares)) > _CLEARLY:
         raise _flip(view, float(starts[flipped[0]]), flipped.size, len(starts))
@@ -114,21 +115,9 @@ def keeps_its_sign(view: View) -> None:
     counts = np.abs(usual) > 0.3 * np.max(np.abs(usual))
     against = counts & (np.abs(force + usual) < 0.3 * np.abs(force - usual))
     for start, row in zip(starts, against, strict=True):
-        begins, ends = runs_of(row)
-        if begins.size and np.max(ends - begins) > _LONG * POINTS:
-            at = start + begins[np.argmax(ends - begins)] * cycles.period / POINTS
-            raise _flip(view, at, 1, len(starts))
-
-
-def _shares(cycles: Folded) -> Floats:
-    """(K,) parts of the force's standard deviation that oppose the velocity, of K cycles.
-
-    Those of c in F = f0 + r t + k x + c v by least squares.
-    """
-    x = np.mean(cycles.displacement, axis=0)
-    velocity = np.roll(x, -1) - np.roll(x, 1)
-    table = np.column_stack([velocity / np.std(velocity), x / np.std(x), np.ones(POINTS), np.linspace(-1, 1, POINTS)])
-    return np.linalg.lstsq(table, cycles.force.T, rcond=None)[0][0] / np.std(cycles.force, axis=1)
+        length, begin = longest_run(row)
+        if length > _LONG * POINTS:
+            raise _flip(view, start + begin * cycles.period / POINTS, 1, len(starts))
 
 
 def _keeps_its_scale(view: View, starts: Floats, folded: Floats) -> None:
@@ -164,7 +153,7 @@ def damping_share(view: View) -> float:
 
     Of a record in segments, which may be tests of their own, the least of all that hold a cycle.
     """
-    whole = _damping_share(view, *(view.strokes.steady or (0, view.run.time.size)))
+    whole = _damping_share(view, view.steady_samples.start, view.steady_samples.stop)
     segments = view.run.segments or ()
     if len(segments) < 2 or view.strokes.period is None:
         return whole
@@ -189,10 +178,7 @@ def _exchanged(view: View) -> bool:
 
 def repeats(view: View) -> Iterator[Finding]:
     """Report cycles of a record that differ from each other by more than noise."""
-    repeated = repeatability(view)
-    if repeated is None:
-        return
-    scatter, noise = repeated
+    scatter, noise = repeatability(view) or (0.0, 0.0)
     beyond = float(np.sqrt(max(scatter**2 - noise**2, 0.0)))
     if beyond > POOR_REPEATABILITY:
         yield Finding(
@@ -244,20 +230,15 @@ def force_follows(view: View) -> None:
         problem = "the force takes no energy out of the motion: that of a spring, or of no damper"
         raise view.refused("E_NO_ENERGY", problem, "check the load cell, and that the damper is mounted")
     _force_rests_with_the_motion(view)
-    repeated = repeatability(view)
-    if (
-        repeated is None
-        or repeated[0] < _UNLIKE
-        or view.noticed("W_FROZEN")
-        or held_in(view.record, steady_window(view))[1]
-    ):
+    scatter, _ = repeatability(view) or (0.0, 0.0)
+    if scatter < _UNLIKE or view.noticed("W_FROZEN") or held_in(view.record, steady_window(view))[1]:
         return
-    raise view.refused(
-        "E_UNRELATED",
-        f"the force differs from cycle to cycle by {100 * repeated[0]:.0f} % of its peak-to-peak value: it does not "
-        "follow the motion",
-        "check that force and displacement are of the same test, and that the load cell does not drift",
+    problem = (
+        f"the force differs from cycle to cycle by {100 * scatter:.0f} % of its peak-to-peak value: it does not "
+        "follow the motion"
     )
+    remedy = "check that force and displacement are of the same test, and that the load cell does not drift"
+    raise view.refused("E_UNRELATED", problem, remedy)
 
 
 def _force_rests_with_the_motion(view: View) -> None:
@@ -266,13 +247,11 @@ def _force_rests_with_the_motion(view: View) -> None:
     if steady is None or period is None or view.noticed("W_FROZEN"):
         return
     time, run = view.run.time, view.run
-    stroke, swing = (float(np.ptp(values[slice(*steady)])) for values in (run.displacement, run.force))
-    for start, stop in ((0, steady[0]), (steady[1], time.size)):
-        if stop - start < _FEWEST_AT_REST:
-            continue
-        # The force may relax for half a cycle after the motion has stopped.
-        rest = slice(int(np.searchsorted(time, time[start] + 0.5 * period)) if start else 0, stop)
-        if stop - rest.start < _FEWEST_AT_REST or time[stop - 1] - time[rest.start] < 0.4 * period:
+    stroke, swing = float(np.ptp(view.steady.displacement)), float(np.ptp(view.steady.force))
+    # The force may relax for half a cycle after the motion has stopped.
+    relaxed = int(np.searchsorted(time, time[steady[1] - 1] + 0.5 * period, "right"))
+    for rest in (slice(0, steady[0]), slice(relaxed, time.size)):
+        if rest.stop - rest.start < _FEWEST_AT_REST or time[rest.stop - 1] - time[rest.start] < 0.4 * period:
             continue
         still = float(np.ptp(run.displacement[rest])) < _STILL * stroke
         if still and float(np.ptp(run.force[rest])) > _GOES_ON * swing:

@@ -61,9 +61,8 @@ def steady_window(view: View) -> tuple[float, float] | None:
         return view.record.window
     if view.motion is None:
         return None
-    cycles = max(1, int(view.motion.cycles + 0.02))
     first, last = float(view.steady.time[0]), float(view.steady.time[-1])
-    return max(first, last - cycles / view.motion.condition.frequency_Hz), last
+    return max(first, last - max(1, view.whole_cycles) / view.motion.condition.frequency_Hz), last
 
 
 def enough_cycles(view: View) -> Iterator[Finding]:
@@ -113,15 +112,12 @@ def drift_of(view: View) -> tuple[float, float]:
     By robust lines through the strokes; of a record with few strokes only the mean, from the
     harmonic fit.
     """
-    start, stop = view.strokes.steady or (0, view.run.time.size)
-    reversals = view.strokes.reversals
-    chosen = reversals[(reversals >= start) & (reversals < stop)]
+    inside, reversals = view.steady_samples, view.strokes.reversals
+    chosen = reversals[(reversals >= inside.start) & (reversals < inside.stop)]
+    length = float(np.ptp(view.steady.time))
     if chosen.size < 4:
-        if view.motion is None or view.motion.cycles < _FEW:
-            return 0.0, 0.0
-        return view.motion.drift * float(np.ptp(view.steady.time)), 0.0
+        return (0.0 if view.motion is None or view.motion.cycles < _FEW else view.motion.drift * length), 0.0
     t, x = view.run.time[chosen], view.run.displacement[chosen]
-    length = float(view.run.time[stop - 1] - view.run.time[start])
     centre = (x[:-2] + 2 * x[1:-1] + x[2:]) / 4  # half way between a reversal and the mean of its neighbours
     size = np.abs(x[:-2] - 2 * x[1:-1] + x[2:]) / 4
     sound = view.without_leap(t[:-2], t[2:])  # a reversal may be lost in a gap

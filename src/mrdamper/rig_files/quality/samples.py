@@ -10,7 +10,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.data.arrays import odd_steps
 from mrdamper.rig_files.quality.cycles import REFUSED, percent, steady_cycles
-from mrdamper.rig_files.quality.view import View, runs_of, sample_noise
+from mrdamper.rig_files.quality.view import View, longest_run, runs_of, sample_noise
 from mrdamper.rig_files.record import COARSE_CLOCK, Finding
 
 _HELD = 3  # samples; held for as long all the time, a channel was recorded at a slower rate
@@ -126,8 +126,7 @@ def _crossed_in_motion(view: View, levels: Floats, least: float, cycles: int) ->
     force = view.steady.force
     changes = np.diff(force)
     steps = np.abs(changes)
-    start, stop = view.strokes.steady or (0, view.run.time.size)
-    velocity = view.moving.velocity[start:stop][1:]
+    velocity = view.moving.velocity[view.steady_samples][1:]
     around = np.max([np.roll(steps, shift) for shift in _AROUND], axis=0)
     at = np.flatnonzero((steps > _STANDS_OUT * around) & (steps > least))
     beside = velocity[np.clip(at[:, None] + np.arange(-4, 5), 0, velocity.size - 1)]  # a reversal is not near
@@ -185,22 +184,21 @@ def copied(view: View) -> Iterator[Finding]:
     if view.force_noise < _NOISY * float(np.ptp(run.force)):
         return
     period = 1 / motion.condition.frequency_Hz / view.step
+    lags = {int(n * period) + shift for n in range(1, int(motion.cycles) + 1) for shift in range(-2, 4)}
     alike: dict[int, np.ndarray] = {}
-    for cycles in range(1, int(motion.cycles) + 1):
-        for lag in range(int(cycles * period) - 2, int(cycles * period) + 4):
-            if not 2 < lag < run.time.size - _COPY:
-                continue
-            equal = run.force[lag:] == run.force[:-lag]
-            if np.count_nonzero(equal) >= _COPY:
-                equal &= run.displacement[lag:] == run.displacement[:-lag]
-                alike |= {lag: equal} if np.count_nonzero(equal) >= _COPY else {}
+    for lag in sorted(lag for lag in lags if 2 < lag < run.time.size - _COPY):
+        equal = run.force[lag:] == run.force[:-lag]
+        if np.count_nonzero(equal) >= _COPY:
+            equal &= run.displacement[lag:] == run.displacement[:-lag]
+            alike |= {lag: equal} if np.count_nonzero(equal) >= _COPY else {}
     if not alike:
         return
     chance = max(float(np.mean(np.diff(run.force) == 0)), 0.5 * _level_share(run.force))
     least = _COPY if chance < 0.3 else int(np.ceil(-16 / np.log(min(chance, 0.97))))
     copies = np.zeros(run.time.size, dtype=bool)
     for lag, equal in alike.items():
-        copies[lag:] |= _long_runs(equal, least)
+        for start, stop in zip(*runs_of(equal), strict=True):
+            copies[lag + start : lag + stop] |= stop - start >= least
     share = float(np.mean(copies))
     if not share:
         return
@@ -218,15 +216,6 @@ def _level_share(values: Floats) -> float:
     noise = sample_noise(values)
     gaps = np.diff(np.unique(values[:2000]))
     return float(min(1.0, np.median(gaps) / (2 * np.sqrt(np.pi) * noise))) if gaps.size and noise else 0.0
-
-
-def _long_runs(mask: np.ndarray, least: int) -> np.ndarray:
-    """Keep the runs of true values of at least a length."""
-    starts, stops = runs_of(mask)
-    kept = np.zeros(mask.size, dtype=bool)
-    for start, stop in zip(starts, stops, strict=True):
-        kept[start:stop] = stop - start >= least
-    return kept
 
 
 def long_enough(view: View) -> None:
@@ -271,15 +260,6 @@ def missing(view: View) -> Iterator[Finding]:
         problem = f"{longest} samples in a row of which one channel or another is missing, {view.place(start)}"
         remedy = f"record again, or cut the record; up to {MOST_IN_A_ROW} in a row are taken"
         raise view.refused("E_MISSING", problem, remedy)
-
-
-def longest_run(mask: np.ndarray) -> tuple[int, int]:
-    """Length and start of the longest run of true values."""
-    starts, stops = runs_of(mask)
-    if not starts.size:
-        return 0, 0
-    longest = int(np.argmax(stops - starts))
-    return int(stops[longest] - starts[longest]), int(starts[longest])
 
 
 def order_of_time(view: View) -> None:

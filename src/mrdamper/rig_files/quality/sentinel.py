@@ -9,7 +9,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.rig_files.column_names import SI
 from mrdamper.rig_files.quality.samples import USED
-from mrdamper.rig_files.quality.view import View, runs_of
+from mrdamper.rig_files.quality.view import View, runs_of, shown
 from mrdamper.rig_files.record import Finding
 
 # Leading digits of the codes in use: 999, 9999, ..., 999.25, 9.91e37, and the ends of 16-, 24- and 32-bit counts.
@@ -24,7 +24,7 @@ COARSEST = {"current": 0.1, "voltage": 1.0}  # leaps below are a supply's own [A
 _CLOCK = 3.0  # times the mean step: larger ones are none of an even clock
 _RARE = 0.1  # of the samples: a value held more often is the channel's own
 _FEW = 50  # distinct values of a channel that does not vary
-_CHUNK = 1_000_000  # samples looked at together
+_CHUNK, _MOST_LEAPS = 1_000_000, 10_000  # samples, and leaps to and fro, that are looked at
 _SOME = 10_000  # samples that show a channel's levels
 _BLOCK = 2**16  # samples compared at a time: a cache holds them
 _LONG = 20  # a value held longer than this on average is a plateau, no code
@@ -109,11 +109,7 @@ def _drops_to(values: Floats, value: float, step: float) -> bool:
 
     A force that changes its sign leaps past zero, and a V turns at its tip: neither counts.
     """
-    starts, stops = runs_of(values == value)
-    inner = (starts > 1) & (stops < values.size - 1)
-    starts, stops = starts[inner], stops[inner]
-    if not starts.size or np.mean(stops - starts) > _LONG:
-        return False
+    starts, stops = _visits(values, value, beside=2)
     before, after = values[starts - 1] - value, values[stops] - value
     slope = np.maximum(np.abs(values[starts - 2] - values[starts - 1]), np.abs(values[stops + 1] - values[stops]))
     away = np.where(before * after > 0, np.minimum(np.abs(before), np.abs(after)) - _SLOPES * slope, 0.0)
@@ -121,9 +117,27 @@ def _drops_to(values: Floats, value: float, step: float) -> bool:
         return False
     steps = np.diff(values)
     turns = np.where(steps[1:] * steps[:-1] < 0, np.minimum(np.abs(steps[1:]), np.abs(steps[:-1])), 0.0)
-    same = values == value
-    own = max(step, float(np.nanmax(turns, where=~(same[:-2] | same[1:-1] | same[2:]), initial=0.0)))
+    own = max(step, float(np.nanmax(turns, where=~_near(values, value), initial=0.0)))
     return bool(np.count_nonzero(away > _TURNS * own) >= 2 or np.any(away > _ONE_TURN * own))
+
+
+def _visits(values: Floats, value: float, beside: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Return starts and stops of the runs of a value with so many samples on either side; none where these are plateaus."""
+    starts, stops = runs_of(values == value)
+    inner = (starts >= beside) & (stops <= values.size - beside)
+    inner &= bool(np.sum((stops - starts)[inner]) <= _LONG * np.count_nonzero(inner))
+    return starts[inner], stops[inner]
+
+
+def _near(values: Floats, value: float) -> np.ndarray:
+    """(N−2,) mask of the inner samples that are a value or stand beside it."""
+    same = values == value
+    return same[:-2] | same[1:-1] | same[2:]
+
+
+def _bends(values: Floats) -> Floats:
+    """(N−2,) distances of the inner samples from the middle of their neighbours."""
+    return np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
 
 
 def _too_often(values: Floats, value: float) -> bool:
@@ -137,10 +151,8 @@ def _too_often(values: Floats, value: float) -> bool:
     often, around = _levels_around(values[np.isfinite(values)], value)
     if often < _OFTEN + _MORE * (int(np.max(around, initial=1)) - 1):
         return False
-    steps = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
-    same = values[1:-1] == value
-    own = steps[~same & np.isfinite(steps)]
-    apart = steps[same & np.isfinite(steps)]
+    bends, same = _bends(values), values[1:-1] == value
+    own, apart = (bends[mask & np.isfinite(bends)] for mask in (~same, same))
     return bool(apart.size and np.mean(apart > 3 * np.quantile(own, 0.9)) > _APART)
 
 
@@ -175,12 +187,8 @@ def _levels_around(values: Floats, value: float) -> tuple[int, np.ndarray]:
 
 def _repeated_leaps(values: Floats, leap: float) -> list[tuple[float, int]]:
     """Values, each with its count, at which a channel leaps there and back: twice, or once to a code in use."""
-    leaps = []
-    for start in range(0, values.size, _CHUNK):
-        piece = values[start : start + _CHUNK + 2]
-        steps = np.abs(np.diff(piece)) > leap
-        leaps.append(piece[1:-1][steps[1:] & steps[:-1]][: _CHUNK // 100])
-    sizes, counts = np.unique(np.concatenate(leaps), return_counts=True)
+    steps = np.abs(np.diff(values)) > leap
+    sizes, counts = np.unique(values[1:-1][steps[1:] & steps[:-1]][:_MOST_LEAPS], return_counts=True)
     most = np.argsort(counts)[::-1][:200]
     return [(float(sizes[i]), int(counts[i])) for i in most if counts[i] > 1 or _known(float(sizes[i]))]
 
@@ -196,13 +204,9 @@ def _known(value: float) -> bool:
 
 def _scattered(values: Floats, value: float, leap: float) -> tuple[int, float]:
     """Return number and share of a value's occurrences that stand off from the samples on both sides."""
-    starts, stops = runs_of(values == value)
-    inner = (starts > 0) & (stops < values.size)
-    starts, stops = starts[inner], stops[inner]
-    if not starts.size or np.mean(stops - starts) > _LONG:
-        return 0, 0.0
+    starts, stops = _visits(values, value)
     off = (np.abs(values[starts - 1] - value) > leap) & (np.abs(values[stops] - value) > leap)
-    return int(np.count_nonzero(off)), float(np.mean(off))
+    return int(np.count_nonzero(off)), float(np.mean(off)) if off.size else 0.0
 
 
 def _stands_out(values: Floats, value: float, leap: float) -> bool:
@@ -210,11 +214,10 @@ def _stands_out(values: Floats, value: float, leap: float) -> bool:
 
     A leap is how far a sample lies from the middle of its neighbours.
     """
-    for_all = np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))[:_CHUNK]
-    same = values == value
-    near = (same[:-2] | same[1:-1] | same[2:])[:_CHUNK]
-    own = for_all[~near & np.isfinite(for_all)]
-    at = for_all[same[1:-1][:_CHUNK] & np.isfinite(for_all) & (for_all > leap)]
+    values = values[:_CHUNK]
+    bends = _bends(values)
+    own = bends[~_near(values, value) & np.isfinite(bends)]
+    at = bends[(values[1:-1] == value) & np.isfinite(bends) & (bends > leap)]
     if own.size < _ENOUGH or not at.size:
         return False
     return bool(np.median(at) > _FAR * np.quantile(own, 0.99))
@@ -253,20 +256,14 @@ def spikes_in(values: Floats, off_by: float) -> np.ndarray:
     enters = enters[np.any(np.abs(values[after] - values[enters - 1, None]) < 0.2 * far, axis=1)]
     if enters.size > _MOST * values.size + 3:
         return np.empty(0, dtype=int)  # a channel that leaps all the time
-    return np.array([i for i in enters if _stands_alone(values, int(i), far)], dtype=int)
-
-
-def _stands_alone(values: Floats, at: int, far: float) -> bool:
-    """Check for up to three samples from here on that lie far off, on one side, from neighbours that agree."""
-    for width in range(1, _WIDEST + 1):
-        if at + width >= values.size:
-            return False
-        before, after, inner = values[at - 1], values[at + width], values[at : at + width]
-        away = inner - 0.5 * (before + after)
-        one_side = abs(float(np.sum(away))) == float(np.sum(np.abs(away)))
-        if abs(after - before) < 0.2 * far and one_side and float(np.min(np.abs(away))) > far:
-            return True
-    return False
+    alone = np.zeros(enters.size, dtype=bool)
+    for width in range(1, _WIDEST + 1):  # samples that lie far off, on one side, from neighbours that agree
+        last = np.minimum(enters + width, values.size - 1)
+        before, after = values[enters - 1], values[last]
+        away = values[np.minimum(enters + np.arange(width)[:, None], last)] - 0.5 * (before + after)
+        far_off = np.all(away > far, axis=0) | np.all(away < -far, axis=0)
+        alone |= far_off & (np.abs(after - before) < 0.2 * far)
+    return enters[alone]
 
 
 def wraps(view: View) -> None:
@@ -276,12 +273,11 @@ def wraps(view: View) -> None:
         values = view.channels[name][:_MOST_SAMPLES]
         leaps = [i for i in leaps_in(values, _OF_RANGE[name], against=name == "force") if i + 1 not in starts]
         if leaps:
-            size = abs(float(values[leaps[0] + 1] - values[leaps[0]]))
-            unit, scale = ("mm", 1e3) if name == "displacement" else ("N", 1.0)
+            size = shown(name, abs(float(values[leaps[0] + 1] - values[leaps[0]])))
             raise view.refused(
                 "E_LEAP",
-                f"{name} leaps by {scale * size:.4g} {unit} {view.place(int(leaps[0]) + 1)}: a counter that "
-                "wraps, or a channel set to zero while it was recorded",
+                f"{name} leaps by {size} {view.place(int(leaps[0]) + 1)}: a counter that wraps, or a channel set to "
+                "zero while it was recorded",
                 "export it with a wider number format, or cut the record there",
             )
 
@@ -300,8 +296,7 @@ def leaps_in(values: Floats, of_range: float, *, against: bool) -> np.ndarray:
     if max(float(np.max(steps)), -float(np.min(steps))) < large:
         return np.empty(0, dtype=int)
     big = np.abs(steps) >= large
-    count = int(np.count_nonzero(big))
-    if not count or count > _MOST * finite.size:
+    if np.count_nonzero(big) > _MOST * finite.size:
         return np.empty(0, dtype=int)
     own = float(np.max(np.abs(steps), where=~big, initial=0.0))
     at = np.flatnonzero(big & (np.abs(steps) > _FAR_STEPS * own))

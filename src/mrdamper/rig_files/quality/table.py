@@ -115,11 +115,9 @@ def _quality(record: Record) -> Quality:
         return Quality(record, refusal=refusal)
     analysis, scatter = view.motion, loop.repeatability(view)
     current, change = motion.held_in(result, motion.steady_window(view))
-    steady = view.steady
-    whole = slice(None)
+    steady, whole = view.steady, slice(None)
     if analysis is not None:
-        count = max(1, int(analysis.cycles + 0.02))
-        whole = steady.time >= steady.time[-1] - count / analysis.condition.frequency_Hz
+        whole = steady.time >= steady.time[-1] - max(1, view.whole_cycles) / analysis.condition.frequency_Hz
     figures = {
         "current_A": np.nan if change else abs(current),
         "frequency_Hz": np.nan if analysis is None else analysis.condition.frequency_Hz,
@@ -151,13 +149,11 @@ def to_run(record: Record) -> Run:
     if record.current is None:
         raise ColumnError("no current", where=f"run {record.id}", remedy="name its column or value in the rig profile")
     keep = _kept(record)
-    count = np.count_nonzero(keep)
     sizes = [int(np.count_nonzero(keep[start:stop])) for start, stop in record.segments]
-    bounds = np.cumsum([0, *(size for size in sizes if size)]).tolist()
-    if count == keep.size:
-        keep = slice(None)  # nothing is copied: a long record lies in a file
-    if count < 3:
-        raise RunError(f"{count} samples", where=f"run {record.id}", remedy="a run needs at least 3")
+    bounds = np.cumsum([0, *filter(None, sizes)]).tolist()
+    if sum(sizes) < 3:
+        raise RunError(f"{sum(sizes)} samples", where=f"run {record.id}", remedy="a run needs at least 3")
+    keep = slice(None) if sum(sizes) == keep.size else keep  # nothing is copied: a long record lies in a file
     steady = record.steady or loop.steady_part(View(record))
     codes = " ".join(dict.fromkeys(finding.code for finding in record.findings))
     further = {f"{name}_{unit}": getattr(record, name) for name, unit in FURTHER.items()} | dict(record.further)

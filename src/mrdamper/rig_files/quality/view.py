@@ -111,10 +111,14 @@ class View:
         return result if inside is None else replace(result, steady=(start + inside[0], start + inside[1]))
 
     @cached_property
+    def steady_samples(self) -> slice:
+        """Samples of `run` in the part of steady motion; all of them where there is none."""
+        return slice(*(self.strokes.steady or (0, self.run.time.size)))
+
+    @cached_property
     def steady(self) -> Run:
         """The part of steady motion; the whole run where there is none."""
-        start, stop = self.strokes.steady or (0, self.run.time.size)
-        return self.run.part(start, stop)
+        return self.run.part(self.steady_samples.start, self.steady_samples.stop)
 
     @cached_property
     def motion(self) -> MotionAnalysis | None:
@@ -124,6 +128,11 @@ class View:
         except ExcitationError:
             return None
         return analysis if analysis.residual < _UNEXPLAINED * float(np.std(self.steady.displacement)) else None
+
+    @cached_property
+    def whole_cycles(self) -> int:
+        """Whole cycles of the steady part, one that a cut at a sample shortens among them; 0 without a period."""
+        return 0 if self.motion is None else int(self.motion.cycles + 0.02)
 
     def _thinned(self, run: Run) -> Run:
         """Leave out samples that a sine of this period does not need, but not the last."""
@@ -182,6 +191,11 @@ class View:
         return index[np.all([np.isfinite(take(c, index)) for c in channels if c is not None], axis=0)]
 
 
+def shown(name: str, value: float, form: str = ".4g") -> str:
+    """Write a displacement [m], in millimetres, or a force [N] for a message."""
+    return f"{1e3 * value:{form}} mm" if name == "displacement" else f"{value:{form}} N"
+
+
 def sample_noise(signal: Floats) -> float:
     """Return standard deviation of white noise on a smooth signal, from its third differences.
 
@@ -202,6 +216,13 @@ def runs_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     bounds = np.concatenate([[0], edges, [mask.size]])
     first = 0 if mask.size and mask[0] else 1
     return bounds[:-1][first::2], bounds[1:][first::2]
+
+
+def longest_run(mask: np.ndarray) -> tuple[int, int]:
+    """Length and start of the longest run of true values; 0 and 0 where there is none."""
+    starts, stops = runs_of(mask)
+    longest = int(np.argmax(stops - starts)) if starts.size else 0
+    return (int(stops[longest] - starts[longest]), int(starts[longest])) if starts.size else (0, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,15 +281,10 @@ def _steady(
         return None  # too few to tell a ramp from the motion
     length, duration = np.median(lengths), np.median(durations)
     alike = (np.abs(lengths / length - 1) < _ALIKE) & (np.abs(durations / duration - 1) < _ALIKE)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], alike.astype(int), [0]])))
-    starts, stops = edges[::2], edges[1::2]
-    if not starts.size:
+    count, first = longest_run(alike)
+    if count < max(3, _SHARE * lengths.size):
         return None
-    longest = int(np.argmax(stops - starts))
-    first, last = int(starts[longest]), int(stops[longest])
-    if last - first < max(3, _SHARE * lengths.size):
-        return None
-    first, last = _without_ramps(lengths, first, last)
+    first, last = _without_ramps(lengths, first, first + count)
     start, stop = int(reversals[first]), int(reversals[last]) + 1
     if first == 0:
         start = _reach(time, x, start, -1, duration, length)
