@@ -20,7 +20,6 @@ from mrdamper.study.validation import (
     leave_out,
     peak_band,
     score_run,
-    session_drift,
     validate,
 )
 
@@ -163,22 +162,22 @@ def test_median_and_worst_count_magnitudes_and_refused_runs_stay_apart():
     assert isinstance(found.runs[0], RunScore)
 
 
-def test_drift_between_sessions_is_the_gains_and_offsets_put_in():
+def test_the_readings_of_runs_are_the_gains_and_offsets_put_in():
     gains, offsets = np.array([0.9, 1.0, 1.2]), np.array([-10.0, 0.0, 20.0])
     runs = [made(1.0, 1.0, f"{g}", gain=g, offset=o) for g, o in zip(gains, offsets, strict=True)]
-    drift = session_drift(Exact(), runs)
-    assert drift.gain == pytest.approx(np.std(gains))
-    assert drift.offset == pytest.approx(np.std(offsets))
-    assert drift.floor == pytest.approx(0.0, abs=1e-9)
+    readings = [score.reading for score in validate(Exact(), runs).runs]
+    assert [reading.gain for reading in readings] == pytest.approx(gains.tolist())
+    assert [reading.offset for reading in readings] == pytest.approx(offsets.tolist())
+    assert [reading.error(reading.gain, reading.offset) for reading in readings] == pytest.approx([0.0] * 3, abs=1e-9)
 
 
 def test_the_floor_is_the_error_left_by_a_gain_and_an_offset():
     run = made(1.0, 1.0, "one", gain=1.1, offset=5.0)
     inside = run.in_window
     wave = 2.0 * np.sin(2 * np.pi * 5 * run.time)  # five times the frequency: no gain and no offset takes it up
-    drift = session_drift(Exact(), [replace(run, force=run.force + wave)])
+    reading = validate(Exact(), [replace(run, force=run.force + wave)]).runs[0].reading
     spread = np.ptp((run.force + wave)[inside])
-    assert drift.floor == pytest.approx(np.sqrt(2.0) / spread, rel=0.02)
+    assert reading.error(reading.gain, reading.offset) == pytest.approx(np.sqrt(2.0) / spread, rel=0.02)
 
 
 def test_a_validation_is_called_after_its_damper_unless_named():
@@ -236,17 +235,6 @@ def test_the_band_of_the_peak_is_told_beside_the_measured_peak_of_the_window(mon
     monkeypatch.setattr(validation, "session_band", lambda expected, *given: said(*given))
     known = peak_band(Exact(), run, expected=SimpleNamespace(gain=2.0, offset=0.0))
     assert known == pytest.approx({**measured, **band, "energy_low_J": 1.8 * expected, "energy_high_J": 2.4 * expected})
-
-
-def test_the_floor_of_several_runs_is_their_median():
-    waves = [1.0, 2.0, 9.0]
-    runs = []
-    for size in waves:
-        run = made(1.0, 1.0, f"{size}")
-        runs.append(replace(run, force=run.force + size * np.sin(2 * np.pi * 5 * run.time)))
-    each = [session_drift(Exact(), [run]).floor for run in runs]
-    assert each == sorted(each)
-    assert session_drift(Exact(), runs).floor == pytest.approx(each[1])
 
 
 def test_what_no_rig_measures_has_no_score():

@@ -105,18 +105,7 @@ def test_forms_are_chosen_parameter_by_parameter():
     assert fit.damper.envelope == Envelope.of(CONDITIONS)
     assert fit.values["fy"] == pytest.approx(150 + 900 * CURRENT)
     assert list(fit.conditions) == CONDITIONS
-    assert fit.few_motions
     assert "method" not in fit_modified(identified(linear), forms).damper.provenance
-
-
-def test_few_motions_are_ten_or_fewer_and_near_ones_are_one():
-    def over(count, step):
-        conditions = [Condition(0.0, 1.0 * step**k, 0.02) for k in range(count)]
-        return fit_modified(identified(linear, conditions), {name: ("constant",) for name in ("fy", "c", "f0")})
-
-    assert over(10, 1.3).few_motions
-    assert not over(11, 1.3).few_motions
-    assert over(11, 1.001).few_motions
 
 
 def test_certain_values_count_more_and_of_a_logarithm_relatively():

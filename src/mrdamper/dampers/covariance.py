@@ -83,11 +83,7 @@ def estimate_uncertainty(
         return damper
     parts = [RunResiduals.of(damper, run) for run in runs]
     numbers = damper.fitted_parameters
-    at_bound = tuple(
-        name
-        for name, own in numbers.items()
-        if bounded and (name.split(".")[0] in held or np.isclose(own.value, own.bounds, rtol=1e-6, atol=1e-12).any())
-    )
+    at_bound = tuple(n for n, own in numbers.items() if bounded and (n.split(".")[0] in held or own.at_bound))
     free = [name for name in numbers if name not in at_bound]
     slopes = [force_slopes(damper, p.prediction, free)[p.picked] for p in parts]
     kept, unseen, alike, inverse = _determined(slopes, parts, len(free))
@@ -233,14 +229,11 @@ def _identifiable(
         if not lost:
             return spread, wide
         wide |= {names[i] for i in lost}
-        worst = max(lost, key=lambda i: _width(own[names[i]], float(errors[i])))
+        widths = {i: relative_width(p.value, float(errors[i]), p.log, p.exponent) for i in lost if (p := own[names[i]])}
+        worst = max(lost, key=widths.__getitem__)
         keep = [i for i in range(len(names)) if i != worst]
         names, slopes = [names[i] for i in keep], [slope[:, keep] for slope in slopes]
         inverse = _determined(slopes, parts, len(keep))[3]
-
-
-def _width(own: FittedParameter, half: float) -> float:
-    return relative_width(own.value, half, own.log, own.exponent)
 
 
 def _determined(

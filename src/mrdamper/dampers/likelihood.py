@@ -77,7 +77,7 @@ class Likelihood:
         measured = np.concatenate([p.predicted - p.residual for p in parts])
         # The remaining score by robust weights is part of the estimate; that by a bound is not.
         score = rows.T @ np.concatenate([p.residual for p in parts])
-        score[[name in damper_bounds(damper) for name in names]] = 0.0
+        score[[bool(numbers[name].at_bound) for name in names]] = 0.0
         logs = tuple(numbers[n].log for n in names)
         start = np.array(
             [np.log(numbers[n].value) if log else numbers[n].value for n, log in zip(names, logs, strict=True)]
@@ -121,15 +121,6 @@ class Likelihood:
         picked = np.concatenate([p.picked + b for p, b in zip(self.parts, begins, strict=True)])
         whole = concatenate(motions)
         return whole, picked, whole.part(picked)
-
-
-def damper_bounds(damper: Damper) -> set[str]:
-    """Parameters at a bound, by value."""
-    return {
-        name
-        for name, own in damper.fitted_parameters.items()
-        if np.isclose(own.value, own.bounds, rtol=1e-6, atol=1e-12).any()
-    }
 
 
 def positive(matrix: Floats) -> Floats:

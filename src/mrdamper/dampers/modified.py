@@ -20,7 +20,7 @@ from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.normal_equations import ABSENT, Condensed, Law, choose_forms, condense, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.dampers.uncertainty import FittedParameter
-from mrdamper.data import Condition, Floats, Run, same_motion
+from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification import Identification
 from mrdamper.models import Model, model_type
@@ -174,11 +174,6 @@ class ModifiedFit:
     at_bounds: tuple[str, ...] = ()
     # forms that violate a physical law, by coordinate and name, with the law
     refused: Mapping[str, str] = field(default_factory=dict[str, str])
-
-    @property
-    def few_motions(self) -> bool:
-        """True where the conditions have few enough motions to draw a curve for each."""
-        return len(same_motion(self.conditions, tolerance=0.08)) <= 10
 
 
 def fit_modified(

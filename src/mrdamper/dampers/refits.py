@@ -51,9 +51,8 @@ def refitted(
     predicted = [run.predicted for run in runs]
     changes = np.zeros((len(shifts), len(names)))
     for change, shift, start in zip(changes, shifts, moved, strict=True):
-        values = {n: numbers[n].value * np.exp(s) if numbers[n].log else numbers[n].value + s
-                  for n, s in zip(names, start.tolist(), strict=True)}  # fmt: skip
-        there = damper.with_parameters({n: float(np.clip(v, *numbers[n].bounds)) for n, v in values.items()}).one_model
+        values = {n: numbers[n].moved(step) for n, step in zip(names, start.tolist(), strict=True)}
+        there = damper.with_parameters(values).one_model
         point = np.clip([axis.coordinate(getattr(there, axis.name)) for axis in problem.axes], *box)
         table.target = np.concatenate(
             [(1 + g) * force + o - rest for (g, o), force, rest in zip(shift, predicted, rests, strict=True)]

@@ -40,6 +40,16 @@ class FittedParameter:
     unit: str = ""
     exponent: float = 0.0
 
+    @property
+    def at_bound(self) -> str:
+        """The bound that its value is, "lower" or "upper"; empty inside them."""
+        near = np.isclose(self.value, self.bounds, rtol=1e-6, atol=1e-12)
+        return "lower" if near[0] else "upper" if near[1] else ""
+
+    def moved(self, step: float) -> float:
+        """Return the value after a step, of its logarithm where this is searched, within the bounds."""
+        return float(np.clip(self.value * math.exp(step) if self.log else self.value + step, *self.bounds))
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Uncertainty(Displayable):
@@ -223,10 +233,9 @@ def _grouped(entries: list[tuple[str, str]], single: str, several: str) -> list[
 
 
 def _limit(own: FittedParameter) -> str:
-    for end, name in zip(own.bounds, ("lower", "upper"), strict=True):
-        if np.isclose(own.value, end, rtol=1e-6, atol=1e-12):
-            return f"its {name} limit {end:g}"
-    return "a limit of what was searched"
+    if not own.at_bound:
+        return "a limit of what was searched"
+    return f"its {own.at_bound} limit {own.bounds[own.at_bound == 'upper']:g}"
 
 
 def table(damper: Damper, level: float = 0.95) -> list[dict[str, Any]]:

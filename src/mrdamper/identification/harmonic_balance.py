@@ -103,18 +103,14 @@ def read_force(
     """
     # No drift: over a few cycles a line is not orthogonal to the sines and would absorb part of them.
     series = fit_harmonics(record.theta, record.force, _FORCE_HARMONICS, frequency=1 / (2 * np.pi), drift=False)
-    top, bottom = _extremes(record)
-    sizes = {
-        "first-harmonic": series.amplitude(1),
-        "half-peak-to-peak": (top.force - bottom.force) / 2,
-        "maximum": top.force,
-    }
+    (top, at_top), (bottom, at_bottom) = _extremes(record)
+    sizes = {"first-harmonic": series.amplitude(1), "half-peak-to-peak": (top - bottom) / 2, "maximum": top}
     # The series counts from the first sample, which lies at phase theta[0].
     leads = {
         "harmonic": series.phase(1) - record.theta[0],
-        "peaks": np.pi / 2 - _circular_mean(top.theta, bottom.theta - np.pi),
+        "peaks": np.pi / 2 - _circular_mean(at_top, at_bottom - np.pi),
     }
-    offsets = {"extremes": (top.force + bottom.force) / 2, "mean": series.mean}
+    offsets = {"extremes": (top + bottom) / 2, "mean": series.mean}
     lead = (leads[phase] + np.pi) % (2 * np.pi) - np.pi
     return ForceReading(sizes[amplitude], float(lead), offsets[offset])
 
@@ -163,43 +159,23 @@ def double_counted(shape: Shape, yield_force: float, amplitude: float, omega: fl
     )
 
 
-@dataclass(frozen=True)
-class StiffnessAndMass:
-    """Stiffness and mass from the in-phase force of several runs."""
-
-    # k1, k3, m: [N/m], [N/m³], [kg]
-    k1: float
-    k3: float
-    m: float
-
-
-def separate_mass(
-    conditions: Sequence[Condition], in_phase: Sequence[float], with_cubic: bool = False
-) -> StiffnessAndMass:
-    """Separate mass from stiffness by regression of k1 + 3/4 k3 X² − m omega² over several runs.
+def separate_mass(conditions: Sequence[Condition], in_phase: Sequence[float]) -> tuple[float, float]:
+    """Separate stiffness [N/m] and mass [kg] by regression of k1 − m omega² over several runs.
 
     At one frequency x and its acceleration are proportional, so one run does not determine both. Raises
-    `IdentificationError` with fewer than two frequencies, or, for k3, than two amplitudes.
+    `IdentificationError` with fewer than two frequencies.
 
-    Parameters
-    ----------
-    in_phase : sequence of float
-        In-phase force over displacement of each run, the hysteretic part removed [N/m].
-    with_cubic : bool
-        Determine k3, too; requires two amplitudes.
+    `in_phase`: in-phase force over displacement of each run, the hysteretic part removed [N/m].
     """
     omega = 2 * np.pi * np.array([c.frequency_Hz for c in conditions])
-    X = np.array([c.amplitude_m for c in conditions])
-    for name, values, needed in (("frequency", omega, True), ("amplitude", X, with_cubic)):
-        if needed and (values.size < 2 or np.ptp(values) < 0.03 * np.max(values)):
-            raise IdentificationError(
-                f"{values.size} runs at one {name}: it takes two to tell "
-                + ("mass from stiffness" if name == "frequency" else "k3 from k1"),
-                remedy=f"add runs at another {name}, or give the gas spring",
-            )
-    columns = [np.ones_like(X), -(omega**2)] + ([0.75 * X**2] if with_cubic else [])
-    solution = solve_linear(np.column_stack(columns), np.asarray(in_phase, dtype=float))
-    return StiffnessAndMass(float(solution[0]), float(solution[2]) if with_cubic else 0.0, float(solution[1]))
+    if omega.size < 2 or np.ptp(omega) < 0.03 * np.max(omega):
+        raise IdentificationError(
+            f"{omega.size} runs at one frequency: it takes two to tell mass from stiffness",
+            remedy="add runs at another frequency, or give the gas spring",
+        )
+    columns = np.column_stack([np.ones_like(omega), -(omega**2)])
+    k1, m = solve_linear(columns, np.asarray(in_phase, dtype=float)).tolist()
+    return k1, m
 
 
 class HarmonicProjection:
@@ -229,23 +205,14 @@ class HarmonicProjection:
         return self._rows @ signals
 
 
-@dataclass(frozen=True)
-class _Extreme:
-    force: float
-    theta: float
-
-
-def _extremes(record: SineRecord) -> tuple[_Extreme, _Extreme]:
-    """Maximum and minimum of the force and where in the cycle they lie, median over the cycles."""
+def _extremes(record: SineRecord) -> list[tuple[float, float]]:
+    """Maximum and minimum of the force [N] and where in the cycle they lie [rad], median over the cycles."""
     cycle = np.floor((record.theta - record.theta[0]) / (2 * np.pi) + 1e-9).astype(int)
     parts = [np.flatnonzero(cycle == number) for number in range(cycle[-1] + 1)]
     most = max(part.size for part in parts)
     whole = [part for part in parts if part.size >= 0.95 * most]
-    highest, lowest = ([part[pick(record.force[part])] for part in whole] for pick in (np.argmax, np.argmin))
-    top, bottom = (
-        _Extreme(float(np.median(record.force[at])), _circular_mean(*record.theta[at])) for at in (highest, lowest)
-    )
-    return top, bottom
+    ends = ([part[pick(record.force[part])] for part in whole] for pick in (np.argmax, np.argmin))
+    return [(float(np.median(record.force[at])), _circular_mean(*record.theta[at])) for at in ends]
 
 
 def _circular_mean(*angles: float) -> float:

@@ -52,15 +52,15 @@ class PaperAssumptions:
         identifications = [identify(run, BoucWen, Balance()) for run in train]
         stiffness = [float(i.model.k1) for i in identifications if isinstance(i.model, BoucWen)]
         try:
-            apart = separate_mass([i.condition for i in identifications], stiffness)
+            k1, m = separate_mass([i.condition for i in identifications], stiffness)
         except IdentificationError as error:
             note = f"the gas spring is unknown and {error}: the mass is not identified, k1 holds k1 − m ω²"
             return cls(None, notes=(note,))
         note = (
-            f"the gas spring is unknown: k1 = {apart.k1:.4g} N/m comes from a regression of the consistent in-phase "
-            f"stiffness k1 − m ω² over the frequencies (with m = {apart.m:.3g} kg); k2 = k3 = 0"
+            f"the gas spring is unknown: k1 = {k1:.4g} N/m comes from a regression of the consistent in-phase "
+            f"stiffness k1 − m ω² over the frequencies (with m = {m:.3g} kg); k2 = k3 = 0"
         )
-        return cls(None, (("k1", apart.k1), ("k2", 0.0), ("k3", 0.0)), ("m",), (note,))
+        return cls(None, (("k1", k1), ("k2", 0.0), ("k3", 0.0)), ("m",), (note,))
 
     def basis(self, method: str | Method) -> Basis:
         """Return the identification of the Bouc–Wen model by a method, with these parameters held."""

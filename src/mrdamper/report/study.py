@@ -35,7 +35,6 @@ from mrdamper.report.summary import error_sentence, omission_lines
 from mrdamper.report.tables import identification_rows, score_row
 from mrdamper.study.parallel import IN_PROCESS, Processes
 from mrdamper.study.recipe import Progress, RecipeResult
-from mrdamper.study.validation import session_drift
 from mrdamper.study.workflow import RigStudy, Study
 
 _LOOPS_SHOWN = 6
@@ -298,7 +297,9 @@ def _parameters_table(study: Study) -> str:
 
 
 def _scatter(rig: RigStudy) -> str:
-    drift = session_drift(rig.damper, [rig.dataset[run.run_id] for run in rig.chosen.cross_validated.runs])
+    scores = (*rig.chosen.cross_validated.runs, *rig.chosen.train.runs)  # the latter of the damper itself come last
+    readings = {score.run_id: score.reading for score in scores if score.reading}.values()
+    gain, offset = (float(np.std([getattr(reading, name) for reading in readings])) for name in ("gain", "offset"))
     sessions = (
         f"the median cross-validated error corrected for the session is {100 * rig.session_known:.2f} %."
         if isinstance(rig.session_known, float)
@@ -310,7 +311,7 @@ def _scatter(rig: RigStudy) -> str:
         if name.startswith("cross-validation, ")
     )
     return omitted + (
-        f"Scatter between runs: gain {100 * drift.gain:.1f} %, offset {drift.offset:.0f} N (standard deviations of "
+        f"Scatter between runs: gain {100 * gain:.1f} %, offset {offset:.0f} N (standard deviations of "
         f"measured over predicted force). No error is corrected for the session; {sessions}"
         + (f" {rig.calibration.summary}." if rig.calibration else "")
     )

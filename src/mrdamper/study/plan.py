@@ -276,10 +276,8 @@ def _slopes_at(
 ) -> Floats:
     """(K, P + 2) these derivatives with the parameters moved by (P,) a shift."""
     motion, last = sine(condition, 2, 4 * _SAMPLES), slice(-4 * _SAMPLES, None, 4)
-    own = [damper.fitted_parameters[name] for name in uncertainty.names]
-    moved = [n.value * math.exp(s) if n.log else n.value + s for n, s in zip(own, shift, strict=True)]
-    values = {name: float(np.clip(v, *n.bounds)) for name, v, n in zip(uncertainty.names, moved, own, strict=True)}
-    drawn = damper.with_parameters(values)
+    own, steps = damper.fitted_parameters, zip(uncertainty.names, shift.tolist(), strict=True)
+    drawn = damper.with_parameters({name: own[name].moved(step) for name, step in steps})
     base = Prediction(motion, drawn.force_along(motion, condition), condition, ())
     force = base.force[last]
     half = float(np.ptp(force) / 2) or 1.0

@@ -13,7 +13,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import PredictedRun, measured_peak
 from mrdamper.dampers.prediction import Prediction
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, GainOffset, RecordingTime, SessionCorrection, Sessions
-from mrdamper.data import Condition, Displayable, Floats, Run
+from mrdamper.data import Condition, Displayable, Run
 from mrdamper.errors import InputError, RunError, UnknownNameError, require, validate_arguments
 from mrdamper.statistics.metrics import Scores, dissipated_power, score
 
@@ -252,33 +252,6 @@ def leave_out(
             damper = fit(rest)
             scored |= {i: score_run(damper, runs[i]) for i in fold}
     return Validation(title, tuple(scored[i] for i in sorted(scored)))
-
-
-@dataclass(frozen=True)
-class SessionDrift:
-    """Part of the error that a gain and an offset fitted to each run would explain.
-
-    Estimated for the report; scores are not corrected.
-    """
-
-    gain: float  # standard deviation of the gains between runs
-    offset: float  # standard deviation of the offsets [N]
-    # remaining median nrmse_pp; no lower limit for other models: gains and offsets absorb model error, too
-    floor: float
-
-
-def session_drift(damper: Damper, runs: Iterable[Run]) -> SessionDrift:
-    """Regress every run's measured force on its prediction."""
-    gains, offsets, errors = list[float](), list[float](), list[float]()
-    for run in runs:
-        inside = run.in_window
-        measured, predicted = run.force[inside], damper.predict(run).force[inside]
-        gain, offset = np.polynomial.polynomial.polyfit(predicted, measured, 1)[::-1]
-        gains.append(gain)
-        offsets.append(offset)
-        rest: Floats = offset + gain * predicted - measured
-        errors.append(float(np.sqrt(np.mean(rest**2)) / np.ptp(measured)))
-    return SessionDrift(float(np.std(gains)), float(np.std(offsets)), float(np.median(errors)))
 
 
 def _scores(run: Run, prediction: Prediction) -> Scores:

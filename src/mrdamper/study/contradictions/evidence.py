@@ -222,7 +222,7 @@ class Evidence:
         if course not in self._priors:
             nodes = _root_covariance(self.nodes, self.spread.saturation, self.spread.bend)
             weights = np.repeat([1.0, self.spread.leak], [_ELEMENTS - len(_LEAKY), len(_LEAKY)])
-            root = _outer(nodes, np.diag(weights))
+            root = np.kron(nodes, np.diag(weights))
             prior = Posterior(np.zeros(len(root)), root, self)
             self._priors[course] = nodes, np.tile(weights, self.nodes.size), prior
         return self._priors[course]
@@ -340,11 +340,6 @@ def model_error(run: RowProducts) -> float:
 def _along_nodes(matrix: Floats, array: Floats) -> Floats:
     """Multiply the coefficients at the nodes, the rows of an array (P, ...), by a matrix (K, K)."""
     return (matrix @ array.reshape(len(matrix), -1)).reshape(array.shape)
-
-
-def _outer(a: Floats, b: Floats) -> Floats:
-    """Kronecker product of two matrices."""
-    return np.einsum("ij,kl->ikjl", a, b).reshape(len(a) * len(b), -1)
 
 
 def stop_operators(tracks: Sequence[Track], yields: Floats, rates: Floats) -> list[Floats]:
