@@ -59,23 +59,9 @@ def band(
 ) -> Band | None:
     """Prediction intervals in a future test session; None if the runs do not determine the scatter between runs.
 
-    Where fewer than three sessions are known they hold for sessions like the tested ones (`scope`).
-
-    Parameters
-    ----------
-    damper : Damper
-    prediction : Prediction
-        Of this damper.
-    level : float
-    shown : (N,) array of bool, optional
-        Samples of the band, its peak and its energy; default all.
-
-    Raises
-    ------
-    InputError
-        E_LEVEL if the level is not between 0 and 1.
-    ParameterError
-        If the square of the force is not finite.
+    Where fewer than three sessions are known they hold for sessions like the tested ones (`scope`). `shown` (N,) are
+    the samples of the band, its peak and its energy; by default all. Raises `InputError` (E_LEVEL) if the level is not
+    between 0 and 1, and `ParameterError` if the square of the force is not finite.
     """
     student(level, 1.0)
     uncertainty: Uncertainty | None = damper.uncertainty
@@ -204,13 +190,9 @@ class PortableBand:
 def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
     """Return the band of a damper in four parameters, from loops at the lowest, middle and highest tested current.
 
-    None where there is no band. The error that comes from the damper's parameters is taken at its
-    root mean square over these loops, so a band may differ by some per cent from `band`.
-
-    Raises
-    ------
-    InputError
-        E_LEVEL if the level is not between 0 and 1.
+    None where there is no band. The error that comes from the damper's parameters is taken at its root mean square over
+    these loops, so a band may differ by some per cent from `band`. Raises `InputError` (E_LEVEL) if the level is not
+    between 0 and 1.
     """
     uncertainty, tested = damper.uncertainty, damper.envelope
     if uncertainty is None or not tested.tested:

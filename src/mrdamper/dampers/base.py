@@ -195,34 +195,16 @@ class Damper(Displayable):
         return import_module("mrdamper").validate(self, runs)
 
     def to_saved(self) -> Saved:
-        """Its own part of a saved model.
-
-        Raises
-        ------
-        InputError
-            If its kind cannot be saved.
-        """
+        """Its own part of a saved model; raises `InputError` if its kind cannot be saved."""
         raise InputError("this kind of damper is not saved", where=self.title, remedy="save another damper")
 
     @classmethod
     def from_saved(cls, saved: Any, **shared: Any) -> Self:
-        """Return the damper from the result of `to_saved` and the fields of all kinds.
-
-        Raises
-        ------
-        InputError
-            If this is no damper.
-        """
+        """Return the damper from the result of `to_saved` and the fields of all kinds; raises `InputError` if none."""
         raise NotImplementedError(cls.kind)  # a kind that cannot be saved is not in files
 
     def holding(self, values: Mapping[str, float]) -> Damper:
-        """Return the damper with some parameters held at a value.
-
-        Raises
-        ------
-        InputError
-            E_HELD if it has no such parameters.
-        """
+        """Return the damper with some parameters held at a value; raises `InputError` (E_HELD) if it has none such."""
         raise not_held(self, values)
 
     @validate_arguments()

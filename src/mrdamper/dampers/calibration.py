@@ -183,12 +183,7 @@ class ModelError:
 
 
 def model_error(runs: Sequence[PredictedRun]) -> ModelError:
-    """Root mean square of the residual after gain and offset of each run; median spread of these.
-
-    Parameters
-    ----------
-    runs : sequence of PredictedRun, length R > 0
-    """
+    """Root mean square of the residual after gain and offset of each run, one at least; median spread of these."""
     corrected = [(run, *run.gain_and_offset) for run in runs]
     rests = [float(np.mean((run.measured - g * run.predicted - o) ** 2)) / run.half**2 for run, g, o in corrected]
     gains, offsets = [g - 1 for _, g, _ in corrected], [o for _, _, o in corrected]
@@ -208,12 +203,8 @@ def model_error(runs: Sequence[PredictedRun]) -> ModelError:
 def scatter_between_sessions(runs: Sequence[PredictedRun]) -> tuple[float, float]:
     """Estimate the standard deviations of the gain and of the offset [N] between sessions.
 
-    The mean of a session, predicted by the mean of the S - 1 others, has an error of S / (S - 1) times the variance.
-
-    Parameters
-    ----------
-    runs : sequence of PredictedRun
-        Predicted by models identified without their session.
+    The runs were predicted by models identified without their session. The mean of a session, predicted by the mean of
+    the S - 1 others, has an error of S / (S - 1) times the variance.
     """
     own: dict[str | None, list[tuple[float, float]]] = {}
     for run in runs:
@@ -263,20 +254,13 @@ class Growth:
         """Least squares of the squared errors in excess of those at the tests, by the squared distances.
 
         The fastest motions, or the highest current, are one fold, which may show no growth by chance. The variances of
-        the folds, of the typical growth and of the curvature have one degree of freedom each and are pooled
-        [moderated variances: Smyth 2004, Stat. Appl. Genet. Mol. Biol. 3, 3]; a distance that no run has has no fold.
+        the folds, of the typical growth and of the curvature have one degree of freedom each and are pooled [moderated
+        variances: Smyth 2004, Stat. Appl. Genet. Mol. Biol. 3, 3]; a distance that no run has has no fold.
 
-        Parameters
-        ----------
-        runs : sequence of PredictedRun
-            Predicted by models identified without a condition, a current, or the fastest motions.
-        at_tests : ModelError
-        by_parameters : mapping of str to (3,) array
-            Relative variances of the force, the peak and the energy of a run by the parameters, which an interval
-            counts beside growth.
-        curvature : (3,) array, optional
-            Growth of the force, the peak and the energy by motion that the curvature over the velocity shows
-            (`growth_by_curvature`).
+        The runs were predicted by models identified without a condition, a current, or the fastest motions.
+        `by_parameters`: by run, (3,) relative variances of the force, the peak and the energy by the parameters, which
+        an interval counts beside growth. `curvature` (3,): their growth by motion that the curvature over the velocity
+        shows (`growth_by_curvature`).
         """
         evidence, dof = np.tile(np.square(_TYPICAL_GROWTH), (3, 1)), np.ones(3)
         if away := [run for run in runs if run.distance.squares.any()]:
@@ -365,13 +349,7 @@ class Calibration:
 
     @classmethod
     def of(cls, runs: Sequence[PredictedRun], scores: Sequence[StandardizedErrors]) -> Calibration:
-        """From cross-validated runs and their errors over the standard deviation of the error model.
-
-        Parameters
-        ----------
-        runs : sequence of PredictedRun, length R
-        scores : sequence of Scored, length R
-        """
+        """From R cross-validated runs and their errors over the standard deviation of the error model."""
         sessions = {run.session for run in runs}
         by_session = None not in sessions and len(sessions) >= _ENOUGH_UNITS
         names = [run.session if by_session else run.run_id for run in runs]

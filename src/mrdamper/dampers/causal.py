@@ -32,17 +32,13 @@ def free_name(number: str) -> str:
 
 
 def trace(damper: Damper, free: bool = False) -> Program:
-    """Return the program of one sample.
+    """Return the program of one sample; with `free`, all parameters of the damper can be set.
 
     From displacement [m], velocity [m/s], acceleration [m/s²], current [A] and the step of time [s] to force [N] and a
     flag of 8 where the frequency was not tested. One model for all conditions keeps its parameters free to be set.
     Where parameters depend on the condition, frequency and amplitude follow from the past motion, averaged over about a
-    cycle of the slowest tested frequency, within the tested frequencies and `Damper.followed_amplitudes`.
-
-    Raises
-    ------
-    ParameterError
-        If the damper is of a kind that has no form for one sample.
+    cycle of the slowest tested frequency, within the tested frequencies and `Damper.followed_amplitudes`. Raises
+    `ParameterError` if the damper is of a kind that has no form for one sample.
     """
     if not damper.streams:
         raise ParameterError(
@@ -121,10 +117,7 @@ def _flags(motion: TracedMotion, current: Any, damper: Damper) -> Any:
 def causal_force(damper: Damper, motion: Excitation) -> Floats:
     """(N,) force [N] along any motion, sample by sample, as a stream of the damper gives it.
 
-    Raises
-    ------
-    ExcitationError
-        If there is no force at a sample.
+    Raises `ExcitationError` if there is no force at a sample.
     """
     record = RecordProgram(trace(damper))
     given = tuple(float(e.value) for e in record.program.tape.parameters.values())

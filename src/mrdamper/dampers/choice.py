@@ -86,19 +86,10 @@ class JointChoice:
 
 @on_one_blas_thread
 def identify_jointly(runs: Sequence[Run], model: str = MODEL) -> JointChoice:
-    """Identify one damper from all runs, with the terms selected by cross-validation.
+    """Identify one damper from all runs of a rig, with the terms selected by cross-validation.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        Of one rig; any motion, any current.
-    model : str
-        One with `current_levels`. Of all but play and bypass, each parameter that is preset to zero is a term.
-
-    Raises
-    ------
-    IdentificationError, RunError
-        As `JointProblem`.
+    The runs have any motion and any current; the model has `current_levels`. Of all models but play and bypass, each
+    parameter that is preset to zero is a term. Raises `IdentificationError` and `RunError` as `JointProblem`.
     """
     return _of_play_and_bypass(runs) if model == MODEL else _with_presets_as_terms(runs, model)
 

@@ -108,19 +108,11 @@ class Coil:
 
 
 def field_current(time: Floats, current: Floats, rise: float, fall: float, signed: bool = False) -> Floats:
-    """Return the current whose steady field is the present one: the lagged magnitude.
+    """Return the current (N,) whose steady field is the present one: the lagged magnitude of a current (N,) [A].
 
-    T di/dt + i = |I|, T = `rise` while |I| > i and `fall` while |I| < i, exact for |I| straight
-    between samples; settled at the first sample.
-
-    Parameters
-    ----------
-    time, current : (N,) arrays
-        [s], [A].
-    rise, fall : float
-        Time constants [s].
-    signed : bool
-        Lag the current itself, not its magnitude: the current behind a driver's L/R.
+    T di/dt + i = |I|, T = `rise` [s] while |I| > i and `fall` [s] while |I| < i, exact for |I| straight between the
+    times (N,) [s]; settled at the first sample. `signed`: lag the current itself, not its magnitude, as behind a
+    driver's L/R.
     """
     wanted = np.asarray(current, dtype=float) if signed else np.abs(current)
     if (rise <= 0 and fall <= 0) or not np.any(np.diff(wanted)):

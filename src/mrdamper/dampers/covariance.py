@@ -49,35 +49,17 @@ def estimate_uncertainty(
     other_sessions: Sequence[PredictedRun] = (),
     bounded: bool = True,
 ) -> Damper:
-    """Estimate the uncertainty of a damper.
+    """Return the damper with its uncertainty.
 
-    Parameters
-    ----------
-    damper : Damper
-    runs : sequence of Run
-        It was identified from.
-    cross_validated : sequence of PredictedRun
-        Runs predicted by models identified without their condition: the model error, and the calibration of prediction
-        intervals. Without them the residuals of the runs are used, uncalibrated.
-    away : sequence of PredictedRun
-        Runs predicted by models identified without their current, or without the fastest motions: how the error grows
-        away from the tests.
-    other_sessions : sequence of PredictedRun
-        Runs predicted by models identified without their session: the scatter between sessions is not below theirs.
-    held : collection of str
-        Parameters that ended at a limit of the search, inside their bounds.
-    bounded : bool
-        Parameters at a bound are held there; otherwise they count like the others.
+    `runs` are those it was identified from. The other runs were predicted by models identified without some of them.
+    `cross_validated`, without their condition: the model error, and the calibration of prediction intervals; without
+    them the residuals of the runs are used, uncalibrated. `away`, without their current or the fastest motions: how the
+    error grows away from the tests. `other_sessions`, without their session: the scatter between sessions is not below
+    theirs.
 
-    Returns
-    -------
-    Damper
-        The same with `uncertainty`.
-
-    Raises
-    ------
-    InputError
-        E_CLOCK if the clock of a session is no date.
+    `held` are parameters that ended at a limit of the search, inside their bounds. Parameters at a bound are held there
+    if `bounded`; otherwise they count like the others. Raises `InputError` (E_CLOCK) if the clock of a session is no
+    date.
     """
     if not damper.fitted_parameters or not runs:
         return damper

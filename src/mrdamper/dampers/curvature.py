@@ -29,18 +29,10 @@ def growth_by_curvature(
 ) -> Floats | None:
     """Relative errors (3,) of the force, the peak and the energy over the distance of a motion, by this curvature.
 
-    A force over v² in each direction is fitted to the residuals beside the parameters, to first order. The change of
-    the force by this fit at twice the largest tested velocity counts as an error of the damper there. None where
+    A force over v² in each direction is fitted to the residuals of the R runs the damper was identified from, beside
+    its parameters of P names, to first order; `slopes` are the (N, P) derivatives of their forces by these. The change
+    of the force by this fit at twice the largest tested velocity counts as an error of the damper there. None where
     only the ranges of the tests are known.
-
-    Parameters
-    ----------
-    damper : Damper
-    parts : sequence of RunResiduals, length R
-        Of the runs it was identified from.
-    slopes : sequence of (N, P) arrays, length R
-        Derivatives of their forces by the parameters of some names.
-    names : sequence of str, length P
     """
     tested = damper.envelope
     if not tested.conditions:

@@ -46,18 +46,10 @@ AT_TESTS = Distance()
 def distance_from(
     tested: Sequence[Condition], at: Condition, current: Floats, *, swept_A: tuple[float, float] | None = None
 ) -> Distance:
-    """Distance of a condition and the currents along its motion from tested conditions.
+    """Distance of a condition and the currents (N,) [A] along its motion from tested conditions, one at least.
 
-    Parameters
-    ----------
-    tested : sequence of Condition
-        Not empty.
-    at : Condition
-        Equivalent condition of the motion.
-    current : (N,) array
-        [A]
-    swept_A : (float, float), optional
-        Lowest and highest current of tests in which it changed, and passed through all between them.
+    `at` is the equivalent condition of the motion; `swept_A` are the lowest and highest current of tests in which it
+    changed, and passed through all between them.
     """
     levels = np.array(sorted({*(swept_A or current_levels([abs(c.current_A) for c in tested]))}))
     some = np.abs(current[:: max(1, current.size // _MAX_SAMPLES)])

@@ -18,20 +18,12 @@ _FIT_TOLERANCE = 1e-4  # relative gain of a step at which a fit without a fold e
 
 
 class FoldFits:
-    """Fits without folds of runs.
+    """Fits without folds of runs: indices of runs that will be omitted together.
 
     Folds are gathered into a few blocks. For each block one search starts from the model's start values on the steady
-    ends of the runs outside it; the fits without the folds of the block begin at its result.
-
-    Parameters
-    ----------
-    problem : JointProblem
-        Of all runs.
-    folds : iterable of sequence of int
-        Indices of runs that will be omitted together.
-    searched : sequence of str
-        Presets that are free in the search as well, as in that over all runs: without them others compensate
-        for their effects, and the search ends in another local minimum.
+    ends of the runs outside it; the fits without the folds of the block begin at its result. `searched` are presets
+    that are free in the search as well, as in that over all runs: without them others compensate for their effects, and
+    the search ends in another local minimum.
     """
 
     def __init__(self, problem: JointProblem, folds: Iterable[Sequence[int]], searched: Sequence[str] = ()):

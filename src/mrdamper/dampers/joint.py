@@ -184,22 +184,10 @@ class JointProblem:
     All runs are concatenated into one motion: the effect of one run on the state decays during the next, which begins
     1.5 cycles before its scored samples, and one long array is evaluated faster than many short ones.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        Of one rig; any motion, any current. Whole records are used, including ramps and rests.
-    model : str or type of Model
-    fixed : mapping, optional
-        Parameters held at a value.
-    free : sequence of str
-        Presets to determine as well.
-    coil : Coil or None, optional
-        Known lags of the field, or none. By default they are determined where a current changes.
-
-    Raises
-    ------
-    IdentificationError
-        If there are no runs, or runs of several rigs.
+    The runs have any motion and any current; whole records are used, including ramps and rests. `fixed` holds
+    parameters at a value, `free` are presets to determine as well. `coil` states known lags of the field, or none; by
+    default they are determined where a current changes. Raises `IdentificationError` if there are no runs, or runs of
+    several rigs.
     """
 
     def __init__(
@@ -304,17 +292,8 @@ class JointProblem:
     ) -> JointFit:
         """Identify from the two most promising of the model's starts, and from another if one is given.
 
-        Parameters
-        ----------
-        start : (D,) array, optional
-            Any point of the search axes.
-        rounds, most_steps, settled
-            As `fit` takes them.
-
-        Returns
-        -------
-        JointFit
-            The best end; the next best of another yield displacement is its `second`.
+        `start` (D,) is any point of the search axes; the other arguments are those of `fit`. Returns the best end; the
+        next best of another yield displacement is its `second`.
         """
         starts = [*self.promising[:2], *([] if start is None else [self._downhill(start).point])]
         ends = [self.fit(start=u, rounds=rounds, most_steps=most_steps, settled=settled) for u in starts]
@@ -334,17 +313,10 @@ class JointProblem:
     ) -> JointFit:
         """Identify from all runs, or from those at some indices.
 
-        Parameters
-        ----------
-        rows : sequence of int, optional
-        start : (D,) array, optional
-            Start on the search axes, for example the result of a fit to more runs.
-        rounds, most_steps : int
-            Rounds of robust weights, and steps of the search in each.
-        settled : float
-            Relative gain of a step at which the search ends; below the default its curvature is estimated, too.
-        to_the_last_digit : bool
-            Continue until the gradient vanishes, so that the result does not depend on rounding.
+        The search begins at `start` (D,) on the search axes, for example the result of a fit to more runs. It has some
+        rounds of robust weights, and steps in each, and ends at a relative gain of a step, `settled`; below the default
+        its curvature is estimated, too. `to_the_last_digit`: continue until the gradient vanishes, so that the result
+        does not depend on rounding.
         """
         begin = time.perf_counter()
         parts = self.parts if rows is None else [self.parts[i] for i in rows]
@@ -387,18 +359,10 @@ class JointProblem:
 
     @on_one_blas_thread
     def refit(self, fit: JointFit, rows: Sequence[int], settled: float = _REFIT_TOLERANCE) -> JointFit:
-        """Fit some of the runs, starting from the fit to all.
+        """Fit the runs at some indices, starting from the fit to all runs of this problem.
 
-        The search first follows the known derivatives of the fit to all, which needs no force, and then its own.
-
-        Parameters
-        ----------
-        fit : JointFit
-            To all runs of this problem.
-        rows : sequence of int
-            Runs to keep.
-        settled : float
-            Relative gain of a step at which the search ends.
+        The search first follows the known derivatives of the fit to all, which needs no force, and then its own. It
+        ends at a relative gain of a step, `settled`.
         """
         begin, rows = time.perf_counter(), sorted(rows)
         linearised = self.linearised(fit)

@@ -52,13 +52,7 @@ class Likelihood:
 
     @classmethod
     def of(cls, damper: Damper, runs: Sequence[Run]) -> Likelihood:
-        """Of the runs a damper was identified from.
-
-        Raises
-        ------
-        InputError
-            E_CERTAINTY if the runs determine none of its parameters.
-        """
+        """Of the runs a damper was identified from; raises `InputError` (E_CERTAINTY) if they determine nothing."""
         whole = estimate_uncertainty(damper, runs, bounded=False)
         uncertainty: Uncertainty | None = whole.uncertainty
         if uncertainty is None or not uncertainty.names:
@@ -150,13 +144,7 @@ class LikelihoodProfile:
 
 
 def profile(likelihood: Likelihood, name: str) -> LikelihoodProfile:
-    """Compute the profile likelihood of one parameter of a damper.
-
-    Raises
-    ------
-    InputError
-        E_CERTAINTY if the damper has no such parameter.
-    """
+    """Compute the profile likelihood of a parameter; raises `InputError` (E_CERTAINTY) if the damper has none such."""
     own = likelihood.damper.fitted_parameters.get(name)
     if own is None:
         names = ", ".join(likelihood.damper.fitted_parameters)

@@ -181,19 +181,10 @@ def fit_modified(
     forms: Mapping[str, Sequence[str]] | None = None,
     provenance: Mapping[str, str] | None = None,
 ) -> ModifiedFit:
-    """Fit a modified model to the identifications of a test matrix.
+    """Fit a modified model to the identifications of a test matrix, of one rig and one model type.
 
-    Parameters
-    ----------
-    identifications : sequence of Identification
-        Of one rig and one model type.
-    forms : mapping, optional
-        Candidate forms by parameter. Default: the model's own candidates.
-
-    Raises
-    ------
-    IdentificationError
-        If there is nothing to fit, or the identifications mix models or rigs.
+    `forms`: candidate forms by parameter; by default the model's own. Raises `IdentificationError` if there is nothing
+    to fit, or the identifications mix models or rigs.
     """
     if not identifications:
         raise IdentificationError("no identifications", remedy="identify at least one run")
@@ -239,25 +230,10 @@ def fit_modified_jointly(
 ) -> tuple[ModifiedFit, Callable[[Sequence[int]], ModifiedModel]]:
     """Fit all parameter functions to the forces of all runs at once.
 
-    Parameters
-    ----------
-    runs : sequence of Run, length R
-    identifications : sequence of Identification, length R
-        Of these runs, in this order: start of the shape coordinate.
-    provenance : mapping, optional
-    any_motion : bool
-        Try functions of frequency and amplitude, too; otherwise laws over the current only.
-
-    Returns
-    -------
-    fit : ModifiedFit
-    refit : callable
-        Fits the model to the runs of some indices only, with the same forms.
-
-    Raises
-    ------
-    IdentificationError
-        If the model has more than one shape coordinate, or there are too few runs.
+    The identifications are of these runs, in this order: the start of the shape coordinate. Functions of frequency and
+    amplitude are tried, too, if `any_motion`; otherwise laws over the current only. Returns the fit, and a function
+    that fits the model to the runs of some indices only, with the same forms. Raises `IdentificationError` if the model
+    has more than one shape coordinate, or there are too few runs.
     """
     model_type = type(identifications[0].model)
     conditions = [i.condition for i in identifications]

@@ -118,17 +118,8 @@ class Condensed:
 def condense(runs: Sequence[Run], model_type: type[Model], more: Sequence[str] = ()) -> Condensed:
     """Condense runs for a model type whose search has one axis.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-    model_type : type of Model
-    more : sequence of str
-        Preset linear parameters to determine as well: one run may not separate them, all together may.
-
-    Raises
-    ------
-    IdentificationError
-        If the model has no such single axis, or there are no runs.
+    `more` are preset linear parameters to determine as well: one run may not separate them, all together may. Raises
+    `IdentificationError` if the model has no such single axis, or there are no runs.
     """
     if not runs:
         raise IdentificationError("no runs", remedy="give at least one")
@@ -261,20 +252,11 @@ def fit_jointly(
     most_steps: int = 12,
     polish: bool = True,
 ) -> JointFunctionFit:
-    """Fit the coefficients of all parameter functions to all runs at once.
+    """Fit the coefficients of all parameter functions to all runs at once, with some form of each coordinate.
 
-    Parameters
-    ----------
-    data : Condensed
-    forms : mapping of str to str
-        Form of each coordinate.
-    start : ParameterFunction or None
-        Of the shape coordinate, to start from; its form and rates are used. None for models
-        without one.
-    reweightings, most_steps : int
-        Effort: rounds of robust weights, steps of the search in each.
-    polish : bool
-        Refine to the last digits at the end, so that results do not depend on rounding.
+    `start` is the function of the shape coordinate to start from; its form and rates are used. It is None for models
+    without one. `reweightings` and `most_steps` are the rounds of robust weights and the steps of the search in each.
+    `polish`: refine to the last digits at the end, so that results do not depend on rounding.
     """
     design = _Design(data, forms)
     if start is None:
@@ -471,17 +453,9 @@ def choose_forms(
     """Choose every coordinate's form by cross-validation over conditions, currents and motions.
 
     Starting from the shortest forms, one coordinate at a time tries its candidates: the smaller of two forms is kept if
-    `selection.smaller_wins`. Two passes.
-
-    Parameters
-    ----------
-    data : Condensed
-    candidates : mapping of str to sequence of str or Law
-        Forms by coordinate, shortest first; those with too many parameters for the tests are skipped.
-    shape_values : (R,) array
-        Shape coordinate of individual fits, as start.
-    dissipating : mapping of str to str, optional
-        Unit of the coordinates that must not be negative: forms that break a law of physics are refused.
+    `selection.smaller_wins`. Two passes. `candidates`: forms by coordinate, shortest first; those with too many
+    parameters for the tests are skipped. `shape_values` (R,): the shape coordinate of individual fits, as start.
+    `dissipating`: units of the coordinates that must not be negative; forms that break a law of physics are refused.
     """
     start = tuple(shape_values.tolist())
     options = {name: _supported(laws, data.conditions) for name, laws in candidates.items()}

@@ -12,6 +12,7 @@ from mrdamper.dampers.likelihood import Likelihood, positive
 from mrdamper.data import Floats
 from mrdamper.errors import InputError, MissingExtraError
 
+_SEED = 1
 _PROPOSAL_DOF = 5.0  # degrees of freedom of the proposals
 _BURN_IN_SHARE = 0.2  # share of a chain that is discarded
 _MIN_AUTOCORRELATION_TIMES, _MAX_RHAT = 50, 1.01  # least length in autocorrelation times; limit of split-R̂
@@ -28,37 +29,22 @@ class Samples:
     split_rhat: float  # largest split-R̂ of any parameter
 
 
-def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed: int = 1) -> Samples:
-    """Markov chains over the likelihood, within the bounds.
+def posterior(likelihood: Likelihood, steps: int = 2000) -> Samples:
+    """Markov chains over the likelihood, within the bounds; of the steps of each walker the first fifth is discarded.
 
     Half of the moves propose from the covariance with wider tails, independent of the chain's position, the others are
-    stretch moves [Goodman and Weare 2010].
-
-    Parameters
-    ----------
-    likelihood : Likelihood
-    steps : int
-        Of each walker; the first fifth is discarded.
-    walkers : int
-        Default: 2 P + 2.
-    seed : int
-
-    Raises
-    ------
-    MissingExtraError
-        If emcee is not installed.
-    InputError
-        E_CONVERGENCE below 50 autocorrelation times or above a split-R̂ of 1.01.
+    stretch moves [Goodman and Weare 2010]. Raises `MissingExtraError` if emcee is not installed, and `InputError`
+    (E_CONVERGENCE) below 50 autocorrelation times or above a split-R̂ of 1.01.
     """
     if importlib.util.find_spec("emcee") is None:
         raise MissingExtraError("samples need emcee", remedy="pip install 'mrdamper[uq]'")
     emcee: Any = importlib.import_module("emcee")
 
     size = len(likelihood.names)
-    count = walkers or 2 * size + 2
+    count = 2 * size + 2  # walkers
     root = np.linalg.cholesky(positive(likelihood.covariance))
     inverse = np.linalg.inv(root)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(_SEED)
 
     def wide(points: Floats) -> Floats:
         """Logarithm of the density the proposals come from: Student's t of five degrees."""
@@ -81,7 +67,7 @@ def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed:
     begin = np.clip(begin, likelihood.bounds[:, 0], likelihood.bounds[:, 1])
     moves = [(emcee.moves.MHMove(propose), 0.7), (emcee.moves.StretchMove(), 0.3)]
     sampler = emcee.EnsembleSampler(count, size, logarithm, moves=moves)
-    sampler.random_state = np.random.RandomState(seed).get_state()
+    sampler.random_state = np.random.RandomState(_SEED).get_state()
     sampler.run_mcmc(begin, steps, skip_initial_state_check=True)
     # (steps, walkers, P)
     kept: Floats = np.asarray(sampler.get_chain(discard=int(_BURN_IN_SHARE * steps)), dtype=float)
@@ -104,12 +90,7 @@ def posterior(likelihood: Likelihood, steps: int = 2000, walkers: int = 0, seed:
 
 
 def split_rhat(chains: Floats) -> float:
-    """Largest potential scale reduction of chains cut in halves [Gelman et al. 2013].
-
-    Parameters
-    ----------
-    chains : (steps, walkers, P) array
-    """
+    """Largest potential scale reduction of chains (steps, walkers, P) cut in halves [Gelman et al. 2013]."""
     half = len(chains) // 2
     parts = np.concatenate([chains[:half], chains[half : 2 * half]], axis=1)
     within = parts.var(axis=0, ddof=1).mean(axis=0)

@@ -83,15 +83,10 @@ def _nonnegative(table: Floats, right: Floats) -> Floats:
 
 
 class GainsAndOffsets:
-    """Gains and offsets of runs from the residuals of a fit.
+    """Gains and offsets of R runs from the residuals of a fit.
 
-    Parameters
-    ----------
-    runs : sequence of RunResiduals, length R
-    slopes : sequence of (N, P) arrays
-        Derivatives of the force by the parameters at the samples of each run.
-    influence : sequence of (P, N) arrays
-        Change of the parameters by a change of each residual [per N].
+    `slopes`: (N, P) derivatives of the force by the parameters at the samples of each run; `influence`: (P, N) changes
+    of the parameters by a change of each residual [per N].
     """
 
     def __init__(self, runs: Sequence[RunResiduals], slopes: Sequence[Floats], influence: Sequence[Floats]):
@@ -138,21 +133,10 @@ class GainsAndOffsets:
         return designs
 
     def _variances(self, shown: Floats, assumed: Floats, noise: float = 1.0) -> tuple[Floats, Floats]:
-        """Estimate variances by the quadratic forms that have least variance at assumed variances.
+        """Estimate variances (D, C), none negative, by the quadratic forms that have least variance at assumed variances.
 
-        Parameters
-        ----------
-        shown : (D, K) array
-            Gains and offsets of the residuals, with a share `noise` of their noise.
-        assumed : (D, C) or (1, C) array
-            No row is zero.
-
-        Returns
-        -------
-        variances : (D, C) array
-            Not negative.
-        inner : (D, G, G) array
-            Zᵀ V⁻¹ Z of the effects.
+        `shown` (D, K): gains and offsets of the residuals, with a share `noise` of their noise; `assumed`: (D, C) or
+        (1, C), no row zero. Returns the inner products (D, G, G) Zᵀ V⁻¹ Z of the effects, too.
         """
         designs = list(self._designs.values())
         whole, first = np.hstack(designs), np.cumsum([0, *(z.shape[1] for z in designs[:-1])])

@@ -28,19 +28,9 @@ def refitted(
 ) -> Floats:
     """Return changes (K, P) of some parameters, or of their logarithms, the others held.
 
-    Parameters
-    ----------
-    damper : Damper
-        Described by one model.
-    runs : sequence of RunResiduals, length R
-        Of this damper.
-    rests : sequence of arrays
-        Residuals of the runs that are no gain and no offset [N].
-    names : sequence of str, length P
-    shifts : (K, R, 2) array
-        Gains [-] and offsets [N] of the runs, of the predicted force.
-    moved : (K, P) array
-        Changes by linearisation, as start of the searches.
+    The damper has one model, and the R runs are residuals of it; `rests` are their residuals that are no gain and no
+    offset [N]. `shifts` (K, R, 2) are gains [-] and offsets [N] of the runs, of the predicted force. The searches start
+    from changes by linearisation, `moved` (K, P).
     """
     model, numbers = damper.one_model, damper.fitted_parameters
     assert model is not None

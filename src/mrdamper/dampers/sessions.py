@@ -208,20 +208,11 @@ class Sessions:
 
     @classmethod
     def of(cls, runs: Sequence[Run], left_out: Sequence[GainOffset], own: Sequence[GainOffset]) -> Sessions:
-        """Estimate them from the tests of a damper.
+        """Estimate them from the tests of a damper, R runs.
 
-        Parameters
-        ----------
-        runs : sequence of Run, length R
-        left_out : sequence of GainOffset, length R
-            Each predicted without its condition: their scatter is that of future sessions.
-        own : sequence of GainOffset, length R
-            Against the damper itself.
-
-        Raises
-        ------
-        InputError
-            E_SESSION if no session has two runs, or there are under three; E_CLOCK if sessions overlap in time.
+        `left_out`: gains and offsets of each run predicted without its condition, whose scatter is that of future
+        sessions; `own`: against the damper itself. Raises `InputError`: E_SESSION if no session has two runs, or there
+        are under three; E_CLOCK if sessions overlap in time.
         """
         when = tuple(RecordingTime.of(run) for run in runs)
         _refuse_disorder(runs, when)
@@ -238,14 +229,7 @@ class Sessions:
         return cls(gain, offset, tuple(run.id for run in runs), when, gains, offsets)
 
     def expected(self, at: RecordingTime, without: str = "") -> SessionCorrection | None:
-        """Gain and offset of a run recorded then; None if its session is unknown.
-
-        Parameters
-        ----------
-        at : When
-        without : str
-            Run whose gain and offset are not used.
-        """
+        """Gain and offset of a run recorded then, by all runs but one; None if its session is unknown."""
         rows = [i for i, name in enumerate(self.run_ids) if name != without]
         when = [self.when[i] for i in rows]
         if at.session is None or all(w.session != at.session for w in when):
@@ -255,14 +239,9 @@ class Sessions:
         return SessionCorrection(1 + gain, gain_spread, offset, offset_spread)
 
     def seen(self, damper: Damper, runs: Iterable[Run], own: bool) -> Sessions:
-        """Return the sessions with the gains and offsets of further runs, with or without the damper's own tests.
+        """Return the sessions with the gains and offsets of further runs, for example check runs of a day.
 
-        Parameters
-        ----------
-        damper : Damper
-        runs : iterable of Run
-            For example check runs of a day.
-        own : bool
+        The damper's own tests count, too, if `own`.
         """
         entries = [(run.id, RecordingTime.of(run), gain_offset_of(damper, run)) for run in runs]
         names = {name for name, _, _ in entries}
@@ -278,10 +257,7 @@ class Sessions:
 def sessions_known(damper: Damper, runs: Iterable[Run] = (), own: bool = False) -> Sessions:
     """Return the sessions as known by check runs, by a damper's own tests, or by both.
 
-    Raises
-    ------
-    InputError
-        E_SESSION if the damper's tests do not determine the scatter between sessions.
+    Raises `InputError` (E_SESSION) if the damper's tests do not determine the scatter between sessions.
     """
     sessions = damper.uncertainty.sessions if damper.uncertainty else None
     if sessions is None:

@@ -17,21 +17,9 @@ _RELATIVE_STEP = 1e-4  # relative step of a parameter
 
 
 def force_slopes(damper: Damper, prediction: Prediction, names: Sequence[str]) -> Floats:
-    """Return derivatives of a predicted force by some of the damper's parameters, or by their logarithm.
+    """(N, P) derivatives of a predicted force by some of the damper's parameters, or by their logarithm [N per unit].
 
     Those by linear parameters of one model are columns of one state; for the others the force is predicted again.
-
-    Parameters
-    ----------
-    damper : Damper
-    prediction : Prediction
-        Of this damper, N samples.
-    names : sequence of str, length P
-
-    Returns
-    -------
-    (N, P) array
-        [N per unit of the number]
     """
     prediction.motion.path  # noqa: B018  cut into strokes once, for every number that is moved
     columns = _linear(damper, prediction, names)
@@ -42,18 +30,9 @@ def force_slopes(damper: Damper, prediction: Prediction, names: Sequence[str]) -
 def relative_variances(slopes: Floats, covariance: Floats, force: Floats, velocity: Floats, time: Floats) -> Floats:
     """Propagate a covariance of parameters to the force, its peak and the dissipated energy.
 
-    Parameters
-    ----------
-    slopes : (N, P) array
-        Of the force (N,) [N], by parameters of covariance (P, P).
-    velocity, time : (N,) arrays
-        [m/s], [s]
-
-    Returns
-    -------
-    (3,) array
-        Mean variance of the force and that of its peak over the square of half the peak-to-peak value; that of the
-        energy, relative.
+    `slopes` (N, P) are derivatives of the force (N,) [N] by parameters of covariance (P, P); velocity and time (N,)
+    [m/s], [s]. Returns (3,): the mean variance of the force and that of its peak over the square of half the
+    peak-to-peak value; that of the energy, relative.
     """
     half = peak_force(force) or 1.0
     power = dissipated_power(force, velocity, time) or 1.0

@@ -87,10 +87,6 @@ class Stepper:
 
     Made by `stepper`. `step` takes the displacement, `step_velocity` the velocity, `step_motion` the whole motion; all
     return the force [N]. A sample that cannot be used raises an error without changing the state.
-
-    Parameters
-    ----------
-    stream : Stream
     """
 
     def __init__(self, stream: Stream):
@@ -116,12 +112,8 @@ class Stepper:
     def set_parameters(self, **values: float) -> None:
         """Change parameters between two samples; the state is kept.
 
-        Raises
-        ------
-        UnknownNameError
-            If there is no parameter of that name.
-        ParameterError
-            If a value is outside its bounds, or needs another program.
+        Raises `UnknownNameError` if there is no parameter of that name, and `ParameterError` if a value is outside its
+        bounds, or needs another program.
         """
         for name in values:
             if name not in self._parameters:
@@ -224,10 +216,7 @@ class Stepper:
     ) -> Floats:
         """Force [N] along a sampled motion, from the present state; compiled where there is a C compiler.
 
-        Parameters
-        ----------
-        time, displacement, velocity, acceleration, current : (N,) arrays
-            [s], [m], [m/s], [m/s²], [A].
+        Time, displacement, velocity, acceleration and current (N,) [s], [m], [m/s], [m/s²], [A].
         """
         t, *channels = series(
             time=time, displacement=displacement, velocity=velocity, acceleration=acceleration, current=current
@@ -256,10 +245,7 @@ class Stepper:
 def steps_of(time: Floats) -> Floats:
     """(N,) steps [s] to each sample, the first as long as the second.
 
-    Raises
-    ------
-    ExcitationError
-        Unless time increases, over two samples at least.
+    Raises `ExcitationError` unless time increases, over two samples at least.
     """
     steps = np.diff(time, prepend=2 * time[0] - time[1]) if time.size > 1 else np.zeros(1)
     if not np.all(steps > 0):

@@ -170,13 +170,7 @@ class Uncertainty(Displayable):
         return interval_about(own.value, error, self.dof[i], level, self.logs[i], own.exponent)
 
     def interval(self, damper: Damper, name: str, level: float = 0.95) -> tuple[float, float]:
-        """Return the ends of a parameter's interval.
-
-        Raises
-        ------
-        InputError
-            E_CERTAINTY if its variance is not known.
-        """
+        """Return the ends of a parameter's interval; raises `InputError` (E_CERTAINTY) if its variance is not known."""
         if ends := self.ends(damper, name, level):
             return ends
         why = "is held by a bound" if name in self.one_sided else NOT_IDENTIFIABLE

@@ -84,10 +84,7 @@ class ConditionedDamper(Damper):
     ) -> Self:
         """Determine the coefficients from runs of one rig and their identifications with `basis`.
 
-        Raises
-        ------
-        IdentificationError
-            If there are fewer than three runs or the identifications are of another model.
+        Raises `IdentificationError` if there are fewer than three runs or the identifications are of another model.
         """
         damper = cls.regressed(identifications, provenance)
         return damper.refined(runs)
