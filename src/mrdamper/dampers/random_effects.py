@@ -133,7 +133,7 @@ class GainsAndOffsets:
         return designs
 
     def _variances(self, shown: Floats, assumed: Floats, noise: float = 1.0) -> tuple[Floats, Floats]:
-        """Estimate variances (D, C), none negative, by the quadratic forms that have least variance at assumed variances.
+        """Estimate variances (D, C), none negative, by quadratic forms of least variance at assumed variances.
 
         `shown` (D, K): gains and offsets of the residuals, with a share `noise` of their noise; `assumed`: (D, C) or
         (1, C), no row zero. Returns the inner products (D, G, G) Zᵀ V⁻¹ Z of the effects, too.

@@ -95,13 +95,8 @@ def write_into(folder: str | Path) -> Generator[Path]:
 def write_result(folder: str | Path, record: ResultRecord | None = None) -> Generator[Path]:
     """Give a temporary folder whose files replace an earlier result in one step when the block ends.
 
-    Further files of the earlier result are removed; other files stay. `made.json` lists the files of a result. Raises
-    `OutputError` if the folder cannot be made or written to.
-
-    Parameters
-    ----------
-    record : ResultRecord, optional
-        Durations and processes, which no other file contains.
+    Further files of the earlier result are removed; other files stay. `made.json` lists the files of a result, and
+    holds the durations and processes of a record. Raises `OutputError` if the folder cannot be made or written to.
     """
     final = Path(folder)
     with _beside(final) as work:

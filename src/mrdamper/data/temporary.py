@@ -17,12 +17,8 @@ _PREFIX, _SUFFIX = "mrdamper-", ".scratch"
 def temporary_folder(parent: Path | None = None, prefix: str = _PREFIX, suffix: str = _SUFFIX) -> Generator[Path]:
     """Give a new folder that is removed after the block; those of its kind whose process was killed are removed before.
 
-    Parameters
-    ----------
-    parent : path, optional
-        Default: the folder of the system for temporary files.
-    prefix, suffix : str
-        Prefix and suffix of the names of the kind.
+    It is made in the system's folder for temporary files, unless another is given; prefix and suffix are those of the
+    names of the kind.
     """
     parent = Path(tempfile.gettempdir()) if parent is None else parent
     _sweep(parent, prefix, suffix)

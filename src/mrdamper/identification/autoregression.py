@@ -110,16 +110,10 @@ def _burg(residual: Floats, highest: int, first: float | None = None) -> list[Au
 def models_by_likelihood(jacobian: Floats, residual: Floats) -> tuple[list[Autoregression], Floats]:
     """Models of shorter and longer correlation times than that of Burg's recursion, and the probability of each.
 
-    A fit reduces the slow part of the noise in its residual. The restricted likelihood is that of the part of the
-    noise that no parameter can describe [Cheang and Reinsel 2000, J. Am. Stat. Assoc. 95, 1173]; the prior of the
-    correlation φ of neighbouring samples is that of Jeffreys, (1 - φ²)^-½.
-
-    Parameters
-    ----------
-    jacobian : (N, P) array
-        P less than N, its columns of similar size.
-    residual : (N,) array
-        Of an order above zero.
+    A fit reduces the slow part of the noise in its residual (N,), which has an order above zero. The restricted
+    likelihood is that of the part of the noise that no parameter can describe [Cheang and Reinsel 2000, J. Am. Stat.
+    Assoc. 95, 1173]; the prior of the correlation φ of neighbouring samples is that of Jeffreys, (1 - φ²)^-½. The
+    Jacobian (N, P) has fewer columns than rows, of similar size.
     """
     turned, sizes, _ = np.linalg.svd(jacobian, full_matrices=False)
     columns = turned[:, sizes > _RANK * sizes[0]]

@@ -16,24 +16,9 @@ from mrdamper.physics.motion.excitation import Excitation
 def linear_table(
     bare: Model, linear: Sequence[ParameterInfo], motion: Excitation, state: Floats, base: Floats | None = None
 ) -> tuple[Floats, Floats]:
-    """Force of a model without its linear parameters, and the force per unit of each.
+    """Force of a model without its linear parameters (N,) [N], and the force per unit of each parameter (N, L).
 
-    Parameters
-    ----------
-    bare : Model
-        With all the linear parameters at zero.
-    motion : Excitation
-        N samples.
-    state : (N,) array
-    base : (N,) array, optional
-        Where it is known.
-
-    Returns
-    -------
-    base : (N,) array
-        [N]
-    columns : (N, L) array
-        [N per unit of the parameter]
+    `bare` has all the linear parameters at zero; `base` is its force, where it is known.
     """
     base = bare.force(motion, state) if base is None else base
     units = [1.0 if info.bounds[0] <= 1.0 <= info.bounds[1] else info.bounds[1] for info in linear]

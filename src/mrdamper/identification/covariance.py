@@ -52,17 +52,7 @@ def spread(
 
     (JᵀJ)⁻¹ Jᵀ Σ J (JᵀJ)⁻¹ with Σ from the residual: an autoregression whose order an information criterion selects,
     and, if the motion repeats, the repeating part of the residual, each harmonic corrected for the part that the fit
-    absorbed.
-
-    Parameters
-    ----------
-    jacobian : (N, P) array
-        Derivatives of the residual with respect to the parameters.
-    residual : (N,) array
-    time : (N,) array, optional
-        [s]; evenly spaced, or nearly.
-    frequency : float, optional
-        Of the motion, where it repeats [Hz].
+    absorbed. The times (N,) [s] are evenly spaced, or nearly; the frequency [Hz] is that of a motion that repeats.
     """
     whole, squares = residual.size, float(residual @ residual)
     if (block := max(1, whole // _MAX_SAMPLES)) > 1:  # means over a few samples keep slower components

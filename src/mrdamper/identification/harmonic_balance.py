@@ -90,16 +90,10 @@ def read_force(
 ) -> ForceReading:
     """Calculate F0, phi and f0 of a measured force.
 
-    [Qian et al. 2024, Eq. 16] The text leaves their definition open; the options are the possible ones.
-
-    Parameters
-    ----------
-    amplitude : {"first-harmonic", "half-peak-to-peak", "maximum"}
-        F0 is the amplitude of the first harmonic, half the peak-to-peak force, or the largest force.
-    phase : {"harmonic", "peaks"}
-        phi is the lead of the first harmonic, or that of the peaks.
-    offset : {"extremes", "mean"}
-        f0 is the mid-point of maximum and minimum (the paper's), or the mean over the cycles.
+    [Qian et al. 2024, Eq. 16] The text leaves their definition open; the options are the possible ones. F0 is the
+    amplitude of the first harmonic, half the peak-to-peak force, or the largest force; phi is the lead of the first
+    harmonic, or that of the peaks; f0 is the mid-point of maximum and minimum (the paper's), or the mean over the
+    cycles.
     """
     # No drift: over a few cycles a line is not orthogonal to the sines and would absorb part of them.
     series = fit_harmonics(record.theta, record.force, _FORCE_HARMONICS, frequency=1 / (2 * np.pi), drift=False)
@@ -118,24 +112,11 @@ def read_force(
 def damping_and_mass(
     reading: ForceReading, amplitude: float, omega: float, k1: float, k3: float
 ) -> tuple[float, float]:
-    """Viscous damping and equivalent mass by first-order harmonic balance.
+    """Viscous damping c [N s/m] and equivalent mass m [kg] by first-order harmonic balance.
 
-    c = F0 sin(phi)/(X omega),  m = (k1 X + 3/4 k3 X³ − F0 cos(phi))/(X omega²)
-    [Qian et al. 2024, Eq. 17–19]. The hysteretic force is counted in both: see `double_counted`.
-
-    Parameters
-    ----------
-    amplitude : float
-        X [m].
-    omega : float
-        [rad/s]
-    k1, k3 : float
-        Stiffnesses of the gas spring [N/m], [N/m³]. The even one has no first harmonic.
-
-    Returns
-    -------
-    c, m : float
-        [N s/m], [kg].
+    c = F0 sin(phi)/(X omega), m = (k1 X + 3/4 k3 X³ − F0 cos(phi))/(X omega²) [Qian et al. 2024, Eq. 17–19], with the
+    amplitude X [m], omega [rad/s] and the stiffnesses of the gas spring k1 [N/m] and k3 [N/m³]; the even one has no
+    first harmonic. The hysteretic force is counted in both: see `double_counted`.
     """
     X = amplitude
     c = reading.amplitude * np.sin(reading.phase) / (X * omega)
@@ -183,14 +164,7 @@ class HarmonicProjection:
 
     Measured and modelled force have the same projection, so neither an incomplete last cycle nor the omitted harmonics
     affect the balance: equal signals have equal projections. Squared differences of projections equal those in time of
-    the harmonics. A linear drift is projected out.
-
-    Parameters
-    ----------
-    theta : (N,) array
-        [rad]
-    harmonics : int
-        H; reduced to the harmonics that the samples resolve.
+    the harmonics. A linear drift is projected out. H is reduced to the harmonics that the samples resolve.
     """
 
     def __init__(self, theta: Floats, harmonics: int):

@@ -25,13 +25,9 @@ _LOPSIDED = 0.1  # share of an interval's half width: less asymmetric, it is wri
 
 
 def student(level: float, dof: float) -> float:
-    """Two-sided quantile of Student's t, to 1e-10 for levels up to 0.999.
+    """Two-sided quantile of Student's t, to 1e-10 for levels up to 0.999 [Abramowitz and Stegun 1972, 26.7.3, 26.7.5].
 
     Raises `InputError` (E_LEVEL) if the level is not between 0 and 1.
-
-    References
-    ----------
-    Abramowitz and Stegun (1972), "Handbook of Mathematical Functions", 26.7.3, 26.7.5.
     """
     if not 0 < level < 1:
         raise InputError(f"level {level:g}", remedy="give a share between 0 and 1, as 0.9", code="E_LEVEL")
@@ -136,14 +132,8 @@ def weaknesses(
 ) -> list[str]:
     """List the parameters that are not, or only roughly, determined, in words.
 
-    Parameters
-    ----------
-    covariance : (P, P) array
-        Infinite on the diagonal for parameters that are not determined.
-    alike : sequence of sequences of int
-        Parameters with the same effect on the force.
-    conditions : sequence of Condition
-        Of the tests, whose single values are the probable reasons.
+    The covariance (P, P) is infinite on the diagonal for parameters that are not determined; `alike` are those with the
+    same effect on the force. Single values of the conditions of the tests are the probable reasons.
     """
     reason = _only_one(conditions)
     sentences = [

@@ -52,23 +52,14 @@ def least_squares(
 ) -> Minimum:
     """Minimise |residual(point)|² inside a box, until a step gains less than `tolerance` of it.
 
-    Coordinates at a bound whose gradient points outwards are held there for the step.
+    Points and ends of the box are (D,), residuals (N,). Coordinates at a bound whose gradient points outwards are held
+    there for the step. `slopes` gives the (N, D) derivatives of the residual at a point; without, they are forward
+    differences.
 
-    Parameters
-    ----------
-    residual : callable
-        (D,) point -> (N,) residual.
-    start, lower, upper : (D,) arrays
-    most_steps : int
-    tolerance : float
-    slopes : callable, optional
-        (D,) point -> (N, D) derivatives of the residual; by forward differences without.
-    curved : bool
-        Estimate the curvature that the Jacobian omits from changes of the gradient. With large residuals, Gauss–Newton
-        converges linearly, this method faster [Dennis, Gay and Welsch 1981, ACM Trans. Math. Software 7, 348].
-    lengthened : bool
-        Lengthen a step that gains more than predicted: the Jacobian overestimates the curvature of residuals with
-        narrow peaks, and a step takes many more operations than a residual.
+    `curved`: estimate the curvature that the Jacobian omits from changes of the gradient. With large residuals,
+    Gauss–Newton converges linearly, this method faster [Dennis, Gay and Welsch 1981, ACM Trans. Math. Software 7, 348].
+    `lengthened`: lengthen a step that gains more than predicted, because the Jacobian overestimates the curvature of
+    residuals with narrow peaks, and a step takes many more operations than a residual.
     """
     width = upper - lower
     point = np.clip(start, lower, upper)
@@ -146,14 +137,9 @@ def newton_refine(gradient: Callable[[Floats], Floats], point: Floats, lower: Fl
     """Refine the minimum next to a point where a search has stopped, to the last digits.
 
     The cost determines its minimum to half of the digits only, and the end of a search by the cost depends on rounding.
-    The gradient determines all of them: Newton steps on it, with the curvature by differences, end below 1e-13 of the
-    box. If they do not converge nearby, at a bound or in a flat region, the point is kept.
-
-    Parameters
-    ----------
-    gradient : callable
-        (D,) point -> (D,) derivatives of the cost, without noise and without jumps.
-    point, lower, upper : (D,) arrays
+    The gradient (D,) at a point (D,), without noise and without jumps, determines all of them: Newton steps on it, with
+    the curvature by differences, end below 1e-13 of the box. If they do not converge nearby, at a bound or in a flat
+    region, the point is kept.
     """
     width = upper - lower
     free = (point > lower) & (point < upper)

@@ -29,18 +29,9 @@ T = TypeVar("T")
 
 
 def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None) -> Floats:
-    """Coefficients of least squares; of several solutions the shortest, relative to the size of each column.
+    """Coefficients (L,) of least squares; of several solutions the shortest, relative to the size of each column.
 
-    Parameters
-    ----------
-    columns : (N, L) array
-    right : (N,) array
-    rank_limit : float, optional
-        Singular value over the largest below which a direction counts as undetermined.
-
-    Returns
-    -------
-    (L,) array
+    A singular value over the largest below `rank_limit` counts as undetermined.
     """
     gram = columns.T @ columns
     scale = np.sqrt(gram.diagonal())
@@ -85,19 +76,9 @@ def project_out_columns(columns: Floats, right: Floats) -> Floats:
 
 
 def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Least squares with bounds on the coefficients, by holding violated ones at their bound.
+    """Least squares with bounds on the coefficients (L,), by holding violated ones at their bound.
 
-    Parameters
-    ----------
-    columns : (N, L) array
-    right : (N,) array
-    lower, upper : (L,) arrays
-
-    Returns
-    -------
-    solution : (L,) array
-    held : (L,) boolean array
-        Coefficients that ended at a bound.
+    Returns the coefficients, and which of them ended at a bound.
     """
     held = np.zeros(columns.shape[1], dtype=bool)
     solution = np.zeros(held.size)
@@ -118,12 +99,8 @@ def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) 
 def robust_weights(errors: Floats, best: float) -> Floats:
     """Weights with which weighted squares sum up to the errors themselves, which limits the effect of one bad run.
 
-    Parameters
-    ----------
-    errors : (R,) array
-        Root mean square residual of each group of rows, at the last fit.
-    best : float
-        Error below which a group gains no more weight.
+    `errors` (R,) are root mean square residuals of each group of rows, at the last fit; below `best` a group gains no
+    more weight.
     """
     return 1.0 / np.sqrt(np.maximum(errors, best))
 

@@ -74,13 +74,7 @@ class Scores:
 
 
 def score(measured: Floats, predicted: Floats, velocity: Floats, time: Floats) -> Scores:
-    """Score one predicted run.
-
-    Parameters
-    ----------
-    measured, predicted, velocity, time : (N,) arrays
-        [N], [N], [m/s], [s].
-    """
+    """Score one predicted run: forces measured and predicted [N], velocity [m/s] and time [s], (N,) each."""
     dissipated = dissipated_power(measured, velocity, time)
     return Scores(
         nrmse_pp=nrmse_pp(measured, predicted),

@@ -29,18 +29,8 @@ def least_squares_in_one(
 ) -> Minimum | None:
     """Minimise |residual(u)|² between two bounds, until the predicted gain of a step is negligible.
 
-    Parameters
-    ----------
-    evaluate : callable
-        u -> (N,) residual and its derivative; None where it is undefined.
-    start, lower, upper : float
-    most_steps : int
-    tolerance : float
-
-    Returns
-    -------
-    Minimum or None
-        None if `evaluate` returns None.
+    `evaluate` gives the residual (N,) and its derivative at u; None where they are undefined, and then there is no
+    minimum.
     """
     low, high = -math.inf, math.inf  # points with gradients of both signs about the minimum
     u, before, best, evaluations = start, None, None, 0

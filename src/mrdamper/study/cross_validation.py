@@ -31,32 +31,18 @@ _STRETCH_NOTE = "stretch of"  # note of a stretch: the record it was cut from
 def cross_validate(pieces: Sequence[Run], refit: Callable[[Sequence[int]], Damper], title: str) -> Validation:
     """Score every run with a damper identified without its condition, and every stretch of a record without it.
 
-    Parameters
-    ----------
-    pieces : sequence of Run
-        Runs, and stretches of long records.
-    refit : callable
-        Makes a damper of the pieces at some indices.
-    title : str
+    `pieces` are runs, and stretches of long records; `refit` makes a damper of the pieces at some indices.
     """
     return _whole_again(leave_out(pieces, condition_folds(pieces), refit, title), pieces)
 
 
 def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
-    """Return indices of runs that are omitted together, by kind of fold beyond a single condition.
+    """Return indices of runs, and stretches of long records, omitted together, by kind of fold beyond a condition.
 
-    Parameters
-    ----------
-    pieces : sequence of Run
-        Runs, and stretches of long records.
-
-    Returns
-    -------
-    dict
-        "current": every level of sines but 0 A; "no current": all sines at 0 A,
-        reported without effect on the ranking; "fastest motions": those whose peak velocity is within a fifth of the
-        largest; "session": every session of several; "other records": all records except sines at one current. A kind
-        is absent where it would leave fewer than two levels, two motions or two sessions.
+    "current": every level of sines but 0 A; "no current": all sines at 0 A, reported without effect on the ranking;
+    "fastest motions": those whose peak velocity is within a fifth of the largest; "session": every session of several;
+    "other records": all records except sines at one current. A kind is absent where it would leave fewer than two
+    levels, two motions or two sessions.
     """
     motions = [equivalent_sine(piece) for piece in pieces]
     sines = [i for i, motion in enumerate(motions) if motion.is_sine and not pieces[i].current_changes]

@@ -11,15 +11,10 @@ from mrdamper.statistics.metrics import dissipated_power
 
 
 def gains_energy(damper: Damper) -> str:
-    """Find a condition at which a steady loop of a damper does not dissipate.
+    """Find a condition at which a steady loop of a damper does not dissipate, as a sentence; empty if every loop does.
 
     Checked are the lowest and the highest tested current and a fifth more, at the corners of the tested ranges of
     frequency and amplitude and a fifth beyond these.
-
-    Returns
-    -------
-    str
-        The condition, as a sentence; empty if every loop dissipates.
     """
     tested = damper.envelope
     if not tested.tested:

@@ -14,10 +14,7 @@ _SESSIONS = 2  # whose repeats show how much they differ
 def first_matrix(limits: Limits, hours: float) -> list[Proposal]:
     """Return a first test matrix, the most informative rows first.
 
-    Raises
-    ------
-    InputError
-        E_LIMITS if the hours hold no record, or nothing is allowed.
+    Raises `InputError` (E_LIMITS) if the hours hold no record, or nothing is allowed.
     """
     limits.candidates(hours)
     (i_low, i_high), (f_low, f_high), (a_low, a_high) = limits.current_A, limits.frequency_Hz, limits.amplitude_mm

@@ -101,10 +101,7 @@ class Limits:
     def read(cls, path: Path) -> Limits:
         """Read the rig limits of a limits file, whose keys are the attributes, units in their names.
 
-        Raises
-        ------
-        InputError
-            E_LIMITS if the file cannot be read, or a key is unknown, missing, or no number.
+        Raises `InputError` (E_LIMITS) if the file cannot be read, or a key is unknown, missing, or no number.
         """
         kinds: dict[str, Any] = {**dict.fromkeys(_RANGES, tuple[_Number, _Number]), "sessions": _Whole}
         part = {f.name: (kinds.get(f.name, _Number), ... if f.default is MISSING else f.default) for f in fields(cls)}
@@ -130,10 +127,7 @@ class Limits:
     def candidates(self, hours: float) -> list[Condition]:
         """Conditions on a grid inside the limits.
 
-        Raises
-        ------
-        InputError
-            E_LIMITS if nothing is allowed, or the hours do not hold one record.
+        Raises `InputError` (E_LIMITS) if nothing is allowed, or the hours do not hold one record.
         """
         current = _rounded(np.linspace(*self.current_A, _LEVELS))
         frequency, amplitude = (

@@ -22,10 +22,7 @@ from mrdamper.errors import ResourceError
 def processes(count: int) -> Generator[ProcessPoolExecutor]:
     """Yield a pool of processes; an exception in the block, and the end of this process, end them at once.
 
-    Raises
-    ------
-    ResourceError
-        E_WORKER if a process was ended from outside, as by a system short of memory.
+    Raises `ResourceError` (E_WORKER) if a process was ended from outside, as by a system short of memory.
     """
     pool = ProcessPoolExecutor(count, SPAWNED, initializer=_begin)
     try:

@@ -61,13 +61,7 @@ class Recipe:
     complete: Callable[[Sequence[Run]], Recipe] | None = field(default=None, compare=False)  # from the runs of a rig
 
     def for_runs(self, sines: Sequence[Run]) -> Recipe:
-        """Return the recipe for a rig from its pure sines for identification.
-
-        Raises
-        ------
-        InputError
-            If these runs do not allow it.
-        """
+        """Return the recipe for a rig from its pure sines; raises `InputError` if these do not allow it."""
         return self if self.complete is None else self.complete(sines)
 
     @property
@@ -126,26 +120,10 @@ def fit_and_score(
 ) -> RecipeResult:
     """Identify a recipe's damper and score it.
 
-    Parameters
-    ----------
-    recipe : Recipe
-    train : sequence of Run, length N
-        Of one rig; the damper is identified from these.
-    identifications : sequence of Identification
-        Of identification runs, as `identified` gives them for the recipe's basis.
-    held_out : sequence of Run
-        Predicted only.
-    spent : float
-        Seconds the identifications took.
-    leave_out : bool
-        Predict every identification run without its condition, too.
-    kinds : bool
-        And without its current, the fastest motions, its session and other records.
-
-    Raises
-    ------
-    InputError
-        If the damper cannot be determined from these runs.
+    The damper is identified from `train`, runs of one rig, whose identifications `identified` gives for the recipe's
+    basis in `spent` seconds. The held-out runs are predicted only. `leave_out`: predict every identification run
+    without its condition, too; `kinds`: and without its current, the fastest motions, its session and other records.
+    Raises `InputError` if the damper cannot be determined from these runs.
     """
     begin = time.perf_counter()
     pieces = [piece for run in train for piece in stretches(run)] if recipe.basis is None else list(train)
@@ -191,23 +169,10 @@ def fit_and_score_all(
     kinds: bool = False,
     cache: IdentificationCache | None = None,
 ) -> tuple[list[RecipeResult], dict[str, str]]:
-    """Follow several recipes on one rig; individual fits that they share are made once.
+    """Follow several recipes, each with its identification runs, on one rig; shared individual fits are made once.
 
-    Parameters
-    ----------
-    steps : sequence of (Recipe, identification runs)
-    held_out : sequence of Run
-    progress : callable
-    leave_out, kinds : bool
-        As `fit_and_score` takes them.
-    cache : mapping, optional
-        Existing identifications by basis and run id, to which new ones are added.
-
-    Returns
-    -------
-    scored : list of RecipeResult
-    refused : mapping of recipe name to reason
-        Recipes whose damper cannot be determined from these runs.
+    `cache` holds existing identifications, to which new ones are added; the other arguments are those of
+    `fit_and_score`. Returns the results, and by name the reasons why a damper cannot be determined from these runs.
     """
     cache = {} if cache is None else cache
     scored, refused = list[RecipeResult](), dict[str, str]()
@@ -233,13 +198,7 @@ def fit_and_score_all(
 def identified(
     basis: Basis | None, runs: Sequence[Run], cache: IdentificationCache, progress: Progress = lambda what, share: None
 ) -> tuple[list[Identification], float]:
-    """Identifications of runs, made if missing, and their time [s].
-
-    Raises
-    ------
-    IdentificationError
-        If a run allows none.
-    """
+    """Identifications of runs, made if missing, and their time [s]; raises `IdentificationError` if one is refused."""
     if basis is None:
         return [], 0.0
     identifications: list[Identification] = []
@@ -334,25 +293,13 @@ def conditioned(cls: Published) -> Recipe:
 
 
 class StudyMethod(ABC):
-    """A published method that a study can follow, with its options as fields.
-
-    Attributes
-    ----------
-    name : str
-        Name for `study --model`.
-    """
+    """A published method that a study can follow, with its name for `study --model`, and its options as fields."""
 
     name: ClassVar[str]
 
     @abstractmethod
     def recipe(self, train: Sequence[Run]) -> Recipe:
-        """Make the recipe for the sine runs of one rig.
-
-        Raises
-        ------
-        InputError
-            If these runs do not allow the method.
-        """
+        """Make the recipe for the sine runs of one rig; raises `InputError` if these runs do not allow the method."""
 
     def beside_others(self) -> StudyMethod:
         """Return the method with reduced effort for a comparison."""
@@ -368,20 +315,9 @@ study_methods = _study_methods.all
 
 
 def study_method(name: str, settings: Mapping[str, str] | None = None, gas: GasSpring | None = None) -> StudyMethod:
-    """Return the study method of a name with its options from text.
+    """Return the study method of a name with its options from text, and with a known gas spring of the damper.
 
-    Parameters
-    ----------
-    name : str
-    settings : mapping of str to str, optional
-        Options by their names.
-    gas : GasSpring, optional
-        Known gas spring of the damper.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no such method, option or value; with the near matches.
+    Raises `UnknownNameError` if there is no such method, option or value; with the near matches.
     """
     chosen = _study_methods.type_named(name)
     values = values_of_fields(chosen, settings or {})
@@ -391,10 +327,7 @@ def study_method(name: str, settings: Mapping[str, str] | None = None, gas: GasS
 def catalogue(method: StudyMethod | None = None) -> Mapping[str, Recipe]:
     """Every recipe that can be compared, by name, including those of added models and dampers.
 
-    Parameters
-    ----------
-    method : StudyMethod, optional
-        A published method with options, in place of its own defaults.
+    `method` is a published method with options, in place of its own defaults.
     """
     all_recipes = [whole_damper(n) if cls.current_levels else modified(n) for n, cls in all_models().items()]
     all_recipes += [jointly(name) for name in _closed_shapes()]
@@ -405,20 +338,10 @@ def catalogue(method: StudyMethod | None = None) -> Mapping[str, Recipe]:
 
 
 def recipes(names: Sequence[str] = (), genetic: bool = False, method: StudyMethod | None = None) -> list[Recipe]:
-    """Recipes of some names, or all.
+    """Recipes of some names, or all; raises `UnknownNameError` with the near matches.
 
-    Parameters
-    ----------
-    names : sequence of str
-    genetic : bool
-        Include those by genetic algorithms, which take most of the time.
-    method : StudyMethod, optional
-        A published method with options, in place of its own defaults.
-
-    Raises
-    ------
-    UnknownNameError
-        With the near matches.
+    Those by genetic algorithms, which take most of the time, are included if `genetic`. `method` is a published method
+    with options, in place of its own defaults.
     """
     by_name = catalogue(method)
     for name in names:

@@ -42,15 +42,9 @@ def hold_out(
 ) -> Split:
     """Choose the validation runs; by default a stratified fifth of the conditions.
 
-    Raises
-    ------
-    SplitError
-        E_SPLIT if there are no runs to select, no identification runs would remain, or the dataset has a split that is
-        not to be replaced.
-    UnknownNameError
-        If a run is not there.
-    ConditionError
-        If a condition is none.
+    Raises `SplitError` (E_SPLIT) if there are no runs to select, no identification runs would remain, or the dataset
+    has a split that is not to be replaced; `UnknownNameError` if a run is not there; `ConditionError` if a condition is
+    none.
     """
     where = f"dataset {dataset.name}"
     before = [run.id for run in dataset if run.split == "validate"]

@@ -77,11 +77,8 @@ class UsableRuns:
 def without_contradictions(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, tuple[Contradiction, ...]]:
     """Set aside the runs of a rig that contradict the others.
 
-    Raises
-    ------
-    ContradictionError
-        If more than a third of the identification runs contradict the others, or their forces differ as those of
-        two dampers do.
+    Raises `ContradictionError` if more than a third of the identification runs contradict the others, or their forces
+    differ as those of two dampers do.
     """
     contradictions = tuple(find_contradictions(accepted_runs(dataset)[0], keep))
     aside = {one.run_id for one in contradictions}

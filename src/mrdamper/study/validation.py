@@ -168,10 +168,7 @@ def validate(
 def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> RunScore:
     """Predict and score one run, corrected where its session is known.
 
-    Raises
-    ------
-    InputError
-        If the run does not move, or its force is constant or not that of a damper.
+    Raises `InputError` if the run does not move, or its force is constant or not that of a damper.
     """
     swing = float(np.ptp(run.force[run.in_window]))
     if not _MIN_SWING_N < swing < 1 / _MIN_SWING_N:
@@ -234,17 +231,7 @@ def peak_band(
 def leave_out(
     runs: Sequence[Run], folds: Iterable[Sequence[int]], fit: Callable[[Sequence[int]], Damper], title: str
 ) -> Validation:
-    """Score every run with a damper identified without its fold.
-
-    Parameters
-    ----------
-    runs : sequence of Run, length N
-    folds : iterable of sequence of int
-        Indices of the runs omitted together.
-    fit : callable
-        Identifies a damper from the runs at the given indices.
-    title : str
-    """
+    """Score every run with a damper that `fit` identifies without the runs of its fold, from the other indices."""
     scored: dict[int, RunScore] = {}
     for fold in folds:
         rest = [i for i in range(len(runs)) if i not in set(fold)]

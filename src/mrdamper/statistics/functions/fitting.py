@@ -56,24 +56,11 @@ def fit_function(
     log: bool = False,
     uncertainty: ArrayLike | None = None,
 ) -> FunctionFit:
-    """Fit one form to a parameter's identified values.
+    """Fit one form to a parameter's identified values (N,), or to their logarithm.
 
-    Parameters
-    ----------
-    form : str or Form
-    conditions : sequence of Condition, length N
-    values : (N,) array
-        Identified values of the parameter.
-    log : bool
-        Fit the logarithm.
-    uncertainty : (N,) array, optional
-        Standard errors of the values (of the logarithm, with `log`): values with smaller errors have more weight, up
-        to those of the best quarter.
-
-    Raises
-    ------
-    IdentificationError
-        If the conditions do not separate the terms of the form: too few currents, frequencies or amplitudes.
+    `uncertainty` (N,) are standard errors of the values (of the logarithm, with `log`): values with smaller errors have
+    more weight, up to those of the best quarter. Raises `IdentificationError` if the conditions do not separate the
+    terms of the form: too few currents, frequencies or amplitudes.
     """
     return _fitted(form, conditions, values, log, _weights(uncertainty, len(conditions))).fit
 
@@ -111,18 +98,9 @@ def choose_function(
     """Choose the form by cross-validation over conditions, currents and motions (`selection.smaller_wins`).
 
     Other parameters are those of `fit_function`; forms that the conditions do not determine are skipped, and so are
-    those with too many parameters for the tested currents and motions.
-
-    Parameters
-    ----------
-    dissipating : str
-        Unit of a parameter that must not be negative; forms that violate a physical law are refused
-        (`selection.broken_law`).
-
-    Raises
-    ------
-    IdentificationError
-        If they determine none.
+    those with too many parameters for the tested currents and motions. `dissipating` is the unit of a parameter that
+    must not be negative: forms that violate a physical law are refused (`selection.broken_law`). Raises
+    `IdentificationError` if the conditions determine none.
     """
     able: list[_Fitted] = []
     refusal: IdentificationError | None = None
@@ -179,10 +157,7 @@ def assess(function: ParameterFunction, conditions: Sequence[Condition], values:
 def require_determined(form: str, conditions: Sequence[Condition]) -> None:
     """Refuse a form without rates whose terms the conditions do not separate.
 
-    Raises
-    ------
-    IdentificationError
-        Also if the form has rates, which need a fit.
+    Raises `IdentificationError`, also if the form has rates, which need a fit.
     """
     chosen = form_named(form)
     I, f, A = features(conditions)

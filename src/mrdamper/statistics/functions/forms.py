@@ -221,13 +221,7 @@ def _numbers(value: Any) -> Any:
 
 
 def form_named(name: str) -> Form:
-    """Return the form of that name.
-
-    Raises
-    ------
-    UnknownNameError
-        With the near matches.
-    """
+    """Return the form of that name; raises `UnknownNameError` with the near matches."""
     if name not in FORMS:
         raise UnknownNameError.of("parameter function", name, FORMS)
     return FORMS[name]

@@ -36,18 +36,10 @@ def mean_error(errors: Errors) -> float:
 
 
 def smaller_wins(smaller: Errors, larger: Errors) -> bool:
-    """Decide between two models by their cross-validated errors.
+    """Decide between two models by their cross-validated errors of the same omitted units, by kind of fold.
 
-    Parameters
-    ----------
-    smaller, larger : mapping of str to (N,) array
-        Errors of the same omitted units, by kind of fold. Kinds that only one of them has do not count.
-
-    Returns
-    -------
-    bool
-        Whether the smaller model is within one standard error of the larger one, over all kinds
-        and in the kind in which it is worst, and within two in every kind of several units.
+    True if the smaller model is within one standard error of the larger one, over all kinds and in the kind in which it
+    is worst, and within two in every kind of several units. Kinds that only one of them has do not count.
     """
     kinds = [kind for kind in smaller if kind in larger and len(smaller[kind])]
     if not kinds:
@@ -110,20 +102,8 @@ def supported(form: Form, conditions: Sequence[Condition]) -> bool:
 def broken_law(function: ParameterFunction, conditions: Sequence[Condition], unit: str) -> str:
     """Return the physical law that a function of a dissipating parameter violates within the tests and 20 % beyond.
 
-    Parameters
-    ----------
-    function : ParameterFunction
-        Of a parameter that must not be negative: a yield force [N], a viscous damping.
-    conditions : sequence of Condition
-        Tested.
-    unit : str
-        Unit of the parameter; one in N is a yield force and may not fall where a straight line over the
-        current does not.
-
-    Returns
-    -------
-    str
-        Empty if it violates none.
+    It is of a parameter that must not be negative: a yield force [N], a viscous damping. A parameter in N is a yield
+    force and may not fall where a straight line over the current does not. Empty if it violates none.
     """
     tested = np.unique(current_levels([abs(c.current_A) for c in conditions]))
     currents = np.unique(np.concatenate([np.linspace(0.0, BEYOND * float(tested[-1]), 61), tested]))

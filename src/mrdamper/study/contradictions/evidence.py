@@ -190,12 +190,7 @@ def _constant(size: int) -> Floats:
 
 
 class Evidence:
-    """A linear model whose scales suit a set of runs.
-
-    Parameters
-    ----------
-    tracks : sequence of Track
-    """
+    """A linear model whose scales suit a set of runs."""
 
     def __init__(self, tracks: Sequence[Track]) -> None:
         self.spread = AssumedScatter()

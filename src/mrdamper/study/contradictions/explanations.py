@@ -76,18 +76,7 @@ class Explanation:
 
 
 class ExplanationCandidate:
-    """A run and its changed versions, whose products are computed once.
-
-    Parameters
-    ----------
-    index : int
-        Position of the run.
-    tracks : sequence of Track
-        All runs.
-    evidence : Evidence
-    products : RowProducts
-        Of the run as it is.
-    """
+    """The run at a position, with its products, and its changed versions, whose products are computed once."""
 
     def __init__(self, index: int, tracks: Sequence[Track], evidence: Evidence, products: RowProducts) -> None:
         self.track, self.evidence, self.own, self._index = tracks[index], evidence, products, index
@@ -102,12 +91,8 @@ class ExplanationCandidate:
     def explanations(self, others: Posterior, like: Sequence[Trial] = ()) -> list[Explanation]:
         """Explanations that are more than differences between sessions, the most probable first.
 
-        Parameters
-        ----------
-        others : Posterior
-            Coefficients by the other runs.
-        like : sequence of Trial
-            Look only at explanations like one of these, if there are any.
+        `others` are coefficients by the other runs. Only explanations like one of some trials are looked at, if there
+        are any.
         """
         changes = [change for change in self._trials(others, like) if self._is_large(*change, others)]
         least, *odds = others.log_probabilities(others.weigh([self.own, *(products for _, products in changes)]))
@@ -256,16 +241,8 @@ class ExplanationCandidate:
 def completed_matrix_odds(odds: float, tracks: Sequence[Track], moved: Mapping[int, Track]) -> float:
     """Return prior odds against other motions of some runs, lower where these fill empty cells of the matrix of tests.
 
-    They are higher where cells become empty.
-
-    Parameters
-    ----------
-    odds : float
-        Where no cell is filled.
-    tracks : sequence of Track
-        All runs.
-    moved : mapping of int to Track
-        Runs with other motions, by position.
+    They are higher where cells become empty. `odds` are those where no cell is filled; `tracks` are all runs, and
+    `moved` those with other motions, by position.
     """
     before = list(tracks)
     after = list(tracks)

@@ -49,15 +49,7 @@ class Contradiction:
 
 
 def describe(run: Run, explanation: Explanation, others: int) -> Contradiction:
-    """Describe the explanation of a run.
-
-    Parameters
-    ----------
-    run : Run
-    explanation : Explanation
-    others : int
-        Number of runs it was compared with.
-    """
+    """Describe the explanation of a run, which was compared with a number of others."""
     text = {
         "force": _force, "offset": _offset, "current": _current, "displacement": _displacement, "time": _time,
         "sign": _sign, "damper": _damper, "shifted": _shifted,

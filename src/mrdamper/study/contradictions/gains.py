@@ -29,14 +29,7 @@ class GainDifferences:
 
 
 def gain_differences(evidence: Evidence, products: Sequence[RowProducts]) -> GainDifferences:
-    """Find the runs with independent gains.
-
-    Parameters
-    ----------
-    evidence : Evidence
-    products : sequence of RowProducts
-        Of the runs that are compared.
-    """
+    """Find the runs with independent gains among those that are compared, by their products."""
     scatter = evidence.spread
     best: tuple[float, float, Sequence[RowProducts]] | None = None
     usual = [replace(run, misfit=1.0) for run in products]

@@ -34,23 +34,12 @@ class ContradictionError(InputError):
 
 @on_one_blas_thread
 def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list[Contradiction]:
-    """Find the runs of one rig that contradict the others.
+    """Find the runs of one rig, accepted by the quality checks, that contradict the others, except those to keep.
 
-    The comparison is of identification runs with each other. A validation run is compared with them
-    afterwards, and only what has a named cause is found; it never takes part in the comparison.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        Accepted by the quality checks.
-    keep : collection of str
-        Runs that are not to be set aside.
-
-    Raises
-    ------
-    ContradictionError
-        If more than a third of the identification runs contradict the others, or their forces differ by
-        factors that currents, motions and sessions do not explain.
+    The comparison is of identification runs with each other. A validation run is compared with them afterwards, and
+    only what has a named cause is found; it never takes part in the comparison. Raises `ContradictionError` if more
+    than a third of the identification runs contradict the others, or their forces differ by factors that currents,
+    motions and sessions do not explain.
     """
     copies = find_copies(runs)
     described = [describe_copy(copy, _split(runs, copy.run_id) == "validate") for copy in copies]

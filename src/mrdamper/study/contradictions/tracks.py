@@ -85,15 +85,7 @@ def tracks_of(runs: Sequence[Run]) -> list[Track]:
 
 
 def irregularity(tracks: Sequence[Track], currents: Sequence[float]) -> int:
-    """Repeated tests, and empty cells of the matrix of currents and motions.
-
-    Parameters
-    ----------
-    tracks : sequence of Track
-        Of constant current.
-    currents : sequence of float
-        Of each test [A].
-    """
+    """Repeated tests, and empty cells of the matrix of currents [A] and motions, of tests at constant current."""
     frequency, amplitude = (np.array([getattr(t, name) for t in tracks]) for name in ("frequency", "amplitude"))
     alike = (frequency > 0)[:, None] & np.logical_and(
         *(np.abs(size[:, None] - size) <= _SAME_MOTION * size for size in (frequency, amplitude))
