@@ -680,3 +680,34 @@ def test_samples_of_tests_stand_in_rows_or_columns_of_matrices(tmp_path, across,
     assert currents(records) == levels
     for record, amperes in zip(records, levels, strict=True):
         np.testing.assert_allclose(record.force, force(amperes), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        [",,Damping force (N) at coil current,,", "Time (s),Disp (mm),0 A,0.5 A,1.5 A"],  # merged over its columns
+        ["Damping force [N],,,,", "Time (s),Disp (mm),0 A,0.5 A,1.5 A"],
+        ["Time (s),Disp (mm),Force (N),,", ",,0 A,0.5 A,1.5 A"],
+        ["Time (s),Disp (mm),Force,,", ",,0 A,500 mA,1500 mA", "s,mm,N,N,N"],
+    ],
+)
+def test_columns_named_after_currents_under_a_heading_of_the_force_are_tests(tmp_path, head):
+    table = rows(T, X, *map(force, (0.0, 0.5, 1.5)))
+    (tmp_path / "motion.csv").write_text("\n".join([*head, table]))
+    assert currents(import_files([tmp_path]).records) == [0.0, 0.5, 1.5]
+
+
+@pytest.mark.parametrize("heading", ["", "Force (N) vs displacement", "Preload force (N): 200", "Maximum force (N)"])
+def test_columns_named_after_currents_are_asked_about_and_none_is_left_out_in_silence(tmp_path, heading):
+    table = rows(T, X, *map(force, (0.0, 0.5, 1.5)))
+    (tmp_path / "motion.csv").write_text(f"{heading}\nTime (s),Disp (mm),0 A,0.5 A,1.5 A\n{table}")
+    (refusal,) = import_files([tmp_path]).refusals
+    assert 'if columns named after currents are the force at each, unit = "..." alone' in str(refusal.error)
+    answered = import_files([tmp_path], parse_profile('[channels.force]\nunit = "N"'))
+    assert currents(answered.records) == [0.0, 0.5, 1.5]
+    one = '[channels.force]\nunit = "N"\ncolumn = "1.5 A"\n'
+    (record,) = import_files([tmp_path], parse_profile(one)).records
+    assert currents([record]) == [1.5]
+    assert any("2 columns named after other currents are not taken: 0 A, 0.5 A" in f.text for f in record.findings)
+    (refusal,) = import_files([tmp_path], parse_profile(f"{one}[current]\nvalue = 0.0")).refusals
+    assert refusal.error.code == "E_CURRENT_CONTRADICTS"

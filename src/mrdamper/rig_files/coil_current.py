@@ -24,6 +24,7 @@ from mrdamper.rig_files.conditions import (
     currents_in,
     stated_by_lines,
     stated_in_titles,
+    without_currents,
 )
 from mrdamper.rig_files.profile import Profile, current_in_name
 from mrdamper.rig_files.readers.base import RawTable
@@ -38,17 +39,17 @@ _FOLDERS = 3  # above a file, whose names may state its current
 
 
 def current_of(
-    table: RawTable, profile: Profile, path: Path, channel: Floats | None, rows: slice
+    table: RawTable, profile: Profile, path: Path, channel: Floats | None, rows: slice, force: int | None = None
 ) -> tuple[float | None, dict[str, str]]:
     """Return the current [A] that a test states beside its columns, and where; None if the channel has it, or neither.
 
-    Of a table of several tests one after the other, this one has the given rows.
+    Of a table of several tests one after the other, this one has the given rows, and its force in the given column.
 
     Raises `InputError`: E_AMBIGUOUS if two statements contradict each other, E_CURRENT_CONTRADICTS if one contradicts
     the channel, E_RANGE if one is no coil current.
     """
     where, source = printable(table.source.name), profile.current
-    statements = _statements(table, path, profile)
+    statements = _statements(table, path, profile, force)
     if source is not None and source.value is not None:
         _refuse_contradiction(source.value, channel, statements, where)
         return source.value, {"current_from": "profile"}
@@ -225,7 +226,7 @@ def _refuse_contradiction(value: float, channel: Floats | None, statements: list
         raise ColumnError(problem, where=where, remedy=remedy, code="E_CURRENT_CONTRADICTS")
 
 
-def _statements(table: RawTable, path: Path, profile: Profile) -> list[Statement]:
+def _statements(table: RawTable, path: Path, profile: Profile, force: int | None) -> list[Statement]:
     """Every current that stands beside the columns, the surest place first."""
     channel = profile.channel("current")
     called = (v for name, v in table.constants.items() if channel.column in (name, split_name(name).name))
@@ -240,6 +241,11 @@ def _statements(table: RawTable, path: Path, profile: Profile) -> list[Statement
         stated = currents_in(text)
         if len(stated) == 1:
             statements.append(Statement(stated[0], whence if whence == "file name" else f"{whence} {text!r}"))
+    headings = [] if force is None else [table.names[force], *table.over[force : force + 1]]
+    for text in headings[:1] + [text for text in headings[1:] if split_name(without_currents(text)).role == "force"]:
+        stated = currents_in(text)
+        if len(stated) == 1 and abs(stated[0]) <= LARGEST_STATED:  # more is the name of a load cell
+            statements.append(Statement(stated[0], f"the column {text!r}"))
     return statements
 
 

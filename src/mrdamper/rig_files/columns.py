@@ -29,7 +29,7 @@ from mrdamper.rig_files.column_names import (
     words,
     words_of,
 )
-from mrdamper.rig_files.conditions import currents_in, rate_in_name, stated_rate
+from mrdamper.rig_files.conditions import currents_in, named_after_currents, rate_in_name, stated_rate
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, SIGNED
 
@@ -180,6 +180,15 @@ def measured_beside_others(table: RawTable, profile: Profile, assigned: Mapping[
     return taken
 
 
+def forces_not_taken(table: RawTable, assigned: Mapping[str, Assigned]) -> list[str]:
+    """Return which columns are not taken that are named after currents as that of the force is: further tests."""
+    named = named_after_currents(table.names)
+    others = [table.names[i] for i in named if i != assigned["force"].column]
+    taken = assigned["force"].column in named
+    text = f"the tests of {len(others)} columns named after other currents are not taken: {', '.join(others)}; "
+    return [f"{text}to take each, leave [channels.force] column out of the profile"] if taken and others else []
+
+
 def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
     """Column and unit of every channel as far as the file says them, for a profile to be completed."""
     proposed: dict[str, tuple[int | None, str]] = {role: (None, "") for role in REQUIRED}
@@ -278,6 +287,8 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
         each = ', and file = "...{run}..." where each file has one channel,'
         fixed |= {role: fixed.get(role, "") + each for role in missing if role != "time"}
     beside = f"(found {shown})"
+    if "force" in missing and named_after_currents(table.names):
+        fixed["force"] = '; or, if columns named after currents are the force at each, unit = "..." alone'
     bare = {r: ' and unit = "..."' for r in missing if not volts and not table.columns(dimension=DIMENSION[r])}
     remedies = {r: remedy.format(r, bare.get(r, "") + fixed.get(r, "")) for r in missing}
     return [_refusal(ColumnError, table, f"no column is known to be {r} {beside}", remedies[r]) for r in missing]

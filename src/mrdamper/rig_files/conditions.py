@@ -181,6 +181,12 @@ def without_currents(text: str) -> str:
     return re.sub(r"\(\s*\)|\[\s*\]|\s{2,}", " ", _IN_NAME.sub(" ", text[:255])).strip() if currents_in(text) else text
 
 
+def named_after_currents(names: Sequence[str]) -> list[int]:
+    """Return the columns whose names are nothing but a current each, where two or more differ: 0 A, 0.5 A."""
+    stated = {i: currents_in(name) for i, name in enumerate(names) if not without_currents(name)}
+    return [i for i, own in stated.items() if own] if len({*stated.values()} - {()}) > 1 else []
+
+
 def amperes(number: str, unit: str) -> float:
     """Return a number with decimal point, comma, x or p, in A or mA."""
     value = float(re.sub("[,xp]", ".", number))

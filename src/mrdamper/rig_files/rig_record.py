@@ -26,6 +26,7 @@ from mrdamper.rig_files.column_names import Unit, role_of, words
 from mrdamper.rig_files.columns import (
     Assigned,
     assign,
+    forces_not_taken,
     index_of_samples,
     left_out,
     measured_beside_others,
@@ -110,6 +111,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         remarks["motion_stated"] = stated_motion(stated_quantities(table.remarks, decimal=table.decimal))
     remarks = {key: text for key, text in remarks.items() if text}
     findings += [Finding("W_CHOSEN", text) for text in measured_beside_others(table, profile, assigned)]
+    findings += [Finding("W_COLUMN", text) for text in forces_not_taken(table, assigned)]
     left_out_channels = left_out(table, profile, assigned).items()
     findings += [Finding("W_COLUMN", f"the {name} channel is not used: {why}") for name, why in left_out_channels]
     records = []
@@ -126,7 +128,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         if "current" in part:
             part["current"], slow = without_gaps(part["current"])
             noticed = [*findings, *slow]
-        current, whence = current_of(table, profile, path, part.get("current"), stretch)
+        current, whence = current_of(table, profile, path, part.get("current"), stretch, assigned["force"].column)
         if current is not None:
             part["current"] = constant(current, part["time"])
             noticed = [f for f in findings if not f.text.startswith(NO_CHANNEL)]

@@ -24,8 +24,9 @@ from mrdamper.rig_files.column_names import (
     says_nothing,
     split_name,
     words,
+    words_of,
 )
-from mrdamper.rig_files.conditions import LONGEST_LINE, currents_in, without_currents
+from mrdamper.rig_files.conditions import LONGEST_LINE, currents_in, named_after_currents, without_currents
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
 from mrdamper.rig_files.mapping.scales import (
     SCALE,
@@ -53,6 +54,7 @@ _TITLES = words("label") | words("notes")
 _UNITS_IN = rf"(?i:{'|'.join(words('unit'))}|unités|unidades|units)"
 _SI_UNITS = re.compile(rf"\bSI[- ](?:base[- ])?{_UNITS_IN}|{_UNITS_IN}\W*(?:(?:in|du|del|do)\W+)?SI\b")
 _EXCEPT = re.compile(r"(?i)\b(?:except|but|not|no|non|außer|nicht|kein\w*|sauf|salvo|excepto|tranne)\b")
+_AT = re.compile(r"\s(?:at|for|bei|mit|à|pour|con|com|en|vs\.?)\s")  # of a condition: force (N) at coil current
 _LABVIEW = ("Delta_X", "X_Dimension")
 _BEHIND_NAME = re.compile(r"\s*[:=|,]\s*|\s[-–—]\s|$")  # in front of what a name means: t - time
 _FIGURE = re.compile("(?i)" + "|".join(words("figure")))  # in a line that is not about the columns
@@ -91,7 +93,7 @@ def completed(table: RawTable) -> RawTable:
     if not any(table.names):
         return table
     table = _with_explained_names(table)
-    table = _with_titles(_with_keyed_lines(table))
+    table = _with_titles(_with_heading_of_currents(_with_keyed_lines(table)))
     table = _with_listed_units(with_axis_as_time(table))
     table = with_stated_signs(_with_si_units(with_epoch(_with_clocks_and_weights(table))))
     return with_sense(with_scales(with_counts(table)))
@@ -165,12 +167,16 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
     """
     width = len(table.names)
     for key, cells in _keyed_cells(table, _LONGEST_CONDITIONS) if width > 2 else ():
-        header, stated = split_name(key), [cell for cell in cells if cell]
-        titled = {key.casefold(), key.casefold().rstrip("s")} & _TITLES or (not key and all(cells))
+        header, stated = split_name(key), [cell for cell in cells if cell and (key or not is_unit(cell))]
+        merged = not all(table.names) and len(stated) > 1
+        titled = {key.casefold(), key.casefold().rstrip("s")} & _TITLES or (not key and (merged or all(cells)))
         if titled and len(cells) == width - 1:
             roles = {split_name(cell).role for cell in cells} - {None}
             if (key and len(roles) > 1) or (stated and all(map(currents_in, stated))):
-                table = replace(table, over=("", *cells))
+                names = [*table.names]
+                for i, cell in enumerate(cells, 1):
+                    names[i] = names[i] or (names[i - 1] if cell and cells[i - 2] else "")  # merged over the currents
+                table = replace(table, over=("", *cells), names=tuple(names))
         elif _UNITS_KEY.fullmatch(key.rstrip(" :")) and not any(table.units) and all(map(is_unit, cells[: width - 1])):
             units = tuple(cells if len(cells) == width and cells[-1] else ("", *cells[: width - 1]))  # one a column
             table = replace(table, units=units) if len(cells) >= width - 1 else table
@@ -253,12 +259,29 @@ def _with_explained_names(table: RawTable) -> RawTable:
     return table.named(headings) if len(headings) > 1 else table
 
 
+def _with_heading_of_currents(table: RawTable) -> RawTable:
+    """Return columns named 0 A, 0.5 A, ... with the only heading of a force above them, cut off from theirs, as title.
+
+    Of a line with a number or another channel the force may be that of something else: preload (N): 200.
+    """
+    columns = named_after_currents(table.names)
+    if not columns or table.over or table.columns("force"):
+        return table
+    lines = {line.strip(' ,;\t|#%/"*') for line in table.lines if not RATING.search(line)}
+    lines = [line for line in lines if {*map(role_of, words_of(line))} <= {"force", "current", None}]
+    headings = [_AT.split(line)[0].strip() for line in lines if not re.search("[0-9;|\t]", line)]
+    headings = [head for head in headings if (header := split_name(head)).role == header.dimension == "force"]
+    if len(headings) != 1:
+        return table
+    return replace(table, over=tuple(headings[0] if i in columns else "" for i in range(len(table.names))))
+
+
 def _with_titles(table: RawTable) -> RawTable:
     """Names joined with the titles above them where only both together name a channel; conditions become titles."""
     over = list(table.over or ("",) * len(table.names))
     names, units = list(table.names), list(table.units)
     for i, (name, title) in enumerate(zip(names, over, strict=True)):
-        header = split_name(name, units[i])
+        header = split_name(name, units[i]) if without_currents(name) else Header(name, units[i])  # 0.5 A: no unit
         if header.dimension == "time" and header.role not in ("time", None) and len(header.name) <= 2:
             names[i] = f"{split_name(title).name} time" if title else "time"
             units[i] = units[i] or header.unit

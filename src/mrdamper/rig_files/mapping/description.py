@@ -90,6 +90,8 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
         (lacking and _of_channels(line)) or (line if states_sign(line) or names & counted[line] else "")
         for line in lines
     ]
+    force = profile.channel("force")
+    stated += [f"force [{force.unit}]"] if force.unit and force.column is None else []  # heads columns 0 A, 0.5 A, ...
     timed = profile.file.sample_rate_Hz or any("time" in (h.role, h.dimension) for h in table.headers)
     if table.names and not timed and not any(map(_OTHER_RATES.search, lines)):
         rates = [match for line in lines for match in _RATE.finditer(line)]
