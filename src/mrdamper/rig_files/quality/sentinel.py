@@ -122,7 +122,7 @@ def _drops_to(values: Floats, value: float, step: float) -> bool:
 
 
 def _visits(values: Floats, value: float, beside: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Return starts and stops of the runs of a value with so many samples on either side; none where these are plateaus."""
+    """Return starts and stops of the runs of a value with samples on either side; none where these are plateaus."""
     starts, stops = runs_of(values == value)
     inner = (starts >= beside) & (stops <= values.size - beside)
     inner &= bool(np.sum((stops - starts)[inner]) <= _LONG * np.count_nonzero(inner))

@@ -9,7 +9,6 @@ import math
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import IO
 
 import numpy as np
 
@@ -270,35 +269,20 @@ class Spool:
     """Columns of numbers written piece by piece and given back as arrays."""
 
     def __init__(self, columns: Sequence[int]):
-        self._columns = tuple(columns)
-        self._pieces: dict[int, list[Floats]] = {c: [] for c in columns}
-        self._files: dict[int, IO[bytes]] | None = None
-        self._bytes = 0
+        most = LARGE // len(columns)
+        self._files = {c: tempfile.SpooledTemporaryFile(most, prefix="mrdamper-") for c in columns}  # noqa: SIM115
 
     def add(self, values: dict[int, Floats]) -> None:
         """Append one piece of every column."""
-        for column in self._columns:
-            self._pieces[column].append(values[column])
-            self._bytes += values[column].nbytes
-        if self._bytes > LARGE:
-            self._to_files()
+        for column, file in self._files.items():
+            file.write(np.ascontiguousarray(values[column]).data)
 
     def arrays(self) -> dict[int, Floats]:
         """Every column, whole; memory-mapped where it is large."""
-        if self._files is None:
-            return {c: np.concatenate(p) if p else np.empty(0) for c, p in self._pieces.items()}
-        self._to_files()
-        arrays = {}
+        arrays: dict[int, Floats] = {}
         for column, file in self._files.items():
-            file.flush()
-            arrays[column] = np.memmap(file, dtype=np.float64, mode="r+")
-            file.close()  # the mapping holds it
+            large = file.tell() > LARGE // len(self._files)
+            file.seek(0)
+            arrays[column] = np.memmap(file, np.float64, "r+") if large else np.frombuffer(bytearray(file.read()))
+            file.close()  # a mapping holds it
         return arrays
-
-    def _to_files(self) -> None:
-        files = self._files or {c: tempfile.TemporaryFile(prefix="mrdamper-") for c in self._columns}  # noqa: SIM115
-        self._files = files
-        for column, waiting in self._pieces.items():
-            for piece in waiting:
-                files[column].write(np.ascontiguousarray(piece).data)
-            waiting.clear()
