@@ -201,7 +201,7 @@ def files_in(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
         inside = [file for file in inside if file.is_file() and not _is_packed_folder(file)]  # no pipes
         recognised = [file for file in inside if file.suffix.lower() in suffixes()]
         # Suffixes of a laboratory's own: run.001
-        recognised = recognised or [file for file in inside if ask_tables(file, _are_named, False)]
+        recognised = recognised or [f for f in inside if ask_tables(f, lambda ts: any(t.names for t in ts), False)]
         recognised = _measured(recognised, path)
         files += recognised
         read = set(recognised)
@@ -225,10 +225,6 @@ def _measured(files: list[Path], top: Path) -> list[Path]:
     names = {file: tuple(w for w in words_of(file.name) if w.casefold() not in COMPUTED | _RAW) for file in files}
     measured = {name for file, name in names.items() if file not in computed}
     return [file for file in files if file not in computed or names[file] not in measured]
-
-
-def _are_named(tables: list[RawTable]) -> bool:
-    return any(table.names for table in tables)
 
 
 def _is_packed_folder(path: Path) -> bool:
@@ -262,21 +258,13 @@ def _folder_of(path: Path, stack: contextlib.ExitStack) -> Path:
 
 def _unzip(source: Source, top: Path) -> None:
     with zip_members(source) as (archive, members):
-        room = _Room(source, top)
-        for member in members:
-            with archive.open(member) as stream:
-                room.write(member.filename, stream)
+        _fill(source, top, ((member.filename, archive.open(member)) for member in members))
 
 
 def _untar(source: Source, top: Path) -> None:
     try:
         with tarfile.open(fileobj=source.file, mode="r:") as archive:
-            room = _Room(source, top)
-            for member in archive:
-                check_member(source, member.name, link=not (member.isfile() or member.isdir()))
-                stream = archive.extractfile(member) if member.isfile() and not is_junk(member.name) else None
-                if stream is not None:
-                    room.write(member.name, stream)
+            _fill(source, top, _files_of(source, archive))
     except RigFileError:
         raise
     except (tarfile.TarError, OSError, ValueError, EOFError) as error:
@@ -284,34 +272,35 @@ def _untar(source: Source, top: Path) -> None:
         raise source.refuse(code, f"damaged archive ({error})", "copy or pack it again") from error
 
 
-class _Room:
-    """The folder that is filled, and how much may still come into it."""
+def _files_of(source: Source, archive: tarfile.TarFile) -> Iterator[tuple[str, IO[bytes]]]:
+    """Yield the names and contents of the files in a tar; refuse links, and names that lead out of it."""
+    for member in archive:
+        check_member(source, member.name, link=not (member.isfile() or member.isdir()))
+        stream = archive.extractfile(member) if member.isfile() and not is_junk(member.name) else None
+        if stream is not None:
+            yield member.name, stream
 
-    def __init__(self, source: Source, top: Path):
-        self._source, self._top = source, top
-        packed = source.path.stat().st_size
-        self._left = min(MOST_UNPACKED, MOST_RATIO * packed)
-        self._count = 0
 
-    def write(self, name: str, stream: IO[bytes]) -> None:
-        """Store one member."""
-        self._count += 1
-        if self._count > _MOST_MEMBERS:
-            raise self._source.refuse("E_ARCHIVE", f"over {_MOST_MEMBERS} members", "unpack it first")
+def _fill(source: Source, top: Path, members: Iterable[tuple[str, IO[bytes]]]) -> None:
+    """Store the members of an archive in a folder, within bounds of their number and size."""
+    left = min(MOST_UNPACKED, MOST_RATIO * source.path.stat().st_size)
+    for count, (name, stream) in enumerate(members, 1):
+        if count > _MOST_MEMBERS:
+            raise source.refuse("E_ARCHIVE", f"over {_MOST_MEMBERS} members", "unpack it first")
         if name.lower().endswith(_NESTED):
-            raise self._source.refuse("E_ARCHIVE", f"an archive inside an archive ({name!a})", "unpack it first")
-        target = self._top.joinpath(*PurePosixPath(name).parts)
+            raise source.refuse("E_ARCHIVE", f"an archive inside an archive ({name!a})", "unpack it first")
+        target = top.joinpath(*PurePosixPath(name).parts)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
             if target.exists():
-                raise self._source.refuse("E_ARCHIVE", f"two members are called {name!a}", "pack it again")
-            with target.open("xb") as file:
+                raise source.refuse("E_ARCHIVE", f"two members are called {name!a}", "pack it again")
+            with stream, target.open("xb") as file:
                 while piece := stream.read(_PIECE):
-                    self._left -= len(piece)
-                    if self._left < 0:
-                        raise bomb(self._source)
+                    left -= len(piece)
+                    if left < 0:
+                        raise bomb(source)
                     file.write(piece)
         except OSError as error:
-            if shutil.disk_usage(self._top).free < _PIECE:
+            if shutil.disk_usage(top).free < _PIECE:
                 raise
-            raise self._source.refuse("E_ARCHIVE", f"member {name!a}: {error.strerror}", "pack it again") from error
+            raise source.refuse("E_ARCHIVE", f"member {name!a}: {error.strerror}", "pack it again") from error

@@ -7,7 +7,8 @@ import stat
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import IO
 
@@ -36,7 +37,9 @@ def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
             code, problem = "E_TRUNCATED" if source.size < 4 else "E_FORMAT", f"no {source.suffix[1:]} archive"
             raise source.refuse(code, f"the content is {problem}", "copy the file again, or correct its name")
         if folder:
-            yield _gunzip(source) if head.startswith(_GZIP) else source
+            source = _gunzip(source) if head.startswith(_GZIP) else source
+            source.file.seek(0)
+            yield source
             return
         if packed and source.suffix not in (".gz", ".zip", ".gzip", ""):
             remedy = "rename it to .zip or .gz"
@@ -97,7 +100,28 @@ def is_arrays(names: list[str]) -> bool:
     return bool(names) and all(name.endswith(".npy") for name in names)
 
 
-def check_sizes(source: Source, members: list[zipfile.ZipInfo]) -> None:
+def is_zip_of(source: Source, holds: Callable[[list[str]], bool], suffixes: Sequence[str]) -> bool:
+    """Tell if the content is a zip of such members, or a damaged zip of such a name."""
+    if source.head(2) != b"PK":
+        return False
+    names = zipped_names(source)
+    return source.suffix in suffixes if names is None else holds(names)
+
+
+@contextlib.contextmanager
+def checked_zip(source: Source, title: str) -> Iterator[zipfile.ZipFile]:
+    """Yield a zip once the sizes of its members are checked; E_TRUNCATED if it cannot be read."""
+    try:
+        archive = zipfile.ZipFile(source.file)
+    except UNREADABLE_ZIP as error:
+        problem = f"damaged {title} (end of file not found)"
+        raise source.refuse("E_TRUNCATED", problem, "copy or export the file again") from error
+    with archive:
+        _check_sizes(source, archive.infolist())
+        yield archive
+
+
+def _check_sizes(source: Source, members: list[zipfile.ZipInfo]) -> None:
     """Refuse what would unpack to far more than it is: E_ARCHIVE_RATIO."""
     unpacked = sum(member.file_size for member in members)
     packed = max(1, sum(member.compress_size for member in members))
@@ -118,8 +142,9 @@ def _unzip(source: Source) -> Source:
             raise source.refuse("E_ARCHIVE", f"{len(members)} members", remedy)
         inner, packed = members[0].filename, max(1, members[0].compress_size)
         with archive.open(members[0]) as stream:
-            file, size = _unpacked(source, iter(lambda: stream.read(_PIECE), b""), packed)
-    return Source(source.path, f"{source.name}:{inner}", PurePosixPath(inner).suffix.lower(), file, size, source.keep)
+            file = _unpacked(source, iter(lambda: stream.read(_PIECE), b""), packed)
+    suffix = PurePosixPath(inner).suffix.lower()
+    return replace(source, name=f"{source.name}:{inner}", suffix=suffix, file=file, size=file.tell())
 
 
 @contextlib.contextmanager
@@ -132,7 +157,7 @@ def zip_members(source: Source) -> Iterator[tuple[zipfile.ZipFile, list[zipfile.
             members = files_among(archive.infolist())
             if any(member.flag_bits & 1 for member in members):
                 raise source.refuse("E_ARCHIVE", "a member is encrypted", "unpack it first")
-            check_sizes(source, members)
+            _check_sizes(source, members)
             yield archive, members
     except RigFileError:
         raise
@@ -170,13 +195,13 @@ def check_member(source: Source, name: str, *, link: bool) -> None:
 
 def _gunzip(source: Source) -> Source:
     try:
-        file, size = _unpacked(source, _inflated(source), source.size)
+        file = _unpacked(source, _inflated(source), source.size)
     except EOFError as error:
         raise _cut(source) from error
     except zlib.error as error:
         raise source.refuse("E_ARCHIVE", f"damaged archive ({error})", "pack it again") from error
     inner = source.path.stem if source.suffix in (".gz", ".gzip") else source.path.name
-    return Source(source.path, source.name, Path(inner).suffix.lower(), file, size, source.keep)
+    return replace(source, suffix=Path(inner).suffix.lower(), file=file, size=file.tell())
 
 
 def _inflated(source: Source) -> Iterator[bytes]:
@@ -193,15 +218,13 @@ def _inflated(source: Source) -> Iterator[bytes]:
         raise source.refuse("E_ARCHIVE", problem, "unpack it first")
 
 
-def _unpacked(source: Source, pieces: Iterable[bytes], packed: int) -> tuple[IO[bytes], int]:
-    target, size = scratch(source.keep), 0
+def _unpacked(source: Source, pieces: Iterable[bytes], packed: int) -> IO[bytes]:
+    target = scratch(source.keep)
     for piece in pieces:
-        size += len(piece)
-        if size > min(MOST_UNPACKED, MOST_RATIO * packed):
-            raise bomb(source)
         target.write(piece)
-    target.seek(0)
-    return target, size
+        if target.tell() > min(MOST_UNPACKED, MOST_RATIO * packed):
+            raise bomb(source)
+    return target
 
 
 def _refuse_nested(source: Source) -> None:

@@ -34,9 +34,9 @@ _IN_MEMORY = 32 * 2**20  # bytes
 _LARGEST_LOOKED_AT = 64 * 2**20  # bytes of a file whose samples are tried
 
 
-def scratch(keep: ExitStack) -> IO[bytes]:
-    """Room for bytes that are unpacked or rewritten: in memory, and in an unnamed file once they are many."""
-    return keep.enter_context(tempfile.SpooledTemporaryFile(_IN_MEMORY, prefix="mrdamper-"))
+def scratch(keep: ExitStack, most: int = _IN_MEMORY) -> IO[bytes]:
+    """Room for bytes that are unpacked or rewritten: in memory, and in an unnamed file once they are more than most."""
+    return keep.enter_context(tempfile.SpooledTemporaryFile(most, prefix="mrdamper-"))
 
 
 class RigFileError(InputError):

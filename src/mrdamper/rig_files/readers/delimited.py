@@ -170,7 +170,7 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
     block, findings = _without_footer(form, block)
     block, cut = _without_cut_row(form, block)
     findings += cut
-    spool, odd = Spool((*columns, _LINES)), False
+    spool, odd = Spool((*columns, _LINES), stream.source.keep), False
     fast = block.stop - block.start > BULK_FROM
     for chunk, at, line in stream.numbered(block.start, block.stop, block.line):
         stream.check(chunk, line)

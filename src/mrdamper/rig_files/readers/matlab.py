@@ -7,13 +7,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.arrays import (
-    check_unpacked,
-    refuse_twice,
-    refusing_damage,
-    texts_in,
-    value_of,
-)
+from mrdamper.rig_files.readers.arrays import check_unpacked, refuse_twice, refusing_damage, texts_in, value_of
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, MOST_STRUCTS, hdf5_tables
 from mrdamper.rig_files.readers.nested import DEEPEST, nested_tables

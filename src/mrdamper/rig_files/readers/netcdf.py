@@ -7,12 +7,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.arrays import (
-    check_unpacked,
-    refusing_damage,
-    text_of,
-    unpacked,
-)
+from mrdamper.rig_files.readers.arrays import check_unpacked, refusing_damage, text_of, unpacked
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 

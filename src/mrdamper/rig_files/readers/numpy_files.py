@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-import zipfile
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_arrays, zipped_names
+from mrdamper.rig_files.readers.archive import checked_zip, is_arrays, is_zip_of
 from mrdamper.rig_files.readers.arrays import (
     array_table,
     check_unpacked,
-    damaged,
     expand,
     pick,
     refuse_twice,
@@ -23,9 +21,6 @@ from mrdamper.rig_files.readers.arrays import (
 )
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
-
-if TYPE_CHECKING:
-    pass
 
 
 class Npy(Reader):
@@ -45,20 +40,14 @@ class Npy(Reader):
         with refusing_damage(source, self.title):
             source.file.seek(0)
             array = np.lib.format.read_array(source.file, allow_pickle=False)
-        if dtype.names:
-            names, parts = list(dtype.names), list(dtype.names)
-        else:
-            parts = [part for _, part in expand("", shape)]
-            names = [""] * len(parts)
-        if not names:
+        if fields := dtype.names:
+            units = ["s" if dtype[name].kind in "Mm" else "" for name in fields]
+            return [array_table(source, fields, units, lambda column: array[fields[column]], self.title)]
+        unnamed = expand("", shape)
+        if not unnamed:
             raise source.refuse("E_NO_DATA", f"an array of {shape}", "save the channels as columns of a matrix")
-
-        def load(column: int) -> np.ndarray:
-            part = parts[column]
-            return array[part] if isinstance(part, str) else pick(array, part)
-
-        units = ["s" if dtype.names and dtype[name].kind in "Mm" else "" for name in names]
-        return [array_table(source, names, units, load, self.title)]
+        blank = [""] * len(unnamed)
+        return [array_table(source, blank, blank, lambda column: pick(array, unnamed[column][1]), self.title)]
 
 
 class Npz(Reader):
@@ -70,10 +59,7 @@ class Npz(Reader):
 
     def recognises(self, source: Source) -> bool:
         """Recognise a zip of arrays, or a damaged zip of that name."""
-        if not source.head(4).startswith(b"PK"):
-            return False
-        names = zipped_names(source)
-        return source.suffix in self.suffixes if names is None else is_arrays(names)
+        return is_zip_of(source, is_arrays, self.suffixes)
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """Return the arrays as columns of one table; a matrix gives numbered ones, a structured array its fields."""
@@ -92,17 +78,11 @@ class Npz(Reader):
 
 def _check_headers(source: Source) -> dict[str, tuple[str, ...]]:
     """Return the fields of structured arrays by name, after a look at the headers of all arrays alone."""
-    try:
-        archive = zipfile.ZipFile(source.file)
-    except UNREADABLE_ZIP as error:
-        raise damaged(source, Npz.title, "end of file not found") from error
     fields: dict[str, tuple[str, ...]] = {}
-    with archive:
-        members = archive.infolist()
-        check_sizes(source, members)
-        names = [member.filename.removesuffix(".npy") for member in members]
+    with checked_zip(source, Npz.title) as archive:
+        names = [member.filename.removesuffix(".npy") for member in archive.infolist()]
         refuse_twice(source, names)
-        for member, name in zip(members, names, strict=True):
+        for member, name in zip(archive.infolist(), names, strict=True):
             with archive.open(member) as stream:
                 _, dtype = stated_array(source, stream, f"array {name!r}", member.file_size)
             if dtype.names:

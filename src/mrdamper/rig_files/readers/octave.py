@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.arrays import (
-    damaged,
-    whole,
-)
+from mrdamper.rig_files.readers.arrays import damaged, whole
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 from mrdamper.rig_files.text.stream import decoded

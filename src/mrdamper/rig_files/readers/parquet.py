@@ -12,12 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.arrays import (
-    array_table,
-    check_unpacked,
-    damaged,
-    refusing_damage,
-)
+from mrdamper.rig_files.readers.arrays import array_table, check_unpacked, damaged, refusing_damage
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source, Words
 from mrdamper.rig_files.readers.nested import nested_tables, object_in, stated_beside
 from mrdamper.rig_files.readers.several_tests import MOST_ITEMS

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import datetime
 import math
-import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.archive import UNREADABLE_ZIP, check_sizes, is_workbook, zipped_names
-from mrdamper.rig_files.readers.arrays import damaged, load, refusing_damage
+from mrdamper.rig_files.readers.archive import checked_zip, is_workbook, is_zip_of
+from mrdamper.rig_files.readers.arrays import load, refusing_damage
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source, scratch
 from mrdamper.rig_files.readers.delimited import DelimitedText
 
@@ -32,20 +31,14 @@ class Workbook(Reader):
 
     def recognises(self, source: Source) -> bool:
         """Recognise a zip with sheets, or a damaged zip or an old compound file of that name."""
-        if not source.head(4).startswith(b"PK"):
-            return source.head(8) == _COMPOUND and source.suffix in self.suffixes
-        names = zipped_names(source)
-        return source.suffix in self.suffixes if names is None else is_workbook(names)
+        old = source.head(8) == _COMPOUND and source.suffix in self.suffixes
+        return old or is_zip_of(source, is_workbook, self.suffixes)
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """One table a sheet that holds one."""
         if source.head(4).startswith(b"PK"):
-            try:
-                with zipfile.ZipFile(source.file) as archive:
-                    members = archive.infolist()
-            except UNREADABLE_ZIP as error:
-                raise damaged(source, self.title, "end of file not found") from error
-            check_sizes(source, members)
+            with checked_zip(source, self.title):
+                pass
         with refusing_damage(source, self.title):
             sheets = _sheets(source, form)
         return tables_of_sheets(source, sheets, form)

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import csv
 import math
-import tempfile
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import CombinedError
 from mrdamper.rig_files.column_names import parse_unit
-from mrdamper.rig_files.readers.base import RigFileError
+from mrdamper.rig_files.readers.base import RigFileError, scratch
 from mrdamper.rig_files.text.layout import QUANTITY, SPACES, Layout, is_comment, split
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, too_long
 from mrdamper.rig_files.text.tokens import MISSING, NUMBER, number, stamp
@@ -268,9 +268,8 @@ def _columns(block: bytes, form: RowFormat) -> list[np.ndarray]:
 class Spool:
     """Columns of numbers written piece by piece and given back as arrays."""
 
-    def __init__(self, columns: Sequence[int]):
-        most = LARGE // len(columns)
-        self._files = {c: tempfile.SpooledTemporaryFile(most, prefix="mrdamper-") for c in columns}  # noqa: SIM115
+    def __init__(self, columns: Sequence[int], keep: ExitStack):
+        self._files = {column: scratch(keep, LARGE // len(columns)) for column in columns}
 
     def add(self, values: dict[int, Floats]) -> None:
         """Append one piece of every column."""
