@@ -9,6 +9,7 @@ import csv
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from importlib.resources import as_file, files
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -168,26 +169,20 @@ def _rows_of(lines: Iterable[list[str]], path: Path) -> list[dict[str, Any]]:
 
     if path.stat().st_size > _RUNS_BYTES:
         raise refuse(f"over {_RUNS_BYTES // 2**20} MB")
-    heads: list[str] | None = None
+    lines = filter(None, lines)
+    heads = next(lines, ["run_id"])
+    if "run_id" not in heads:
+        raise missing_column("run_id", heads, path)
+    if len(set(heads)) < len(heads) or len(heads) > MOST_COLUMNS:
+        raise refuse(f"{len(heads)} columns, {len(set(heads))} of different names")
     rows = []
     for line in lines:
-        if not line:
-            continue
-        if heads is None:
-            heads = line
-            if "run_id" not in heads:
-                raise missing_column("run_id", heads, path)
-            if len(set(heads)) < len(heads) or len(heads) > MOST_COLUMNS:
-                raise refuse(f"{len(heads)} columns, {len(set(heads))} of different names")
-        elif len(line) > len(heads):
-            raise refuse(
-                f"{len(line)} cells under {len(heads)} columns in the row of run {line[heads.index('run_id')][:80]}"
-            )
-        elif len(rows) == _MOST_RUNS:
+        if len(line) > len(heads):
+            run = line[heads.index("run_id")][:80]
+            raise refuse(f"{len(line)} cells under {len(heads)} columns in the row of run {run}")
+        if len(rows) == _MOST_RUNS:
             raise refuse(f"over {_MOST_RUNS:,} runs")
-        else:
-            cells = [csv_value(cell) or None for cell in line] + [None] * (len(heads) - len(line))
-            rows.append(dict(zip(heads, cells, strict=True)))
+        rows.append({head: csv_value(cell) or None for head, cell in zip_longest(heads, line, fillvalue="")})
     return rows
 
 

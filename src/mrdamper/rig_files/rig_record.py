@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from datetime import datetime
+from datetime import date
+from datetime import time as clock
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,7 @@ from mrdamper.rig_files.readers import suffixes
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import FURTHER, OPTIONAL, Finding, Record
 from mrdamper.rig_files.sequences import stretches_of_session
+from mrdamper.rig_files.text.tokens import MONTHS
 
 _KEPT = {**FURTHER, "length": "m", "force": "N"}
 _SCALES = words("scale")
@@ -51,20 +53,13 @@ _MOST_FURTHER = 12  # channels
 _LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged cell there costs the channel, not the run
 _DATES, _TIMES = words("date_line"), words("time_of_day")
 _KEYED = re.compile(r"^[\W_]*(?P<key>[^\W\d_][\w ./-]{0,40}?)[\"' ]*[:=;,\t]+[\"' ]*(?P<value>\S.{0,60})")
-_YEAR_FIRST = re.compile(
-    r"(?<!\d)(?P<year>(?:19|20)\d\d)(?P<mark>[-./])(?P<month>\d{1,2})(?P=mark)(?P<day>\d{1,2})(?!\d)"
-)
-_YEAR_LAST = re.compile(
-    r"(?<!\d)(?P<first>\d{1,2})(?P<mark>[-./])(?P<second>\d{1,2})(?P=mark)(?P<year>(?:19|20)\d\d)(?!\d)"
-)
-_NAMED = re.compile(
-    r"(?i)(?<!\w)(?:(?P<day>\d{1,2})[. -]+(?P<month>[a-z]{3,9})|(?P<month_first>[a-z]{3,9})[. ]+(?P<day_last>\d{1,2}))"
-    r"[., -]+(?P<year>(?:19|20)\d\d)(?!\d)"
+_DAY = re.compile(  # 2024-05-31, 31/5/2024, 31 May 2024, May 31, 2024
+    r"(?<!\d)(?:(?:19|20)\d\d(?P<first>[-./])\d{1,2}(?P=first)\d{1,2}|\d{1,2}(?P<last>[-./])\d{1,2}(?P=last)(?:19|20)\d\d"
+    r"|(?<!\w)(?:\d{1,2}[. -]+[^\W\d_]{3,9}|[^\W\d_]{3,9}[. ]+\d{1,2})[., -]+(?:19|20)\d\d)(?!\d)"
 )
 _TIME = re.compile(
     r"(?i)(?<![\d:])(?P<hour>\d{1,2}):(?P<minute>\d\d)(?::(?P<second>\d\d))?(?:[.,]\d+)?\s*(?P<half>[ap]m)?"
 )
-_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 
 
 def _tests_of(channels: dict[str, Floats], profile: Profile) -> tuple[list[slice], list[Finding]]:
@@ -359,23 +354,18 @@ def recording_time(lines: Iterable[str]) -> dict[str, str]:
 
 def _day_in(text: str) -> tuple[str, str] | None:
     """Return a day as ISO 8601 ("?" and the text where day and month may be exchanged) and as written."""
-    if match := _YEAR_FIRST.search(text):
-        year, month, day = (int(match[name]) for name in ("year", "month", "day"))
-    elif match := _YEAR_LAST.search(text):
-        day, month, year = int(match["first"]), int(match["second"]), int(match["year"])
-        if match["mark"] != "." and day != month and max(day, month) <= 12:
-            return f"?{match[0]}", match[0]
-        if month > 12:
-            day, month = month, day
-    elif match := _NAMED.search(text):
-        name = (match["month"] or match["month_first"])[:3].casefold()
-        if name not in _MONTHS:
-            return None
-        year, month, day = int(match["year"]), _MONTHS.index(name) + 1, int(match["day"] or match["day_last"])
-    else:
+    match = _DAY.search(text)
+    if match is None:
         return None
+    parts = re.split(r"[-./, ]+", match[0].casefold())
+    numbers = [MONTHS.get(part[:3], 0) if part.isalpha() else int(part) for part in parts]
+    year, month, day = numbers if match["first"] else reversed(numbers)
+    if match["last"] in ("-", "/") and day != month and max(day, month) <= 12:
+        return f"?{match[0]}", match[0]
+    if parts[0].isalpha() or (match["last"] and month > 12):
+        day, month = month, day
     try:
-        return datetime(year, month, day).date().isoformat(), match[0]
+        return date(year, month, day).isoformat(), match[0]
     except ValueError:
         return None
 
@@ -389,6 +379,6 @@ def _time_in(text: str) -> str | None:
     if match["half"]:
         hour = hour % 12 + 12 * (match["half"].casefold() == "pm")
     try:
-        return datetime(1970, 1, 1, hour, int(match["minute"]), int(match["second"] or 0)).time().isoformat()
+        return clock(hour, int(match["minute"]), int(match["second"] or 0)).isoformat()
     except ValueError:
         return None

@@ -17,6 +17,7 @@ from mrdamper.rig_files.text.tokens import stamp
 
 _SAVED_MODEL = "mrdamper-model"
 _FEWEST_ROWS = 8  # samples of a test
+_CELL = (int, float, type(None))
 
 
 class Json(Reader):
@@ -124,13 +125,11 @@ def _tree(value: Any) -> Any:
         stamps = [stamp(item) for item in value] if stamp(value[0]) is not None else [None]
         stamped = [entry[0] for entry in stamps if entry is not None]
         return (np.array(stamped) - stamped[0]) / 1e9 if len(stamped) == len(value) else value
-    if value and all(item is None or isinstance(item, (int, float)) for item in value):
-        return np.array([np.nan if item is None else item for item in value], dtype=float)
-    rows = value and all(isinstance(item, list) and len(item) == len(value[0]) for item in value)
-    if rows and all(isinstance(cell, (int, float)) or cell is None for row in value for cell in row):
-        return np.array([[np.nan if cell is None else cell for cell in row] for row in value], dtype=float)
+    even = all(isinstance(item, list) and len(item) == len(value[0]) for item in value)
+    if value and all(isinstance(cell, _CELL) for row in (value if even else [value]) for cell in row):
+        return np.array(value, dtype=float)  # NaN for null
     items = [item for item in value if item is not None]
     records = len(items) >= _FEWEST_ROWS and all(isinstance(item, dict) for item in items)
-    if records and all(v is None or isinstance(v, (int, float, str)) for item in items for v in item.values()):
+    if records and all(isinstance(v, (*_CELL, str)) for item in items for v in item.values()):
         return items
     return [_tree(item) for item in items]

@@ -295,7 +295,7 @@ def _records(items: list[Mapping[str, Any]]) -> dict[str, Any]:
     for key in items[0]:
         cells = [item[key] for item in items]
         if all(cell is None or isinstance(cell, (int, float)) for cell in cells):
-            columns[key] = np.array([np.nan if cell is None else cell for cell in cells], dtype=float)
+            columns[key] = np.array(cells, dtype=float)  # NaN for null
         elif all(isinstance(cell, str) for cell in cells):
             columns[key] = np.array([cell[:MOST_TEXT] for cell in cells])
         else:

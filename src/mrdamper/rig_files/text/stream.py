@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import io
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -87,21 +88,11 @@ class TextStream:
     def chunks(self, start: int, stop: int) -> Iterator[bytes]:
         """Yield the bytes between two places, cut after line feeds."""
         self.file.seek(start)
-        rest, at = b"", start
-        while at < stop:
-            block = self.file.read(min(CHUNK, stop - at))
-            if not block:
-                break
-            at += len(block)
-            block = rest + block
-            cut = block.rfind(b"\n") + 1 if at < stop else len(block)
-            if cut == 0 and len(block) > CHUNK:
+        while chunk := (self.file.read(CHUNK) + self.file.readline(CHUNK))[: max(0, stop - start)]:
+            start += len(chunk)
+            if not chunk.endswith(b"\n") and start < stop:
                 raise too_long(self.source, None)
-            rest = block[cut:]
-            if cut:
-                yield block[:cut]
-        if rest:
-            yield rest
+            yield chunk
 
     def numbered(self, start: int, stop: int, line: int) -> Iterator[tuple[bytes, int, int]]:
         """Yield the chunks between two places, each with its place and the line it starts at."""
@@ -227,23 +218,19 @@ def _telling_words(text: bytes, encoding: str) -> int:
 def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[IO[bytes], int]:
     """Return the text in UTF-8 with line feeds, in memory or, if large, in a temporary file."""
     source.file.seek(mark)
-    decoder = codecs.getincrementaldecoder(encoding)()
-    target = scratch(source.keep)
-    line, carry = 1, ""
-    while True:
-        block = source.file.read(CHUNK)
-        try:
-            text = carry + decoder.decode(block)
-        except UnicodeDecodeError as error:
-            problem = f"bytes that are no {encoding} ({error.reason})"
-            remedy = "export the file again, as UTF-8 if you can choose"
-            raise source.refuse("E_ENCODING", problem, remedy, line=line) from error
-        carry = "\r" if block and text.endswith("\r") else ""
-        text = text[: len(text) - len(carry)].replace("\r\n", "\n").replace("\r", "\n")
-        line += text.count("\n")
-        target.write(text.encode("utf-8"))
-        if not block:
-            return target, target.tell()
+    target, line = scratch(source.keep), 1
+    text = io.TextIOWrapper(source.file, encoding)  # any line end is read as a line feed
+    try:
+        while block := text.read(CHUNK):
+            line += block.count("\n")
+            target.write(block.encode("utf-8"))
+    except UnicodeDecodeError as error:
+        problem = f"bytes that are no {encoding} ({error.reason})"
+        remedy = "export the file again, as UTF-8 if you can choose"
+        raise source.refuse("E_ENCODING", problem, remedy, line=line) from error
+    finally:
+        text.detach()
+    return target, target.tell()
 
 
 def _without_end_mark(file: IO[bytes], size: int) -> int:

@@ -42,7 +42,7 @@ _STAMP = re.compile(
     r"(?: ?([AP]M))?(Z|[+-][0-9]{2}:?[0-9]{2})?",
     re.IGNORECASE,
 )
-_MONTHS = {name: i for names in TABLES["months"]["names"] for i, name in enumerate(names.split(), 1)}
+MONTHS = {name: i for names in TABLES["months"]["names"] for i, name in enumerate(names.split(), 1)}
 FORTRAN = re.compile(r"[+-]?[0-9]*[.,]?[0-9]+[dD][+-]?[0-9]{1,3}")  # 1.25D-03; taken where a file writes so throughout
 _ROWS = 60  # looked at
 
@@ -104,7 +104,7 @@ def stamp(token: str) -> tuple[int, bool] | None:
     if dotted[0]:
         day, month, year = dotted[:3]
     if dotted[3]:
-        day, month, year = dotted[3], str(_MONTHS.get(dotted[4].lower(), 0)), dotted[5]
+        day, month, year = dotted[3], str(MONTHS.get(dotted[4].lower(), 0)), dotted[5]
     if hour is None:
         if fraction is None or year is not None:
             return None  # 12:30 may be hours and minutes
