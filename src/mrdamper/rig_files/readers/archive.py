@@ -56,15 +56,15 @@ def opened(path: Path, *, folder: bool = False) -> Iterator[Source]:
 def as_it_is(path: Path) -> Iterator[Source]:
     """Open a file, whatever it holds."""
     try:
-        problem = "is a folder" if path.is_dir() else "" if path.is_file() else "no such file"
-        size, file = (0, None) if problem else (path.stat().st_size, path.open("rb"))
+        problem = "is a folder" if path.is_dir() else "no such file"
+        file = path.open("rb") if path.is_file() else None
     except (OSError, ValueError) as error:
-        problem, size, file = getattr(error, "strerror", None) or str(error), 0, None
+        problem, file = getattr(error, "strerror", None) or str(error), None
     if file is None:
         raise RigFileError("E_FILE", problem, file=str(path), remedy="give the path of a rig's file")
     with contextlib.ExitStack() as stack:
         stack.enter_context(file)
-        yield Source(path, path.name, path.suffix.lower(), file, size, stack)
+        yield Source(path, path.name, path.suffix.lower(), file, path.stat().st_size, stack)
 
 
 def is_plain_zip(source: Source) -> bool:

@@ -20,8 +20,6 @@ from mrdamper.rig_files.readers.several_tests import MOST_ITEMS
 if TYPE_CHECKING:
     import polars as pl
 
-_CALLS = (("read", "_schema"), ("scan", ""), ("read", ""))
-
 
 class _Frame(Reader):
     """A file of polars: one table of typed columns, between two marks."""
@@ -49,19 +47,19 @@ class _Frame(Reader):
             raise damaged(source, self.title, "the file ends early, truncated")
         source.file.seek(0)
         content = source.file.read()
-        schema_of, scan, read = (getattr(pl, f"{do}_{self.short}{what}") for do, what in _CALLS)
         with refusing_damage(source, self.title):
-            schema = schema_of(self.given(content))
-            rows = scan(self.given(content)).select(pl.len()).collect().item() if len(schema) else 0
+            scan: pl.LazyFrame = getattr(pl, f"scan_{self.short}")(self.given(content), **self.options)
+            schema = scan.collect_schema()
+            rows = scan.select(pl.len()).collect().item() if len(schema) else 0
             units, constants, remarks = stated_beside(self.metadata(content))
 
         def loaded(name: str) -> pl.Series:
-            return read(self.given(content), columns=[name], **self.options)[name]
+            return scan.select(name).collect()[name]
 
         lists = [name for name, kind in schema.items() if isinstance(kind, pl.List) and kind.inner.is_numeric()]
         if len(lists) > 1 and rows <= MOST_ITEMS:
             with refusing_damage(source, self.title):
-                frame = read(self.given(content), **self.options)
+                frame = scan.collect()
                 check_unpacked(source, sum(8 * int(frame[name].list.len().sum()) for name in lists))
                 tests = [{k: _of_test(frame[k][i]) for k in schema} for i in range(rows)]
             return nested_tables(source, {"": tests}, self.title)
@@ -104,8 +102,7 @@ def _warm() -> None:
 
     content = io.BytesIO()
     pl.DataFrame({"x": [0.0]}).write_parquet(content)
-    pl.scan_parquet(content.getvalue()).select(pl.len()).collect()
-    pl.read_parquet(content.getvalue())
+    pl.scan_parquet(content.getvalue()).collect()
 
 
 def _table(

@@ -80,12 +80,6 @@ def read_cells(block: bytes, line: int, form: RowFormat, *, final: bool = False)
     return Rows(values, np.array(lines, dtype=float), form.stream.is_odd(block))
 
 
-def read_row(text: str, line: int, form: RowFormat) -> list[float]:
-    """Return the wanted cells of one row; raises as `read_cells`."""
-    rows, lines = split_rows([text], line, form, False)
-    return [float(_numbers([row[c] for row in rows], c, lines, form)[0]) for row in rows for c in form.wanted]
-
-
 def field_count(form: RowFormat, fields: int, line: int, final: bool) -> RigFileError:
     """Return the refusal of a row with another number of cells than the others."""
     width = form.layout.width
@@ -211,11 +205,11 @@ def read_bulk(block: bytes, line: int, form: RowFormat) -> Rows | None:
         return None
     for row in stray:
         start = int(ends[row - 1]) + 1 if row else 0
-        cells = read_row(form.stream.decode(block[start : int(ends[row])]), line + int(row), form)
-        if not cells:
+        cells = read_cells(block[start : int(ends[row])], line + int(row), form)
+        if not cells.lines.size:
             return None
-        for value, cell in zip(values, cells, strict=True):
-            value[row] = cell
+        for value, column in zip(values, form.wanted, strict=True):
+            value[row] = cells.values[column][0]
     lines = np.arange(line, line + ends.size, dtype=float)
     return Rows(dict(zip(form.wanted, values, strict=True)), lines, form.stream.is_odd(block))
 
