@@ -271,7 +271,7 @@ def test_a_missing_library_is_named_with_the_way_to_install_it(tmp_path, monkeyp
 def test_a_reading_process_that_dies_is_replaced(tmp_path):
     good = write(tmp_path, "good.mat", mat_bytes(columns()))
     before = read_run(good)
-    with sandbox.SANDBOXES.taken("mat") as child:
+    with sandbox.taken("mat") as child:
         assert child.read({"reader": "none such"}, 30.0) is None
         assert not child.alive
     np.testing.assert_array_equal(read_run(good).time, before.time)

@@ -9,8 +9,8 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterable
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -49,15 +49,12 @@ def read_samples(folder: Path, *, trusted: bool = False) -> dict[str, Channels]:
         raise DatasetError(f"none of {', '.join(SAMPLE_FILES)} is there", where=str(folder), remedy="add the samples")
     try:
         with opened(path) as source:
-            if path.suffix == ".parquet":
-                reader: AbstractContextManager[list[RawTable]] = (
-                    nullcontext(Parquet().tables(source, FileForm()))
-                    if trusted
-                    else guarded_tables(source, Parquet(), FileForm())
-                )
-                with reader as tables:
-                    return _of_parquet(tables[0], path)
-            return _of_text(source, path)
+            if path.suffix != ".parquet":
+                return _of_text(source, path)
+            if trusted:
+                return _of_parquet(Parquet().tables(source, FileForm())[0], path)
+            with guarded_tables(source, Parquet(), FileForm()) as tables:
+                return _of_parquet(tables[0], path)
     except RigFileError as error:
         raise DatasetError(error.found, where=str(path), remedy=error.remedy, code=error.code) from error
 
@@ -139,14 +136,12 @@ def _refuse_bomb(size: int, path: Path) -> None:
 def _by_run(codes: np.ndarray, labels: tuple[str, ...], channels: Channels) -> dict[str, Channels]:
     """Rows of a run need not stand together; their order stays."""
     order = np.argsort(codes, kind="stable")
-    ends = np.cumsum(np.bincount(codes, minlength=len(labels)))
-    together = bool(np.all(np.diff(order) == 1))
-    take: Callable[[Floats], Floats] = (lambda values: values) if together else (lambda values: values[order])
-    sorted_channels = {name: take(values) for name, values in channels.items()}
-    parts = [slice(end - count, end) for end, count in zip(ends, np.diff(ends, prepend=0), strict=True)]
+    if np.any(np.diff(order) != 1):  # else nothing is copied
+        channels = {name: values[order] for name, values in channels.items()}
+    bounds = pairwise([0, *np.cumsum(np.bincount(codes, minlength=len(labels)))])
     return {
-        label: {name: values[part] for name, values in sorted_channels.items()}
-        for label, part in zip(labels, parts, strict=True)
+        label: {name: values[start:stop] for name, values in channels.items()}
+        for label, (start, stop) in zip(labels, bounds, strict=True)
     }
 
 

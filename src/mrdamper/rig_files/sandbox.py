@@ -9,6 +9,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import os
+import shutil
 import signal
 import tempfile
 import threading
@@ -50,7 +51,7 @@ def guarded_tables(source: Source, reader: Reader, form: FileForm) -> Iterator[l
     """
     with contextlib.ExitStack() as stack:
         path = _on_disk(source, stack)
-        sandbox = stack.enter_context(SANDBOXES.taken(reader.name))
+        sandbox = stack.enter_context(taken(reader.name))
         # The child keeps the folder it was started in; this process may stand in another by now.
         request = {"reader": reader.name, "path": str(path.absolute()), "name": source.name, "suffix": source.suffix}
         limits = {
@@ -131,34 +132,20 @@ class _Sandbox(Child):
             raise RigFileError("E_FORMAT", "the reading process ended early") from None
 
 
-class _Sandboxes:
-    """The one child of this process, started when it is first needed."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._sandbox: _Sandbox | None = None
-        self._owner = 0
-
-    @contextlib.contextmanager
-    def taken(self, reader: str) -> Iterator[_Sandbox]:
-        """Yield the child, for one file at a time; if it dies, its successor makes ready for that reader."""
-        with self._lock:
-            if self._owner != os.getpid():  # a fork must not share its parent's pipes
-                self._sandbox, self._owner = None, os.getpid()
-            if self._sandbox is None or not self._sandbox.alive:
-                self._sandbox = _Sandbox()
-            sandbox = self._sandbox
-            try:
-                yield sandbox
-            finally:
-                if not sandbox.alive:
-                    self._sandbox = _Sandbox()
-                    self._sandbox.prepare(reader)
-
-    def close(self) -> None:
-        if self._sandbox is not None and self._owner == os.getpid():
-            self._sandbox.close()
-        self._sandbox = None
+@contextlib.contextmanager
+def taken(reader: str) -> Iterator[_Sandbox]:
+    """Yield the child of this process, for one file at a time; if it dies, the next one is prepared for that reader."""
+    with _LOCK:
+        process = os.getpid()
+        sandbox = _CHILDREN.get(process)
+        if sandbox is None or not sandbox.alive:
+            sandbox = _CHILDREN[process] = _Sandbox()
+        try:
+            yield sandbox
+        finally:
+            if not sandbox.alive:
+                _CHILDREN[process] = _Sandbox()
+                _CHILDREN[process].prepare(reader)
 
 
 def _sleeps(pid: int) -> bool:
@@ -176,16 +163,17 @@ def _on_disk(source: Source, stack: contextlib.ExitStack) -> Path:
         return source.path
     copy = stack.enter_context(tempfile.NamedTemporaryFile(prefix="mrdamper-"))  # noqa: SIM115
     source.file.seek(0)
-    while piece := source.file.read(2**20):
-        copy.write(piece)
+    shutil.copyfileobj(source.file, copy)
     copy.flush()
     return Path(copy.name)
 
 
 def close() -> None:
     """End the reading process; the next file starts another."""
-    SANDBOXES.close()
+    if sandbox := _CHILDREN.pop(os.getpid(), None):
+        sandbox.close()
 
 
-SANDBOXES = _Sandboxes()
+_LOCK = threading.Lock()
+_CHILDREN: dict[int, _Sandbox] = {}  # by the process that started it: a fork must not share its parent's pipes
 atexit.register(close)
