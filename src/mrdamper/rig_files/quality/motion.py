@@ -65,29 +65,19 @@ def steady_window(view: View) -> tuple[float, float] | None:
     return max(first, last - max(1, view.whole_cycles) / view.motion.condition.frequency_Hz), last
 
 
-def enough_cycles(view: View) -> Iterator[Finding]:
-    """Report a record shorter than a cycle: it has no frequency and no amplitude."""
-    cycles = cycles_of(view)
-    if cycles < LEAST_CYCLES:
-        yield Finding(
-            "W_SHORT",
-            "the record holds less than one cycle: no frequency or amplitude is stated, nothing is identified from it",
-        )
-
-
 def is_a_sine(view: View) -> Iterator[Finding]:
-    """Report a motion that is no sine: the harmonic balance needs one."""
+    """Report a record shorter than a cycle, which has no frequency, and a motion that is no sine."""
+    motion, use = view.motion, "only identification in time can use it"
     if cycles_of(view) < LEAST_CYCLES:
-        return
-    motion = view.motion
-    if motion is None:
-        yield Finding("W_NOT_SINE", "the motion has no period: only identification in time can use it")
-    elif motion.distortion > SINE_DISTORTION_LIMIT:
-        yield Finding(
-            "W_NOT_SINE",
-            f"distortion of the motion {100 * motion.distortion:.1f} % (limit {100 * SINE_DISTORTION_LIMIT:g} %): "
-            "only identification in time can use it",
+        text = (
+            "the record holds less than one cycle: no frequency or amplitude is stated, nothing is identified from it"
         )
+        yield Finding("W_SHORT", text)
+    elif motion is None:
+        yield Finding("W_NOT_SINE", f"the motion has no period: {use}")
+    elif motion.distortion > SINE_DISTORTION_LIMIT:
+        limit = f"(limit {100 * SINE_DISTORTION_LIMIT:g} %)"
+        yield Finding("W_NOT_SINE", f"distortion of the motion {100 * motion.distortion:.1f} % {limit}: {use}")
 
 
 def drifts(view: View) -> Iterator[Finding]:

@@ -22,35 +22,6 @@ _FOLLOWS = 0.1  # of such a step, by which the force follows
 _FEWEST_CYCLES = 3  # cycles
 
 
-def force_is_steady(view: View) -> Iterator[Finding]:
-    """Report a force whose gain, offset or timing changes over the cycles of one motion."""
-    cycles = steady_cycles(view)
-    if cycles is None or len(cycles.starts) < _FEWEST_CYCLES:
-        return
-    force, motion = cycles.force, cycles.displacement
-    gain = _largest(np.log(np.maximum(1 + force.gain, 1e-3)) - _followed(cycles))
-    offset = _largest(force.offset) / force.span
-    late = _largest(force.late - motion.late)
-    if abs(gain) > GAIN:
-        yield Finding(
-            "W_UNSTEADY",
-            f"the force changes by {100 * np.expm1(gain):+.3g} % over the record at one motion: damping and force are "
-            f"uncertain by {percent(abs(gain) / 2)}; warm the damper up, or check the amplifier and the current",
-        )
-    if abs(offset) > OFFSET:
-        yield Finding(
-            "W_UNSTEADY",
-            f"the mean force changes by {force.span * offset:+.3g} N over the record, {percent(abs(offset))} of its "
-            "peak-to-peak value: check the load cell's zero and its temperature",
-        )
-    if abs(late) > LATE:
-        yield Finding(
-            "W_UNSTEADY",
-            f"the force shifts by {1e3 * late * cycles.period:+.3g} ms ({100 * late:+.2g} % of the period) against the "
-            "motion over the record: the channels have clocks of their own, or samples of one are lost",
-        )
-
-
 def stroke_steps(view: View) -> Iterator[Finding]:
     """Report strokes of two lengths at one force: the displacement's gain was changed."""
     strokes, force = view.strokes, view.run.force
@@ -75,26 +46,33 @@ def stroke_steps(view: View) -> Iterator[Finding]:
         return
 
 
-def motion_is_steady(view: View) -> Iterator[Finding]:
-    """Report an amplitude that changes while the force does not, and a motion that is not in time with its clock."""
+def cycles_are_steady(view: View) -> Iterator[Finding]:
+    """Report changes over the cycles of one motion: of the amplitude alone, of the clock, and of the force."""
     cycles = steady_cycles(view)
     if cycles is None or len(cycles.starts) < _FEWEST_CYCLES:
         return
-    motion = cycles.displacement
-    stroke = _largest(motion.gain)
-    if abs(stroke) > STROKE and abs(_largest(cycles.force.gain)) < 0.2 * abs(stroke) and not view.noticed("W_DRIFT"):
-        yield Finding(
-            "W_UNSTEADY",
-            f"the amplitude changes by {100 * stroke:+.3g} % over the record and the force does not: damping is "
-            f"uncertain by {percent(abs(stroke) / 2)}; check the displacement sensor",
-        )
-    jump = _step(motion.late)
-    if abs(jump) > LATE:
-        yield Finding(
-            "W_UNSTEADY",
-            f"the motion shifts by {1e3 * jump * cycles.period:+.3g} ms ({100 * jump:+.2g} % of the period) against "
-            "its clock within the record: samples are lost, or the clock does not run evenly",
-        )
+    force, motion, period = cycles.force, cycles.displacement, 1e3 * cycles.period
+    stroke, jump = _largest(motion.gain), _step(motion.late)
+    if abs(_largest(force.gain)) >= 0.2 * abs(stroke) or view.noticed("W_DRIFT"):
+        stroke = 0.0  # the force follows, or the drift is reported
+    gain = _largest(np.log(np.maximum(1 + force.gain, 1e-3)) - _followed(cycles))
+    offset, late = _largest(force.offset) / force.span, _largest(force.late - motion.late)
+    changes = (
+        (stroke, STROKE, f"the amplitude changes by {100 * stroke:+.3g} % over the record and the force does not: "
+         f"damping is uncertain by {percent(abs(stroke) / 2)}; check the displacement sensor"),
+        (jump, LATE, f"the motion shifts by {jump * period:+.3g} ms ({100 * jump:+.2g} % of the period) against its "
+         "clock within the record: samples are lost, or the clock does not run evenly"),
+        (gain, GAIN, f"the force changes by {100 * np.expm1(gain):+.3g} % over the record at one motion: damping and "
+         f"force are uncertain by {percent(abs(gain) / 2)}; warm the damper up, or check the amplifier and the "
+         "current"),
+        (offset, OFFSET, f"the mean force changes by {force.span * offset:+.3g} N over the record, "
+         f"{percent(abs(offset))} of its peak-to-peak value: check the load cell's zero and its temperature"),
+        (late, LATE, f"the force shifts by {late * period:+.3g} ms ({100 * late:+.2g} % of the period) against the "
+         "motion over the record: the channels have clocks of their own, or samples of one are lost"),
+    )  # fmt: skip
+    for change, limit, text in changes:
+        if abs(change) > limit:
+            yield Finding("W_UNSTEADY", text)
 
 
 def _followed(cycles: Cycles) -> Floats:
