@@ -244,8 +244,6 @@ def spikes_in(values: Floats, off_by: float) -> np.ndarray:
     some = values[:: max(1, values.size // _SHOWN)]
     low, high = np.quantile(some[np.isfinite(some)], [0.01, 0.99])
     steps = np.diff(values)
-    if not np.nanmax(np.abs(steps)) > 0.5 * off_by * float(high - low):
-        return np.empty(0, dtype=int)
     at = np.arange(1, values.size - 1)[:: max(1, values.size // _SHOWN)]
     bends = np.abs(values[at] - 0.5 * (values[at - 1] + values[at + 1]))
     usual = float(np.quantile(bends[np.isfinite(bends)], 0.95))
@@ -293,8 +291,6 @@ def leaps_in(values: Floats, of_range: float, *, against: bool) -> np.ndarray:
     finite = values if there.size == values.size else values[there]
     steps = np.diff(finite)
     large = of_range * float(np.ptp(finite))
-    if max(float(np.max(steps)), -float(np.min(steps))) < large:
-        return np.empty(0, dtype=int)
     big = np.abs(steps) >= large
     if np.count_nonzero(big) > _MOST * finite.size:
         return np.empty(0, dtype=int)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -49,17 +50,15 @@ def _parsed(source: Source, content: bytes) -> Any:
             refuse_twice(source, [name for name, _ in pairs])
         return members
 
-    text = ""
+    text, decode = "", partial(json.loads, object_pairs_hook=unique)
     try:
         text = content.decode("utf-8-sig")
         try:
-            return json.loads(text, object_pairs_hook=unique)
+            return decode(text)
         except json.JSONDecodeError as error:
             if not error.msg.startswith("Extra data"):
                 raise
-            return _with_notes(
-                [json.loads(line, object_pairs_hook=unique) for line in text.splitlines() if line.strip()]
-            )
+            return _with_notes([decode(line) for line in text.splitlines() if line.strip()])
     except json.JSONDecodeError as error:
         early = error.pos >= len(text.rstrip()) - 1
         raise damaged(source, Json.title, "truncated" if early else f"{error.msg}, line {error.lineno}") from error

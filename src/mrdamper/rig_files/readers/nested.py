@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -89,7 +89,6 @@ def document_tables(source: Source, tree: Mapping[str, Any], title: str) -> list
 
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
-    inner: list[tuple[str, Any]] = []
     tree = _with_functions({key: object_in(value) for key, value in tree.items()})
     texts = [value for value in tree.values() if isinstance(value, _JsonText)]
     lists = {f"{key} ": own.pop(key) for own in texts for key in list(own) if isinstance(own[key], list)}
@@ -102,8 +101,8 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= FEWEST_SAMPLES}
     texts = [_LISTING.sub("", value) for value in tree.values() if isinstance(value, str)]
     node.lists += [re.split(r"\s*[,;]\s*", text.strip()) for text in texts if len(text) < MOST_TEXT]
-    inner += [(key, {"column": tree[key]}) for key in _matrices_of_tests(tree)]
-    tree = {key: value for key, value in tree.items() if key not in {key for key, _ in inner}}
+    inner: list[tuple[str, Any]] = [(key, {"column": tree[key]}) for key in _matrices_of_tests(tree)]
+    tree = {key: value for key, value in tree.items() if key not in dict(inner)}
     for key, value in _paired(tree, node.units).items():
         if isinstance(value, list) and all(isinstance(item, str) for item in value):
             if split_name(key).role is not None or len(value) in sizes:
@@ -129,9 +128,8 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     yield node
     for key, value in inner if depth < DEEPEST else ():
         label = f"{node.label}/{key}" if node.label and key else node.label or key
-        yield from _walk(
-            value, _Node(label, [], list(node.lists), dict(node.constants), list(node.remarks), node.units), depth + 1
-        )
+        beside = list(node.lists), dict(node.constants), list(node.remarks), node.units
+        yield from _walk(value, _Node(label, [], *beside), depth + 1)
 
 
 def stated_beside(stated: Mapping[str, Any]) -> tuple[dict[str, str], dict[str, float], tuple[str, ...]]:
@@ -283,8 +281,10 @@ def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[s
     return nodes
 
 
-def _stated(says: Mapping[str, Any], names: Collection[str], kind: type[str] | type[float]) -> str | float | None:
-    return next((v for key, v in says.items() if key.casefold() in names and isinstance(v, kind)), None)
+def _stated(says: Mapping[str, Any], names: Iterable[str], kind: Any) -> Any:
+    """Return the first value of a kind that a mapping holds under one of some names; None if there is none."""
+    lower = {key.casefold(): value for key, value in says.items()}
+    return next((lower[name] for name in names if isinstance(lower.get(name), kind)), None)
 
 
 def _records(items: list[Mapping[str, Any]]) -> dict[str, Any]:
@@ -313,7 +313,7 @@ def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
             across = np.asarray(points)
             lower |= {name: None, "time": across[:, 0], "data": across[:, 1]}
             break
-    data = next((lower[name] for name in KEYS["data"] if isinstance(lower.get(name), Array)), None)
+    data = _stated(lower, KEYS["data"], Array)
     numbers = [split_name(name).dimension for name, value in says.items() if isinstance(value, float)]
     if data is not None and data.ndim == 2 and min(data.shape) > 1 and "current" in numbers:  # a test
         return []
@@ -322,12 +322,10 @@ def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
         data = signals.get("values") if isinstance(signals, Mapping) else None
         if not isinstance(data, Array):
             return []
-    time = next((lower[name] for name in KEYS["time"] if isinstance(lower.get(name), Array)), None)
+    time = _stated(lower, KEYS["time"], Array)
     arrays = [value for value in lower.values() if isinstance(value, Array) and value.size >= data.size]
     others = [array for array in arrays if array is not data and array is not time]
-    stated = next(
-        (lower[name] for name in KEYS["name"] if isinstance(lower.get(name), str) and lower[name].strip()), ""
-    )
+    stated = next((text for name in KEYS["name"] if isinstance(text := lower.get(name), str) and text.strip()), "")
     if others or not (stated or key):
         return []
     unit = _unit_of(lower, KEYS["unit"], "datainfo")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
@@ -52,10 +52,6 @@ class _Frame(Reader):
             schema = scan.collect_schema()
             rows = scan.select(pl.len()).collect().item() if len(schema) else 0
             units, constants, remarks = stated_beside(self.metadata(content))
-
-        def loaded(name: str) -> pl.Series:
-            return scan.select(name).collect()[name]
-
         lists = [name for name, kind in schema.items() if isinstance(kind, pl.List) and kind.inner.is_numeric()]
         if len(lists) > 1 and rows <= MOST_ITEMS:
             with refusing_damage(source, self.title):
@@ -63,8 +59,10 @@ class _Frame(Reader):
                 check_unpacked(source, sum(8 * int(frame[name].list.len().sum()) for name in lists))
                 tests = [{k: _of_test(frame[k][i]) for k in schema} for i in range(rows)]
             return nested_tables(source, {"": tests}, self.title)
-        table = _table(source, self.title, schema, rows, loaded, units)
-        return [replace(table, constants=constants, remarks=remarks)]
+        if not rows:
+            raise source.refuse("E_NO_DATA", "no rows", "export the file again")
+        check_unpacked(source, 8 * rows)
+        return [replace(_table(source, self.title, scan, units), constants=constants, remarks=remarks)]
 
 
 class Parquet(_Frame):
@@ -105,21 +103,15 @@ def _warm() -> None:
     pl.scan_parquet(content.getvalue()).collect()
 
 
-def _table(
-    source: Source,
-    title: str,
-    schema: Mapping[str, pl.DataType],
-    rows: int,
-    loaded: Callable[[str], pl.Series],
-    units: Mapping[str, str],
-) -> RawTable:
+def _table(source: Source, title: str, scan: pl.LazyFrame, units: Mapping[str, str]) -> RawTable:
     """Return a table of typed columns, each loaded by its name when it is asked for."""
     import polars as pl
 
-    if not rows:
-        raise source.refuse("E_NO_DATA", "no rows", "export the file again")
+    schema = scan.collect_schema()
     names = list(schema)
-    check_unpacked(source, 8 * rows)
+
+    def loaded(name: str) -> pl.Series:
+        return scan.select(name).collect()[name]
 
     def column_of(column: int) -> np.ndarray:
         kind = schema[names[column]]
