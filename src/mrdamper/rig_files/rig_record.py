@@ -158,10 +158,9 @@ def _read(table: RawTable, assigned: dict[str, Assigned], profile: Profile):
             findings.append(Finding(code, f"the {name} channel is not used: {error.found}"))
             del assigned[name]
     for name in [name for name in assigned if name in OPTIONAL]:
-        if any(np.isfinite(piece).any() for _, piece in chunks(raw[assigned[name].column])):
-            continue
-        findings.append(Finding("W_COLUMN", f"the {name} channel is not used: its column is empty"))
-        del assigned[name]
+        if not any(np.isfinite(piece).any() for _, piece in chunks(raw[assigned[name].column])):
+            findings.append(Finding("W_COLUMN", f"the {name} channel is not used: its column is empty"))
+            del assigned[name]
     return raw, findings, content.lines
 
 
@@ -249,11 +248,8 @@ def _further(table: RawTable, assigned: dict[str, Assigned], size: int) -> dict[
     values = table.try_read(*columns) if columns else {}
     if values is None:  # one of them cannot be read
         values = {column: own[column] for column in columns if (own := table.try_read(column)) is not None}
-    return {
-        key: rescale(values[column], unit.factor, unit.offset)
-        for key, (column, unit) in wanted.items()
-        if column in values and values[column].size == size
-    }
+    whole = {column: own for column, own in values.items() if own.size == size}
+    return {key: rescale(whole[at], unit.factor, unit.offset) for key, (at, unit) in wanted.items() if at in whole}
 
 
 def thousands_in(values: Floats) -> bool:
@@ -280,16 +276,15 @@ def thousands_in(values: Floats) -> bool:
 def _aligned(channels: dict[str, Floats], assigned: dict[str, Assigned], lines):
     """Take known delays off, by linear interpolation; samples without a partner are left out."""
     delays = {name: entry.delay for name, entry in assigned.items() if entry.delay and name != "time"}
-    if not delays:
-        return channels, lines
     time = channels["time"]
     finite = np.isfinite(time)
-    shifted = {}
-    for name, delay in delays.items():
-        shifted[name] = np.interp(time + delay, time[finite], channels[name][finite], left=np.nan, right=np.nan)
-    late, early = max(0.0, *delays.values()), min(0.0, *delays.values())
-    if not finite.any():
+    if not delays or not finite.any():
         return channels, lines
+    shifted = {
+        name: np.interp(time + delay, time[finite], channels[name][finite], left=np.nan, right=np.nan)
+        for name, delay in delays.items()
+    }
+    late, early = max(0.0, *delays.values()), min(0.0, *delays.values())
     keep = np.flatnonzero((time + late <= np.nanmax(time)) & (time + early >= np.nanmin(time)))
     if not keep.size:
         raise ColumnError("the delays of the profile are longer than the record", remedy="correct delay_ms")

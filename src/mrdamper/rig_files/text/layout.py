@@ -12,7 +12,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import accumulate, islice
 from string import ascii_uppercase
 from typing import Literal
 
@@ -240,12 +240,9 @@ def _below_preamble(lines: Sequence[str], first: int, separator: str) -> int:
     columns follow that hold displacement and force, and its own do not.
     """
     wanted = {"displacement", "force"}
-    if any(wanted <= _roles(_fields(line, separator, 0)) for line in lines[:first]):
-        return 0
-    for i, line in enumerate(lines[first : first + _SAMPLE], first):
-        if wanted <= _roles(_fields(line, separator, 0)):
-            return i + 1
-    return 0
+    heads = (i for i, line in enumerate(lines[: first + _SAMPLE]) if wanted <= _roles(_fields(line, separator, 0)))
+    head = next(heads, -1)
+    return head + 1 if head >= first else 0
 
 
 def _roles(cells: Sequence[str]) -> set[str | None]:
@@ -272,10 +269,7 @@ def _titles(above: Sequence[str], separator: str, width: int) -> tuple[str, ...]
     cells = cells_of(above[-1], separator)[:width]
     if sum(map(bool, cells)) < 2 or not cells[0] or len(cells) < width // 2:
         return ()
-    titles = [""] * width
-    for i in range(width):
-        titles[i] = (cells[i] if i < len(cells) else "") or titles[i - 1]
-    return tuple(titles)
+    return tuple(accumulate([*cells, *[""] * (width - len(cells))], lambda before, cell: cell or before))
 
 
 def split(line: str, separator: str) -> list[str]:
@@ -320,13 +314,9 @@ def _separator(lines: Sequence[str], content: Sequence[tuple[int, str]], source:
         raise source.refuse(
             "E_NO_DATA", f"only remarks in the first {len(lines)} lines", "remove them, or export the data again"
         )
-    best, most = "", 0.0
-    for separator in _SEPARATORS:
-        score = _evenness(last, separator)
-        if score > most + 1e-9:
-            best, most = separator, score
-    if best:
-        return best
+    evenness = {separator: round(_evenness(last, separator), 9) for separator in _SEPARATORS}
+    if any(evenness.values()):
+        return max(_SEPARATORS, key=evenness.__getitem__)
     # One column, or only a header: the separator does not matter, or the header shows it.
     counts = {s: last[-1].count(s) for s in _SEPARATORS[:-1]}
     return max(counts, key=lambda s: counts[s]) if any(counts.values()) else ","
