@@ -153,8 +153,13 @@ class _Channel:
 
     @cached_property
     def level(self) -> float:
-        """Resolution step; zero where there is none."""
-        return _resolution(self.values)
+        """Step of which the channel's values are multiples; zero where they are none."""
+        present = self.values[np.isfinite(self.values)][:100_000]
+        gaps = np.diff(np.unique(present)[1:-1])  # a clipped end need not lie on the grid
+        gaps = gaps[gaps > 1e-7 * np.ptp(present)] if present.size else gaps  # less is rounding
+        step = float(np.min(gaps, initial=np.inf))
+        # Where there is no step, the counts are as far from whole numbers as chance has it: 0.25.
+        return step if gaps.size and np.mean(np.abs(gaps / step - np.round(gaps / step))) < 0.1 else 0.0
 
     @property
     def span(self) -> float:
@@ -233,19 +238,6 @@ def _equal_stretches(values: Floats) -> np.ndarray:
     starts, stops = runs_of(values[1:] == values[:-1])
     stretches = np.column_stack([starts, stops + 1])
     return stretches[stretches[:, 1] - starts >= FLAT][:_MOST]
-
-
-def _resolution(values: Floats) -> float:
-    """Step of which the channel's values are multiples; zero where they are none."""
-    present = values[np.isfinite(values)][:100_000]
-    gaps = np.diff(np.unique(present)[1:-1])  # a clipped end need not lie on the grid
-    gaps = gaps[gaps > 1e-7 * np.ptp(present)] if present.size else gaps  # less is rounding
-    if not gaps.size:
-        return 0.0
-    step = float(np.min(gaps))
-    counts = gaps / step
-    # Where there is no step, these are as far from whole numbers as chance has it: 0.25.
-    return step if np.mean(np.abs(counts - np.round(counts))) < 0.1 else 0.0
 
 
 class Top(NamedTuple):

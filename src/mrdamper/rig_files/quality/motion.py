@@ -227,21 +227,18 @@ def agrees_with_its_name(view: View) -> Iterator[Finding]:
     contradictions = []
     if frequency is not None and abs(measured.frequency_Hz / frequency - 1) > _SAME_FREQUENCY:
         contradictions.append((f"{frequency:g} Hz", f"{measured.frequency_Hz:.3g} Hz", "time"))
-    if amplitude is not None and not _AMPLITUDES[0] < 1e3 * measured.amplitude_m / amplitude < _AMPLITUDES[1]:
-        contradictions.append(
-            (f"{amplitude:g} mm", f"an amplitude of {1e3 * measured.amplitude_m:.3g} mm", "displacement")
-        )
-    rate = notes.get("time_from", "")
-    if len(contradictions) == 1 and rate and contradictions[0][2] == "time":
-        stated, has, _ = contradictions[0]
-        problem = f"the name or heading states {stated}, and by the sampling rate ({rate}) the motion has {has}"
-        raise view.refused(
-            "E_MOTION_CONTRADICTS", problem, "set [file] sample_rate_Hz = ... in a profile, or correct the name"
-        )
+    size = 1e3 * measured.amplitude_m
+    if amplitude is not None and not _AMPLITUDES[0] < size / amplitude < _AMPLITUDES[1]:
+        contradictions.append((f"{amplitude:g} mm", f"an amplitude of {size:.3g} mm", "displacement"))
+    if not contradictions:
+        return
+    stated, has, channels = (" and ".join(words) for words in zip(*contradictions, strict=True))
+    states, rate = f"the name or heading states {stated}", notes.get("time_from", "")
     if len(contradictions) > 1:
-        stated, has, channels = (" and ".join(words) for words in zip(*contradictions, strict=True))
-        problem = f"the name or heading states {stated}, and the record has {has}: the record of another test?"
+        problem = f"{states}, and the record has {has}: the record of another test?"
         raise view.refused("E_MOTION_CONTRADICTS", problem, f"correct the name or heading, or the units of {channels}")
-    for stated, has, channel in contradictions:
-        text = f"the name or heading states {stated} and the record has {has}: check the unit of {channel}, or the name"
-        yield Finding("W_NAME", text)
+    if rate and channels == "time":
+        problem = f"{states}, and by the sampling rate ({rate}) the motion has {has}"
+        remedy = "set [file] sample_rate_Hz = ... in a profile, or correct the name"
+        raise view.refused("E_MOTION_CONTRADICTS", problem, remedy)
+    yield Finding("W_NAME", f"{states} and the record has {has}: check the unit of {channels}, or the name")

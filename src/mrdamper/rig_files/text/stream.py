@@ -73,15 +73,9 @@ class TextStream:
         return False
 
     def head(self) -> bytes:
-        """Return the start of the text, whole lines where there is more."""
+        """Return the start of the text, whole lines but for one that is too long."""
         self.file.seek(self.start)
-        head = self.file.read(min(_HEAD, self.stop - self.start))
-        if self.start + len(head) < self.stop:
-            cut = head.rfind(b"\n") + 1
-            if cut == 0:
-                self.check(head, 1)
-                raise too_long(self.source, 1)
-            head = head[:cut]
+        head = (self.file.read(_HEAD) + self.file.readline(LONGEST_LINE))[: self.stop - self.start]
         self.check(head, 1)
         return head
 
