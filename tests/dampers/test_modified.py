@@ -21,6 +21,7 @@ from mrdamper.models.bingham import Bingham
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper.functions import PAPER_FORMS, paper_functions
 from mrdamper.physics.motion import sine
+from mrdamper.report.plots.model import parameter_curves
 from mrdamper.statistics.functions.fitting import choose_function
 from mrdamper.statistics.functions.forms import FORMS, ParameterFunction
 from mrdamper.statistics.functions.motion_hull import MotionHull
@@ -106,6 +107,17 @@ def test_forms_are_chosen_parameter_by_parameter():
     assert fit.values["fy"] == pytest.approx(150 + 900 * CURRENT)
     assert list(fit.conditions) == CONDITIONS
     assert "method" not in fit_modified(identified(linear), forms).damper.provenance
+
+
+def test_up_to_ten_motions_have_a_curve_each_and_near_ones_are_one():
+    def curves(count, step):
+        conditions = [Condition(0.0, 1.0 * step**k, 0.02) for k in range(count)]
+        fit = fit_modified(identified(linear, conditions), {name: ("constant",) for name in ("fy", "c", "f0")})
+        return len(parameter_curves(fit).axes[0].series)
+
+    assert curves(10, 1.3) == 20
+    assert curves(11, 1.3) == 12
+    assert curves(11, 1.001) == 2
 
 
 def test_certain_values_count_more_and_of_a_logarithm_relatively():

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from mrdamper.models.bingham import Bingham
 from mrdamper.physics.motion import sine
 from mrdamper.physics.simulation import simulate
 from mrdamper.study.validation import validate
+from mrdamper.study.workflow import _with_sessions
 
 DAMPER = damper_of(Bingham(c=9000.0, fy=1.0))
 
@@ -47,6 +49,19 @@ def test_a_reading_does_not_depend_on_the_unit_and_a_constant_shows_no_gain(unit
     assert (found.gain, found.offset) == pytest.approx((1.2, 3 * unit))
     still = GainOffset.of(unit * np.linspace(1, 3, 90), np.full(90, 0.1 * unit))
     assert (still.gain, still.offset) == (1.0, pytest.approx(1.9 * unit))
+
+
+def test_a_record_predicted_in_parts_takes_no_part_in_the_scatter_between_sessions():
+    runs, readings = days(3)
+    whole = [SimpleNamespace(run_id=r.id, reading=reading) for r, reading in zip(runs, readings, strict=True)]
+    parts = SimpleNamespace(run_id="parts", reading=None)
+    chosen = SimpleNamespace(
+        damper=replace(DAMPER, uncertainty=None),
+        train=SimpleNamespace(runs=[*whole, SimpleNamespace(run_id="parts", reading=readings[0])]),
+        cross_validated=SimpleNamespace(runs=[parts, *whole]),
+    )
+    dataset = {run.id: run for run in (*runs, replace(runs[0], id="parts"))}
+    assert _with_sessions(chosen, dataset)[1] == pytest.approx(float(np.median(known(runs, readings))))
 
 
 def test_check_runs_join_the_own_tests_and_replace_those_of_their_name():

@@ -27,10 +27,17 @@ from mrdamper.report.damper_tests import facts_of_tests, figures_of_tests, force
 from mrdamper.report.limitations import Limitation, by_group, limitations
 from mrdamper.report.page import made_from, plain, render_page
 from mrdamper.report.plots.figure import Figure
-from mrdamper.report.plots.model import BAND_LEVEL, parameter_curves, predicted_loops, residual_map, score_strip
+from mrdamper.report.plots.model import (
+    BAND_LEVEL,
+    motions_of,
+    parameter_curves,
+    predicted_loops,
+    residual_map,
+    score_strip,
+)
 from mrdamper.report.plots.reversal import force_since_reversal
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
-from mrdamper.report.plots.style import Picture
+from mrdamper.report.plots.style import MOST_NAMED, Picture
 from mrdamper.report.summary import error_sentence, omission_lines
 from mrdamper.report.tables import identification_rows, score_row
 from mrdamper.study.parallel import IN_PROCESS, Processes
@@ -215,7 +222,8 @@ def _measured(rig: RigStudy) -> dict[str, Characteristics]:
 
 
 def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limit]) -> dict[str, Any]:
-    chosen, mapped = rig.chosen, (_mapped(rig) or (None, None))[0]
+    chosen = rig.chosen
+    mapped, functions = _mapped(rig) or (None, None)
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
     held = all(run.split == "validate" for run in _shown(rig))
     return {
@@ -237,6 +245,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         "identifications": mapped.identifications if mapped else (),
         "parameter_names": _free_names(mapped.identifications[0]) if mapped else (),
         "mapped": mapped,
+        "every_motion_drawn": functions is not None and len(motions_of(functions)) <= MOST_NAMED,
         "joint": _joint_table(chosen, chosen.fit.damper.model) if isinstance(chosen.fit, JointFit) else (),
         "predicted_caption": (
             "Validation runs, last cycle of the steady window; none was used for identification."

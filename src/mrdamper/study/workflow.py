@@ -380,11 +380,15 @@ def _with_uncertainty(chosen: RecipeResult, taken: Sequence[Run]) -> RecipeResul
 def _with_sessions(chosen: RecipeResult, dataset: Dataset) -> tuple[RecipeResult, float | str]:
     """Return the candidate with what sessions share, and its cross-validated error with them known, or a reason."""
     damper, own = chosen.damper, {score.run_id: score.reading for score in chosen.train.runs}
-    left_out = [score for score in chosen.cross_validated.runs if own.get(score.run_id) is not None]
-    runs = [dataset[score.run_id] for score in left_out]
-    readings = [score.reading for score in left_out if score.reading is not None]
+    # A record whose parts several folds predict has no gain of its own.
+    scored = [
+        (dataset[score.run_id], score.reading, reading)
+        for score in chosen.cross_validated.runs
+        if score.reading is not None and (reading := own.get(score.run_id)) is not None
+    ]
+    runs, readings = [run for run, _, _ in scored], [left_out for _, left_out, _ in scored]
     try:
-        sessions = Sessions.of(runs, readings, [own[score.run_id] for score in left_out])  # type: ignore[misc]
+        sessions = Sessions.of(runs, readings, [reading for _, _, reading in scored])
         error = float(np.median(known_errors(sessions, runs, readings)))
     except InputError as reason:
         return chosen, str(reason)

@@ -71,13 +71,18 @@ def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
     return figure
 
 
+def motions_of(fit: ModifiedFit) -> list[list[int]]:
+    """Return the conditions of each motion by their position; up to `MOST_NAMED` motions have a curve each."""
+    return same_motion(fit.conditions, tolerance=0.08)
+
+
 def parameter_curves(fit: ModifiedFit) -> Figure:
     """Return identified values over current, one colour per motion, and the fitted functions."""
     names = [name for name in fit.functions if np.ptp(fit.values[name]) > 0] or list(fit.functions)
     rows = -(-len(names) // 2)
     figure = Figure(rows, 2, 2.5 * rows, right=1.75)
     axes = figure.axes
-    groups = sorted(same_motion(fit.conditions, tolerance=0.08), key=lambda g: fit.conditions[g[0]].peak_velocity)
+    groups = sorted(motions_of(fit), key=lambda g: fit.conditions[g[0]].peak_velocity)
     speeds = [fit.conditions[g[0]].peak_velocity for g in groups]
     few = len(groups) <= MOST_NAMED
     shades = current_colours(speeds) if few else speed_colours(figure, speeds)

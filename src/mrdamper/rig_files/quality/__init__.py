@@ -103,17 +103,17 @@ def check_long_record(record: Record) -> Record:
     """
     if record.time.size <= 2 * PART:
         return check_record(record)
-    found: dict[str, list[Finding]] = {}
+    by_code: dict[str, list[Finding]] = {}
     segments: list[tuple[int, int]] = []
     resting: list[InputError | None] = []
     for start, (noticed, inside, error) in _checked_parts(record):
         resting.append(error)
         for finding in noticed:
-            found.setdefault(finding.code, []).append(finding)
+            by_code.setdefault(finding.code, []).append(finding)
         _extend(segments, inside, start)
     if all(resting) and resting[0] is not None:
         raise resting[0]
-    findings = (*record.findings, *_summed(found, len(resting), resting.count(None)), *motion.change_of(record, None))
+    findings = (*record.findings, *_summed(by_code, len(resting), resting.count(None)), *motion.change_of(record, None))
     return replace(record, findings=findings, segments=tuple(segments))
 
 
@@ -154,9 +154,9 @@ def _extend(segments: list[tuple[int, int]], new: tuple[tuple[int, int], ...], s
             segments.append((start + a, start + b))
 
 
-def _summed(found: dict[str, list[Finding]], parts: int, moving: int) -> Iterator[Finding]:
+def _summed(by_code: dict[str, list[Finding]], parts: int, moving: int) -> Iterator[Finding]:
     """Yield the first finding of every code, with the number of parts that have it, some only if all parts have it."""
-    for code, findings in found.items():
+    for code, findings in by_code.items():
         times = len(findings)
         if code not in _ONCE and (code not in _OF_THE_WHOLE or times >= moving):
             more = f" (first of {times} parts out of {parts})" if times > 1 else ""
