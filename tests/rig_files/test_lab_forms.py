@@ -711,3 +711,27 @@ def test_columns_named_after_currents_are_asked_about_and_none_is_left_out_in_si
     assert any("2 columns named after other currents are not taken: 0 A, 0.5 A" in f.text for f in record.findings)
     (refusal,) = import_files([tmp_path], parse_profile(f"{one}[current]\nvalue = 0.0")).refusals
     assert refusal.error.code == "E_CURRENT_CONTRADICTS"
+
+
+@pytest.mark.parametrize(
+    "conditions",
+    [
+        [
+            {"parameter": "Coil current", "value": 500, "unit": "mA"},
+            {"parameter": "Operator", "value": "K", "unit": ""},
+        ],
+        [{"grandeur": "Courant bobine", "valeur": "0,5", "unité": "A", "incertitude": 0.01}],
+        {"parameter": [{"item": "Spulenstrom", "wert": 0.5, "einheit": "A"}]},
+    ],
+    ids=["a parameter in words beside it", "French, as text", "below a key"],
+)
+def test_a_list_of_parameters_states_the_current_under_whatever_key_its_name_stands(tmp_path, conditions):
+    named = (("Time", "s", T), ("Stroke", "mm", X), ("Force", "N", force(0.5)))
+    channels = [{"name": name, "unit": unit, "data": values.tolist()} for name, unit, values in named]
+    (tmp_path / "S-1.json").write_text(json.dumps({"conditions": conditions, "channels": channels}))
+    assert currents(import_files([tmp_path]).records) == [0.5]
+    text = json.dumps({"conditions": conditions, "channels": channels})
+    for word in ("Coil current", "Courant bobine", "Spulenstrom"):
+        text = text.replace(word, f"Max. {word}")
+    (tmp_path / "S-1.json").write_text(text)
+    assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_CURRENT_MISSING"]

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.column_names import KEYS, is_unit, parse_unit, split_name, words
-from mrdamper.rig_files.conditions import stated_clock
+from mrdamper.rig_files.conditions import CELL, stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, RigFileError, Source
 from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES, MOST_ITEMS, with_tests_apart
 
-_VALUE = words("value")
+_VALUE, _NAMES = words("value"), words("channel")
 DEEPEST = 8  # levels
 MOST_TEXT = 200  # characters
 _HEAD = re.compile(r"_?(?:header|info|properties|attributes|meta(?:data)?)$", re.IGNORECASE)
@@ -257,10 +257,8 @@ def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, A
 def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[str, Any]]]:
     """Nodes of their own among the items of a list; items that are channels become columns, records a table."""
     mappings = [item for item in items if isinstance(item, Mapping)]
-    own = {_stated(item, KEYS["name"], str): item for item in mappings if _stated(item, _VALUE, float) is not None}
-    if len(own) == len(items) and None not in own:  # parameters, each with its name, value and unit
-        for name, item in own.items():
-            _tell(node, {key: value for key, value in item.items() if value is not name}, str(name))
+    if _parameters(items):
+        _tell(node, {key: items}, "")
         return []
     records = _records(mappings) if len(mappings) == len(items) else {}
     if records:
@@ -285,6 +283,23 @@ def _stated(says: Mapping[str, Any], names: Iterable[str], kind: Any) -> Any:
     """Return the first value of a kind that a mapping holds under one of some names; None if there is none."""
     lower = {key.casefold(): value for key, value in says.items()}
     return next((lower[name] for name in names if isinstance(lower.get(name), kind)), None)
+
+
+def _parameters(items: list[Any]) -> dict[str, dict[str, Any]]:
+    """Return value and unit by name of a list of parameters, some of them numbers; empty if it is no such list.
+
+    The name stands under a known key, or is the only text beside the value and the unit.
+    """
+    parameters: dict[str, dict[str, Any]] = {}
+    for item in items:
+        lower = {key.casefold(): value for key, value in item.items()} if isinstance(item, Mapping) else {}
+        texts = {k: v for k, v in lower.items() if isinstance(v, str) and v and k not in (*_VALUE, *KEYS["unit"])}
+        names = [text for key, text in texts.items() if key in KEYS["name"] or key in _NAMES] or [*texts.values()]
+        value = _stated(lower, _VALUE, (float, str))
+        if len(names) == 1 and value is not None:
+            parameters[names[0]] = {"value": value, "unit": _stated(lower, KEYS["unit"], str)}
+    some = any(isinstance(item["value"], float) or CELL.fullmatch(item["value"]) for item in parameters.values())
+    return parameters if some and len(parameters) == len(items) else {}
 
 
 def _records(items: list[Mapping[str, Any]]) -> dict[str, Any]:
@@ -368,15 +383,16 @@ def _is_plain(value: Any) -> bool:
     """Tell if nothing in a node is an array or a list of nodes: it only describes the nodes beside it."""
     if isinstance(value, Mapping):
         return all(_is_plain(item) for item in value.values())
-    return not isinstance(value, (Array, list)) or (isinstance(value, list) and not value)
+    return not isinstance(value, (Array, list)) or (isinstance(value, list) and (not value or bool(_parameters(value))))
 
 
 def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
     """Keep single numbers and texts beside the columns of a node."""
-    lower = {key.casefold(): value for key, value in says.items()}
-    number, unit = (next((lower[key] for key in keys if key in lower), None) for keys in (_VALUE, KEYS["unit"]))
-    if above and isinstance(number, float) and isinstance(unit, str):  # {"current": {"value": 0.5, "unit": "A"}}
+    number, unit = _stated(says, _VALUE, float), _stated(says, KEYS["unit"], str)
+    if above and number is not None and unit is not None:  # {"current": {"value": 0.5, "unit": "A"}}
         says = {f"{above} [{unit}]": number}
+    elif above and isinstance(number, str):
+        says = {above: f"{number} {unit or ''}".rstrip()}
     elif above and isinstance(unit, str) and [float] == [type(v) for v in says.values() if not isinstance(v, str)]:
         says = {f"{key} [{unit}]" if isinstance(v, float) else key: v for key, v in says.items()}
     for key, value in says.items():
@@ -386,6 +402,9 @@ def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
             key = f"{key} [{node.units[key]}]" if key in node.units else key
             value_of = node.constants.get(key, value)
             node.constants[key if value_of == value else f"{above} {key}"] = value
+        elif isinstance(value, list):
+            for name, item in _parameters(value).items():
+                _tell(node, item, name)
         elif isinstance(value, str) and len(node.remarks) < MOST_COLUMNS:
             node.remarks.append(f"{key}: {value}"[:MOST_TEXT])
 
