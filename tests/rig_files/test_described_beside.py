@@ -468,3 +468,18 @@ def test_columns_of_forces_state_their_current_behind_the_unit(at, tmp_path):
     columns = np.column_stack([T, X, *map(force, CURRENTS.values())])
     np.savetxt(tmp_path / "wide.csv", columns, delimiter=",", header=",".join(names), comments="")
     require_the_tests(tmp_path)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1000.0], ids=["s", "ms"])
+@pytest.mark.parametrize(
+    "text", ["scan rate 200 Hz", "DAQ: 200 scans per second", "0.2 kS/s, 8 mm", "Messrate: 200 Hz"]
+)
+def test_a_rate_in_a_text_beside_gives_the_unit_of_time_and_another_rate_does_not(tmp_path, text, factor):
+    rows = "".join(f"{t:.6g},{x},{f}\n" for t, x, f in zip(factor * T, X, force(0.5), strict=True))
+    (tmp_path / "a_0.5A.csv").write_text(f"Time,disp [mm],force [N]\n{rows}")
+    (tmp_path / "README.txt").write_text(f"Damper bench\n{text}\n")
+    (record,) = import_files([tmp_path]).records
+    assert np.median(np.diff(record.time)) == pytest.approx(0.005, rel=1e-6)
+    for other in (text.replace("2", "7"), "filter 200 Hz"):
+        (tmp_path / "README.txt").write_text(f"Damper bench\n{other}\n")
+        assert [refusal.error.code for refusal in import_files([tmp_path]).refusals] == ["E_UNITS_MISSING"]

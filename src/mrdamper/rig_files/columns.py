@@ -15,6 +15,7 @@ from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, p
 from mrdamper.rig_files.column_names import (
     COIL,
     DIMENSION,
+    TABLES,
     WORDS,
     Header,
     Unit,
@@ -40,6 +41,7 @@ ROLES = (*REQUIRED, *OPTIONAL)
 _DERIVED = ("velocity", "acceleration")  # of the displacement
 _MOST_RESTARTS = 0.05  # of the samples of a clock that counts within steps
 _TOTAL = re.compile(r"total|absolut|gesamt|cumulat|kumul", re.IGNORECASE)
+_COUNTS = ("counts", *TABLES["unit_names"]["counts"])
 _INDEX, _MEASURED = words("sample"), words("measured")
 _TIMES = re.compile(r"(?i)(?<!\w)multipl(?:y|ie[ds]?|ier|iz|ic|ik)\w*")  # no multiple, no multiplexer
 _FACTOR = re.compile(r"(?<![\w.,])[0-9]+(?:[.,][0-9]+)?(?!\w)")
@@ -279,17 +281,20 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
     shown += "" if any(header.unit for header in table.headers) else ", without units"
     remedy = 'set [channels.{}] column = "..."{} in a profile'
     fixed = {"time": " or, with a fixed rate, [file] sample_rate_Hz = ..."}
-    volts = [table.names[i] for i in table.columns(dimension="voltage")]
-    if volts:  # a column alone would not do
-        shown += f"; {', '.join(volts)} in volts without a scale"
-        fixed |= dict.fromkeys(("displacement", "force"), ", unit and scale (unit per volt)")
+    signals = {"volts": table.columns(dimension="voltage"), "counts": []}
+    signals["counts"] = [i for i, h in enumerate(table.headers) if h.dimension == "count" and holds(h.unit, _COUNTS)]
+    signals = {unit: [table.names[i] for i in columns] for unit, columns in signals.items() if columns}
+    for unit, names in signals.items():  # a column alone would not do
+        shown += f"; {', '.join(names)} in {unit} without a scale"
+    per = " or per ".join(unit.removesuffix("s") for unit in signals)
+    fixed |= dict.fromkeys(SIGNED, f", unit and scale (unit per {per})") if signals else {}
     if (len(table.names) == 2 and len(missing) > 1) or {*columns} & {*SIGNED, "current"}:  # several files
         each = ', and file = "...{run}..." where each file has one channel,'
         fixed |= {role: fixed.get(role, "") + each for role in missing if role != "time"}
     beside = f"(found {shown})"
     if "force" in missing and named_after_currents(table.names):
         fixed["force"] = '; or, if columns named after currents are the force at each, unit = "..." alone'
-    bare = {r: ' and unit = "..."' for r in missing if not volts and not table.columns(dimension=DIMENSION[r])}
+    bare = {r: ' and unit = "..."' for r in missing if not signals and not table.columns(dimension=DIMENSION[r])}
     remedies = {r: remedy.format(r, bare.get(r, "") + fixed.get(r, "")) for r in missing}
     return [_refusal(ColumnError, table, f"no column is known to be {r} {beside}", remedies[r]) for r in missing]
 

@@ -44,12 +44,18 @@ _NAMED = (*_STRUCTURES, ".xml")  # structures that describe the record of their 
 _READ = (".txt", ".md", ".rst", ".csv", ".tsv", *_STRUCTURES)
 _LARGEST_LIST = 4096  # bytes of a list of channels
 _TEXTS = (".csv", ".txt", ".tsv", ".ini", ".cfg", ".par", ".set")
-_RATE = re.compile(  # all channels were sampled at 512 Hz; of "samples", which may be specimens, 100 or more
-    r"(?i)(?:(?:sampl(?:ed|ing)|sample[ _]?(?:rate|freq\w*)|ab(?:ge)?tast\w*|échantillonn\w*|muestre\w*|amostra[gd]\w*"
-    r"|campiona[mt]\w*)|(?:samples?|recorded|acquired|logged)\b(?=[^0-9]{0,40}(?:[0-9]{3}|[0-9.,]+ ?k)))"
-    r"(?:[\s:=()]|(?:rates?|freq\w*|is|was|were|at|with|by|of|for|about|all|both|the|every|each|channels?|tests?|signals?|data"
-    r"|force|logger|system|simultaneously|synchronously|von|mit|bei|beträgt|aller?|Kanäle|Tests|de|à|a|da|di|des|con|com|los)\b){0,15}"
-    r"(?P<rate>[0-9]+(?:[.,][0-9]+)? ?k?Hz)\b(?![^.;,]{0,15}(?:filt|pass|sine|sinus|motion|excit|mains))"
+_PER_SECOND = r"(?P<number>[0-9]+(?:[.,][0-9]+)?) ?(?P<kilo>k?)"
+_IN_SAMPLES = r"(?:S(?:ps|/s)|(?:sample|scan|reading|value)s? ?(?:/ ?s(?:ec)?|per s(?:ec(?:ond)?)?)|(?:Mess)?werte (?:pro|je) Sekunde)\b"
+_RATES = (
+    re.compile(  # all channels were sampled at 512 Hz; of "samples", which may be specimens, 100 or more
+        r"(?i)(?:(?:sampl(?:ed|ing)|(?:sample|scan|acquisition|logging|data)[ _]?(?:rate|freq\w*)|ab(?:ge)?tast\w*|mess(?:rate|freq\w*)"
+        r"|échantillonn\w*|muestre\w*|amostra[gd]\w*|campiona[mt]\w*)"
+        r"|(?:samples?|scanned|recorded|acquired|logged)\b(?=[^0-9]{0,40}(?:[0-9]{3}|[0-9.,]+ ?k)))"
+        r"(?:[\s:=()]|(?:rates?|freq\w*|is|was|were|at|with|by|of|for|about|all|both|the|every|each|channels?|tests?|signals?|data"
+        r"|force|logger|system|simultaneously|synchronously|von|mit|bei|beträgt|aller?|Kanäle|Tests|de|à|a|da|di|des|con|com|los)\b){0,15}"
+        rf"{_PER_SECOND}(?:Hz\b|{_IN_SAMPLES})(?![^.;,]{{0,15}}(?:filt|pass|sine|sinus|motion|excit|mains))"
+    ),
+    re.compile(rf"(?i)(?<![\w.,]){_PER_SECOND}(?:{_IN_SAMPLES}|Hz (?:sampl|scan|acqui|logg|abtast|messrate))"),
 )
 _OTHER_RATES = re.compile(  # than that of the rows
     r"(?i)decim|dezim|resampl|down-?sampl|averaged (?:to|down)"
@@ -92,10 +98,11 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     ]
     force = profile.channel("force")
     stated += [f"force [{force.unit}]"] if force.unit and force.column is None else []  # heads columns 0 A, 0.5 A, ...
-    timed = profile.file.sample_rate_Hz or any("time" in (h.role, h.dimension) for h in table.headers)
+    timed = profile.file.sample_rate_Hz or profile.channel("time").unit
+    timed = timed or any(h.dimension == "time" or (h.role == "time" and h.unit) for h in table.headers)
     if table.names and not timed and not any(map(_OTHER_RATES.search, lines)):
-        rates = [match for line in lines for match in _RATE.finditer(line)]
-        stated += [f"sample rate: {match['rate']}" for match in rates]
+        rates = [match for line in lines for pattern in _RATES for match in pattern.finditer(line)]
+        stated += [f"sample rate: {match['number']} {match['kilo']}Hz" for match in rates]
         table = table.noted(*(Finding("W_CHOSEN", f"a text beside the file says {match[0]!r}") for match in rates[:1]))
     calibrated = frozenset(role for role, channel in profile.channels.items() if channel.scale is not None)
     return replace(table, remarks=(*table.remarks, *filter(None, stated)), calibrated=calibrated)
