@@ -483,3 +483,41 @@ def test_a_rate_in_a_text_beside_gives_the_unit_of_time_and_another_rate_does_no
     for other in (text.replace("2", "7"), "filter 200 Hz"):
         (tmp_path / "README.txt").write_text(f"Damper bench\n{other}\n")
         assert [refusal.error.code for refusal in import_files([tmp_path]).refusals] == ["E_UNITS_MISSING"]
+
+
+_CUBE = (
+    "array (test, sample, channel)\n\n- channels: time (s), displacement (mm), force (N)\n- currents of the tests: {}\n"
+)
+
+
+@pytest.mark.parametrize("axes", [(0, 1, 2), (0, 2, 1), (2, 0, 1), (1, 2, 0)])
+@pytest.mark.parametrize("listed", ["0, 0.5, 1.0 and 1.5 A", "0; 500; 1000; 1500 mA", "0 A, 0,5 A, 1,0 A und 1,5 A"])
+def test_tests_of_an_array_are_told_by_their_time_and_have_the_currents_that_a_text_lists(tmp_path, axes, listed):
+    cube = np.array([np.column_stack([T, X, force(amperes)]) for amperes in (0.0, 0.5, 1.0, 1.5)])
+    np.save(tmp_path / "cube.npy", cube.transpose(axes))
+    (tmp_path / "README.md").write_text(_CUBE.format(listed))
+    records = import_files([tmp_path]).records
+    assert [record.current[0] for record in records] == [0.0, 0.5, 1.0, 1.5]
+    assert [np.ptp(record.force) for record in records] == pytest.approx([np.ptp(test[:, 2]) for test in cube])
+    assert all("README.md, a list of as many currents" in f.text for r in records for f in r.findings[-1:])
+
+
+@pytest.mark.parametrize(
+    ("order", "stretched", "listed"),
+    [
+        ((0, 1, 2, 3), 1, "0, 0.5 and 1.0 A"),  # fewer than tests
+        ((0, 1, 2, 3), 1, "0, 0.5, 1.0 and 1.5 A; then 0, 0.2, 0.4, 0.6 A"),  # two lists
+        ((0, 1, 2, 3), 1, "maximum of the supply 0, 0.5, 1.0, 1.5 A"),
+        ((1, 0, 2, 3), 1, "0, 0.5, 1.0 and 1.5 A"),  # forces that do not grow so
+        ((0, 1, 2, 3), 2, "0, 0.5, 1.0 and 1.5 A"),  # another motion
+    ],
+)
+def test_a_list_of_currents_that_may_not_be_that_of_the_tests_is_asked_about(tmp_path, order, stretched, listed):
+    cube = np.array([np.column_stack([T, X, force(amperes)]) for amperes in (0.0, 0.5, 1.0, 1.5)])[[*order]]
+    cube[3, :, 1] *= stretched
+    np.save(tmp_path / "cube.npy", cube)
+    (tmp_path / "README.md").write_text(_CUBE.format(listed))
+    assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
+    np.save(tmp_path / "cube.npy", cube[:, :, 1:])
+    (refusal,) = import_files([tmp_path]).refusals
+    assert "save each test as a matrix of its own" in str(refusal.error)

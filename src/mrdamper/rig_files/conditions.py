@@ -68,6 +68,10 @@ _LISTED = re.compile(  # 0, 1, 2 A; 0 to 2 A; 0-2A; 0.5-2A: of 3-2A, 3 may be th
     r"|\.{2,3})[\s_-]*"
     rf"|(?<![0-9A-Za-z.,-])(0|[0-9]+[.,xp][0-9]+)\s?[-–]\s?)({_NUMBER})[\s_]*(m?A)(?![A-Za-z0-9])"
 )
+_AND = r"(?:,?\s(?:and|und|et|y|e|en|och|og|i|и)\s|[;/、]\s*|,\s+)"
+_SERIES = re.compile(
+    rf"(?<![\w.,-])({_NUMBER}(?:(?:\s?m?A)?{_AND}{_NUMBER})+)\s?(m?A)(?![A-Za-z0-9/])"
+)  # 0, 0.5 and 1 A
 _LABELLED_RATING = re.compile(
     "|".join([r"fuse|suppl|amplif|rated|range|clamp|(?<![a-z])(?:max|limit)(?![a-z])", *words("probe")]), re.IGNORECASE
 )
@@ -223,6 +227,14 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
         if len(stated) == 1:
             statements.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))
     return statements if len({statement.amperes for statement in statements}) == 1 else []
+
+
+def series_in(line: str) -> tuple[float, ...]:
+    """Return the different currents [A] that a line lists in a row: 0, 0.5 and 1.0 A; empty if it lists none."""
+    series = [] if RATING.search(line) or _SCALE.search(line) else _SERIES.findall(line[:LONGEST_LINE])
+    listed = [amperes(number, series[0][1]) for number in re.findall(_NUMBER, series[0][0])] if len(series) == 1 else []
+    mixed = bool(listed) and {*re.findall("m?A", series[0][0])} - {series[0][1]}  # 500 mA, 1 A
+    return tuple(listed) if len({*listed}) == len(listed) and not mixed else ()
 
 
 def rate_in_name(name: str) -> float | None:

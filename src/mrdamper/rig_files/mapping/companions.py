@@ -6,6 +6,7 @@ import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,10 @@ import numpy as np
 from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import rescale, take
 from mrdamper.errors import InputError, QualityError
-from mrdamper.rig_files.coil_current import as_data, current_of, with_value_of_name
+from mrdamper.rig_files.coil_current import as_data, current_of, with_stated_current, with_value_of_name
 from mrdamper.rig_files.column_names import RATING, SI, role_of, split_name, words_of
 from mrdamper.rig_files.columns import partly_assigned
-from mrdamper.rig_files.conditions import amperes
+from mrdamper.rig_files.conditions import amperes, series_in
 from mrdamper.rig_files.file_records import digest_of, records_of_file
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.description import short_lines, with_notes
@@ -219,6 +220,32 @@ def currents_beside(
     return [(codes[code], f"{path.name}, {code.upper()}") for (code,) in own]
 
 
+def currents_listed(path: Path, tests: Sequence[tuple[Path, Record]]) -> list[tuple[float, str]] | None:
+    """Return the current [A] of every test and where it stands, by the only list of currents in a text: 0, 0.5 and 1 A.
+
+    None unless the names of the tests of each file count as many, alike in motion, whose forces grow as the currents.
+    """
+    lines = short_lines(path) if path.suffix.lower() in TEXTS else []
+    listed = {series for line in lines if (series := series_in(line))}
+    groups: dict[str, dict[int, int]] = defaultdict(dict)  # the places of tests by the beginning of their names
+    for i, (_, record) in enumerate(tests):
+        name, number = re.fullmatch(r"(.*?)([0-9]*)", record.id, re.DOTALL).groups()  # type: ignore[union-attr]
+        groups[name][int(number or -1)] = i
+    stated: dict[int, tuple[float, str]] = {}
+    for group in groups.values() if len(listed) == 1 else ():
+        currents = min(listed)
+        if sorted(group) not in ([*range(len(currents))], [*range(1, len(currents) + 1)]):
+            return None
+        own = {group[number]: current for number, current in zip(sorted(group), currents, strict=True)}
+        points = [_point(with_stated_current(tests[i][1], current, "", "")) for i, current in own.items()]
+        known = sorted((point for point in points if point), key=lambda point: point[2])
+        rising = all(one[3] < other[3] and _are_near(one, other) for one, other in pairwise(known))
+        if len(known) < len(own) or not rising:
+            return None
+        stated |= {i: (current, f"{path.name}, a list of as many currents as tests") for i, current in own.items()}
+    return [stated[i] for i in range(len(tests))] if len(stated) == len(tests) else None
+
+
 def _meant(key: str, files: Collection[str]) -> list[str]:
     """Return the codes that the key of a legend names, or the file: I1, test01-test04, a.dat."""
     code = _CODE.fullmatch(key)
@@ -343,10 +370,13 @@ def _sampled(channel: Floats, size: int) -> Floats:
 
 
 def _contradict(one: _Point, other: _Point) -> bool:
-    near = abs(one[2] - other[2]) <= _ALIKE_A and all(
-        abs(a - b) <= _ALIKE * max(a, b) for a, b in zip(one[:2], other[:2], strict=True)
-    )
+    near = abs(one[2] - other[2]) <= _ALIKE_A and _are_near(one, other)
     return near and max(one[3], other[3]) > _SEVERAL * min(one[3], other[3])
+
+
+def _are_near(one: _Point, other: _Point) -> bool:
+    """Tell if two tests are alike in frequency and amplitude."""
+    return all(abs(a - b) <= _ALIKE * max(a, b) for a, b in zip(one[:2], other[:2], strict=True))
 
 
 def _refusal(record: Record, one: _Point, beside: Record, other: _Point) -> QualityError:

@@ -44,18 +44,21 @@ _NAMED = (*_STRUCTURES, ".xml")  # structures that describe the record of their 
 _READ = (".txt", ".md", ".rst", ".csv", ".tsv", *_STRUCTURES)
 _LARGEST_LIST = 4096  # bytes of a list of channels
 _TEXTS = (".csv", ".txt", ".tsv", ".ini", ".cfg", ".par", ".set")
-_PER_SECOND = r"(?P<number>[0-9]+(?:[.,][0-9]+)?) ?(?P<kilo>k?)"
-_IN_SAMPLES = r"(?:S(?:ps|/s)|(?:sample|scan|reading|value)s? ?(?:/ ?s(?:ec)?|per s(?:ec(?:ond)?)?)|(?:Mess)?werte (?:pro|je) Sekunde)\b"
+_RATE = r"(?P<number>[0-9]+(?:[.,][0-9]+)?) ?(?P<kilo>k?)"
+_IN_SAMPLES = (
+    r"(?:S(?:ps|/s)|(?:sample|scan|reading|value)s? ?(?:/ ?s(?:ec)?|per s(?:ec(?:ond)?)?)|werte (?:pro|je) Sekunde)\b"
+)
 _RATES = (
     re.compile(  # all channels were sampled at 512 Hz; of "samples", which may be specimens, 100 or more
-        r"(?i)(?:(?:sampl(?:ed|ing)|(?:sample|scan|acquisition|logging|data)[ _]?(?:rate|freq\w*)|ab(?:ge)?tast\w*|mess(?:rate|freq\w*)"
+        r"(?i)(?:(?:sampl(?:ed|ing)|(?:sample|scan|acquisition|logging|data|mess)[ _]?(?:rate|freq\w*)|ab(?:ge)?tast\w*"
         r"|échantillonn\w*|muestre\w*|amostra[gd]\w*|campiona[mt]\w*)"
         r"|(?:samples?|scanned|recorded|acquired|logged)\b(?=[^0-9]{0,40}(?:[0-9]{3}|[0-9.,]+ ?k)))"
-        r"(?:[\s:=()]|(?:rates?|freq\w*|is|was|were|at|with|by|of|for|about|all|both|the|every|each|channels?|tests?|signals?|data"
-        r"|force|logger|system|simultaneously|synchronously|von|mit|bei|beträgt|aller?|Kanäle|Tests|de|à|a|da|di|des|con|com|los)\b){0,15}"
-        rf"{_PER_SECOND}(?:Hz\b|{_IN_SAMPLES})(?![^.;,]{{0,15}}(?:filt|pass|sine|sinus|motion|excit|mains))"
+        r"(?:[\s:=()]|(?:rates?|freq\w*|is|was|were|at|with|by|of|for|about|all|both|the|every|each|channels?|tests?"
+        r"|signals?|data|force|logger|system|simultaneously|synchronously|von|mit|bei|beträgt|aller?|Kanäle|Tests|de|à|a"
+        r"|da|di|des|con|com|los)\b){0,15}"
+        rf"{_RATE}(?:Hz\b|{_IN_SAMPLES})(?![^.;,]{{0,15}}(?:filt|pass|sine|sinus|motion|excit|mains))"
     ),
-    re.compile(rf"(?i)(?<![\w.,]){_PER_SECOND}(?:{_IN_SAMPLES}|Hz (?:sampl|scan|acqui|logg|abtast|messrate))"),
+    re.compile(rf"(?i)(?<![\w.,]){_RATE}(?:{_IN_SAMPLES}|Hz (?:sampl|scan|acqui|logg|abtast|messrate))"),
 )
 _OTHER_RATES = re.compile(  # than that of the rows
     r"(?i)decim|dezim|resampl|down-?sampl|averaged (?:to|down)"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,8 +21,9 @@ from mrdamper.rig_files.readers.arrays import (
     stated_array,
     value_of,
 )
-from mrdamper.rig_files.readers.base import RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import RawTable, Reader, RigFileError, Source
 from mrdamper.rig_files.readers.nested import nested_tables
+from mrdamper.rig_files.readers.several_tests import tests_of_array
 
 
 class Npy(Reader):
@@ -32,7 +35,7 @@ class Npy(Reader):
     marks = (b"\x93NUMPY",)
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """Return the one table."""
+        """Return the one table, or that of each test of an array of more dimensions."""
         with refusing_damage(source, self.title):
             source.file.seek(0)
             shape, dtype = stated_array(source, source.file, "the array", source.size)
@@ -43,11 +46,23 @@ class Npy(Reader):
         if fields := dtype.names:
             units = ["s" if dtype[name].kind in "Mm" else "" for name in fields]
             return [array_table(source, fields, units, lambda column: array[fields[column]], self.title)]
-        unnamed = expand("", shape)
-        if not unnamed:
-            raise source.refuse("E_NO_DATA", f"an array of {shape}", "save the channels as columns of a matrix")
-        blank = [""] * len(unnamed)
-        return [array_table(source, blank, blank, lambda column: pick(array, unnamed[column][1]), self.title)]
+        try:
+            tests = tests_of_array(array) if array.squeeze().ndim > 2 and dtype.kind in "iuf" else [array]
+        except RigFileError as error:  # which names no file
+            raise source.refuse(error.code, error.found, error.remedy) from None
+        tables = []
+        for number, test in enumerate(tests, 1):
+            parts = [part for _, part in expand("", test.shape)]
+            if not parts:
+                raise source.refuse("E_NO_DATA", f"an array of {shape}", "save the channels as columns of a matrix")
+            names, load = [""] * len(parts), partial(_column, test, parts)
+            label = f"test_{number}" if len(tests) > 1 else ""
+            tables.append(replace(array_table(source, names, names, load, self.title), label=label))
+        return tables
+
+
+def _column(array: np.ndarray, parts: list[int | None], column: int) -> np.ndarray:
+    return pick(array, parts[column])
 
 
 class Npz(Reader):

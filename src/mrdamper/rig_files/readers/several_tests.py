@@ -47,6 +47,24 @@ def _grid_of(value: Any, channels: Mapping[int, int | None]) -> tuple[tuple[int,
     return (len(rows), len(flat) // len(rows)) if len(flat) > len(rows) else (len(rows),), flat
 
 
+def tests_of_array(array: np.ndarray) -> list[np.ndarray]:
+    """Return the matrices of an array over tests, samples and channels; these are told from tests by their time alone.
+
+    Raises `RigFileError`, E_AMBIGUOUS, unless one dimension has one place whose numbers increase along the longest.
+    """
+    along = int(np.argmax(array.shape))
+    across = []
+    for i in [i for i in range(array.ndim) if i != along]:
+        steps = np.diff(np.moveaxis(array, (i, along), (0, -1)).reshape(array.shape[i], -1, array.shape[along]))
+        across += [i] if np.count_nonzero(((steps > 0) | np.isnan(steps)).all(axis=(1, 2))) == 1 else []
+    if len(across) != 1 or array.shape[along] < FEWEST_SAMPLES:
+        problem = f"an array of {' x '.join(map(str, array.shape))}, whose time would tell channels from tests"
+        remedy = "save each test as a matrix of its own, a channel a column, its current in its name: test_0.5A.npy"
+        raise RigFileError("E_AMBIGUOUS", problem, remedy=remedy)
+    matrices = np.moveaxis(array, (along, across[0]), (-2, -1)).reshape(-1, array.shape[along], array.shape[across[0]])
+    return [_unpadded(matrix) for matrix in matrices]
+
+
 def _dimension_of_channels(array: np.ndarray, along: int, channels: Mapping[int, int | None]) -> int | None:
     """Return the only dimension of a length of `channels`, the number and the place of the time; of two, whose time
     increases along the samples. None if there is none; E_AMBIGUOUS if both may be meant.
