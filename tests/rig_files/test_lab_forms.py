@@ -744,3 +744,29 @@ def test_a_list_of_parameters_states_the_current_under_whatever_key_its_name_sta
         text = text.replace(word, f"Max. {word}")
     (tmp_path / "S-1.json").write_text(text)
     assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_CURRENT_MISSING"]
+
+
+def test_a_written_profile_has_the_sign_that_a_text_beside_states(tmp_path):
+    (tmp_path / "a_0.5A.csv").write_text("Time [s],disp [mm],force [N]\n" + rows(T, X, -force(0.5)))
+    (tmp_path / "README.txt").write_text("Damper bench. Force: compression positive.")
+    written = guess_profile(tmp_path / "a_0.5A.csv")
+    assert written.channel("force").sign == -1
+    (record,) = import_files([tmp_path], written).records
+    assert np.array_equal(record.force, import_files([tmp_path]).records[0].force)
+
+
+def test_a_pattern_of_folders_is_refused_under_the_path_as_it_was_given(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lvl3").mkdir()
+    (tmp_path / "lvl3" / "t.csv").write_text("Time [s],disp [mm],force [N]\n" + rows(T, X, force(0.5)))
+    pattern = '[current]\npattern = "*/lvl{current}/*"\n'
+    (refusal,) = import_files(["lvl3/t.csv"], parse_profile(pattern)).refusals
+    assert str(refusal.error).startswith("lvl3/t.csv: the pattern")
+    assert currents(import_files(["lvl3/t.csv"], parse_profile(f'{pattern}unit = "A"')).records) == [3.0]
+
+
+@pytest.mark.parametrize("line", ["# 0.5 A,1 A", "# 0.5 A, 1 A", "# 0.5 A;1 A", "0.5 A,1 A"])
+def test_two_currents_in_a_line_over_one_test_are_asked_about(tmp_path, line):
+    (tmp_path / "a.csv").write_text(f"{line}\nTime [s],disp [mm],force [N]\n" + rows(T, X, force(0.5)))
+    (refusal,) = import_files([tmp_path]).refusals
+    assert refusal.error.code == "E_CURRENT_MISSING"

@@ -55,7 +55,6 @@ def current_of(
         return source.value, {"current_from": "profile"}
     if source is not None and source.pattern is not None:
         places = [path.name, table.label, f"{path.name}/{table.label}", f"{path.as_posix()}/{table.label}".rstrip("/")]
-        places.append(f"/{places[-1]}")  # the folders of */lvl{current}/* may be all there are
         current = next((v for place in places if place and (v := current_in_name(place, profile)) is not None), None)
         if current is None and channel is None:
             raise ColumnError(

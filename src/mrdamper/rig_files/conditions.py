@@ -28,7 +28,7 @@ from mrdamper.rig_files.column_names import (
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
 _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it
 _IN_NAME = re.compile(
-    r"(?<![0-9A-Za-z.,])"
+    r"(?<![0-9A-Za-z.])(?<![0-9],)"  # 0.5 A,1 A are two
     r"(?:(?:[iI](?:_?(?:[cC]oil|[sS]pule))?|(?:[sS]pulen|[cC]oil)?(?:[sS]trom|[cC]urr(?:ent)?|[cC]ur))(?: ?= ?)?)?"
     r"([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(m?)(?:A(?:mp(?:ere)?s?)?|amp(?:ere)?s?|(?<=m)a)"
     r"(?![A-Za-z0-9]|\s?/\s?(?:m?V|%|div|s)\b)"

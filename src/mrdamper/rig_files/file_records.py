@@ -58,10 +58,7 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
     Raises `InputError` if no test of the file can be used.
     """
     with raw_tables(path, profile.file) as every:
-        if len(every) == 1:
-            every = [with_description(every[0], path, profile)]
-        every = [with_notes(table, path, profile) for table in every]
-        tables, problems = tables_of_tests(test_tables(every, profile), profile)
+        tables, problems = tables_of_tests(test_tables(described(every, path, profile), profile), profile)
         tables, computed = _without_computed(tables)
         records: list[Record] = []
         for table in tables:
@@ -91,6 +88,12 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
     if not named:
         CombinedError.raise_from(problems)
     return named, problems
+
+
+def described(tables: list[RawTable], path: Path, profile: Profile) -> list[RawTable]:
+    """Return the tables of a file with what the texts beside it state."""
+    own = [with_description(tables[0], path, profile)] if len(tables) == 1 else tables
+    return [with_notes(table, path, profile) for table in own]
 
 
 def digest_of(path: Path) -> str:

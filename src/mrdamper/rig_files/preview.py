@@ -13,7 +13,7 @@ from mrdamper.errors import InputError, listed
 from mrdamper.rig_files.coil_current import held_current_of
 from mrdamper.rig_files.column_names import DIMENSION, Header, names_compression
 from mrdamper.rig_files.columns import assign, column_called, propose, rate_of, sign_of
-from mrdamper.rig_files.file_records import files_in, tables_of_tests, test_tables, unpacked
+from mrdamper.rig_files.file_records import described, files_in, tables_of_tests, test_tables, unpacked
 from mrdamper.rig_files.profile import Channel, Profile, current_pattern, profile_of
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.base import RawTable
@@ -40,7 +40,7 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
     """
     profile = profile_of(profile)
     with raw_tables(path, profile.file) as tables:
-        table, channels = _guess_channels(test_tables(tables, profile), profile)
+        table, channels = _guess_channels(test_tables(described(tables, Path(path), profile), profile), profile)
     of_file = {key: value for key, value in table.form.items() if key != "sheet" or len(tables) == 1}  # tests in others
     form = {**of_file, **profile.file.model_dump(exclude_defaults=True)}
     if not any(table.names):
@@ -66,7 +66,7 @@ def preview(path: str | Path, profile: Profile | str | Path | None = None) -> di
     """
     profile = profile_of(profile)
     with raw_tables(path, profile.file) as tables:
-        table, channels = _guess_channels(test_tables(tables, profile), profile)
+        table, channels = _guess_channels(test_tables(described(tables, Path(path), profile), profile), profile)
         cells = [_first_cells(table, column) for column in range(min(len(table.names), _MOST_SHOWN))]
         places = {
             name: {"column": _place(table, channel.column), "unit": channel.unit or "", "sign": channel.sign}

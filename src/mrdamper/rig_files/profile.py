@@ -302,10 +302,11 @@ def current_pattern(name: str) -> CurrentSource | None:
 
 
 def _as_expression(pattern: str) -> str:
-    parts = re.split(r"(\{(?:current|run|frequency|amplitude)\}|\*)", pattern)
+    parts = re.split(r"(^\*/|\{(?:current|run|frequency|amplitude)\}|\*)", pattern)
     number = r"(?P<current>[+-]?[0-9]{1,4}(?:[.,xp][0-9]{1,4})?)"
     other = r"[+-]?[0-9]{1,6}(?:[.,xp][0-9]{1,4})?"
     meant = {"{current}": number, "*": ".*?", "{run}": "(?P<run>.+?)", "{frequency}": other, "{amplitude}": other}
+    meant["*/"] = "(?:.*?/)?"  # the folders of */lvl{current}/* may be all there are
     inner = "".join(meant.get(part, re.escape(part)) for part in parts)
     return inner if re.search(r"\.[A-Za-z0-9]{1,5}$|\*$", pattern) else inner + r"(?:\..*)?"
 
