@@ -520,4 +520,4 @@ def test_a_list_of_currents_that_may_not_be_that_of_the_tests_is_asked_about(tmp
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
     np.save(tmp_path / "cube.npy", cube[:, :, 1:])
     (refusal,) = import_files([tmp_path]).refusals
-    assert "save each test as a matrix of its own" in str(refusal.error)
+    assert "save each test as an array of its own, its current in its name" in str(refusal.error)

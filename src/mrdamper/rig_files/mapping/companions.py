@@ -223,27 +223,23 @@ def currents_beside(
 def currents_listed(path: Path, tests: Sequence[tuple[Path, Record]]) -> list[tuple[float, str]] | None:
     """Return the current [A] of every test and where it stands, by the only list of currents in a text: 0, 0.5 and 1 A.
 
-    None unless the names of the tests of each file count as many, alike in motion, whose forces grow as the currents.
+    None unless the names of the tests, or of those of each file, count as many, alike in motion, and their forces grow
+    as the currents.
     """
-    lines = short_lines(path) if path.suffix.lower() in TEXTS else []
-    listed = {series for line in lines if (series := series_in(line))}
-    groups: dict[str, dict[int, int]] = defaultdict(dict)  # the places of tests by the beginning of their names
-    for i, (_, record) in enumerate(tests):
-        name, number = re.fullmatch(r"(.*?)([0-9]*)", record.id, re.DOTALL).groups()  # type: ignore[union-attr]
-        groups[name][int(number or -1)] = i
-    stated: dict[int, tuple[float, str]] = {}
-    for group in groups.values() if len(listed) == 1 else ():
-        currents = min(listed)
-        if sorted(group) not in ([*range(len(currents))], [*range(1, len(currents) + 1)]):
-            return None
-        own = {group[number]: current for number, current in zip(sorted(group), currents, strict=True)}
-        points = [_point(with_stated_current(tests[i][1], current, "", "")) for i, current in own.items()]
+    listed = {of for line in (short_lines(path) if path.suffix.lower() in TEXTS else []) if (of := series_in(line))}
+    files = [file if len(listed) == 1 and len(tests) > len(min(listed)) else path for file, _ in tests]
+    stated: dict[int, float] = {}
+    for file in dict.fromkeys(files) if len(listed) == 1 else ():
+        own = [i for i, of in enumerate(files) if of == file]
+        rows = [Results(min(listed), tuple((f"{n + k}",) for n in range(len(min(listed)))), "", ("",)) for k in (0, 1)]
+        found = [of for row in rows if (of := row.by_test([(tests[i][1].id,) for i in own]))]
+        currents = {own[at]: current for at, current in (found or [{}])[0].items()}
+        points = [_point(with_stated_current(tests[i][1], current, "", "")) for i, current in currents.items()]
         known = sorted((point for point in points if point), key=lambda point: point[2])
-        rising = all(one[3] < other[3] and _are_near(one, other) for one, other in pairwise(known))
-        if len(known) < len(own) or not rising:
-            return None
-        stated |= {i: (current, f"{path.name}, a list of as many currents as tests") for i, current in own.items()}
-    return [stated[i] for i in range(len(tests))] if len(stated) == len(tests) else None
+        if all(one[3] < other[3] and _are_near(one, other) for one, other in pairwise(known)):
+            stated |= currents if len(known) == len(own) else {}
+    title = f"{path.name}, a list of as many currents as tests"
+    return [(stated[i], title) for i in range(len(tests))] if len(stated) == len(tests) else None
 
 
 def _meant(key: str, files: Collection[str]) -> list[str]:

@@ -29,17 +29,13 @@ def with_tests_apart(tree: Mapping[str, Any], arrays: Mapping[str, Any]) -> Mapp
 def _grid_of(value: Any, channels: Mapping[int, int | None]) -> tuple[tuple[int, ...], list[Array]]:
     """Return the conditions' dimensions and the arrays of samples of a list, or of an array over conditions.
 
-    The channels of such an array stand along the dimension of a length of `channels`, else along one of the last two.
+    The channels of such an array stand along one of the last two, where `_dimensions` does not tell.
     """
     if isinstance(value, Array) and value.ndim > 2 and min(value.shape) > 1 and value.dtype.kind in "iuf":
-        array, along = np.asarray(value), int(np.argmax(value.shape))
-        across = _dimension_of_channels(array, along, channels)
-        if across is None and along < array.ndim - 2:
-            return (), []
-        array = np.moveaxis(array, (-2, -1) if across is None else (along, across), (-2, -1))
-        outer = array.shape[:-2]
-        matrices = np.reshape(array, (-1, *array.shape[-2:]))
-        return (outer, [_unpadded(matrix) for matrix in matrices]) if len(matrices) <= MOST_ITEMS else ((), [])
+        array = np.asarray(value)
+        along, across = _dimensions(array, channels)
+        last = (-2, -1) if across is None else (along, across)
+        return _matrices(array, last) if across is not None or along >= array.ndim - 2 else ((), [])
     rows = value if isinstance(value, list) and len(value) > 1 else []
     flat = [item for row in rows for item in (row if isinstance(row, list) else [row])]
     if not flat or not all(isinstance(item, Array) for item in flat):
@@ -48,37 +44,45 @@ def _grid_of(value: Any, channels: Mapping[int, int | None]) -> tuple[tuple[int,
 
 
 def tests_of_array(array: np.ndarray) -> list[np.ndarray]:
-    """Return the matrices of an array over tests, samples and channels; these are told from tests by their time alone.
+    """Return the matrices of an array over tests, samples and channels, of which the time tells the channels.
 
-    Raises `RigFileError`, E_AMBIGUOUS, unless one dimension has one place whose numbers increase along the longest.
+    Raises `RigFileError`, E_AMBIGUOUS, unless the longest dimension is that of the samples and one other has the time.
+    """
+    along, across = _dimensions(array, {})
+    if across is None or array.shape[along] < FEWEST_SAMPLES:
+        raise _refusal(array)
+    return _matrices(array, (along, across))[1]
+
+
+def _matrices(array: np.ndarray, last: tuple[int, int]) -> tuple[tuple[int, ...], list[np.ndarray]]:
+    """Return the conditions' dimensions of an array and the samples of each; `last`: those of samples and channels."""
+    array = np.moveaxis(array, last, (-2, -1))
+    outer, matrices = array.shape[:-2], np.reshape(array, (-1, *array.shape[-2:]))
+    return (outer, [_unpadded(matrix) for matrix in matrices]) if len(matrices) <= MOST_ITEMS else ((), [])
+
+
+def _dimensions(array: np.ndarray, channels: Mapping[int, int | None]) -> tuple[int, int | None]:
+    """Return the longest dimension, of the samples, and the only other of a length of `channels`, or None.
+
+    `channels` has the place of the time by their number. Of several dimensions, and of all where no channels are named,
+    that counts whose time alone increases along the samples; E_AMBIGUOUS if that is not one of those named.
     """
     along = int(np.argmax(array.shape))
-    across = []
-    for i in [i for i in range(array.ndim) if i != along]:
-        steps = np.diff(np.moveaxis(array, (i, along), (0, -1)).reshape(array.shape[i], -1, array.shape[along]))
-        across += [i] if np.count_nonzero(((steps > 0) | np.isnan(steps)).all(axis=(1, 2))) == 1 else []
-    if len(across) != 1 or array.shape[along] < FEWEST_SAMPLES:
-        problem = f"an array of {' x '.join(map(str, array.shape))}, whose time would tell channels from tests"
-        remedy = "save each test as a matrix of its own, a channel a column, its current in its name: test_0.5A.npy"
-        raise RigFileError("E_AMBIGUOUS", problem, remedy=remedy)
-    matrices = np.moveaxis(array, (along, across[0]), (-2, -1)).reshape(-1, array.shape[along], array.shape[across[0]])
-    return [_unpadded(matrix) for matrix in matrices]
+    across = [i for i, n in enumerate(array.shape) if i != along and (n in channels or not channels)]
+    if len(across) > 1 or not channels:
+        steps = {i: np.diff(np.moveaxis(array, (i, along), (0, -1)).astype(float)) for i in across}
+        rising = {i: ~(of <= 0).any(axis=tuple(range(1, array.ndim))) for i, of in steps.items()}
+        times = {i: [*np.flatnonzero(places)] for i, places in rising.items()}
+        across = [i for i, own in times.items() if len(own) == 1 and channels.get(array.shape[i], own[0]) == own[0]]
+        if len(across) != 1 and channels:
+            raise _refusal(array)
+    return along, across[0] if len(across) == 1 else None
 
 
-def _dimension_of_channels(array: np.ndarray, along: int, channels: Mapping[int, int | None]) -> int | None:
-    """Return the only dimension of a length of `channels`, the number and the place of the time; of two, whose time
-    increases along the samples. None if there is none; E_AMBIGUOUS if both may be meant.
-    """
-    across = [i for i, n in enumerate(array.shape) if n in channels and i != along]
-    if len(across) > 1:
-        timed = [(i, time) for i in across if (time := channels[array.shape[i]]) is not None]
-        steps = {i: np.diff(np.moveaxis(array, (i, along), (0, -1))[time].astype(float)) for i, time in timed}
-        across = [i for i, step in steps.items() if not (step <= 0).any()]
-        if len(across) != 1:
-            problem = f"the channels may stand along two dimensions of an array of {' x '.join(map(str, array.shape))}"
-            remedy = "save each test as an array of its own, or the time among the channels"
-            raise RigFileError("E_AMBIGUOUS", problem, remedy=remedy)
-    return across[0] if across else None
+def _refusal(array: np.ndarray) -> RigFileError:
+    problem = f"the channels may stand along two dimensions of an array of {' x '.join(map(str, array.shape))}"
+    remedy = "save each test as an array of its own, its current in its name, or the time among the channels"
+    return RigFileError("E_AMBIGUOUS", problem, remedy=remedy)
 
 
 def _tests_of_lists(tree: Mapping[str, Any]) -> Mapping[str, Any]:
