@@ -521,3 +521,28 @@ def test_a_list_of_currents_that_may_not_be_that_of_the_tests_is_asked_about(tmp
     np.save(tmp_path / "cube.npy", cube[:, :, 1:])
     (refusal,) = import_files([tmp_path]).refusals
     assert "save each test as an array of its own, its current in its name" in str(refusal.error)
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells", "codes"),
+    [
+        ("Supply current (A)", ("0", "0.5", "1.5"), set()),
+        ("Coil current Nominal (A)", ("0", "0.5", "1.5"), set()),
+        ("Supply current (A),Coil current (A)", ("2.0,0", "2.5,0.5", "3.5,1.5"), set()),
+        ("Supply current (A)", ("2", "2", "2"), {"E_CURRENT_MISSING"}),
+        ("Supply current limit (A)", ("1", "2", "3"), {"E_CURRENT_MISSING"}),
+    ],
+)
+def test_a_supplys_current_that_differs_between_tests_is_the_coils_where_no_other_is_listed(
+    tmp_path, heading, cells, codes
+):
+    lines = [f"{number},{cell}\n" for number, cell in enumerate(cells, 1)]
+    (tmp_path / "results.csv").write_text("".join([f"Test,{heading}\n", *lines]))
+    for number, amperes in enumerate((0.0, 0.5, 1.5), 1):
+        rows = zip(T, X, force(amperes), strict=True)
+        text = "".join(f"{t},{x},{f}\n" for t, x, f in rows)
+        (tmp_path / f"test_{number}.csv").write_text(f"time [s],disp [mm],force [N]\n{text}")
+    found = import_files([tmp_path])
+    assert {refusal.error.code for refusal in found.refusals} == codes
+    assert [record.current[0] for record in found.records] == ([] if codes else [0.0, 0.5, 1.5])
+    assert all("its current is the" in record.findings[-1].text for record in found.records)

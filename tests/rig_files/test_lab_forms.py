@@ -251,15 +251,15 @@ def test_channels_in_volts_are_refused_with_the_scale_that_is_missing(tmp_path):
     head = "Vertical Units,V,V,\nLabel,LVDT,Load cell,\n\nTIME,CH1,CH2\n"
     (tmp_path / "tek_0.5A.csv").write_text(head + rows(T, X / 2, force(0.5) / 200))
     (refusal,) = {str(r.error) for r in import_files([tmp_path]).refusals if "force" in str(r.error)}
-    assert "CH1, CH2 in volts without a scale" in refusal
+    assert "CH1, CH2 in volts or counts without a scale" in refusal
     assert "unit and scale" in refusal
 
 
 def test_a_channel_in_counts_is_asked_for_with_all_that_it_needs_at_once(tmp_path):
     (tmp_path / "a_0.5A.csv").write_text("t_ms,encoder_counts,force_N\n" + rows(1000 * T, np.round(40 * X), force(0.5)))
     (refusal,) = import_files([tmp_path]).refusals
-    assert "encoder_counts in counts without a scale" in str(refusal.error)
-    assert 'set [channels.displacement] column = "...", unit and scale (unit per count)' in str(refusal.error)
+    assert "encoder_counts in volts or counts without a scale" in str(refusal.error)
+    assert 'set [channels.displacement] column = "...", unit and scale (unit per volt or count)' in str(refusal.error)
     answer = '[channels.displacement]\ncolumn = "encoder_counts"\nunit = "mm"\nscale = 0.025'
     assert currents(import_files([tmp_path], parse_profile(answer)).records) == [0.5]
 

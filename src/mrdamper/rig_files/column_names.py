@@ -52,29 +52,19 @@ _UNITS = {
     for dimension, units in TABLES["units"].items()
     for name, factor in units.items()
 }
-
-
 _WORDS = meanings("unit_names")
-
-
 SI = MappingProxyType(
     {
         "time": "s", "displacement": "m", "force": "N", "velocity": "m/s", "acceleration": "m/s²", "current": "A",
         "voltage": "V", "temperature": "°C", "pressure": "Pa",
     }
 )  # fmt: skip
-
-
 DIMENSION = MappingProxyType({name: "length" if name == "displacement" else name for name in SI})  # of a channel
-
-
 _PINT = {
     "[time]": "time", "[length]": "length", "[mass] * [length] / [time] ** 2": "force",
     "[length] / [time]": "velocity", "[length] / [time] ** 2": "acceleration", "[current]": "current",
     "[mass] * [length] ** 2 / [current] / [time] ** 3": "voltage",
 }  # fmt: skip
-
-
 _PLAIN = re.compile(r"[A-Za-zµμΩ°]{1,20}(?:\^?-?[1-4])?(?:[*/·⋅ ][A-Za-zµμΩ°]{1,20}(?:\^?-?[1-4])?){0,3}")
 
 
@@ -160,8 +150,6 @@ _LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
 _RATE_GROUP = re.compile(r"\s+\d*\s*-\s*(?:default|fast|slow) sample rate", re.IGNORECASE)
 _DEVICE = re.compile(r"\\[\w.-]{1,30}:[0-9]{1,3}$")  # F_rod\ES650:1
 _FUSED = re.compile(r"[ _.:-]+")
-
-
 _SMALL = MappingProxyType({"a": "current", "n": "force"})  # units of one letter in names in small letters
 _BY_UNIT = MappingProxyType({"length": "displacement", "force": "force", "current": "current"})
 

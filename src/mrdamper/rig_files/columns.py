@@ -281,13 +281,10 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
     shown += "" if any(header.unit for header in table.headers) else ", without units"
     remedy = 'set [channels.{}] column = "..."{} in a profile'
     fixed = {"time": " or, with a fixed rate, [file] sample_rate_Hz = ..."}
-    signals = {"volts": table.columns(dimension="voltage"), "counts": []}
-    signals["counts"] = [i for i, h in enumerate(table.headers) if h.dimension == "count" and holds(h.unit, _COUNTS)]
-    signals = {unit: [table.names[i] for i in columns] for unit, columns in signals.items() if columns}
-    for unit, names in signals.items():  # a column alone would not do
-        shown += f"; {', '.join(names)} in {unit} without a scale"
-    per = " or per ".join(unit.removesuffix("s") for unit in signals)
-    fixed |= dict.fromkeys(SIGNED, f", unit and scale (unit per {per})") if signals else {}
+    signals = [i for i, h in enumerate(table.headers) if h.dimension == "voltage" or holds(h.unit, _COUNTS)]
+    if signals:  # a column alone would not do
+        shown += f"; {', '.join(table.names[i] for i in signals)} in volts or counts without a scale"
+        fixed |= dict.fromkeys(SIGNED, ", unit and scale (unit per volt or count)")
     if (len(table.names) == 2 and len(missing) > 1) or {*columns} & {*SIGNED, "current"}:  # several files
         each = ', and file = "...{run}..." where each file has one channel,'
         fixed |= {role: fixed.get(role, "") + each for role in missing if role != "time"}

@@ -98,6 +98,15 @@ _RATE_IN_NAME = re.compile(
 _SPACED = re.compile(
     r"^[\s#%/\"]*(?P<key>[^\d:=;,\t]{1,60}?)\s+(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)\s*(?P<unit>(?:1/)?(?:[^\W\d_]|/){1,9}(?:-1)?)\s*$"
 )
+BARE_RATE = re.compile(r"(?i)f_?s|(?:sampl(?:e|ing)|scan|abtast)[ _]?(?:rate|freq(?:uency)?)")
+_BARE_STEP = re.compile(
+    r"(?i)d_?t|delta_?t|(?:sampl(?:e|ing)|time|wf|x)[ _]?(?:delta|step|inc(?:r(?:ement)?)?|interval)|delta_?x"
+)
+_START = re.compile(r"(?i)[tx]_?0|(?:start|x)[ _]?time|wf_start_offset|x_?start")
+_WHICH = r"(?i)(?:test|excitation|motion|sine|drive|nominal|set|soll|prüf|anregungs|signal)?[ _-]*"
+_FREQUENCY_KEY = re.compile(_WHICH + r"(?:frequency|freq|frequenz|fréquence|frecuencia|frequenza|频率|周波数)")
+_AMPLITUDE_KEY = re.compile(_WHICH + r"(?:amplitude|ampl|amplitud|ampiezza|stroke|hub|course|振幅)")
+_TURNS = re.compile(r"speed|rpm|drehzahl|crank|régime|vitesse|velocidad|giri|обороты|转速|回転", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,17 +302,6 @@ def _only(values: Sequence[float], agree: float, shown: float, unit: str) -> flo
     return values[0] if values else None
 
 
-BARE_RATE = re.compile(r"(?i)f_?s|(?:sampl(?:e|ing)|scan|abtast)[ _]?(?:rate|freq(?:uency)?)")
-
-
-_BARE_STEP = re.compile(
-    r"(?i)d_?t|delta_?t|(?:sampl(?:e|ing)|time|wf|x)[ _]?(?:delta|step|inc(?:r(?:ement)?)?|interval)|delta_?x"
-)
-
-
-_START = re.compile(r"(?i)[tx]_?0|(?:start|x)[ _]?time|wf_start_offset|x_?start")
-
-
 def stated_clock(numbers: Mapping[str, float]) -> tuple[float, float, str] | None:
     """Step, start and unit of a channel's clock by the numbers beside its samples: dt, sampling_rate_Hz, t0.
 
@@ -323,15 +321,6 @@ def stated_clock(numbers: Mapping[str, float]) -> tuple[float, float, str] | Non
     return None if clock is None else (clock[0], start, clock[1])
 
 
-_WHICH = r"(?i)(?:test|excitation|motion|sine|drive|nominal|set|soll|prüf|anregungs|signal)?[ _-]*"
-
-
-_FREQUENCY_KEY = re.compile(_WHICH + r"(?:frequency|freq|frequenz|fréquence|frecuencia|frequenza|频率|周波数)")
-
-
-_AMPLITUDE_KEY = re.compile(_WHICH + r"(?:amplitude|ampl|amplitud|ampiezza|stroke|hub|course|振幅)")
-
-
 def stated_motion(quantities: Iterable[Quantity]) -> str:
     """Frequency and amplitude of the motion that is stated, as a name would: 2Hz 10mm; empty if neither is."""
     words = []
@@ -341,9 +330,6 @@ def stated_motion(quantities: Iterable[Quantity]) -> str:
         elif value > 0 and unit.dimension == "length" and _AMPLITUDE_KEY.fullmatch(key):
             words.append(f"{1e3 * value:g}mm")
     return " ".join(dict.fromkeys(words))
-
-
-_TURNS = re.compile(r"speed|rpm|drehzahl|crank|régime|vitesse|velocidad|giri|обороты|转速|回転", re.IGNORECASE)
 
 
 def stated_speed(quantities: Iterable[Quantity]) -> float | None:

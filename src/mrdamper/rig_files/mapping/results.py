@@ -18,6 +18,7 @@ from mrdamper.rig_files.text.layout import cells_of, is_units
 _SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
 _NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
 _QUANTITY = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s*(m?A)")
+_SUPPLY = re.compile(r"(?i)\b(?:power[ _-]?)?suppl(?:y|ied)\b|\bpsu\b")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
@@ -207,7 +208,10 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
         if sum(map(bool, row)) < 2:  # most lines are one cell where another character separates them
             continue
         columns = [i for i, cell in enumerate(row) if cell and not _NUMBER.fullmatch(cell) and _is_current(cell)]
-        columns = columns or [i for i, cell in enumerate(row) if holds(cell, COIL) and cell.isalpha()]  # above 0.5 A
+        supply = [] if columns else [i for i, cell in enumerate(row) if _is_current(_SUPPLY.sub("", cell))]
+        columns = (
+            columns or supply or [i for i, cell in enumerate(row) if holds(cell, COIL) and cell.isalpha()]
+        )  # above 0.5 A
         if not columns:
             continue
         below = at + 1
@@ -224,6 +228,8 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
         every = [[_amperes(cells[i], unit or split_name(row[i]).unit) for cells in body] for i in columns]
         currents = every[0]
         if len(body) < _FEWEST_ROWS or any(value is None for value in currents):
+            continue
+        if supply and len({*currents}) == 1:  # of tests at different currents the coil's, else the supply's rating
             continue
         pairs = [pair for other in every[1:] for pair in zip(currents, other, strict=True)]
         if any(a is not None and b is not None and contradicts(a, b) for a, b in pairs):
