@@ -189,13 +189,12 @@ def with_current_behind_label(record: Record, path: Path, names: Collection[str]
     current = current_behind_label(place, names)
     if current is None:
         return record
-    text = f"{place!r} is read as {current:g} A: by the other names, the digit before it is part of a label"
-    record = with_stated_current(record, current, f"the name {place!r}", place)
-    return replace(record, findings=(*record.findings, Finding("W_CHOSEN", printable(text))))
+    note = f"{place!r} is read as {current:g} A: by the other names, the digit before it is part of a label"
+    return with_stated_current(record, current, f"the name {place!r}", place, note)
 
 
-def with_stated_current(record: Record, current: float, whence: str, where: str) -> Record:
-    """Return the record with the current [A] that a profile or a table of tests states; a channel that agrees stays.
+def with_stated_current(record: Record, current: float, whence: str, where: str, note: str = "") -> Record:
+    """Return the record with the current [A] that is stated beside it, and a note on it; a channel that agrees stays.
 
     Raises `ColumnError`: E_CURRENT_CONTRADICTS if the channel, name or heading of the file states another.
     """
@@ -208,6 +207,7 @@ def with_stated_current(record: Record, current: float, whence: str, where: str)
     if record.current is not None and not own:
         return record
     findings = tuple(finding for finding in record.findings if not finding.text.startswith(NO_CHANNEL))
+    findings += (Finding("W_CHOSEN", printable(note)),) if note else ()
     provenance = {**record.provenance, "current_from": as_data(whence)}
     return replace(record, current=constant(current, record.time), findings=findings, provenance=provenance)
 

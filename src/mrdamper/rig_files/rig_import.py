@@ -16,7 +16,7 @@ import numpy as np
 from mrdamper.data import Dataset
 from mrdamper.data.displayable import Displayable
 from mrdamper.data.temporary import without_temporary_folder
-from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, printable, shown, validate_arguments
+from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files.coil_current import as_data, require_current, with_current_behind_label, with_stated_current
 from mrdamper.rig_files.file_records import files_in, records_of_file, unpacked
 from mrdamper.rig_files.mapping.companions import (
@@ -41,7 +41,7 @@ from mrdamper.rig_files.profile import Profile, profile_of
 from mrdamper.rig_files.quality import check_long_record
 from mrdamper.rig_files.quality.table import to_run
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
-from mrdamper.rig_files.record import Finding, Record, Refusal, unique_names
+from mrdamper.rig_files.record import Record, Refusal, unique_names
 from mrdamper.rig_files.sequences import follows, goes_on, tests_of_files
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, names_tests
@@ -333,9 +333,10 @@ class _Intake:
             tests = self._numbered(results) if results else pending
             stated = currents_beside(path, results, tests) or currents_listed(path, tests)
             if stated:
+                both = zip(within_times(tests, results), stated, strict=True)
                 self._pending = [
-                    (file, with_stated_current(record, current, whence, file.name).noticed(_from_text(current, whence)))
-                    for (file, record), (current, whence) in zip(within_times(tests, results), stated, strict=True)
+                    (file, with_stated_current(record, *own, file.name, f"its current is the {own[0]:g} A of {own[1]}"))
+                    for (file, record), own in both
                 ]
                 self.notes = [note for note in self.notes if Path(note.file) != path]
                 self._drop_refusals({path})
@@ -373,10 +374,6 @@ class _Intake:
         tests = self.tests()
         self.refusals += [Refusal(str(tests[i][0]), error, tests[i][1].id) for i, error in errors.items()]
         self._found = [test for i, test in enumerate(tests) if i not in errors]
-
-
-def _from_text(current: float, whence: str) -> Finding:
-    return Finding("W_CHOSEN", printable(f"its current is the {current:g} A of {whence}"))
 
 
 def _unchecked(path: Path, profile: Profile) -> tuple[list[Record], list[Refusal]]:
