@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy.integrate import solve_ivp
 from scipy.special import hyp2f1, iv
 
 from mrdamper.errors import ExcitationError, ParameterError
@@ -156,17 +155,15 @@ def test_far_beyond_yield_it_is_the_sign_of_the_velocity(n, rho):
     np.testing.assert_allclose(zeta[away], np.sign(np.cos(theta[away])), atol=ROUNDING)
 
 
-@given(shapes, st.floats(-1, 3), st.floats(0, 5), st.floats(0, 5))
+@given(shapes, st.floats(-1, 1), st.floats(0, 5), st.floats(0, 5))
 def test_two_strokes_one_way_are_one(shape, zeta0, a, b):
-    zeta0 = zeta0 if shape.rho * abs(zeta0) ** shape.n <= 1 and zeta0 <= 10 else 1.0
     a, b = a / shape.kappa, b / shape.kappa
     twice = stroke(shape, stroke(shape, zeta0, a), b)
     assert twice == pytest.approx(stroke(shape, zeta0, a + b), abs=LEAVING)
 
 
-@given(shapes, st.floats(-1, 3), st.floats(0, 5))
+@given(shapes, st.floats(-1, 1), st.floats(0, 5))
 def test_float_and_array_strokes_agree(shape, zeta0, reach):
-    zeta0 = zeta0 if shape.rho * abs(zeta0) ** shape.n <= 1 else 1.0
     one_float = step(shape, zeta0, reach / shape.kappa)
     assert one_float == pytest.approx(stroke(shape, zeta0, reach / shape.kappa), abs=ROUNDING)
 
@@ -361,20 +358,6 @@ def test_stroke_against_hypergeometric_distance(n, rho):
     np.testing.assert_allclose(half, -before / 2, atol=TABLE)
 
 
-@pytest.mark.parametrize(("n", "zeta0"), [(1.0, 3.0), (1.5, 2.0), (2.0, 5.0), (3.0, 10.0), (8.0, 1.3)])
-@pytest.mark.parametrize("rho", [-2.0, 0.0])
-def test_from_above_z_max_against_an_ode_solver(n, zeta0, rho):
-    distances = np.array([1e-3, 0.1, 0.5, 2.0])
-    for start in (zeta0, -zeta0):
-
-        def rate(s, w):
-            return np.where(w >= 0, 1 - np.abs(w) ** n, 1 - rho * np.abs(w) ** n)
-
-        truth = solve_ivp(rate, (0, 2), [start], "DOP853", distances, rtol=1e-12, atol=1e-13, max_step=0.02).y[0]
-        # The solver crosses the kink at zero with one ordinary step: its error, not ours.
-        np.testing.assert_allclose(stroke(Shape(1.0, rho, n), start, distances), truth, atol=1e-8)
-
-
 @pytest.mark.parametrize("n", [1.0, 2.0])
 @pytest.mark.parametrize("rho", [-3.0, 0.0, 0.5])
 def test_tables_meet_the_closed_forms(n, rho):
@@ -413,10 +396,9 @@ def test_impossible_motions_are_refused(x):
         Path.of(x)
 
 
-def test_starts_that_run_away_are_refused():
-    with pytest.raises(ParameterError, match="runs away"):
-        follow(Shape(1.0, 0.5), Path.of([0.0, 1.0]), 1.5)
-    with pytest.raises(ParameterError, match="z_max"):
-        stroke(Shape(1.0, 0.0), 50.0, 1.0)
+@pytest.mark.parametrize("start", [1.001, -50.0, np.nan])
+def test_starts_beyond_z_max_are_refused(start):
+    with pytest.raises(ParameterError, match="within ±z_max"):
+        follow(Shape(1.0, 0.5), Path.of([0.0, 1.0]), start)
     with pytest.raises(ExcitationError, match="amplitude"):
         peak_of(Shape(1.0, 0.0), 0.0)

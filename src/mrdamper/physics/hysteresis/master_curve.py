@@ -6,8 +6,8 @@ the distance in units of the yield displacement,
     dw/dphi = 1 − w^n  (w >= 0, climb)        dw/dphi = 1 − rho |w|^n  (w < 0, release).
 
 n = 1 and n = 2 have closed forms. Any other n is tabulated, once for each n: the factor
-|rho|^(1/n) scales every release onto dy/dphi = 1 ∓ y^n, so three curves without a parameter
-besides n serve all rho (rising to 1, growing without bound, falling to 1 from above).
+|rho|^(1/n) scales every release onto dy/dphi = 1 ∓ y^n, so two curves without a parameter
+besides n serve all rho (rising to 1, growing without bound).
 
 The tables hold r = −ln|1 − y| (or ln(1 + y) on the growing curve) over distance. In r the curves are nearly straight,
 also where y is within rounding of 1, and dr/dphi and its derivative are known exactly; quintic Hermite cells then reach
@@ -33,7 +33,6 @@ import numpy as np
 from mrdamper.data.arrays import Floats
 from mrdamper.tracing.expression import Expression, choose, settled
 
-CEILING = 11.0  # largest |w| a motion may start from
 STEEPEST = 1e6  # largest |rho| |w|^n: a shorter release is below rounding
 SATURATED = 38.0  # in r: 1 − e^−38 rounds to 1
 _BELOW_ONE = 1 - 2**-50  # keeps a state of 1 from the pole of a logarithm, by a rounding error
@@ -79,7 +78,7 @@ class MasterCurve(ABC):
 
     @abstractmethod
     def climb(self, w: Value, phi: Value, xp: ModuleType) -> Value:
-        """State reached from w >= 0, also from above 1, after a distance phi."""
+        """State reached from w in 0...1 after a distance phi."""
 
     @abstractmethod
     def climb_distance(self, r: float) -> float:
@@ -124,7 +123,6 @@ class _Tangent(MasterCurve):
         return xp.tanh(phi)
 
     def climb(self, w: Value, phi: Value, xp: ModuleType) -> Value:
-        # The addition theorem of tanh is also that of coth, so w > 1 needs no separate case.
         t = xp.tanh(phi)
         return (w + t) / (1.0 + w * t)
 
@@ -161,15 +159,8 @@ class _Tabulated(MasterCurve):
         return -xp.expm1(-self._rising.coordinate(phi, xp))
 
     def climb(self, w: Value, phi: Value, xp: ModuleType) -> Value:
-        if xp is math:
-            return self._fall_from(w, phi, xp) if w > 1 else self._climb_from(w, phi, xp)
-        if isinstance(phi, Expression):  # a stream starts at rest and stays below 1
-            return self._climb_from(w, phi, xp)
-        above = w > 1
-        reached = np.empty_like(phi)
-        reached[above] = self._fall_from(w[above], phi[above], xp)
-        reached[~above] = self._climb_from(w[~above], phi[~above], xp)
-        return reached
+        start = -xp.log1p(-(min(w, 1.0) if xp is math else np.minimum(w, 1.0)) * _BELOW_ONE)  # by rounding above 1
+        return -xp.expm1(-self._rising.coordinate(self._rising.distance(start, xp) + phi, xp))
 
     def climb_distance(self, r: float) -> float:
         # Past the table (1 − w^n)/(1 − w) is n.
@@ -193,14 +184,6 @@ class _Tabulated(MasterCurve):
             lambda: size,
         )
 
-    def _climb_from(self, w: Value, phi: Value, xp: ModuleType) -> Value:
-        start = -xp.log1p(-w * _BELOW_ONE)
-        return -xp.expm1(-self._rising.coordinate(self._rising.distance(start, xp) + phi, xp))
-
-    def _fall_from(self, w: Value, phi: Value, xp: ModuleType) -> Value:
-        start = self._falling.distance(-xp.log(w - 1.0), xp)
-        return 1.0 + xp.exp(-self._falling.coordinate(start + phi, xp))
-
     @cached_property
     def _rising(self) -> _CurveTable:
         """dy/dphi = 1 − y^n from 0 to 1; y = 1 − e^−r."""
@@ -222,17 +205,6 @@ class _Tabulated(MasterCurve):
             return speed, self.n * y ** (self.n - 1) - speed
 
         return _CurveTable(crowded_nodes(math.log1p(STEEPEST ** (1 / self.n))), rate)
-
-    @cached_property
-    def _falling(self) -> _CurveTable:
-        """dy/dphi = 1 − y^n from the ceiling down to 1; y = 1 + e^−r."""
-
-        def rate(r: Floats) -> tuple[Floats, Floats]:
-            gap = np.exp(-r)
-            speed = np.expm1(self.n * np.log1p(gap)) / gap
-            return speed, speed - self.n * (1 + gap) ** (self.n - 1)
-
-        return _CurveTable(np.linspace(-math.log(CEILING - 1), SATURATED, 4097), rate)
 
 
 def crowded_nodes(end: float) -> Floats:
