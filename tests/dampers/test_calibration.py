@@ -53,11 +53,11 @@ def test_a_run_is_compared_inside_its_window_with_what_it_takes_out_of_the_motio
     power = [np.trapezoid(f[inside] * velocity[inside], TIME[inside]) for f in (1.2 * force + 3, force)]
     assert found.energy == pytest.approx(power[0] / power[1])
     assert found.measured == pytest.approx(1.2 * found.predicted + 3)
-    assert found.gain_and_offset == pytest.approx((1.2, 3.0))
+    assert (found.reading.gain, found.reading.offset) == pytest.approx((1.2, 3.0))
     assert found.half == pytest.approx(50.0)
     assert found.predicted.size == np.sum(inside)  # some hundred samples are not thinned
     small = replace(found, predicted=1e-4 * found.predicted, measured=1e-4 * found.measured)
-    assert small.gain_and_offset == pytest.approx((1.2, 3e-4))
+    assert (small.reading.gain, small.reading.offset) == pytest.approx((1.2, 3e-4))
     parts = [found, *(replace(found, peak=np.array([p]), energy=np.array([e])) for p, e in ((1.4, 0.9), (2.5, 2.0)))]
     both = PredictedRun.joined("whole", parts)
     assert (both.run_id, both.session) == ("whole", "a")
@@ -66,7 +66,7 @@ def test_a_run_is_compared_inside_its_window_with_what_it_takes_out_of_the_motio
     assert both.predicted == pytest.approx(np.tile(found.predicted[::3], 3))
     assert both.measured == pytest.approx(np.tile(found.measured[::3], 3))
     still = replace(found, predicted=np.full(5, 7.0), measured=np.full(5, 9.0))
-    assert still.gain_and_offset == pytest.approx((1.0, 2.0))  # a constant shows no gain
+    assert (still.reading.gain, still.reading.offset) == pytest.approx((1.0, 2.0))  # a constant shows no gain
     assert still.half == 1.0  # nor a swing: errors are then in N
 
 

@@ -259,16 +259,21 @@ def test_a_basis_asks_for_what_it_names(monkeypatch):
                      "gas": basis.gas}  # fmt: skip
 
 
-def test_joint_ways_hand_on_what_their_fits_make(monkeypatch):
-    identifications = [SimpleNamespace(method="balance")] * 2
-    asked = []
+@pytest.mark.parametrize(("way", "any_motion"), [(("global fit",), True), ((), True), (("current laws",), False)])
+def test_joint_fits_of_functions_follow_the_motion_or_the_current_alone(monkeypatch, way, any_motion):
+    identifications, asked = [SimpleNamespace(method="balance")] * 2, []
     fit = SimpleNamespace(damper="damper")
-    monkeypatch.setattr(recipes, "fit_modified_jointly", lambda *given: asked.append(given) or (fit, "refit"))
-    made_ = recipes.fit_functions_jointly("ab", identifications)
+    monkeypatch.setattr(
+        recipes, "fit_modified_jointly", lambda *given, **named: asked.append((given, named)) or (fit, "refit")
+    )
+    made_ = recipes.fit_functions_jointly("ab", identifications, *way)
     assert (made_.damper, made_.refit, made_.fit) == ("damper", "refit", fit)
-    assert asked == [
-        ("ab", identifications, {"method": "balance", "identification runs": "2", "functions": "global fit"})
-    ]
+    about = {"method": "balance", "identification runs": "2", "functions": (*way, "global fit")[0]}
+    assert asked == [(("ab", identifications, about), {"any_motion": any_motion})]
+
+
+def test_joint_ways_hand_on_what_their_fits_make(monkeypatch):
+    asked, fit = [], SimpleNamespace(damper="damper")
     folds = SimpleNamespace(refit=lambda rows: SimpleNamespace(damper=("without", rows)))
     choice = SimpleNamespace(problem="problem", fit=fit, searched=("leak",))
     monkeypatch.setattr(recipes, "identify_jointly", lambda runs, model: asked.append((runs, model)) or choice)
@@ -283,18 +288,6 @@ def test_joint_ways_hand_on_what_their_fits_make(monkeypatch):
     assert made_.refit([2, 0]) == (["c", "a"], [9, 7], {"identification runs": "3"})
     law.basis = None
     assert recipes.fit_published(law, "abc", []).damper == (["a", "b", "c"], [], {"identification runs": "3"})
-
-
-def test_laws_of_the_current_alone_are_fitted_without_the_motion(monkeypatch):
-    identifications, asked = [SimpleNamespace(method="balance")] * 2, []
-    fit = SimpleNamespace(damper="damper")
-    monkeypatch.setattr(
-        recipes, "fit_modified_jointly", lambda *given, **named: asked.append((given, named)) or (fit, "refit")
-    )
-    made_ = recipes.fit_current_laws("ab", identifications)
-    assert (made_.damper, made_.refit, made_.fit) == ("damper", "refit", fit)
-    about = {"method": "balance", "identification runs": "2", "functions": "current laws"}
-    assert asked == [(("ab", identifications, about), {"any_motion": False})]
 
 
 def test_a_recipe_that_depends_on_the_runs_is_completed_by_them():

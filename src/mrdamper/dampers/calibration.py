@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.distance import AT_TESTS, Distance
+from mrdamper.dampers.sessions import GainOffset
 from mrdamper.data.arrays import Floats, index_at
 from mrdamper.data.runs import Run, once_per_run
 from mrdamper.data.sessions import session_of
@@ -113,12 +114,9 @@ class PredictedRun:
         return peak_force(self.predicted) or 1.0
 
     @property
-    def gain_and_offset(self) -> tuple[float, float]:
-        """Least squares of the measured force on the predicted one: [-] and [N]."""
-        swing = self.predicted - self.predicted.mean()
-        square = float(swing @ swing)
-        gain = float(swing @ self.measured) / square if square > 0 else 1.0
-        return gain, float(self.measured.mean()) - gain * float(self.predicted.mean())
+    def reading(self) -> GainOffset:
+        """Least squares of the measured force on the predicted one."""
+        return GainOffset.of(self.measured, self.predicted)
 
 
 @once_per_run
@@ -184,11 +182,12 @@ class ModelError:
 
 def model_error(runs: Sequence[PredictedRun]) -> ModelError:
     """Root mean square of the residual after gain and offset of each run, one at least; median spread of these."""
-    corrected = [(run, *run.gain_and_offset) for run in runs]
-    rests = [float(np.mean((run.measured - g * run.predicted - o) ** 2)) / run.half**2 for run, g, o in corrected]
-    gains, offsets = [g - 1 for _, g, _ in corrected], [o for _, _, o in corrected]
-    peaks = [run.peak / g - 1 for run, g, _ in corrected if g > 0]
-    energies = [run.energy / g - 1 for run, g, _ in corrected if g > 0]
+    corrected = [(run, run.reading) for run in runs]
+    rests = [r.rest / run.half**2 for run, r in corrected]
+    gains, offsets = [r.gain - 1 for _, r in corrected], [r.offset for _, r in corrected]
+    peaks, energies = (
+        [getattr(run, name) / r.gain - 1 for run, r in corrected if r.gain > 0] for name in ("peak", "energy")
+    )
 
     def root(errors: Sequence[Floats]) -> float:
         finite = [own for e in errors if (own := e[np.isfinite(e)]).size]
@@ -208,7 +207,7 @@ def scatter_between_sessions(runs: Sequence[PredictedRun]) -> tuple[float, float
     """
     own: dict[str | None, list[tuple[float, float]]] = {}
     for run in runs:
-        own.setdefault(run.session, []).append(run.gain_and_offset)
+        own.setdefault(run.session, []).append((run.reading.gain, run.reading.offset))
     means = np.array([np.mean(values, axis=0) for values in own.values()]) - [1.0, 0.0]
     gain, offset = np.sqrt((1 - 1 / len(means)) * np.mean(means**2, axis=0)).tolist()
     return gain, offset

@@ -243,14 +243,16 @@ class Sessions:
 
         The damper's own tests count, too, if `own`.
         """
-        entries = [(run.id, RecordingTime.of(run), gain_offset_of(damper, run)) for run in runs]
-        names = {name for name, _, _ in entries}
+        rows = list[tuple[str, RecordingTime, float, float]]()
+        for run in runs:
+            inside = run.in_window
+            reading = GainOffset.of(run.force[inside], damper.predict(run).force[inside])
+            rows.append((run.id, RecordingTime.of(run), reading.gain, reading.offset))
         if own:
-            rows = [i for i, name in enumerate(self.run_ids) if name not in names]
-            still = [GainOffset(self.gains[i], self.offsets[i], 0.0, 0.0, 0.0, 1.0) for i in rows]
-            entries += [(self.run_ids[i], self.when[i], r) for i, r in zip(rows, still, strict=True)]
-        ids, when, readings = zip(*entries, strict=True) if entries else ((), (), ())
-        gains, offsets = tuple(r.gain for r in readings), tuple(r.offset for r in readings)
+            names = {name for name, *_ in rows}
+            tests = zip(self.run_ids, self.when, self.gains, self.offsets, strict=True)
+            rows += [row for row in tests if row[0] not in names]
+        ids, when, gains, offsets = zip(*rows, strict=True) if rows else ((), (), (), ())
         return replace(self, run_ids=ids, when=when, gains=gains, offsets=offsets)
 
 
@@ -268,12 +270,6 @@ def sessions_known(damper: Damper, runs: Iterable[Run] = (), own: bool = False) 
             code="E_SESSION",
         )
     return sessions.seen(damper, runs, own)
-
-
-def gain_offset_of(damper: Damper, run: Run) -> GainOffset:
-    """Gain and offset of a run against a damper, inside the steady window."""
-    inside = run.in_window
-    return GainOffset.of(run.force[inside], damper.predict(run).force[inside])
 
 
 def known_errors(sessions: Sessions, runs: Sequence[Run], left_out: Sequence[GainOffset]) -> Floats:

@@ -141,8 +141,10 @@ def same_motion(conditions: Sequence[Condition], tolerance: float = 0.05) -> lis
 @lru_cache(maxsize=256)
 def _grouped(conditions: tuple[Condition, ...], tolerance: float, by_current: bool) -> list[list[int]]:
     def agree(a: Condition, b: Condition) -> bool:
-        near = not by_current or abs(a.current_A - b.current_A) <= 1e-3 + tolerance * abs(b.current_A)
-        return near and _agree_in_motion(a, b, tolerance)
+        if by_current and abs(a.current_A - b.current_A) > 1e-3 + tolerance * abs(b.current_A):
+            return False
+        ratios = a.frequency_Hz / b.frequency_Hz, a.amplitude_m / b.amplitude_m
+        return all(abs(ratio - 1) <= tolerance for ratio in ratios)
 
     groups: list[list[int]] = []
     for index, condition in enumerate(conditions):
@@ -153,7 +155,3 @@ def _grouped(conditions: tuple[Condition, ...], tolerance: float, by_current: bo
         else:
             groups.append([index])
     return groups
-
-
-def _agree_in_motion(a: Condition, b: Condition, tolerance: float) -> bool:
-    return abs(a.frequency_Hz / b.frequency_Hz - 1) <= tolerance and abs(a.amplitude_m / b.amplitude_m - 1) <= tolerance

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, wraps
 from typing import Literal, TypeVar
 from weakref import WeakKeyDictionary
@@ -241,6 +241,11 @@ class Run(Displayable):
         for name, value in values.items():
             object.__setattr__(part, name, value)
         return part
+
+    def thinned(self, step: int, window: tuple[float, float]) -> Run:
+        """Return every `step`-th sample of motion, force and current as one segment, with another steady window [s]."""
+        channels = {name: getattr(self, name)[::step] for name in ("time", "displacement", "force", "current")}
+        return replace(self, **channels, velocity=None, further={}, segments=(), window=window)
 
     @property
     def _where(self) -> str:

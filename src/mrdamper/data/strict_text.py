@@ -125,9 +125,7 @@ def read_toml(text: str) -> dict[str, Any]:
         raise tomllib.TOMLDecodeError("a name of more than 16 parts between dots")
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
-        raise
     except RecursionError:
         raise tomllib.TOMLDecodeError("nested too deeply") from None
-    except ValueError as error:  # an integer of thousands of digits
+    except ValueError as error:  # also an integer of thousands of digits
         raise tomllib.TOMLDecodeError(str(error)) from error

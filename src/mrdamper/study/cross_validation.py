@@ -18,7 +18,7 @@ from mrdamper.data import SESSIONS_NEEDED, Condition, Run, current_levels, same_
 from mrdamper.data.arrays import index_at
 from mrdamper.errors import InputError
 from mrdamper.physics.motion import equivalent_sine
-from mrdamper.study.validation import RunScore, Validation, leave_out, score_run
+from mrdamper.study.validation import RunScore, Validation, leave_out
 
 _MOTION_TOLERANCE = 0.05  # frequencies and amplitudes this close are one motion
 _FAST_VELOCITY_RATIO = 0.8  # of the largest peak velocity, from which a motion is among the fastest
@@ -114,8 +114,7 @@ def cross_validate_by_kind(
         refused: dict[str, str] = {}
         for group in groups:
             try:
-                damper = refit([i for i in range(len(pieces)) if i not in set(group)])
-                scored += [score_run(damper, pieces[i]) for i in group]
+                scored += leave_out(pieces, [group], refit, title).runs
             except InputError as error:
                 refused |= {pieces[i].notes.get(_STRETCH_NOTE, pieces[i].id): str(error) for i in group}
         scores[kind] = replace(_whole_again(Validation(title, tuple(scored)), pieces), refused=refused)

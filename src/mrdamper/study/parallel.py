@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import Executor, Future, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any, TypeVar
 
@@ -164,16 +164,4 @@ def shortened(run: Run) -> Run:
         return run
     cut = steady.part(begin, steady.time.size)
     step = max(1, int(cut.time.size / (np.ptp(cut.time) * frequency) / _PER_CYCLE))
-    pick = slice(None, None, step)
-    window = (float(max(cut.time[0], cut.time[-1] - _CYCLES / frequency)), float(cut.time[-1]))
-    return replace(
-        cut,
-        time=cut.time[pick],
-        displacement=cut.displacement[pick],
-        force=cut.force[pick],
-        current=cut.current[pick],
-        velocity=None,
-        further={},
-        window=window,
-        segments=(),
-    )
+    return cut.thinned(step, (float(max(cut.time[0], cut.time[-1] - _CYCLES / frequency)), float(cut.time[-1])))

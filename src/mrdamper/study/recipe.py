@@ -37,6 +37,7 @@ from mrdamper.study.validation import Validation, validate
 
 Progress = Callable[[str, float], None]
 
+_GLOBAL_FIT, _CURRENT_LAWS = "global fit", "current laws"  # procedures in words
 WHOLE_DAMPER = ("tanh", MODEL)  # models with one set of parameters for every current, which a study compares
 
 
@@ -223,16 +224,12 @@ def fit_per_run(runs: Sequence[Run], identifications: Sequence[Identification]) 
     return FitResult(fit.damper, lambda rows: fit_modified([identifications[i] for i in rows]).damper, fit)
 
 
-def fit_functions_jointly(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
-    """Parameter functions fitted to the forces of all runs at once."""
-    fit, refit = fit_modified_jointly(runs, identifications, _about(runs, identifications, "global fit"))
-    return FitResult(fit.damper, refit, fit)
-
-
-def fit_current_laws(runs: Sequence[Run], identifications: Sequence[Identification]) -> FitResult:
-    """Parameter functions of the current alone, fitted to the forces of all runs at once."""
-    about = _about(runs, identifications, "current laws")
-    fit, refit = fit_modified_jointly(runs, identifications, about, any_motion=False)
+def fit_functions_jointly(
+    runs: Sequence[Run], identifications: Sequence[Identification], way: str = _GLOBAL_FIT
+) -> FitResult:
+    """Parameter functions, or those of the current alone, fitted to the forces of all runs at once."""
+    about = _about(runs, identifications, way)
+    fit, refit = fit_modified_jointly(runs, identifications, about, any_motion=way != _CURRENT_LAWS)
     return FitResult(fit.damper, refit, fit)
 
 
@@ -271,19 +268,19 @@ def modified(name: str, method: str = "projection") -> Recipe:
 
 def jointly(name: str) -> Recipe:
     """Return a model whose parameter functions are fitted to all forces at once."""
-    return replace(modified(name), name=f"{name}:joint", make=fit_functions_jointly, way="global fit")
+    return replace(modified(name), name=f"{name}:joint", make=fit_functions_jointly, way=_GLOBAL_FIT)
 
 
 def current_only(name: str) -> Recipe:
     """Return a model whose parameters follow the current alone, fitted to all forces at once."""
-    apart, limits = modified(name), "the same at any motion"
-    return replace(apart, name=f"{name}:current", make=fit_current_laws, way="current laws", limits=limits)
+    make, limits = partial(fit_functions_jointly, way=_CURRENT_LAWS), "the same at any motion"
+    return replace(modified(name), name=f"{name}:current", make=make, way=_CURRENT_LAWS, limits=limits)
 
 
 def whole_damper(name: str) -> Recipe:
     """Return a model with one set of parameters for every condition."""
     cls, limits = model_type(name), "takes any motion and a current that varies"
-    return Recipe(name, None, partial(fit_whole_damper, name), "global fit", cls.title, cls.source, limits)
+    return Recipe(name, None, partial(fit_whole_damper, name), _GLOBAL_FIT, cls.title, cls.source, limits)
 
 
 def conditioned(cls: Published) -> Recipe:

@@ -223,12 +223,8 @@ def _last_cycles(problem: Problem) -> Problem:
     last = int(np.flatnonzero(run.in_window)[-1]) + 1
     size = max(8, math.ceil(cycle * (run.time.size - 1) / float(np.ptp(run.time))))
     piece = run.part(max(0, last - _PIECE_CYCLES * size), last)
-    thin = slice(None, None, max(1, size // _PIECE_SAMPLES_A_CYCLE))
-    channels = {name: getattr(piece, name)[thin] for name in ("time", "displacement", "force", "current")}
     window = (float(piece.time[0]) + cycle, float(piece.time[-1]))
-    velocity = None if piece.velocity is None else piece.velocity[thin]
-    short = replace(piece, **channels, velocity=velocity, further={}, segments=(), window=window)
-    return replace(problem, run=short)
+    return replace(problem, run=piece.thinned(max(1, size // _PIECE_SAMPLES_A_CYCLE), window))
 
 
 def _point(axes: tuple[SearchAxis, ...], u: Floats) -> dict[str, float]:
