@@ -336,11 +336,9 @@ class CrossValidation:
         moved = self.values + shift
         moved[on] += solve_linear(J, -base, rank_limit=1e-10)
         values = dict(zip(self.names, moved.tolist(), strict=True))
-        lower = np.array([a.coordinate(a.lower) for a in problem.axes])
-        upper = np.array([a.coordinate(a.upper) for a in problem.axes])
-        return np.clip(
-            [values[a.name] for a in problem.axes], lower + 0.02 * (upper - lower), upper - 0.02 * (upper - lower)
-        )
+        lower, upper = problem.box()
+        margin = 0.02 * (upper - lower)
+        return np.clip([values[a.name] for a in problem.axes], lower + margin, upper - margin)
 
 
 def _damped(normal: Floats, right: Floats) -> Floats:

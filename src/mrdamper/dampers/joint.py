@@ -12,7 +12,6 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -27,6 +26,7 @@ from mrdamper.dampers.uncertainty import FittedParameter
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
+from mrdamper.models.base import box_of, grid_of, values_at
 from mrdamper.models.recorded import force_tangents
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares, newton_refine
@@ -264,7 +264,7 @@ class JointProblem:
         Each length of free play has its own local minimum and its best start. The first is the most probable: another
         must be clearly better.
         """
-        grid = [np.array(u) for u in product(*([axis.coordinate(g) for g in axis.grid] for axis in self.axes))]
+        grid = grid_of(self.axes)
         if len(grid) == 1:
             return grid
         table = self._few
@@ -396,7 +396,7 @@ class JointProblem:
         """Return the coil at a point of the search axes."""
         if all(axis.name != RISE for axis in self.axes):
             return self.coil
-        lags = {axis.name: axis.value(float(u)) for axis, u in zip(self.axes, point, strict=True)}
+        lags = values_at(self.axes, point)
         return Coil(lags[RISE], lags[FALL])
 
     def _at_bounds(self, point: Floats) -> list[str]:
@@ -415,10 +415,7 @@ class JointProblem:
 
     def box(self) -> tuple[Floats, Floats]:
         """Lower and upper ends of the search axes."""
-        return (
-            np.array([axis.coordinate(axis.lower) for axis in self.axes]),
-            np.array([axis.coordinate(axis.upper) for axis in self.axes]),
-        )
+        return box_of(self.axes)
 
     def force_slopes(self, point: Floats, model: Model, motion: Excitation, picked: NDArray[np.intp]) -> Floats | None:
         """(N, D) derivatives of the force at some samples of a motion by the search axes, the linear parameters held.
@@ -465,8 +462,7 @@ class JointProblem:
 
     def without_linear(self, point: Floats) -> Model:
         """Return the model at a point of the search axes, its linear parameters zero."""
-        values = {axis.name: axis.value(float(u)) for axis, u in zip(self.axes, point, strict=True)}
-        values = {name: value for name, value in values.items() if name not in (RISE, FALL)}
+        values = {name: v for name, v in values_at(self.axes, point).items() if name not in (RISE, FALL)}
         return self.model_type.build({**self.fixed, **values, **{info.name: 0.0 for info in self.linear}})
 
 

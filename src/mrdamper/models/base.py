@@ -12,6 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import ClassVar, Self
 
 import numpy as np
@@ -69,6 +70,27 @@ class SearchAxis:
         """Tell if a position lies within a thousandth of the axis from one of its ends."""
         low, high = self.coordinate(self.lower), self.coordinate(self.upper)
         return min(coordinate - low, high - coordinate) < 1e-3 * (high - low)
+
+
+def box_of(axes: Sequence[SearchAxis]) -> tuple[Floats, Floats]:
+    """Lower and upper ends of search axes."""
+    lower, upper = ([axis.coordinate(getattr(axis, end)) for axis in axes] for end in ("lower", "upper"))
+    return np.array(lower), np.array(upper)
+
+
+def grid_of(axes: Sequence[SearchAxis]) -> list[Floats]:
+    """Every combination of the start points of search axes."""
+    return [np.array(u) for u in product(*([axis.coordinate(g) for g in axis.grid] for axis in axes))]
+
+
+def values_at(axes: Sequence[SearchAxis], point: Floats) -> dict[str, float]:
+    """Values at a point of search axes, by name."""
+    return {axis.name: axis.value(float(u)) for axis, u in zip(axes, point, strict=True)}
+
+
+def names_at_bounds(axes: Sequence[SearchAxis], point: Floats) -> tuple[str, ...]:
+    """Names of the search axes at whose ends a point lies."""
+    return tuple(axis.name for axis, u in zip(axes, point, strict=True) if axis.at_bound(float(u)))
 
 
 def axes_of(free: Sequence[str], *axes: SearchAxis) -> tuple[SearchAxis, ...]:

@@ -7,7 +7,13 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from mrdamper.dampers.published.base import ConditionedDamper, fit_quadratic, quadratic
+from mrdamper.dampers.published.base import (
+    ConditionedDamper,
+    fit_quadratic,
+    powers_of_motion,
+    quadratic,
+    scale_of_motion,
+)
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.identification import Identification
 from mrdamper.models.spencer import Spencer
@@ -66,8 +72,7 @@ class AliType(ConditionedDamper):
         given = self.coefficients
         values: dict[str, float] = {}
         for name in _VARYING:
-            power = (condition.amplitude_m / self.reference.amplitude_m) ** given[f"{name}_p"]
-            power *= (condition.frequency_Hz / self.reference.frequency_Hz) ** given[f"{name}_q"]
+            power = scale_of_motion(condition, self.reference, given[f"{name}_p"], given[f"{name}_q"])
             values[name] = np.maximum(quadratic(condition.current_A, given, name), given[f"{name}_floor"]) * power
         c1 = values["c1"]
         return Spencer(
@@ -87,13 +92,9 @@ class AliType(ConditionedDamper):
 
 def _power_law(name: str, conditions: Sequence[Condition], values: Floats, reference: Condition) -> dict[str, float]:
     """Powers from logarithms with a level for every current, then the quadratic of the remainder."""
+    powers = powers_of_motion(conditions, reference, np.log(np.maximum(values, 1e-3)))
+    p, q = np.clip(powers, -2, 2).tolist()
     currents = np.array([c.current_A for c in conditions])
-    amplitude = np.log([c.amplitude_m / reference.amplitude_m for c in conditions])
-    frequency = np.log([c.frequency_Hz / reference.frequency_Hz for c in conditions])
-    levels = [np.isclose(currents, level, atol=2e-3) for level in np.unique(np.round(currents, 3))]
-    logs = np.log(np.maximum(values, 1e-3))
-    solution = np.linalg.lstsq(np.column_stack([amplitude, frequency, *levels]), logs, rcond=1e-6)[0]
-    p, q = (float(power) for power in np.clip(solution[:2], -2, 2))
-    rest = values / np.exp(p * amplitude + q * frequency)
+    rest = values / [scale_of_motion(c, reference, p, q) for c in conditions]
     floor = 0.2 * float(np.min(rest))  # the quadratic may dip below zero between currents
     return {**fit_quadratic(name, currents, rest), f"{name}_p": p, f"{name}_q": q, f"{name}_floor": max(floor, 1e-3)}

@@ -174,6 +174,21 @@ def quadratic(current: float, coefficients: Mapping[str, float], name: str) -> f
     return coefficients[f"{name}0"] + current * (coefficients[f"{name}1"] + current * coefficients[f"{name}2"])
 
 
+def powers_of_motion(conditions: Sequence[Condition], reference: Condition, logarithms: Floats) -> tuple[float, float]:
+    """Powers of amplitude and frequency in values, from their logarithms, with a level for every current."""
+    currents = np.array([c.current_A for c in conditions])
+    amplitude = np.log([c.amplitude_m / reference.amplitude_m for c in conditions])
+    frequency = np.log([c.frequency_Hz / reference.frequency_Hz for c in conditions])
+    levels = [np.isclose(currents, level, atol=2e-3) for level in np.unique(np.round(currents, 3))]
+    p, q = np.linalg.lstsq(np.column_stack([amplitude, frequency, *levels]), logarithms, rcond=1e-6)[0][:2].tolist()
+    return p, q
+
+
+def scale_of_motion(condition: Condition, reference: Condition, p: float, q: float) -> float:
+    """(A/A_r)^p (f/f_r)^q."""
+    return (condition.amplitude_m / reference.amplitude_m) ** p * (condition.frequency_Hz / reference.frequency_Hz) ** q
+
+
 def fit_quadratic(name: str, currents: Floats, values: Floats) -> dict[str, float]:
     """Coefficients of `quadratic` by least squares; as many as the distinct currents allow, the rest zero."""
     terms = min(3, len(np.unique(np.round(currents, 3))))

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from mrdamper.dampers.published.base import ConditionedDamper
+from mrdamper.dampers.published.base import ConditionedDamper, powers_of_motion, scale_of_motion
 from mrdamper.data import Condition, Floats
 from mrdamper.identification import Identification
 from mrdamper.models.bouc_wen import BoucWen
@@ -60,8 +60,8 @@ class DominguezType(ConditionedDamper):
         }
         total = values["beta"] + values["gamma"]
         force = values["alpha"] / np.sqrt(total)
-        powers = _powers(conditions, reference, force, currents)
-        scale = np.array([_scale(c, reference, *powers) for c in conditions])
+        powers = powers_of_motion(conditions, reference, np.log(np.maximum(force, 1.0)))
+        scale = np.array([scale_of_motion(c, reference, *powers) for c in conditions])
         beta = float(np.quantile(total, 0.9)) / 2
         # Alpha follows from the yield force, which is well determined, and not from the identified alpha.
         smooth_total = np.exp(np.polyval(_line(currents, np.log(total)), currents))
@@ -69,8 +69,8 @@ class DominguezType(ConditionedDamper):
         straight = np.maximum(np.polyval(gamma, currents) + beta, _FLOOR * beta)
         k = _line(currents, values["k1"] / scale)
         return {
-            "d2": powers[0],
-            "d4": powers[1],
+            "d2": powers[1],
+            "d4": powers[0],
             **_rising("c", currents, values["c"] / scale, reference.current_A),
             **_rising("alpha", currents, force * np.sqrt(straight) / scale, reference.current_A),
             "k1": float(k[1]),
@@ -83,7 +83,7 @@ class DominguezType(ConditionedDamper):
 
     def model_at(self, condition: Condition) -> BoucWen:
         given, current = self.coefficients, condition.current_A
-        scale = _scale(condition, self.reference, given["d2"], given["d4"])
+        scale = scale_of_motion(condition, self.reference, given["d4"], given["d2"])
         beta = np.maximum(given["beta"], 1.0)
         gamma = np.clip(given["gamma1"] - given["gamma2"] * current, (_FLOOR - 1) * beta, beta)
         return BoucWen(
@@ -94,28 +94,6 @@ class DominguezType(ConditionedDamper):
             k1=scale * (given["k1"] + given["k2"] * current),
             f0=given["f0"],
         )
-
-
-def _scale(condition: Condition, reference: Condition, d2: float, d4: float) -> float:
-    frequency = condition.frequency_Hz / reference.frequency_Hz
-    amplitude = condition.amplitude_m / reference.amplitude_m
-    return frequency**d2 * amplitude**d4
-
-
-def _powers(
-    conditions: Sequence[Condition], reference: Condition, force: Floats, currents: Floats
-) -> tuple[float, float]:
-    """Powers of frequency and amplitude in the yield force, with a level for every current."""
-    levels = np.unique(np.round(currents, 3))
-    table = np.column_stack(
-        [
-            [np.log(c.frequency_Hz / reference.frequency_Hz) for c in conditions],
-            [np.log(c.amplitude_m / reference.amplitude_m) for c in conditions],
-            *[np.isclose(currents, level, atol=2e-3) for level in levels],
-        ]
-    )
-    solution = np.linalg.lstsq(table, np.log(np.maximum(force, 1.0)), rcond=1e-6)[0]
-    return float(solution[0]), float(solution[1])
 
 
 def _line(currents: Floats, values: Floats) -> Floats:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import ClassVar
 
 import numpy as np
@@ -20,6 +19,7 @@ from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.harmonic_balance import HarmonicProjection, SineRecord
 from mrdamper.identification.problem import Method, Problem, Solution
 from mrdamper.models import Model, Scale
+from mrdamper.models.base import box_of, grid_of, names_at_bounds, values_at
 from mrdamper.physics.hysteresis import steady_loop
 from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.statistics.linear import solve_bounded
@@ -62,27 +62,22 @@ class Balance(Method):
             model, _, held = balanced.at({})
             return Solution(model, 0.0, held, {}, {}, 1, StopReason.SOLVED)
 
-        def point(u: Floats) -> dict[str, float]:
-            return {axis.name: axis.value(float(c)) for axis, c in zip(axes, u, strict=True)}
-
         def residual(u: Floats) -> Floats:
-            return balanced.at(point(u))[1]
+            return balanced.at(values_at(axes, u))[1]
 
-        grid = [np.array(u) for u in product(*([axis.coordinate(g) for g in axis.grid] for axis in axes))]
+        grid = grid_of(axes)
         costs = [float(np.sum(residual(u) ** 2)) for u in grid]
-        lower = np.array([axis.coordinate(axis.lower) for axis in axes])
-        upper = np.array([axis.coordinate(axis.upper) for axis in axes])
         starts: list[Floats] = [grid[i] for i in np.argsort(costs)[: min(len(axes), 2)]]
-        minima = [(start, least_squares(residual, start, lower, upper)) for start in starts]
+        minima = [(start, least_squares(residual, start, *box_of(axes))) for start in starts]
         start, best = min(minima, key=lambda pair: pair[1].cost)
-        model, _, held = balanced.at(point(best.point))
-        edge = tuple(axis.name for axis, u in zip(axes, best.point, strict=True) if axis.at_bound(float(u)))
+        end = values_at(axes, best.point)
+        model, _, held = balanced.at(end)
         return Solution(
             model=model,
             delay=0.0,
-            at_bounds=(*held, *edge),
-            start=point(start),
-            end=point(best.point),
+            at_bounds=(*held, *names_at_bounds(axes, best.point)),
+            start=values_at(axes, start),
+            end=end,
             evaluations=len(grid) + sum(minimum.evaluations for _, minimum in minima),
             ending=best.ending,
         )

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import ClassVar
 
 import numpy as np
@@ -22,6 +21,7 @@ from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.elimination import Elimination
 from mrdamper.identification.problem import DELAY, DELAY_LIMIT, Method, Problem, Solution
 from mrdamper.models import Model, Scale, SearchAxis
+from mrdamper.models.base import box_of, grid_of, names_at_bounds, values_at
 from mrdamper.models.recorded import force_tangents
 from mrdamper.physics.hysteresis import Shape
 from mrdamper.physics.hysteresis.batch import batch_cost
@@ -64,7 +64,7 @@ class Projection(Method):
             starts, evaluated = _best_of_grid(problem, axes, elimination, self.refine_best if len(axes) > 1 else 1)
         minima = [(start, _refined(problem, axes, elimination, start)) for start in starts]
         start, best = min(minima, key=lambda pair: pair[1].cost)
-        end = _point(axes, best.point)
+        end = values_at(axes, best.point)
         model, held = (elimination and elimination.solved(end)), ()
         if model is None:
             projected = _project(problem, end)
@@ -72,8 +72,8 @@ class Projection(Method):
         return Solution(
             model=model,
             delay=end.get(DELAY, 0.0),
-            at_bounds=(*held, *_axes_at_bounds(axes, best)),
-            start=_point(axes, start),
+            at_bounds=(*held, *names_at_bounds(axes, best.point)),
+            start=values_at(axes, start),
             end=end,
             evaluations=evaluated + sum(minimum.evaluations for _, minimum in minima),
             ending=best.ending,
@@ -122,8 +122,7 @@ def search_axes(problem: Problem) -> tuple[SearchAxis, ...]:
 def _refined(problem: Problem, axes: tuple[SearchAxis, ...], elimination: Elimination | None, start: Floats) -> Minimum:
     """Minimum next to a start point, the linear parameters eliminated."""
     names = [axis.name for axis in axes]
-    lower = np.array([axis.coordinate(axis.lower) for axis in axes])
-    upper = np.array([axis.coordinate(axis.upper) for axis in axes])
+    lower, upper = box_of(axes)
     shaped = elimination is not None and elimination.kind.has_shape
     if elimination and shaped and len(axes) == 1:
         (axis,), slope = axes, elimination.residual_and_slope
@@ -135,7 +134,7 @@ def _refined(problem: Problem, axes: tuple[SearchAxis, ...], elimination: Elimin
         return _refined_by_tangents(problem, axes, start, lower, upper)
 
     def residual(u: Floats) -> Floats:
-        point = _point(axes, u)
+        point = values_at(axes, u)
         fit = elimination.residual(point) if elimination else None
         return _project(problem, point).residual if fit is None else fit
 
@@ -152,12 +151,12 @@ def _refined_by_tangents(
 
     def residual(u: Floats) -> Floats:
         latest.clear()
-        latest[u.tobytes()] = _project(problem, _point(axes, u))
+        latest[u.tobytes()] = _project(problem, values_at(axes, u))
         return latest[u.tobytes()].residual
 
     def slopes(u: Floats) -> Floats:
         """Return derivatives of the projected residual without those along the columns [Kaufman 1975]."""
-        at = latest.get(u.tobytes()) or _project(problem, _point(axes, u))
+        at = latest.get(u.tobytes()) or _project(problem, values_at(axes, u))
         tangents = force_tangents(at.model, problem.motion, names, picked)
         if tangents is None:
             return forward_differences(residual, u, at.residual, lower, upper)
@@ -170,12 +169,12 @@ def _refined_by_tangents(
 def _best_of_grid(
     problem: Problem, axes: tuple[SearchAxis, ...], elimination: Elimination | None, keep: int
 ) -> tuple[list[Floats], int]:
-    grid = [np.array(u) for u in product(*([axis.coordinate(g) for g in axis.grid] for axis in axes))]
+    grid = grid_of(axes)
     if elimination and elimination.kind.has_shape:
-        costs = _batched_costs(elimination, [_point(axes, u) for u in grid])
+        costs = _batched_costs(elimination, [values_at(axes, u) for u in grid])
     else:
         thin = max(1, problem.force.size // _GRID_SAMPLES)
-        costs = np.array([float(np.sum(_project(problem, _point(axes, u), thin).residual ** 2)) for u in grid])
+        costs = np.array([float(np.sum(_project(problem, values_at(axes, u), thin).residual ** 2)) for u in grid])
     if not np.isfinite(costs).any():
         raise IdentificationError(
             "no start point gives a finite force", where=f"run {problem.run.id}", remedy="check the units of the run"
@@ -225,11 +224,3 @@ def _last_cycles(problem: Problem) -> Problem:
     piece = run.part(max(0, last - _PIECE_CYCLES * size), last)
     window = (float(piece.time[0]) + cycle, float(piece.time[-1]))
     return replace(problem, run=piece.thinned(max(1, size // _PIECE_SAMPLES_A_CYCLE), window))
-
-
-def _point(axes: tuple[SearchAxis, ...], u: Floats) -> dict[str, float]:
-    return {axis.name: axis.value(float(c)) for axis, c in zip(axes, u, strict=True)}
-
-
-def _axes_at_bounds(axes: tuple[SearchAxis, ...], minimum: Minimum) -> tuple[str, ...]:
-    return tuple(axis.name for axis, u in zip(axes, minimum.point, strict=True) if axis.at_bound(float(u)))
