@@ -21,7 +21,7 @@ import numpy as np
 
 from mrdamper.dampers.uncertainty import table as intervals
 from mrdamper.study.recipe import catalogue
-from mrdamper.study.validation import Validation, session_drift
+from mrdamper.study.validation import Validation
 from mrdamper.study.workflow import RigStudy, Study
 
 ROOT = Path(__file__).parent.parent
@@ -96,12 +96,11 @@ def of_study(study: Study) -> list[Told]:
         f"{100 * np.median([r.repeatability for r in rig.dataset if r.repeatability]):.1f}" for rig in (one, other)
     ]
     rows.append(f"| cycle-to-cycle scatter of the rigs | | {floors[0]} | {floors[0]} | {floors[1]} | {floors[1]} |")
-    drifts = [
-        session_drift(r.damper, [r.dataset[s.run_id] for s in r.chosen.cross_validated.runs]) for r in (other, one)
-    ]
+    readings = [rig.readings for rig in (other, one)]
     raw, offset, left = _sweep(one)
     page = "docs/play-and-bypass.md"
-    gains, rest = tuple(sorted(100 * d.gain for d in drifts)), tuple(100 * d.floor for d in drifts)
+    gains = tuple(sorted(100 * float(np.std([r.gain for r in of])) for of in readings))
+    rest = tuple(100 * float(np.median([r.error(r.gain, r.offset) for r in of])) for of in readings)
     return [
         Table("README.md", "| model | parameters | utfsm cross-validation", tuple(rows)),
         Table(page, "| parameter | utfsm | labcontrol |", _parameters(one, other), share=WORST),

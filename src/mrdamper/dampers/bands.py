@@ -27,31 +27,19 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Prediction intervals at one level.
+    """Prediction intervals at one level."""
 
-    Attributes
-    ----------
-    low, high : (N,) arrays
-        [N]
-    parameter, session, model : (N,) arrays
-        Standard deviations of the parts: of the parameters, between sessions, and between runs of one
-        session with the error of the form [N].
-    peak : (float, float)
-        Of half the peak-to-peak force [N].
-    energy : (float, float)
-        Relative, around the predicted dissipated energy, and not below -1, because a damper dissipates energy.
-    known_session : (float, float)
-        Peak force once the session's gain is known [N].
-    """
-
-    low: Floats
-    high: Floats
+    low: Floats  # (N,) [N]
+    high: Floats  # (N,) [N]
+    # parameter, session, model: (N,) standard deviations of the parts [N]: of the parameters, between sessions, and
+    # between runs of one session with the error of the form
     parameter: Floats
     session: Floats
     model: Floats
-    peak: tuple[float, float]
+    peak: tuple[float, float]  # of half the peak-to-peak force [N]
+    # relative, around the predicted dissipated energy, and not below -1, because a damper dissipates energy
     energy: tuple[float, float]
-    known_session: tuple[float, float]
+    known_session: tuple[float, float]  # peak force once the session's gain is known [N]
 
 
 def band(

@@ -50,28 +50,15 @@ _NORMAL_MEDIAN = 1.4826  # standard deviation of a normal distribution over its 
 
 @dataclass(frozen=True, eq=False)
 class PredictedRun:
-    """A run and its prediction, inside the steady window.
-
-    Attributes
-    ----------
-    run_id : str
-    session : str or None
-        None where it is not known.
-    predicted, measured : (N,) arrays
-        At most some hundred samples [N].
-    peak, energy : (L,) arrays
-        Measured over predicted peak-to-peak force, and dissipated energy, of each loop (`_loops`).
-    distance : Distance
-        From the runs that the model was identified from.
-    """
+    """A run and its prediction, inside the steady window."""
 
     run_id: str
-    session: str | None
-    predicted: Floats
-    measured: Floats
-    peak: Floats
-    energy: Floats
-    distance: Distance = AT_TESTS
+    session: str | None  # None where it is not known
+    predicted: Floats  # (N,) at most some hundred samples [N]
+    measured: Floats  # (N,) [N]
+    peak: Floats  # (L,) measured over predicted peak-to-peak force of each loop (`_loops`)
+    energy: Floats  # (L,) the same of the dissipated energy
+    distance: Distance = AT_TESTS  # from the runs that the model was identified from
 
     @classmethod
     def of(cls, run: Run, predicted: Floats, velocity: Floats, distance: Distance = AT_TESTS) -> PredictedRun:
@@ -161,23 +148,13 @@ def _peak(force: Floats, cycles: NDArray[np.intp]) -> float:
 
 @dataclass(frozen=True)
 class ModelError:
-    """Standard deviations of the residuals after gain and offset of a run, and of these between runs.
+    """Standard deviations of the residuals after gain and offset of a run, and of these between runs."""
 
-    Attributes
-    ----------
-    force : float
-        Over half the peak-to-peak predicted force.
-    peak, energy : float
-        Relative.
-    gain, offset : float
-        Of all runs about the prediction, including sessions [-] and [N].
-    """
-
-    force: float
-    peak: float
-    energy: float
-    gain: float
-    offset: float
+    force: float  # over half the peak-to-peak predicted force
+    peak: float  # relative
+    energy: float  # relative
+    gain: float  # of all runs about the prediction, including sessions [-]
+    offset: float  # the same [N]
 
 
 def model_error(runs: Sequence[PredictedRun]) -> ModelError:
@@ -215,23 +192,16 @@ def scatter_between_sessions(runs: Sequence[PredictedRun]) -> tuple[float, float
 
 @dataclass(frozen=True)
 class Growth:
-    """Standard deviations by which the error of the form grows with the distance from the tests.
-
-    Attributes
-    ----------
-    force, peak, energy : (float, float, float)
-        Per unit of `Distance.between`, `beyond` and `motion`: of the force over half its peak-to-peak value, of the
-        peak force and of the dissipated energy, relative.
-    dof : (float, float, float)
-        Degrees of freedom of their squares, by distance.
-    """
+    """Standard deviations by which the error of the form grows with the distance from the tests."""
 
     __pydantic_config__: ClassVar = STRICT
 
+    # force, peak, energy: per unit of `Distance.between`, `beyond` and `motion`, of the force over half its
+    # peak-to-peak value, of the peak force and of the dissipated energy, relative
     force: tuple[float, float, float] = (0.0, 0.0, 0.0)
     peak: tuple[float, float, float] = (0.0, 0.0, 0.0)
     energy: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    dof: tuple[float, float, float] = (_NORMAL_DOF, _NORMAL_DOF, _NORMAL_DOF)
+    dof: tuple[float, float, float] = (_NORMAL_DOF, _NORMAL_DOF, _NORMAL_DOF)  # of their squares, by distance
 
     def half_width(self, quantity: Quantity, distance: Distance, level: float) -> float:
         """Half the relative interval by a distance alone."""
@@ -296,27 +266,18 @@ def _expected(run: PredictedRun, at_tests: ModelError) -> Floats:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Factors on the standard deviations of the error model, and their observed coverage.
-
-    Attributes
-    ----------
-    unit : "run" or "session"
-        Taken as independent.
-    units : int
-    force, peak, energy : tuple of float
-        Factor on the quantile of a normal distribution at each of `LEVELS` that these units reach.
-    coverage : tuple of float, length 3
-        Share of samples, peak forces and energies inside their interval of 90 %, or of the level that can be
-        reached, each unit omitted from the calibration in turn.
-    """
+    """Factors on the standard deviations of the error model, and their observed coverage."""
 
     __pydantic_config__: ClassVar = STRICT
 
-    unit: Literal["run", "session"]
+    unit: Literal["run", "session"]  # taken as independent
     units: int
+    # force, peak, energy: factor on the quantile of a normal distribution at each of `LEVELS` that these units reach
     force: tuple[float, ...]
     peak: tuple[float, ...]
     energy: tuple[float, ...]
+    # share of samples, peak forces and energies inside their interval of 90 %, or of the level that can be reached,
+    # each unit omitted from the calibration in turn
     coverage: tuple[float, float, float]
 
     @property

@@ -24,28 +24,16 @@ _MAX_LAG_S = 10.0  # s; the longest lag of a coil
 class Driver:
     """Current driver: gain, coil lag and limit from the command voltage to the current.
 
-    Attributes
-    ----------
-    amperes_per_volt : float
-        Gain of the amplifier [A/V]; for a bare coil one over its resistance.
-    resistance_ohm, inductance_H : float
-        Of the coil behind an amplifier without current control [ohm], [H]: the current then lags
-        by L/R. Zero inductance: a current controller, no lag of its own.
-    limit_A : float, optional
-        Largest magnitude of current it delivers [A], if there is a limit.
-
-    Raises
-    ------
-    ParameterError
-        If a value is not possible.
+    Behind an amplifier without current control the current lags by L/R. Zero inductance is a current controller,
+    without a lag. Raises `ParameterError` if a value is not possible.
     """
 
     __pydantic_config__: ClassVar = STRICT
 
-    amperes_per_volt: float
-    resistance_ohm: float = 0.0
-    inductance_H: float = 0.0
-    limit_A: float | None = None
+    amperes_per_volt: float  # gain of the amplifier; for a bare coil one over its resistance
+    resistance_ohm: float = 0.0  # of the coil
+    inductance_H: float = 0.0  # of the coil
+    limit_A: float | None = None  # largest magnitude of current it delivers, if there is a limit
 
     def __post_init__(self) -> None:
         for name, value, good in (
@@ -78,24 +66,15 @@ class Driver:
 class Coil:
     """Lags of the field behind the current.
 
-    Attributes
-    ----------
-    rise_s, fall_s : float
-        Time constants [s] while the field grows and while it decays; zero follows at once.
-    driver : Driver or None
-        Source of the current, if the input is a voltage.
-
-    Raises
-    ------
-    ParameterError
-        If a time constant is negative, not finite, or over 10 s.
+    Raises `ParameterError` if a time constant is negative, not finite, or over 10 s.
     """
 
     __pydantic_config__: ClassVar = STRICT
 
+    # rise_s, fall_s: time constants while the field grows and while it decays; zero follows at once
     rise_s: float
     fall_s: float
-    driver: Driver | None = None
+    driver: Driver | None = None  # source of the current, if the input is a voltage
 
     def __post_init__(self) -> None:
         for name, value in (("rise_s", self.rise_s), ("fall_s", self.fall_s)):

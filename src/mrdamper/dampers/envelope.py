@@ -50,23 +50,14 @@ class Beyond(NamedTuple):
 
 @dataclass(frozen=True)
 class Envelope:
-    """Ranges of the tests a damper was identified from.
-
-    Attributes
-    ----------
-    current_A, frequency_Hz, amplitude_m, peak_velocity_m_s : (float, float)
-        Lowest and highest tested.
-    any_motion : bool
-        Motions that are no sine, or currents that change, were among the tests.
-    conditions : tuple of (float, float, float)
-        Tested currents [A] with their frequencies [Hz] and amplitudes [m]; empty where only the ranges are known.
-    """
+    """Ranges of the tests a damper was identified from: lowest and highest tested."""
 
     current_A: tuple[float, float]
     frequency_Hz: tuple[float, float]
     amplitude_m: tuple[float, float]
     peak_velocity_m_s: tuple[float, float]
-    any_motion: bool = False
+    any_motion: bool = False  # motions that are no sine, or currents that change, were among the tests
+    # tested currents [A] with their frequencies [Hz] and amplitudes [m]; empty where only the ranges are known
     conditions: tuple[tuple[float, float, float], ...] = ()
 
     @classmethod

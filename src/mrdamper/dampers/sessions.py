@@ -34,20 +34,12 @@ _REMEDY = "repeat a condition on each of three days or more; state recorded_at o
 
 @dataclass(frozen=True)
 class RecordingTime:
-    """Session and time of a recording.
-
-    Attributes
-    ----------
-    session : str or None
-        None where it is not known.
-    hour : float or None
-        Hours since 1970; None where only a day or a name is known.
-    """
+    """Session and time of a recording."""
 
     __pydantic_config__: ClassVar = STRICT
 
-    session: str | None
-    hour: float | None = None
+    session: str | None  # None where it is not known
+    hour: float | None = None  # since 1970; None where only a day or a name is known
 
     @classmethod
     def of(cls, run: Run) -> RecordingTime:
@@ -86,22 +78,14 @@ class GainOffset:
 
 @dataclass(frozen=True)
 class RunScatter:
-    """Standard deviations of one quantity between runs.
-
-    Attributes
-    ----------
-    session, hour, run : float
-        Shared by a session, by neighbours in it, and of the run alone.
-    hours : float
-        Correlation time of neighbours [h].
-    """
+    """Standard deviations of one quantity between runs."""
 
     __pydantic_config__: ClassVar = STRICT
 
-    session: float
-    hour: float
-    run: float
-    hours: float
+    session: float  # shared by a session
+    hour: float  # shared by neighbours in a session
+    run: float  # of the run alone
+    hours: float  # correlation time of neighbours [h]
 
     @property
     def total(self) -> float:
@@ -178,25 +162,14 @@ class SessionCorrection:
 class Sessions:
     """Scatter between the sessions of a rig, and gains and offsets of the sessions a damper was identified in.
 
-    Attributes
-    ----------
-    gain, offset : RunScatter
-        Of gains [-] and of offsets [N].
-    run_ids : tuple of str, length R
-    when : tuple of RecordingTime, length R
-    gains, offsets : (R,) tuples of float
-        Of the damper's own tests, against the damper.
-
-    Raises
-    ------
-    InputError
-        If the lists differ in length.
+    Raises `InputError` if the lists, of R runs, differ in length.
     """
 
     __pydantic_config__: ClassVar = STRICT
 
-    gain: RunScatter
-    offset: RunScatter
+    gain: RunScatter  # of gains [-]
+    offset: RunScatter  # of offsets [N]
+    # run_ids, when, gains, offsets: of the damper's own tests, against the damper
     run_ids: tuple[str, ...]
     when: tuple[RecordingTime, ...]
     gains: tuple[float, ...]

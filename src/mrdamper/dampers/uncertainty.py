@@ -53,76 +53,42 @@ class FittedParameter:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Uncertainty(Displayable):
-    """Uncertainty of the parameters and predictions of a damper.
+    """Uncertainty of the P parameters and the predictions of a damper."""
 
-    Attributes
-    ----------
-    names : tuple of str, length P
-        Parameters determined from the data.
-    logs : tuple of bool, length P
-        Whether the covariance is that of the logarithm.
-    covariance : (P, P) array
-    dof : (P,) array
-        Degrees of freedom of each variance.
-    one_sided : tuple of str
-        Parameters held at a bound: their interval is one-sided.
-    unknown : tuple of str
-        Parameters not identifiable from these runs; for those among `names` the variance holds with the
-        others fixed.
-    gain, offset : float
-        Standard deviations between sessions, of the force as a share and as a shift [N].
-    session_dof : float
-        Their degrees of freedom; zero with fewer than three known sessions. Then
-        intervals are for sessions like the tested ones.
-    run_gain, run_offset : float
-        Standard deviations between runs of one session [-] and [N].
-    run_dof : float
-        Their degrees of freedom; zero if the runs do not determine them.
-    force, peak, energy : float
-        Standard deviations after a gain and an offset are fitted to each run: of the force over half its
-        peak-to-peak value, of the peak force and of the dissipated energy, relative.
-    left_out : int
-        Number of cross-validated runs behind them; zero where the residuals of the fit are used instead.
-    growth : Growth
-        Of the model's error with the distance from the tests.
-    calibration : Calibration or None
-        Of prediction intervals, on cross-validated runs.
-    sessions : Sessions or None
-        Variation between sessions, days and hours, where the tests determine it.
-    words : tuple of str
-        Findings that need the runs: correlated parameters, and parameters determined mainly by one run.
-    information : mapping of str to float
-        Share of each run in the information on the parameters.
-    effective : mapping of str to float
-        Independent samples with the same standard error of each parameter, without sessions and correlated noise.
-    interval_factor : (P,) array, or float
-        Factor on the standard error of each parameter, for curvature (above one) and few sessions (below one).
-        Prediction intervals of the force do not use it.
-    """
-
-    names: tuple[str, ...]
-    logs: tuple[bool, ...]
-    covariance: Floats
-    dof: Floats
-    one_sided: tuple[str, ...] = ()
+    names: tuple[str, ...]  # parameters determined from the data
+    logs: tuple[bool, ...]  # whether the covariance is that of the logarithm
+    covariance: Floats  # (P, P)
+    dof: Floats  # (P,) degrees of freedom of each variance
+    one_sided: tuple[str, ...] = ()  # parameters held at a bound: their interval is one-sided
+    # parameters not identifiable from these runs; for those among `names` the variance holds with the others fixed
     unknown: tuple[str, ...] = ()
+    # gain, offset: standard deviations between sessions, of the force as a share and as a shift [N]
     gain: float = 0.0
     offset: float = 0.0
+    # their degrees of freedom; zero with fewer than three known sessions: then intervals are for sessions like these
     session_dof: float = 0.0
+    # run_gain, run_offset: standard deviations between runs of one session [-] and [N]
     run_gain: float = 0.0
     run_offset: float = 0.0
-    run_dof: float = 0.0
+    run_dof: float = 0.0  # their degrees of freedom; zero if the runs do not determine them
+    # force, peak, energy: standard deviations after a gain and an offset are fitted to each run: of the force over half
+    # its peak-to-peak value, of the peak force and of the dissipated energy, relative
     force: float = 0.0
     peak: float = 0.0
     energy: float = 0.0
-    left_out: int = 0
+    left_out: int = 0  # cross-validated runs behind them; zero where the residuals of the fit are used instead
+    # findings that need the runs: correlated parameters, and parameters determined mainly by one run
     words: tuple[str, ...] = ()
+    # share of each run in the information on the parameters
     information: Mapping[str, float] = field(default_factory=dict[str, float])
+    # independent samples with the same standard error of each parameter, without sessions and correlated noise
     effective: Mapping[str, float] = field(default_factory=dict[str, float])
+    # (P,) factor on the standard errors, for curvature (above one) and few sessions (below one); prediction intervals
+    # of the force do not use it
     interval_factor: Floats | float = 1.0
-    sessions: Sessions | None = None
-    calibration: Calibration | None = None
-    growth: Growth = field(default_factory=Growth)
+    sessions: Sessions | None = None  # variation between sessions, days and hours, where the tests determine it
+    calibration: Calibration | None = None  # of prediction intervals, on cross-validated runs
+    growth: Growth = field(default_factory=Growth)  # of the model's error with the distance from the tests
 
     @property
     def headline(self) -> str:

@@ -30,19 +30,10 @@ _REMEDY = "choose a folder you may write to"
 
 @dataclass(frozen=True)
 class ResultRecord:
-    """Contents of `made.json`: the files of a result, and its computing times.
+    """Contents of `made.json`: the files of a result, and its computing times."""
 
-    Attributes
-    ----------
-    files : tuple of str
-        Paths relative to the folder, sorted.
-    seconds : mapping
-        Durations [s] by computation, or by rig and model.
-    processes : int or None
-        Number of processes.
-    """
-
-    files: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()  # paths relative to the folder, sorted
+    # durations [s] by computation, or by rig and model
     seconds: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict[str, float])
     processes: int | None = None
 

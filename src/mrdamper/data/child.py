@@ -38,15 +38,10 @@ importlib.import_module(sys.argv[1]).serve()
 
 
 class Child:
-    """The process of a module whose `serve()` answers requests.
+    """The process of a module whose `serve()` answers requests; linear algebra has one thread there.
 
-    Parameters
-    ----------
-    module : str
-        Imported in the process; linear algebra has one thread there.
-    session : bool
-        In a separate session, which Ctrl-C at the terminal does not reach; `serve` ends it with its parent. Otherwise
-        it ends with its parent from the start.
+    In a separate session Ctrl-C at the terminal does not reach it, and `serve` ends it with its parent. Otherwise it
+    ends with its parent from the start.
     """
 
     died = 0  # signal that ended it, or minus its exit status

@@ -306,9 +306,7 @@ def _parameters_table(study: Study) -> str:
 
 
 def _scatter(rig: RigStudy) -> str:
-    scores = (*rig.chosen.cross_validated.runs, *rig.chosen.train.runs)  # the latter of the damper itself come last
-    readings = {score.run_id: score.reading for score in scores if score.reading}.values()
-    gain, offset = (float(np.std([getattr(reading, name) for reading in readings])) for name in ("gain", "offset"))
+    gain, offset = (float(np.std([getattr(one, name) for one in rig.readings])) for name in ("gain", "offset"))
     sessions = (
         f"the median cross-validated error corrected for the session is {100 * rig.session_known:.2f} %."
         if isinstance(rig.session_known, float)

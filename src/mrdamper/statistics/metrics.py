@@ -54,20 +54,12 @@ def dissipated_power(force: Floats, velocity: Floats, time: Floats) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Scores:
-    """Scores of one predicted run; fractions.
-
-    Attributes
-    ----------
-    nrmse_pp, nrmse_std, wape, mean_relative_error : float
-        See the functions of these names.
-    peak_error, energy_error : float
-        Relative error of half the peak-to-peak force and of the dissipated energy; positive if that of the
-        model is too large.
-    """
+    """Scores of one predicted run; fractions."""
 
     nrmse_pp: float
     nrmse_std: float
     wape: float
+    # of half the peak-to-peak force and of the dissipated energy, relative; positive if that of the model is too large
     peak_error: float
     energy_error: float
     mean_relative_error: float

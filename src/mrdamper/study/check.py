@@ -20,26 +20,13 @@ P = ParamSpec("P")
 
 @dataclass(frozen=True)
 class DatasetFinding:
-    """A finding on a run of a dataset.
+    """A finding on a run of a dataset."""
 
-    Attributes
-    ----------
-    run_id : str
-        Empty for a finding on a whole rig.
-    rig : str
-    code : str
-        Stable: E_DISSIPATION_SIGN, W_CLIPPED, E_FORCE_SCALE, ...
-    severity : "refused", "set aside" or "noted"
-        Refused by its own record, set aside because it contradicts other runs, or noted only.
-    text : str
-        Values, and the remedy.
-    """
-
-    run_id: str
+    run_id: str  # empty for a finding on a whole rig
     rig: str
-    code: str
-    severity: Severity
-    text: str
+    code: str  # stable: E_DISSIPATION_SIGN, W_CLIPPED, E_FORCE_SCALE, ...
+    severity: Severity  # refused by its own record, set aside because it contradicts other runs, or noted only
+    text: str  # values, and the remedy
 
     def __str__(self) -> str:
         return f"{self.run_id or (f'rig {self.rig}' if self.rig else 'dataset')}, {self.severity}: {self.text}"
@@ -47,13 +34,7 @@ class DatasetFinding:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DatasetCheck(Displayable):
-    """The findings on a dataset.
-
-    Attributes
-    ----------
-    dataset : Dataset
-    findings : tuple of DatasetFinding
-    """
+    """The findings on a dataset."""
 
     dataset: Dataset
     findings: tuple[DatasetFinding, ...]

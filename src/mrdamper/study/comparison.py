@@ -34,26 +34,14 @@ RANKING = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigComparison(Displayable):
-    """All recipes on one rig, the best in cross-validation over conditions first.
-
-    Attributes
-    ----------
-    rig : str
-    dataset : Dataset
-    sines : frozenset of str
-        Runs whose motion is a steady sine; validation errors of other motions are separate.
-    entries : tuple of Scored
-    refused : mapping of name to reason
-        Recipes that this rig's data do not allow.
-    not_identified : mapping of run id to reason
-    """
+    """All recipes on one rig, the best in cross-validation over conditions first."""
 
     rig: str
     dataset: Dataset
-    sines: frozenset[str]
+    sines: frozenset[str]  # runs of a steady sine; validation errors of other motions are separate
     entries: tuple[RecipeResult, ...]
-    refused: Mapping[str, str]
-    not_identified: Mapping[str, str]
+    refused: Mapping[str, str]  # by recipe, why this rig's data do not allow it
+    not_identified: Mapping[str, str]  # reason by run
 
     @property
     def headline(self) -> str:

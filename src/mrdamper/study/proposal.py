@@ -15,24 +15,13 @@ from mrdamper.study.limits import Limits
 
 @dataclass(frozen=True)
 class Proposal:
-    """A proposed record.
+    """A proposed record."""
 
-    Attributes
-    ----------
-    session : int
-        From 1.
-    condition : Condition
-    minutes : float
-        Rig time without the set-up of the session.
-    reason : str
-    before, after : float
-        The uncertainty to reduce, without and with this record, after those before it; NaN without a model.
-    """
-
-    session: int
+    session: int  # from 1
     condition: Condition
-    minutes: float
+    minutes: float  # rig time without the set-up of the session
     reason: str
+    # the uncertainty to reduce, without and with this record, after those before it; NaN without a model
     before: float = math.nan
     after: float = math.nan
 

@@ -23,57 +23,27 @@ _MIN_SWING_N = 1e-100  # smallest force, and its inverse the largest [N], whose 
 
 @dataclass(frozen=True, eq=False)
 class RunScore:
-    """Scores of the prediction of one run, inside its steady window.
-
-    Attributes
-    ----------
-    run_id : str
-    rig : str
-    condition : Condition
-        Of the sine that is equivalent to the measured motion.
-    scores : Scores
-    floor : float or None
-        Cycle-to-cycle scatter of the run as nrmse_pp.
-    extrapolation : tuple of str
-        Quantities outside the envelope of the tests the damper was identified from.
-    rest : float or None
-        RMS error at rest, anywhere in the record, over the peak-to-peak force; None without rest.
-    session : str
-        "unknown": predicted as it is; "known": corrected by other runs of its session.
-    reading : GainOffset or None
-        Gain and offset of the best fit to the run; no score is corrected by them.
-    predicted : PredictedRun or None
-        Samples of the uncorrected prediction and the measured ones.
-    """
+    """Scores of the prediction of one run, inside its steady window."""
 
     run_id: str
     rig: str
-    condition: Condition
+    condition: Condition  # of the sine that is equivalent to the measured motion
     scores: Scores
-    floor: float | None
-    extrapolation: tuple[str, ...]
-    rest: float | None = None
-    session: str = UNKNOWN
-    reading: GainOffset | None = None
-    predicted: PredictedRun | None = None
+    floor: float | None  # cycle-to-cycle scatter of the run as nrmse_pp
+    extrapolation: tuple[str, ...]  # quantities outside the tests the damper was identified from
+    rest: float | None = None  # RMS error at rest, anywhere in the record, over the peak-to-peak force
+    session: str = UNKNOWN  # predicted as it is, or corrected by other runs of its session
+    reading: GainOffset | None = None  # of the best fit to the run; no score is corrected by them
+    predicted: PredictedRun | None = None  # samples of the uncorrected prediction and the measured ones
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Validation(Displayable):
-    """Scores of several runs.
+    """Scores of several runs."""
 
-    Attributes
-    ----------
-    title : str
-        What was validated.
-    runs : tuple of RunScore
-    refused : mapping of str to str
-        Runs that could not be scored, and why.
-    """
-
-    title: str
+    title: str  # what was validated
     runs: tuple[RunScore, ...]
-    refused: Mapping[str, str] = field(default_factory=dict[str, str])
+    refused: Mapping[str, str] = field(default_factory=dict[str, str])  # runs that could not be scored, and why
 
     @property
     def headline(self) -> str:

@@ -20,7 +20,7 @@ from mrdamper.dampers.calibration import QUANTITIES, Calibration
 from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
-from mrdamper.dampers.sessions import Sessions, known_errors
+from mrdamper.dampers.sessions import GainOffset, Sessions, known_errors
 from mrdamper.data import Dataset, Displayable, Floats, Run
 from mrdamper.data.displayable import joined
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError, validate_arguments
@@ -74,38 +74,22 @@ def table_of(rig: str, results: Sequence[RecipeResult]) -> dict[str, list[Any]]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RigStudy(Displayable):
-    """The study of one rig.
-
-    Attributes
-    ----------
-    rig : str
-    dataset : Dataset
-    loops : tuple of LoopAnalysis
-        Of every sine run.
-    ranges : tuple of DynamicRange
-    candidates : tuple of Scored
-        The chosen one first, the others by their mean error over the kinds of fold.
-    not_identified : mapping of run id to the reason
-    refused : mapping of recipe name to the reason
-        Recipes whose damper could not be determined from this rig's data, or whose loops gain energy somewhere.
-    asked_for : bool
-        The model was requested by the user, not selected.
-    session_known : float or str
-        Median nrmse_pp of omitted conditions, corrected by the other runs of their session (scores are for unknown
-        sessions); or why there is none.
-    contradictions : tuple of Contradiction
-        Runs that were set aside because they contradict the others; `dataset` is without them.
-    """
+    """The study of one rig."""
 
     rig: str
     dataset: Dataset
-    loops: tuple[LoopAnalysis, ...]
+    loops: tuple[LoopAnalysis, ...]  # of every sine run
     ranges: tuple[DynamicRange, ...]
+    # the chosen one first, the others by their mean error over the kinds of fold
     candidates: tuple[RecipeResult, ...]
-    not_identified: Mapping[str, str]
+    not_identified: Mapping[str, str]  # reason by run
+    # by recipe, why its damper cannot be determined from this rig's data, or where its loops gain energy
     refused: Mapping[str, str]
-    asked_for: bool = False
+    asked_for: bool = False  # the model was requested by the user, not selected
+    # median nrmse_pp of omitted conditions, corrected by the other runs of their session (scores are for unknown
+    # sessions); or why there is none
     session_known: float | str = ""
+    # runs that were set aside because they contradict the others; `dataset` is without them
     contradictions: tuple[Contradiction, ...] = ()
 
     @property
@@ -143,6 +127,12 @@ class RigStudy(Displayable):
         return self.chosen.damper
 
     @property
+    def readings(self) -> list[GainOffset]:
+        """Gain and offset of every identification run against the chosen damper; no score is corrected by them."""
+        scores = (*self.chosen.cross_validated.runs, *self.chosen.train.runs)  # those of the damper itself come last
+        return list({score.run_id: score.reading for score in scores if score.reading}.values())
+
+    @property
     def calibration(self) -> Calibration | None:
         """Of the chosen damper's prediction intervals."""
         return self.damper.uncertainty.calibration if self.damper.uncertainty else None
@@ -162,14 +152,7 @@ class RigStudy(Displayable):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Study(Displayable):
-    """A study of a dataset, rig by rig.
-
-    Attributes
-    ----------
-    dataset : Dataset
-    rigs : tuple of RigStudy
-    seconds : float
-    """
+    """A study of a dataset, rig by rig."""
 
     dataset: Dataset
     rigs: tuple[RigStudy, ...]
