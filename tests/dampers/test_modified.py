@@ -176,7 +176,7 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
         asked.update(runs=runs, cls=cls, more=more)
         return Data()
 
-    monkeypatch.setattr(modified, "condense", condensed)
+    monkeypatch.setattr(modified, "_condensed", condensed)
     monkeypatch.setattr(modified, "choose_forms", chosen)
     monkeypatch.setattr(modified, "fit_jointly", lambda part, forms, start: SimpleNamespace(parameters=parameters))
     rows = SimpleNamespace(of=lambda c: SimpleNamespace(condition=c, changes=False, is_sine=True))

@@ -264,9 +264,7 @@ def fit_modified_jointly(
     return fit, refit
 
 
-@lru_cache(maxsize=2)  # functions of the motion are tried on them, and functions of the current alone
-def _condensed(runs: tuple[Run, ...], model_type: type[Model], inertia: tuple[str, ...]) -> Condensed:
-    return condense(runs, model_type, inertia)
+_condensed = lru_cache(maxsize=2)(condense)  # functions of the motion are tried on them, and of the current alone
 
 
 def _candidates(data: Condensed, any_motion: bool) -> dict[str, list[str | Law]]:

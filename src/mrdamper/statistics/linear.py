@@ -7,12 +7,12 @@ of the linear algebra save no time and change the last bits of a result by anoth
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from functools import cache, cached_property, wraps
+from functools import cache, cached_property
 from importlib import import_module
-from typing import Any, ParamSpec, Self, TypeVar
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,6 @@ _RANK_LIMIT = 1e-10  # singular value over the largest below which a direction i
 _MIN_RELATIVE_PIVOT = 1e-5  # pivot over the largest below which a column is explained by the others
 
 _ROWS_PER_BLOCK = 50_000  # rows of a table that are factored at a time
-
-P = ParamSpec("P")
-T = TypeVar("T")
 
 
 def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None) -> Floats:
@@ -222,15 +219,7 @@ def one_blas_thread() -> Generator[None]:
         yield
 
 
-def on_one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
-    """Run a function inside `one_blas_thread`."""
-
-    @wraps(function)
-    def held(*args: P.args, **kwargs: P.kwargs) -> T:
-        with one_blas_thread():
-            return function(*args, **kwargs)
-
-    return held
+on_one_blas_thread = one_blas_thread()  # as a decorator of a function that runs inside such a block
 
 
 @cache

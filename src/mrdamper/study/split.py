@@ -107,43 +107,28 @@ def _stratified(condition_of: dict[str, Condition | None], where: str) -> tuple[
     """Return a fifth of the conditions, spread over currents and motions, all of which stay in the identification."""
     names = [name for name, c in condition_of.items() if c is not None]
     conditions = [c for c in condition_of.values() if c is not None]
-    groups = same_condition(conditions)
-    at_rest = [Condition(0.0, c.frequency_Hz, c.amplitude_m) for c in conditions]
     current_of = _levels([Condition(c.current_A, 1.0, 1.0) for c in conditions])
-    motion_of = _levels(at_rest)
-    left_current = Counter(current_of[group[0]] for group in groups)
-    left_motion = Counter(motion_of[group[0]] for group in groups)
-    order = sorted(left_current, key=lambda level: min(conditions[i].current_A for i in range(len(conditions))
-                                                      if current_of[i] == level))  # fmt: skip
-    ends = {*order[:1], *order[-1:]}
-    target, chosen = max(1, round(SHARE * len(groups))), list[list[int]]()
-    taken_current: Counter[int] = Counter()
-    taken_motion: Counter[int] = Counter()
+    motion_of = _levels([Condition(0.0, c.frequency_Hz, c.amplitude_m) for c in conditions])
+    by_current = sorted(range(len(conditions)), key=lambda i: conditions[i].current_A)
+    ends = {current_of[i] for i in (*by_current[:1], *by_current[-1:])}
+    groups = {group[0]: group for group in same_condition(conditions)}
+    target, chosen = max(1, round(SHARE * len(groups))), list[int]()
     while len(chosen) < target:
-        free = [
-            g for g in groups
-            if g not in chosen and left_current[current_of[g[0]]] > 1 and left_motion[motion_of[g[0]]] > 1
-        ]  # fmt: skip
+        left = [first for first in groups if first not in chosen]
+        # Conditions of each level, those that are left and those that are chosen.
+        currents, taken_currents = (Counter(current_of[k] for k in part) for part in (left, chosen))
+        motions, taken_motions = (Counter(motion_of[k] for k in part) for part in (left, chosen))
+        free = [k for k in left if currents[current_of[k]] > 1 and motions[motion_of[k]] > 1]
         if not free:
             break
-        best = min(
-            free,
-            key=lambda g: (
-                taken_current[current_of[g[0]]] + taken_motion[motion_of[g[0]]], current_of[g[0]] in ends, g[0]
-            ),
-        )  # fmt: skip
-        chosen.append(best)
-        for level, left, taken in (
-            (current_of[best[0]], left_current, taken_current), (motion_of[best[0]], left_motion, taken_motion)
-        ):  # fmt: skip
-            left[level] -= 1
-            taken[level] += 1
+        taken = {k: taken_currents[current_of[k]] + taken_motions[motion_of[k]] for k in free}
+        chosen.append(min(free, key=lambda k: (taken[k], current_of[k] in ends, k)))
     if not chosen:
         raise SplitError(
             "every choice of validation runs would lose a current or a motion", where=where,
             remedy="name the runs: --run, --current or --condition",
         )  # fmt: skip
-    held = {names[i] for group in chosen for i in group}
+    held = {names[i] for first in chosen for i in groups[first]}
     return held, f"stratified, {len(chosen)} of {len(groups)} conditions; every current and every motion stays in"
 
 

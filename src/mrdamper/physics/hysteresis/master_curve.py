@@ -47,18 +47,13 @@ def master_curve(n: float) -> MasterCurve:
         return _Exponential()
     if n == 2:
         return _Tangent()
-    return _tabulated(settled(n))
+    return _tabulated(settled(n))  # type: ignore[return-value]
 
 
 @lru_cache
 def gauss_legendre(points: int) -> tuple[Floats, Floats]:
     """Return nodes and weights of a Gauss–Legendre rule on −1...1; NumPy solves an eigenvalue problem for them."""
     return np.polynomial.legendre.leggauss(points)
-
-
-@lru_cache(maxsize=128)
-def _tabulated(n: float) -> MasterCurve:
-    return _Tabulated(n)
 
 
 def approach_rate(r: Floats, n: float) -> Floats:
@@ -205,6 +200,9 @@ class _Tabulated(MasterCurve):
             return speed, self.n * y ** (self.n - 1) - speed
 
         return _CurveTable(crowded_nodes(math.log1p(STEEPEST ** (1 / self.n))), rate)
+
+
+_tabulated = lru_cache(maxsize=128)(_Tabulated)
 
 
 def crowded_nodes(end: float) -> Floats:
