@@ -159,10 +159,7 @@ class Run(Displayable):
     def current_A(self) -> float:
         """The run's one coil current [A]: the mean over the steady window.
 
-        Raises
-        ------
-        RunError
-            E_CURRENT_VARIES if the current changes within the run.
+        Raises `RunError` (E_CURRENT_VARIES) if the current changes within the run.
         """
         current, change = _held_current(self)
         if change:

@@ -55,34 +55,72 @@ class Elimination:
         return FixedColumns.of(columns, right)
 
     @cached_property
-    def projector(self) -> FixedColumnSolver | None:
-        """The columns factored; None where they depend on each other."""
+    def _fixed(self) -> FixedColumns | None:
+        """The constant columns at all scored samples, factored once; None where they depend on each other."""
         fixed = self.fixed_columns()
-        if not fixed.independent:
-            return None
-        return FixedColumnSolver(fixed, *bounds_of(self.kind.others), self.kind.state.bounds)
+        return fixed if fixed.independent else None
+
+    @cached_property
+    def _bounds(self) -> tuple[Floats, Floats]:
+        return bounds_of(self.kind.others)
 
     def residual(self, point: Mapping[str, float]) -> Floats | None:
         """Residual at a point of the search; None where the general method is needed."""
-        return None if self.projector is None else self.projector.residual(self._state(point))
+        fixed = self._fixed
+        if fixed is None or (fit := self._fit(fixed, self._state(point))) is None:
+            return None
+        size, beside, _ = fit
+        return size * beside - fixed.rest
 
     def residual_and_slope(self, length: float) -> tuple[Floats, Floats] | None:
-        """Residual at a yield displacement that is searched alone, and its derivative with ln length."""
-        shape = self.kind.shape({_LENGTH: length})
-        if self.projector is None or shape is None:
+        """Residual at a yield displacement that is searched alone, and its derivative with ln length.
+
+        [Golub and Pereyra 1973]
+        """
+        shape, fixed = self.kind.shape({_LENGTH: length}), self._fixed
+        if fixed is None or shape is None:
             return None
-        state, by_kappa = follow_with_slope(*shape, self.problem.motion.path, self.problem.scored)
-        return self.projector.residual_and_slope(state, np.negative(by_kappa, out=by_kappa))
+        state, change = follow_with_slope(*shape, self.problem.motion.path, self.problem.scored)
+        if (fit := self._fit(fixed, state)) is None:
+            return None
+        size, beside, _ = fit
+        np.negative(change, out=change)  # all in place, because these may be long
+        moved = fixed.basis @ (change @ fixed.basis)
+        np.subtract(change, moved, out=moved)
+        growth = (float(moved @ fixed.rest) - 2 * size * float(moved @ beside)) / float(beside @ beside)
+        residual = size * beside
+        residual -= fixed.rest
+        moved *= size
+        beside *= growth
+        moved += beside
+        return residual, moved
 
     def solved(self, point: Mapping[str, float]) -> Model | None:
         """Model at a point of the search; None where the general method is needed."""
-        solution = self.projector.solve(self._state(point)) if self.projector else None
-        if solution is None:
+        if self._fixed is None or (fit := self._fit(self._fixed, self._state(point))) is None:
             return None
-        shape, (size, others) = self.kind.shape(point), solution
-        values = dict(zip((i.name for i in self.kind.others), others, strict=True))
+        shape, (size, _, others) = self.kind.shape(point), fit
+        values = dict(zip((i.name for i in self.kind.others), others.tolist(), strict=True))
         values[self.kind.state.name] = size * shape[0] if shape else size  # the state is zeta/kappa
         return self.problem.model_type.build({**self.problem.fixed, **point, **values})
+
+    def _fit(self, fixed: FixedColumns, state: Floats) -> tuple[float, Floats, Floats] | None:
+        """Best coefficient of a state, the part of it beside the constant columns, and their coefficients.
+
+        None where a bound or dependence interferes.
+        """
+        along = state @ fixed.basis
+        beside = fixed.basis @ along
+        np.subtract(state, beside, out=beside)
+        square = float(beside @ beside)
+        if not square > _MIN_UNEXPLAINED_SHARE * float(state @ state):
+            return None
+        size = float(beside @ fixed.rest) / square
+        others = fixed.inverse @ (fixed.along - size * along)
+        (low, high), (lower, upper) = self.kind.state.bounds, self._bounds
+        if not (low <= size <= high and ((others >= lower) & (others <= upper)).all()):
+            return None
+        return size, beside, others
 
     def _state(self, point: Mapping[str, float]) -> Floats:
         # Its size has no effect on the residual.
@@ -131,7 +169,12 @@ def linear_structure(
     state = next((i for i in linear if i.name == model_type.state_column), None)
     if state is None or not axes:
         return None
-    points = [{**dict(fixed), **{axis.name: at(axis) for axis in axes}} for at in (_first, _other)]
+    first = {axis.name: axis.grid[0] for axis in axes}
+    other = {
+        a.name: a.grid[-1] if len(a.grid) > 1 else a.value(0.4 * (a.coordinate(a.lower) + a.coordinate(a.upper)))
+        for a in axes
+    }
+    points = [{**dict(fixed), **point} for point in (first, other)]
     try:
         bare = [model_type.build({**point, **{i.name: 0.0 for i in linear}}) for point in points]
     except ParameterError:  # held parameters exclude one of the points
@@ -155,66 +198,3 @@ def _has_shape(kind: LinearStructure, model: Model, point: Mapping[str, float]) 
 
 
 _SCALE = Scale(amplitude=0.02, speed=0.1)  # points of the search at which a model is evaluated
-
-
-def _first(axis: SearchAxis) -> float:
-    return axis.grid[0]
-
-
-def _other(axis: SearchAxis) -> float:
-    return (
-        axis.grid[-1] if len(axis.grid) > 1 else axis.value(0.4 * sum(map(axis.coordinate, (axis.lower, axis.upper))))
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class FixedColumnSolver:
-    """Least squares on constant columns and one that changes: the constant ones are factored once."""
-
-    fixed: FixedColumns  # the constant columns
-    # lower, upper: (L,) bounds of their coefficients
-    lower: Floats
-    upper: Floats
-    size_bounds: tuple[float, float]  # bounds of the coefficient of the state
-
-    def residual(self, state: Floats) -> Floats | None:
-        """Fitted minus right side for the best coefficients; None where a bound or dependence interferes."""
-        fit = self._fit(state)
-        return None if fit is None else fit[0] * fit[1] - self.fixed.rest
-
-    def residual_and_slope(self, state: Floats, change: Floats) -> tuple[Floats, Floats] | None:
-        """`residual`, and its derivative where the state changes at a rate [Golub and Pereyra 1973]."""
-        fit = self._fit(state)
-        if fit is None:
-            return None
-        size, beside, _ = fit
-        basis, rest = self.fixed.basis, self.fixed.rest
-        moved = basis @ (change @ basis)
-        np.subtract(change, moved, out=moved)
-        growth = (float(moved @ rest) - 2 * size * float(moved @ beside)) / float(beside @ beside)
-        residual = size * beside
-        residual -= rest
-        moved *= size  # in place, because these may be long
-        beside *= growth
-        moved += beside
-        return residual, moved
-
-    def solve(self, state: Floats) -> tuple[float, list[float]] | None:
-        """Best coefficients of the state and of the columns; None as `residual`."""
-        fit = self._fit(state)
-        return None if fit is None else (fit[0], fit[2].tolist())
-
-    def _fit(self, state: Floats) -> tuple[float, Floats, Floats] | None:
-        fixed = self.fixed
-        along = state @ fixed.basis
-        beside = fixed.basis @ along
-        np.subtract(state, beside, out=beside)
-        square = float(beside @ beside)
-        if not square > _MIN_UNEXPLAINED_SHARE * float(state @ state):
-            return None
-        size = float(beside @ fixed.rest) / square
-        others = fixed.inverse @ (fixed.along - size * along)
-        low, high = self.size_bounds
-        if not (low <= size <= high and ((others >= self.lower) & (others <= self.upper)).all()):
-            return None
-        return size, beside, others

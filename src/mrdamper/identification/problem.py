@@ -162,60 +162,27 @@ class RunUncertainty:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(Displayable):
-    """A model identified from one run.
-
-    Attributes
-    ----------
-    run_id : str
-    rig : str
-    condition : Condition
-        Measured current, frequency, amplitude.
-    model : Model
-        With the parameters found.
-    method : str
-        Name of the method.
-    free, at_bounds : tuple of str
-        Parameters determined; those that ended at a limit.
-    delay : float
-        Delay of the force channel [s].
-    scores : Scores
-        Inside the steady window.
-    floor : float or None
-        The run's cycle-to-cycle scatter as nrmse_pp, the lower limit of the error of any model.
-    start, end : mapping of str to float
-        Search coordinates the refinement began and ended at.
-    evaluations : int
-        Forces computed.
-    ending : StopReason
-        Why the search ended.
-    seed : int or None
-        Of the random search, where one was used.
-    notes : tuple of str
-        Remarks on the parameters.
-    residual : (N,) array
-        Predicted minus measured force in the steady window [N].
-    ask : callable
-        Returns the uncertainty, which takes longer than the search and is computed on first use.
-    """
+    """A model identified from one run."""
 
     run_id: str
     rig: str
-    condition: Condition
-    model: Model
-    method: str
-    free: tuple[str, ...]
-    at_bounds: tuple[str, ...]
-    delay: float
-    scores: Scores
-    floor: float | None
+    condition: Condition  # measured
+    model: Model  # with the parameters found
+    method: str  # its name
+    free: tuple[str, ...]  # parameters determined
+    at_bounds: tuple[str, ...]  # those that ended at a limit
+    delay: float  # of the force channel [s]
+    scores: Scores  # inside the steady window
+    floor: float | None  # the run's cycle-to-cycle scatter as nrmse_pp, the lower limit of the error of any model
+    # start, end: search coordinates the refinement began and ended at
     start: Mapping[str, float]
     end: Mapping[str, float]
-    evaluations: int
+    evaluations: int  # forces computed
     ending: StopReason
-    seed: int | None
-    notes: tuple[str, ...]
-    residual: Floats
-    ask: Callable[[], RunUncertainty]
+    seed: int | None  # of the random search, where one was used
+    notes: tuple[str, ...]  # remarks on the parameters
+    residual: Floats  # (N,) predicted minus measured force in the steady window [N]
+    ask: Callable[[], RunUncertainty]  # returns the uncertainty, which takes longer than the search
 
     @cached_property
     def uncertainty(self) -> RunUncertainty:
@@ -273,10 +240,7 @@ class Identification(Displayable):
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float] | None:
         """Return the ends of a parameter's interval within the form of the model; None where there is none.
 
-        Raises
-        ------
-        InputError
-            E_LEVEL if the level is not between 0 and 1.
+        Raises `InputError` (E_LEVEL) if the level is not between 0 and 1.
         """
         error = self.standard_errors.get(name)
         if error is None:

@@ -24,43 +24,22 @@ _Whole = Annotated[int, Field(strict=True)]
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a rig, and the time a test takes.
+    """Limits of a rig, each range from the lowest to the highest, and the time a test takes.
 
-    Attributes
-    ----------
-    current_A, frequency_Hz, amplitude_mm : (float, float)
-        Lowest and highest.
-    velocity_m_s : float
-        Highest peak velocity.
-    force_N : float
-        Rated force of the damper; only a plan without a model needs it.
-    cycles : float
-        Of a record.
-    sample_rate_Hz : float
-    minutes_between : float
-        From the end of a record to the start of the next: set-up and cooling.
-    session_minutes : float
-        To begin a session: mount the damper, zero the load cell, warm up.
-    sessions : int
-        Largest number; a plan uses the best number.
-
-    Raises
-    ------
-    InputError
-        E_LIMITS if they allow nothing, or appear to have another unit.
+    Raises `InputError` (E_LIMITS) if they allow nothing, or appear to have another unit.
     """
 
     read_by: ClassVar = "mrdamper.study.limits.Limits.read(file) or .of(damper)"
     current_A: tuple[float, float]
     frequency_Hz: tuple[float, float]
     amplitude_mm: tuple[float, float]
-    velocity_m_s: float = math.inf
-    force_N: float = 0.0
-    cycles: float = 6.0
+    velocity_m_s: float = math.inf  # highest peak velocity
+    force_N: float = 0.0  # rated force of the damper; only a plan without a model needs it
+    cycles: float = 6.0  # of a record
     sample_rate_Hz: float = 500.0
-    minutes_between: float = 3.0
-    session_minutes: float = 10.0
-    sessions: int = 12
+    minutes_between: float = 3.0  # from the end of a record to the start of the next: set-up and cooling
+    session_minutes: float = 10.0  # to begin a session: mount the damper, zero the load cell, warm up
+    sessions: int = 12  # largest number; a plan uses the best number
 
     def __post_init__(self) -> None:
         for name in _RANGES:

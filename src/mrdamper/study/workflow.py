@@ -170,13 +170,7 @@ class Study(Displayable):
 
     @property
     def model(self) -> Damper:
-        """The damper, where the dataset holds one rig.
-
-        Raises
-        ------
-        IdentificationError
-            If it holds several: take `study.rig(name).damper`.
-        """
+        """The damper, where the dataset holds one rig; raises `IdentificationError` if it holds several."""
         if len(self.rigs) > 1:
             names = ", ".join(r.rig for r in self.rigs)
             raise IdentificationError(
@@ -185,27 +179,11 @@ class Study(Displayable):
         return next(iter(self.rigs)).damper
 
     def write_report(self, folder: str | Path, **options: Any) -> list[Path]:
-        """Write report.html, models, tables and figures.
+        """Write report.html, models, tables and figures to a folder; return the written files, the report first.
 
-        Parameters
-        ----------
-        folder : path
-            Made if missing.
-        **options
-            Keywords of `mrdamper.report.study.write_study`: about, limits, also, paper. `about` is an `About`, a
-            mapping of its names to texts, or the path of a TOML file (`mrdamper init about`).
-
-        Returns
-        -------
-        list of Path
-            Written files, the report first.
-
-        Raises
-        ------
-        AboutError
-            If `about` has an unknown name.
-        OutputError
-            If the folder cannot be written to.
+        Options are keywords of `mrdamper.report.study.write_study`: about, limits, also, paper. `about` is an `About`,
+        a mapping of its names to texts, or the path of a TOML file (`mrdamper init about`). Raises `AboutError` if it
+        has an unknown name, and `OutputError` if the folder cannot be written to.
         """
         write = importlib.import_module("mrdamper.report.study").write_study  # draws: needed here only
         return write(self, folder, **options)

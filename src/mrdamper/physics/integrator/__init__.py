@@ -36,25 +36,16 @@ def integrate(
 ) -> Floats:
     """(N, S) state along a motion: (N,) time [s], displacement [m], velocity [m/s], current [A]; from a start (S,).
 
-    Between samples the displacement is the cubic with the given values and slopes, the velocity its derivative, and the
-    current straight. Raises `ExcitationError` if time does not increase. Raises `ParameterError` if the tolerance
-    cannot be kept: the model is too stiff, or it diverges.
+    `rate`, a function (x, v, current, state, parameters, out), writes d(state)/dt into `out`, with operators and
+    NumPy's functions. It runs once on symbols (`mrdamper.tracing`), and the program is compiled. Between samples the
+    displacement is the cubic with the given values and slopes, the velocity its derivative, and the current straight.
 
-    Parameters
-    ----------
-    rate : function (x, v, current, state, parameters, out)
-        Writes d(state)/dt into `out`, with operators and NumPy's functions. It runs once on symbols
-        (`mrdamper.tracing`), and the program is compiled.
-    scale : S numbers
-        Typical size of each state; errors are measured against the larger of it and the state.
-    tolerance : float
-        Error allowed per step, relative.
+    `scale` (S,) is the typical size of each state: errors are measured against the larger of it and the state, and the
+    error allowed per step is the relative `tolerance`. Raises `ExcitationError` if time does not increase, and
+    `ParameterError` if the tolerance cannot be kept: the model is too stiff, or it diverges.
 
-    References
-    ----------
-    Rodas3: Sandu et al. (1997), "Benchmarking stiff ODE solvers for atmospheric chemistry
-    problems II: Rosenbrock solvers", Atmospheric Environment 31, 3459–3472; coefficients
-    recalled, order and stability tested here.
+    Rodas3: Sandu et al. (1997), "Benchmarking stiff ODE solvers for atmospheric chemistry problems II: Rosenbrock
+    solvers", Atmospheric Environment 31, 3459–3472; coefficients recalled, order and stability tested here.
     """
     time, x, v, current = (np.asarray(channel, dtype=float) for channel in motion)
     if not np.all(np.diff(time) > 0):
