@@ -19,48 +19,61 @@ class DamperLike(Protocol):
     @property
     def title(self) -> str:
         """Name of the damper."""
+        ...
 
     @property
     def envelope(self) -> Any:
         """Tested ranges."""
+        ...
 
     @property
     def coil(self) -> Any:
         """Response of the field to the current."""
+        ...
 
     @property
     def uncertainty(self) -> Any:
         """Uncertainty of the parameters, or None."""
+        ...
 
     @property
     def one_model(self) -> Any:
         """Model for all conditions, or None."""
+        ...
 
     @property
     def fitted_parameters(self) -> Mapping[str, Any]:
         """Parameters determined from data."""
+        ...
 
     @property
     def followed_amplitudes(self) -> tuple[float, float]:
         """Amplitudes within which the parameters follow the motion [m]."""
+        ...
 
     def with_parameters(self, values: Mapping[str, float]) -> Any:
         """Return the damper with other parameters."""
+        ...
 
     def model_at(self, condition: Condition) -> Any:
         """Return the model at a condition."""
+        ...
 
     def loop(self, condition: Condition) -> Any:
         """Return the steady loop at a condition."""
+        ...
 
     def force_along(self, motion: Any, condition: Condition) -> Floats:
         """Force along a motion that amounts to a condition [N]."""
+        ...
 
     def with_field_current(self, motion: Any) -> Any:
         """Return the motion with the current whose field is there."""
+        ...
 
     def predict(self, at: Any) -> Any:
         """Predict the steady loop at a condition, or the force along a run."""
+        ...
 
 
 class SearchSpace(Protocol):
@@ -69,15 +82,20 @@ class SearchSpace(Protocol):
     @property
     def linear(self) -> Sequence[ParameterInfo]:
         """Parameters that enter the force linearly."""
+        ...
 
     def box(self) -> tuple[Floats, Floats]:
         """Return the lower and upper bounds of the coordinates."""
+        ...
 
     def coil_at(self, point: Floats) -> Any:
         """Return the response of the field at a point."""
+        ...
 
     def force_slopes(self, point: Floats, model: Any, motion: Any, picked: Any) -> Floats | None:
         """Return the derivatives of the force at some samples by the coordinates, where they are exact."""
+        ...
 
     def without_linear(self, point: Floats) -> Any:
         """Return the model of a point with its linear parameters at zero."""
+        ...

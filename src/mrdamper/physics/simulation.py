@@ -23,15 +23,19 @@ class ForceLaw(Protocol):
 
     def parameters(self) -> tuple[ParameterInfo, ...]:
         """Describe each parameter."""
+        ...
 
     def values(self) -> dict[str, float]:
         """Parameter values by name."""
+        ...
 
     def state(self, motion: Excitation) -> Floats:
         """Calculate the internal state along a motion."""
+        ...
 
     def force(self, motion: Excitation, state: Floats) -> Floats:
         """Force [N] along a motion, given the state there."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

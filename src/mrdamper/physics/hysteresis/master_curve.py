@@ -47,7 +47,7 @@ def master_curve(n: float) -> MasterCurve:
         return _Exponential()
     if n == 2:
         return _Tangent()
-    return _tabulated(settled(n))  # type: ignore[return-value]
+    return _tabulated(settled(n))
 
 
 @lru_cache

@@ -217,7 +217,7 @@ class Evidence:
         if course not in self._priors:
             nodes = _root_covariance(self.nodes, self.spread.saturation, self.spread.bend)
             weights = np.repeat([1.0, self.spread.leak], [_ELEMENTS - len(_LEAKY), len(_LEAKY)])
-            root = np.kron(nodes, np.diag(weights))
+            root: Floats = np.asarray(np.kron(nodes, np.diag(weights)), dtype=float)
             prior = Posterior(np.zeros(len(root)), root, self)
             self._priors[course] = nodes, np.tile(weights, self.nodes.size), prior
         return self._priors[course]
