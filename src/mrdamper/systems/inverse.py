@@ -80,7 +80,7 @@ def _forces(damper: Damper, grid: Floats) -> Floats:
     """Calculate (samples, currents) forces [N] along the second half of a tested sine."""
     stepping = stream(replace(damper, coil=None))
     prepare, step = python_functions(stepping.step)
-    given = tuple(float(e.value) for e in stepping.step.tape.parameters.values())
+    given = stepping.step.given
     derived, memory = prepare(given)[1], tuple(stepping.step.tape.starts.values())
     amplitude = damper.envelope.amplitude_m[1]
     omega = min(2 * math.pi * damper.envelope.frequency_Hz[1], damper.envelope.peak_velocity_m_s[1] / amplitude)

@@ -42,7 +42,7 @@ class CWriter(Writer):
     def name(self, expression: Expression) -> str:
         name = super().name(expression)
         if expression.op == "memory":
-            return f"s{self.member}{self.memory_prefix}{name}"
+            return self.memory(name)
         owner = {"parameter": "p", "input": "u"}.get(expression.op)
         if owner is None and any(expression is d for d in self.program.derived):
             owner = "d"
@@ -59,10 +59,19 @@ class CWriter(Writer):
     def results(self) -> str:
         """Write outputs, then the new memory: all of it is computed before any of it is stored."""
         tape = self.program.tape
-        lines = [f"out{self.member}{name} = {self.text(value)};" for name, value in self.program.outputs.items()]
+        outputs = enumerate(self.program.outputs.items())
+        lines = [f"{self.output(i, name)} = {self.text(value)};" for i, (name, value) in outputs]
         lines += [f"{self.constant} next_{name} = {self.text(value)};" for name, value in tape.updates.items()]
-        lines += [f"s{self.member}{self.memory_prefix}{name} = next_{name};" for name in tape.updates]
+        lines += [f"{self.memory(name)} = next_{name};" for name in tape.updates]
         return "".join(f"    {line}\n" for line in lines)
+
+    def output(self, index: int, name: str) -> str:
+        """Return the place of an output."""
+        return f"out{self.member}{name}"
+
+    def memory(self, name: str) -> str:
+        """Return the place of a memory value."""
+        return f"s{self.member}{self.memory_prefix}{name}"
 
     def _guards(self, stage: int) -> str:
         lines: list[str] = []

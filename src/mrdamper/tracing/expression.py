@@ -10,9 +10,9 @@ that result only. A condition on the motion has no value while tracing and is re
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
@@ -24,34 +24,10 @@ class TraceError(TypeError):
     """Code of a model that cannot be converted to a program: an internal error."""
 
 
-class Recorder(Protocol):
-    """Recorder of the operations on expressions."""
-
-    def settle(self, question: Expression, /) -> bool:
-        """Evaluate a condition on parameters while tracing."""
-        ...
-
-    def apply(self, op: str, /, *args: Any) -> Any:
-        """Record an operation and return its result."""
-        ...
-
-    def select(self, condition: Any, then: Any, otherwise: Any, /) -> Any:
-        """Record a choice and return its result."""
-        ...
-
-
 class Traced:
     """Objects that replace arrays in a traced function."""
 
-    tape: Any  # the `Recorder` that made it
-
-
-@dataclass(frozen=True)
-class Operation:
-    """An operation on numbers: its value for floats, and whether it is logical."""
-
-    value: Callable[[Any], Any] | Callable[[Any, Any], Any]
-    logical: bool = False
+    tape: Any  # the `Tape` that made it
 
 
 def sign(x: float) -> float:
@@ -59,36 +35,33 @@ def sign(x: float) -> float:
     return 1.0 if x > 0 else (-1.0 if x < 0 else 0.0)
 
 
-OPERATIONS: dict[str, Operation] = {
-    "add": Operation(lambda a, b: a + b),
-    "subtract": Operation(lambda a, b: a - b),
-    "multiply": Operation(lambda a, b: a * b),
-    "divide": Operation(lambda a, b: a / b),
-    "power": Operation(math.pow),
-    "negative": Operation(lambda a: -a),
-    "absolute": Operation(abs),
-    "sign": Operation(sign),
-    "sqrt": Operation(math.sqrt),
-    "exp": Operation(math.exp),
-    "expm1": Operation(math.expm1),
-    "log": Operation(math.log),
-    "log1p": Operation(math.log1p),
-    "tan": Operation(math.tan),
-    "arctan": Operation(math.atan),
-    "tanh": Operation(math.tanh),
-    "arctanh": Operation(math.atanh),
-    "minimum": Operation(lambda a, b: a if a < b else b),
-    "maximum": Operation(lambda a, b: a if a > b else b),
-    "less": Operation(lambda a, b: a < b, logical=True),
-    "less_equal": Operation(lambda a, b: a <= b, logical=True),
-    "greater": Operation(lambda a, b: a > b, logical=True),
-    "greater_equal": Operation(lambda a, b: a >= b, logical=True),
-    "equal": Operation(lambda a, b: a == b, logical=True),
-    "not_equal": Operation(lambda a, b: a != b, logical=True),
-    "logical_and": Operation(lambda a, b: bool(a) and bool(b), logical=True),
-    "logical_or": Operation(lambda a, b: bool(a) or bool(b), logical=True),
-    "logical_not": Operation(lambda a: not a, logical=True),
-    "isfinite": Operation(math.isfinite, logical=True),
+_LOGICAL: dict[str, Callable[..., Any]] = {
+    "less": operator.lt,
+    "less_equal": operator.le,
+    "greater": operator.gt,
+    "greater_equal": operator.ge,
+    "equal": operator.eq,
+    "not_equal": operator.ne,
+    "logical_and": lambda a, b: bool(a) and bool(b),
+    "logical_or": lambda a, b: bool(a) or bool(b),
+    "logical_not": operator.not_,
+    "isfinite": math.isfinite,
+}
+OPERATIONS: dict[str, Callable[..., Any]] = {  # with the values for floats
+    "add": operator.add,
+    "subtract": operator.sub,
+    "multiply": operator.mul,
+    "divide": operator.truediv,
+    "power": math.pow,
+    "negative": operator.neg,
+    "absolute": abs,
+    "sign": sign,
+    **{name: getattr(math, name) for name in ("sqrt", "exp", "expm1", "log", "log1p", "tan", "tanh")},
+    "arctan": math.atan,
+    "arctanh": math.atanh,
+    "minimum": lambda a, b: a if a < b else b,
+    "maximum": lambda a, b: a if a > b else b,
+    **_LOGICAL,
 }
 _NUMPY: tuple[type[Any], ...] = (np.ndarray, np.generic)
 _ALIASES = {"true_divide": "divide", "bitwise_and": "logical_and", "bitwise_or": "logical_or", "invert": "logical_not"}
@@ -111,7 +84,7 @@ class Expression(NDArrayOperatorsMixin, Traced):
 
     __slots__ = ("args", "name", "op", "stage", "tape", "value")
 
-    def __init__(self, tape: Recorder, op: str, args: tuple[Any, ...], stage: int, value: Any = None, name: str = ""):
+    def __init__(self, tape: Any, op: str, args: tuple[Any, ...], stage: int, value: Any = None, name: str = ""):
         self.tape, self.op, self.args, self.stage, self.value, self.name = tape, op, args, stage, value, name
 
     def __repr__(self) -> str:
@@ -123,7 +96,7 @@ class Expression(NDArrayOperatorsMixin, Traced):
     @property
     def logical(self) -> bool:
         """True if its value is true or false."""
-        return self.op in OPERATIONS and OPERATIONS[self.op].logical
+        return self.op in _LOGICAL
 
     def __bool__(self) -> bool:
         if self.value is None:

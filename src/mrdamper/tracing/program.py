@@ -58,6 +58,11 @@ class Program:
     # name of an expression by its id; expressions without a name are written where they are used
     names: dict[int, str] = field(default_factory=dict[int, str])
 
+    @property
+    def given(self) -> tuple[float, ...]:
+        """Values of the parameters as they were traced."""
+        return tuple(float(parameter.value) for parameter in self.tape.parameters.values())
+
     def guards(self, stage: int) -> list[tuple[Expression, bool]]:
         """Guards that can be evaluated at a stage."""
         return [(question, answer) for question, answer in self.tape.guards if question.stage == stage]

@@ -9,8 +9,6 @@ from typing import Any, ClassVar
 from mrdamper.tracing.expression import PARAMETER, SAMPLE, Expression, sign
 from mrdamper.tracing.program import FUNCTIONS, Branch, Program, Repeat, Writer
 
-DONE, OUTSIDE = 0, 1  # not valid: a guard has another value
-
 
 class PythonWriter(Writer):
     """Writer of Python."""
@@ -48,7 +46,7 @@ class PythonWriter(Writer):
 def python_source(program: Program) -> str:
     """Two functions: `prepare(p)` gives (status, derived), `step(p, derived, memory, inputs)` the rest.
 
-    The rest is (status, outputs, memory); a status of 0 is good.
+    The rest is (status, outputs, memory). The status is 0, or 1 where a guard has another value.
     """
     writer, tape = PythonWriter(program), program.tape
     derived = [writer.name(node) for node in program.derived]
@@ -58,13 +56,8 @@ def python_source(program: Program) -> str:
     lines += _guards(writer, program, PARAMETER, f"(0.0,){f' * {len(derived)}' if derived else '[:0]'}")
     lines.append(f"    return 0, {_tuple(derived)}")
     lines += ["", "", "def step(_p, _d, _s, _u):"]
-    for name, members in (
-        ("_p", list(tape.parameters)),
-        ("_d", derived),
-        ("_s", list(tape.memory)),
-        ("_u", list(tape.inputs)),
-    ):
-        lines += _unpack(name, members)
+    for name, members in (("_p", tape.parameters), ("_d", derived), ("_s", tape.memory), ("_u", tape.inputs)):
+        lines += _unpack(name, list(members))
     lines += writer.lines(program.step, 1)
     lines += _guards(writer, program, SAMPLE, f"(0.0,) * {len(program.outputs)}, _s")
     outputs = [writer.text(value) for value in program.outputs.values()]
@@ -84,7 +77,7 @@ def _guards(writer: Writer, program: Program, stage: int, rest: str) -> list[str
     lines: list[str] = []
     for question, answer in program.guards(stage):
         text = writer.text(question)
-        lines += [f"    if {'not ' if answer else ''}{text}:", f"        return {OUTSIDE}, {rest}"]
+        lines += [f"    if {'not ' if answer else ''}{text}:", f"        return 1, {rest}"]
     return lines
 
 

@@ -143,11 +143,7 @@ class Tape:
         return self._note("lookup", (indices[0] if indices else len(self.tables) - 1, x))
 
     def loop(
-        self,
-        start: Sequence[Any],
-        body: Callable[..., tuple[Any, Sequence[Any]]],
-        most: int,
-        still: int = 0,
+        self, start: Sequence[Any], body: Callable[..., tuple[Any, Sequence[Any]]], most: int, still: int = 0
     ) -> tuple[Expression, ...]:
         """Repeat `body(*carried) -> (whether to continue, new values)` with a largest number of repetitions."""
         loop = TracedLoop([plain(value) for value in start], most, still)
@@ -181,10 +177,7 @@ class Tape:
 def streamed(step: Callable[..., Any]) -> Callable[[F], F]:
     """Give a function of arrays its form for one sample.
 
-    Parameters
-    ----------
-    step : function of (tape, *arguments)
-        Records memory and operations of a sample; returns the value there.
+    `step`, a function of (tape, *arguments), records memory and operations of a sample and returns the value there.
     """
 
     def decorate(of_arrays: F) -> F:
@@ -226,6 +219,6 @@ def _value(op: str, args: tuple[Any, ...]) -> Any:
     if op == "lookup" or any(v is None for v in values):
         return None
     try:
-        return OPERATIONS[op].value(*values)
+        return OPERATIONS[op](*values)
     except (ValueError, OverflowError, ZeroDivisionError):
         return None

@@ -87,7 +87,7 @@ def _gain() -> float | None:
 
     model = Spencer(c1=1e4, c0_ratio=0.1, k0_rate=1.0, creep=0.01, yield_displacement=1e-4)
     record = RecordProgram(trace(damper_of(model)))
-    given = tuple(float(e.value) for e in record.program.tape.parameters.values())
+    given = record.program.given
     derived = record.prepare(given) or ()
     turns = np.linspace(0.0, 30.0, 1500)
     motion = (0.01 * np.sin(turns), 0.06 * np.cos(turns), -0.36 * np.sin(turns), np.zeros(1500), np.full(1500, 2e-3))

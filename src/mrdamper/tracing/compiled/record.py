@@ -37,7 +37,7 @@ class RecordProgram:
     def __init__(self, program: Program):
         self.program = program
         self.starts = tuple(program.tape.starts.values())
-        self._prepare, self._step = python_functions(program)
+        self._prepare, self.step = python_functions(program)
         self._walked = 0
 
     def prepare(self, given: Sequence[float]) -> tuple[float, ...] | None:
@@ -58,7 +58,7 @@ class RecordProgram:
         """
         arrays = [np.asarray(channel, dtype=float) for channel in channels]
         size = arrays[0].size
-        self._walked += size * self._lines
+        self._walked += size * self.lines
         if self._walked > _MIN_COMPILED_LINES and (library := self._library) is not None:
             return _compiled_along(library, self.program, given, derived, memory, arrays)
         return self.interpreted_along(given, derived, memory, arrays)
@@ -88,7 +88,7 @@ class RecordProgram:
         held, given, derived = tuple(memory), tuple(given), tuple(derived)
         for i, sample in enumerate(zip(*(channel.tolist() for channel in arrays), strict=True)):
             try:
-                status, out, after = self._step(given, derived, held, sample)
+                status, out, after = self.step(given, derived, held, sample)
             except (ValueError, ArithmeticError):
                 return Along(outputs, held, i)
             if status:
@@ -97,7 +97,8 @@ class RecordProgram:
         return Along(outputs, held, -1)
 
     @cached_property
-    def _lines(self) -> int:
+    def lines(self) -> int:
+        """Lines of the program, the cost of a sample in the interpreter."""
         return python_source(self.program).count("\n")
 
     @cached_property
@@ -116,7 +117,7 @@ class RecordProgram:
             **{name: size * (0.5 + 0.1 * turns) for name, size in _POSITIVE.items()},
         }
         arrays = [values.get(name, (1 + k) * 1e-2 * np.sin(turns)) for k, name in enumerate(self.program.tape.inputs)]
-        given = [float(e.value) for e in self.program.tape.parameters.values()]
+        given = self.program.given
         derived = self.prepare(given)
         if derived is None:
             return True

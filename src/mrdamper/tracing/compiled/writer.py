@@ -18,11 +18,8 @@ PREAMBLE = _HERE.with_name("preamble.c").read_text(encoding="utf-8")
 class ArrayWriter(CWriter):
     """C whose parameters, derived numbers, memory, inputs and outputs are elements of arrays.
 
-    Parameters
-    ----------
-    keep : bool
-        Keep results that depend on the time step or the current alone until these change; step functions then take one
-        more array.
+    With `keep`, results that depend on the time step or the current alone are kept until these change; step functions
+    then take one more array.
     """
 
     member = "["
@@ -92,14 +89,11 @@ class ArrayWriter(CWriter):
     def name(self, expression: Expression) -> str:
         return self._places.get(id(expression)) or super(CWriter, self).name(expression)
 
-    def results(self) -> str:
-        """Write outputs, then the new memory: all of it is computed before any of it is stored."""
-        tape = self.program.tape
-        places = {name: self._places[id(tape.memory[name])] for name in tape.updates}
-        lines = [f"out[{i}] = {self.text(value)};" for i, value in enumerate(self.program.outputs.values())]
-        lines += [f"{self.constant} next_{name} = {self.text(value)};" for name, value in tape.updates.items()]
-        lines += [f"{place} = next_{name};" for name, place in places.items()]
-        return "".join(f"    {line}\n" for line in lines)
+    def output(self, index: int, name: str) -> str:
+        return f"out[{index}]"
+
+    def memory(self, name: str) -> str:
+        return self._places[id(self.program.tape.memory[name])]
 
 
 # Inputs that are constant over most samples.
