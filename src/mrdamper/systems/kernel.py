@@ -11,60 +11,65 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError
 from mrdamper.tracing import Program
+from mrdamper.tracing.compiled import RecordProgram
 
 _MAX_EVALUATIONS = 60  # evaluations of one element in one search
 _MAX_SWEEPS = 50  # over all elements in one step
 _FORCE_TOLERANCE = 1e-8  # of an element's largest force so far
 
-Step = Callable[..., Any]
-
 
 @dataclass(frozen=True, eq=False)
 class LoopElement:
-    """A function for one sample, with its parameters: (p, derived, memory, inputs) → (status, outputs, memory)."""
+    """A program for one sample with parameters, and the gain and offset of its first output."""
 
-    step: Step
-    given: tuple[float, ...]  # its parameters
-    derived: tuple[float, ...]  # derived constants
-    start: tuple[float, ...]  # the memory before the first sample
-    program: Program  # source of `step`
-    lines: int  # lines of the program, the cost of a step in the interpreter
-    prepare: Callable[..., Any]  # from other parameters to (status, derived)
-    names: tuple[str, ...] = ()  # of its parameters
-    scale: tuple[float, float] = (1.0, 0.0)  # gain and offset of its first output
+    source: RecordProgram
+    given: tuple[float, ...]  # parameters
+    derived: tuple[float, ...]  # constants that follow from these
+    scale: tuple[float, float] = (1.0, 0.0)  # gain and offset
+
+    @classmethod
+    def of(cls, program: Program) -> LoopElement:
+        """Return a traced program with the parameters it was traced with."""
+        source = RecordProgram(program)
+        return cls(source, program.given, source.prepare(program.given) or ())
+
+    @property
+    def program(self) -> Program:
+        """The program."""
+        return self.source.program
+
+    @property
+    def start(self) -> tuple[float, ...]:
+        """Memory before the first sample."""
+        return self.source.starts
 
     @property
     def scaled_given(self) -> tuple[float, ...]:
         """Gain, offset and parameters, concatenated."""
         return (*self.scale, *self.given)
 
-    def scaled(self, gain: float, offset: float) -> LoopElement:
-        """Return the stage with its first output times a gain, plus an offset."""
-        return replace(self, scale=(gain, offset))
-
     @property
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of parameters, derived constants and memory values."""
         return len(self.given), len(self.derived), len(self.start)
 
-    def at(self, given: tuple[float, ...]) -> LoopElement:
-        """Return the stage with other parameters.
+    def at(self, given: tuple[float, ...], scale: tuple[float, float]) -> LoopElement:
+        """Return the element with other parameters, gain and offset.
 
         Raises `ParameterError` if they need another program: another branch, or other bounds.
         """
-        status, derived = self.prepare(given)
-        if status or len(given) != len(self.given):
+        derived = self.source.prepare(given)
+        if derived is None or len(given) != len(self.given):
             raise ParameterError("parameters that need another program", remedy="trace that damper by itself")
-        return replace(self, given=given, derived=tuple(derived))
+        return LoopElement(self.source, given, derived, scale)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +81,9 @@ class ElementParameters:
     start: Floats
 
     @classmethod
-    def of(cls, stages: Sequence[LoopElement]) -> ElementParameters:
+    def of(cls, elements: Sequence[LoopElement]) -> ElementParameters:
         def joined(name: str) -> Floats:
-            return np.array([value for stage in stages for value in getattr(stage, name)], dtype=float)
+            return np.array([value for element in elements for value in getattr(element, name)], dtype=float)
 
         return cls(joined("scaled_given"), joined("derived"), joined("start"))
 
@@ -94,13 +99,13 @@ def interpreted_loop(elements: Sequence[LoopElement], control: LoopElement | Non
     def evaluate(j, p, d, memory, later, x, v, a, current, dt):
         (p0, d0, m0), (p1, d1, m1) = ends[j : j + 2]
         given = (_numbers(part) for part in (p[p0 + 2 : p1], d[d0:d1], memory[m0:m1]))
-        status, out, later[m0:m1] = elements[j].step(*given, (x, v, a, current, dt))
+        status, out, later[m0:m1] = elements[j].source.step(*given, (x, v, a, current, dt))
         return status, p[p0] * out[0] + p[p0 + 1], out[1]
 
     def command(p, d, memory, y, out):
         assert control is not None
         inputs = _numbers(y[: len(control.program.tape.inputs)])
-        status, out[:], memory[:] = control.step(_numbers(p[2:]), _numbers(d), _numbers(memory), inputs)
+        status, out[:], memory[:] = control.source.step(_numbers(p[2:]), _numbers(d), _numbers(memory), inputs)
         return status
 
     return partial(walk, evaluate, command)

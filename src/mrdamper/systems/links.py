@@ -11,25 +11,13 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.causal import trace
 from mrdamper.systems.kernel import LoopElement
 from mrdamper.systems.structure import Link
-from mrdamper.tracing import Program, Tape, program
-from mrdamper.tracing.python import python_functions, python_source
-
-
-def stage_of(program: Program) -> LoopElement:
-    """Return a traced program as a stage; its parameters as they were traced."""
-    prepare, step = python_functions(program)
-    given = tuple(float(e.value) for e in program.tape.parameters.values())
-    derived = prepare(given)[1]
-    lines, tape = python_source(program).count("\n"), program.tape
-    return LoopElement(
-        step, given, tuple(derived), tuple(tape.starts.values()), program, lines, prepare, tuple(tape.parameters)
-    )
+from mrdamper.tracing import Tape, program
 
 
 @lru_cache(maxsize=32)  # a loop is prepared for every law
 def damper_stage(damper: Damper, free: bool = False) -> LoopElement:
     """Return a damper as a stage, with variable parameters on request; raises as `stream`."""
-    return stage_of(trace(damper, free))
+    return LoopElement.of(trace(damper, free))
 
 
 @lru_cache(maxsize=32)
@@ -42,7 +30,7 @@ def contact_stage(link: Link) -> LoopElement:
     for name in ("acceleration", "current", "dt"):
         tape.input(name)
     force, touching = (_stop if link.role == "stop" else _tyre)(tape, x, v, stiffness, damping, gap)
-    return stage_of(program(tape, {"force": force, "flags": tape.select(touching, 1.0, 0.0)}))
+    return LoopElement.of(program(tape, {"force": force, "flags": tape.select(touching, 1.0, 0.0)}))
 
 
 def _stop(tape: Tape, x: Any, v: Any, stiffness: Any, damping: Any, gap: Any) -> tuple[Any, Any]:

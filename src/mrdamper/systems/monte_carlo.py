@@ -155,7 +155,8 @@ def _numbers(loop: SystemLoop, one: Mapping[str, Draw]) -> ElementParameters:
         if link.name in one:
             drawn = one[link.name]
             moved = {free_name(name): value for name, value in drawn.numbers.items()}
-            given = tuple(moved.get(name, value) for name, value in zip(stage.names, stage.given, strict=True))
-            stage = stage.at(given).scaled(1.0 + drawn.gain, drawn.offset)
+            names = stage.program.tape.parameters
+            given = tuple(moved.get(name, value) for name, value in zip(names, stage.given, strict=True))
+            stage = stage.at(given, (1.0 + drawn.gain, drawn.offset))
         stages.append(stage)
     return ElementParameters.of(stages)

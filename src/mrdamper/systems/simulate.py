@@ -20,7 +20,7 @@ from mrdamper.systems.controllers.preview import NonCausalOptimum
 from mrdamper.systems.inputs import Input
 from mrdamper.systems.kernel import ElementParameters, LoopElement, interpreted_loop, slope_and_scale
 from mrdamper.systems.linear import aims, linear_system
-from mrdamper.systems.links import contact_stage, damper_stage, stage_of
+from mrdamper.systems.links import contact_stage, damper_stage
 from mrdamper.systems.machine import compiled_loop
 from mrdamper.systems.result import HALVING, PART, Simulation
 from mrdamper.systems.structure import System
@@ -159,7 +159,7 @@ class SystemLoop:
                 remedy=f"between two and {_MAX_STEPS:,} steps",
             )
         if machine is None:
-            lines = _LINES_PER_STEP + 3 * sum(stage.lines for stage in (*self.stages, *self._controllers))
+            lines = _LINES_PER_STEP + 3 * sum(stage.source.lines for stage in (*self.stages, *self._controllers))
             machine = 3 * samples * lines > _MAX_INTERPRETED_LINES  # this run and that at half the step
         done = self._at_rest(dt * np.arange(samples, dtype=np.float64))
         S: Any = np.linalg.inv(2 / dt * system.M + system.C + dt / 2 * system.K)
@@ -291,7 +291,7 @@ class SystemLoop:
     @cached_property
     def _controllers(self) -> list[LoopElement]:
         """None or one."""
-        return [stage_of(self.control.program)] if self.control.program else []
+        return [LoopElement.of(self.control.program)] if self.control.program else []
 
     def _walk(self, machine: bool) -> Any:
         if machine not in self._walks:
