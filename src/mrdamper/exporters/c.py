@@ -74,10 +74,8 @@ def write_program(traced: Program, name: str, title: str, folder: str | Path) ->
 
 def self_test(stepping: Stream, name: str) -> str:
     """Write a program that steps the model along a motion and compares the forces with a reference."""
-    x, current, dt = reference_motion(stepping)
-    steps = Stepper(stepping)
-    force = [steps.step(*sample, dt) for sample in zip(x.tolist(), current.tolist(), strict=True)]
-    rows = [f"{{{x!r}, {i!r}, {f!r}}}" for x, i, f in zip(x.tolist(), current.tolist(), force, strict=True)]
+    motion, force, dt = reference_force(stepping)
+    rows = [f"{{{x!r}, {i!r}, {f!r}}}" for (x, i), f in zip(motion, force, strict=True)]
     return render("model_test.c.j2", name=name, upper=name.upper(), rows=rows, dt=repr(dt), tolerance=TOLERANCE)
 
 
@@ -92,6 +90,15 @@ def reference_motion(stepping: Stream, samples: int = _TEST_SAMPLES) -> tuple[np
     x = amplitude * np.minimum(1.0, 0.2 + turns / 2) * np.sin(2 * np.pi * turns)
     current = np.where(turns % 1 < 0.6, low + 0.5 * (high - low), low + 0.8 * (high - low))
     return x, current, float(2 / (frequency * (samples - 1)))
+
+
+def reference_force(
+    stepping: Stream, samples: int = _TEST_SAMPLES
+) -> tuple[list[tuple[float, float]], list[float], float]:
+    """Displacement [m] and current [A] of `reference_motion`, the stepper's force [N] there, and the time step [s]."""
+    x, current, dt = reference_motion(stepping, samples)
+    steps, motion = Stepper(stepping), list(zip(x.tolist(), current.tolist(), strict=True))
+    return motion, [steps.step(*sample, dt) for sample in motion], dt
 
 
 def c_facts(stepping: Stream, name: str, rig: str, language: type[CWriter] = CWriter) -> dict[str, Any]:
@@ -202,10 +209,5 @@ def _parameter(info: Any, value: float) -> Mapping[str, str]:
 def _envelope(stepping: Stream) -> list[tuple[str, str, str]]:
     if stepping.envelope is None:
         return []
-    return [
-        (name.upper(), repr(float(low)), repr(float(high)))
-        for name, (low, high) in (
-            (name, getattr(stepping.envelope, name))
-            for name in ("current_A", "frequency_Hz", "amplitude_m", "peak_velocity_m_s")
-        )
-    ]
+    names = ("current_A", "frequency_Hz", "amplitude_m", "peak_velocity_m_s")
+    return [(name.upper(), *(repr(float(end)) for end in getattr(stepping.envelope, name))) for name in names]

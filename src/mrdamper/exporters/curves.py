@@ -7,7 +7,6 @@ defined here. DYNA4 takes vectors and matrices of MATLAB, under names that diffe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -22,7 +21,7 @@ from mrdamper.exporters.base import Exporter, Written
 from mrdamper.exporters.templates import render
 from mrdamper.models import Model
 
-COLUMNS = ("current_A", "amplitude_m", "velocity_m_s", "force_N", "peak_force_N", "tested")
+_COLUMNS = ("velocity_m_s", "force_N", "peak_force_N", "tested")
 _SPEEDS, _CURRENTS = 12, 6
 _MIN_VELOCITY_SHARE = 0.02  # of the highest tested velocity
 
@@ -36,11 +35,13 @@ class TableExporter(Exporter):
     def export(self, damper: Damper | Model, name: str) -> Written:
         curves = force_velocity(damper)
         rows = [row for curve in curves for row in curve.rows]
-        heads = ["velocity_m_s", *(f"force_N_at_{c.current_A:g}_A" for c in curves)]
-        grid = [[float(v), *(float(c.force[i]) for c in curves)] for i, v in enumerate(curves[0].velocity)]
+        grid = [
+            {"velocity_m_s": float(v)} | {f"force_N_at_{c.current_A:g}_A": float(c.force[i]) for c in curves}
+            for i, v in enumerate(curves[0].velocity)
+        ]
         note = f"sines of {1e3 * curves[0].amplitude_m:.3g} mm, force at mid-stroke; no hysteresis in such a table"
-        files = {f"{name}_force_velocity.csv": _csv(COLUMNS, rows), f"{name}_grid.csv": _csv(heads, grid)}
-        return Written(files, (note,))
+        files = {f"{name}_force_velocity.csv": csv_text(rows), f"{name}_grid.csv": csv_text(grid)}
+        return Written({file: text.encode() for file, text in files.items()}, (note,))
 
 
 class AdamsExporter(Exporter):
@@ -56,13 +57,7 @@ class AdamsExporter(Exporter):
             at_rest = float(curve.force[half - 1 : half + 1].mean())
             points = [*zip(1e3 * curve.velocity[:half], curve.force[:half], strict=True), (0.0, at_rest)]
             points += zip(1e3 * curve.velocity[half:], curve.force[half:], strict=True)
-            text = render(
-                "damper.dmp.j2",
-                rig=damper_of(damper).rig,
-                current=curve.current_A,
-                amplitude=curve.amplitude_m,
-                points=points,
-            )
+            text = render("damper.dmp.j2", rig=damper_of(damper).rig, curve=curve, points=points)
             files[f"{name}_{curve.current_A:.3g}A.dmp".replace("-", "minus")] = text.encode("ascii", "replace")
         return Written(files, ("the curves contain no hysteresis; c and fmu do",))
 
@@ -108,10 +103,12 @@ class ForceVelocity:
     tested: np.ndarray  # (K,), whether the sine lies inside the tested ranges
 
     @property
-    def rows(self) -> list[tuple[float, ...]]:
-        """The curve as rows of `COLUMNS`."""
-        points = zip(self.velocity, self.force, self.peak_force, self.tested, strict=True)
-        return [(self.current_A, self.amplitude_m, *map(float, forces), int(tested)) for *forces, tested in points]
+    def rows(self) -> list[dict[str, float]]:
+        """The curve as rows of a table."""
+        head = {"current_A": self.current_A, "amplitude_m": self.amplitude_m}
+        columns = (self.velocity, self.force, self.peak_force, self.tested.astype(int))
+        points = zip(*(column.tolist() for column in columns), strict=True)
+        return [head | dict(zip(_COLUMNS, point, strict=True)) for point in points]
 
 
 def force_velocity(given: Damper | Model) -> list[ForceVelocity]:
@@ -121,9 +118,9 @@ def force_velocity(given: Damper | Model) -> list[ForceVelocity]:
     in the logarithm. Raises `InputError` (E_EXPORT) if the damper has no tested ranges.
     """
     damper = damper_of(given)
-    if not damper.envelope.tested:
-        raise InputError("a model without tested ranges", remedy="export a saved damper", code="E_EXPORT")
     envelope = damper.envelope
+    if not envelope.tested:
+        raise InputError("a model without tested ranges", remedy="export a saved damper", code="E_EXPORT")
     amplitude = float(np.sqrt(np.prod(envelope.amplitude_m)))
     highest = envelope.peak_velocity_m_s[1]
     speeds = np.geomspace(_MIN_VELOCITY_SHARE * highest, highest, _SPEEDS)
@@ -147,7 +144,3 @@ def _curve(damper: Damper, current: float, amplitude: float, speeds: Floats) -> 
         np.concatenate([lowest[::-1], highest]),
         np.concatenate([tested[::-1], tested]),
     )
-
-
-def _csv(head: Sequence[str], rows: Sequence[Sequence[float]]) -> bytes:
-    return csv_text([dict(zip(head, row, strict=True)) for row in rows]).encode()

@@ -7,7 +7,7 @@ import io
 import math
 import uuid
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -21,7 +21,7 @@ from mrdamper.data.encoding import csv_text
 from mrdamper.errors import InputError
 from mrdamper.exporters.base import Exporter, Written, identifier
 from mrdamper.exporters.c import c_facts, c_sources, reference_motion
-from mrdamper.exporters.fmu_description import c_bounds, description_facts, parameters_of_stream, serial_fields
+from mrdamper.exporters.fmu_description import description_facts
 from mrdamper.exporters.templates import render
 from mrdamper.exporters.toolchain import PLATFORMS, build_library
 from mrdamper.models import Model
@@ -130,17 +130,19 @@ def _walk(steps: Stepper, samples: list[tuple[float, float]], step: float, count
 
 
 def fmu_texts(damper: Damper | Model, name: str, fmi: int) -> dict[str, bytes]:
-    """Return the texts of an FMU by path. The token is a hash of the others."""
+    """Return the texts of the FMU of a damper by path."""
     stepping = stream(damper)
     expected = reference(stepping)
     rig = damper_of(damper).rig
+    time = expected.step * np.arange(expected.force.size, dtype=np.float64)
+    given = {"displacement": expected.displacement, "velocity": expected.velocity, "current": expected.current}
+    outputs = {
+        "force": expected.force,
+        **{f"outside_{flag}": expected.flags >> bit & 1 for bit, flag in enumerate(FLAGS)},
+    }
     facts = _facts(stepping, name, rig, fmi, expected)
-    return with_token(lambda token: _texts(stepping, facts, expected, rig, token))
-
-
-def with_token(texts: Callable[[str], dict[str, bytes]]) -> dict[str, bytes]:
-    """Return the texts with the token, which is computed without it."""
-    return texts(token_of(texts("")))
+    sources = c_sources(stepping, name, rig)
+    return all_texts(facts, sources, "fmu_instance", "fmu_documentation", time, given, outputs)
 
 
 def token_of(files: Mapping[str, bytes]) -> str:
@@ -166,34 +168,19 @@ def zipped(files: Mapping[str, bytes]) -> bytes:
 
 
 def _facts(stepping: Stream, name: str, rig: str, fmi: int, expected: Reference) -> dict[str, Any]:
-    facts = c_facts(stepping, name, rig)
-    infos = parameters_of_stream(stepping)
-    envelope = stepping.envelope
-    facts |= description_facts(stepping, fmi, expected.internal_step, envelope.current_A[0] if envelope else 0.0)
-    facts |= serial_fields(facts["members"], [info.name for info, _ in infos])
-    facts["parameters"] = [{"name": i.name, "tunable": tunable, "bounds": c_bounds(i)} for i, tunable in infos]
-    facts["envelope"] = [
-        (text, *(f"{factor * bound:.4g}" for bound in getattr(envelope, field)), unit)
-        for text, field, factor, unit in _TESTED
-        if envelope
-    ]
+    facts, envelope = c_facts(stepping, name, rig), stepping.envelope
+    facts |= description_facts(stepping, fmi, expected.internal_step, facts["members"])
     return facts | {
         "fmi": fmi,
+        "envelope": [
+            (text, *(f"{factor * bound:.4g}" for bound in getattr(envelope, field)), unit)
+            for text, field, factor, unit in _TESTED
+            if envelope
+        ],
         "most_steps": MOST_STEPS,
         "stop_time": repr(expected.step * (expected.force.size - 1)),
         "about": f"{stepping.title}{f' of rig {rig}' if rig else ''}, written by mrdamper.",
     }
-
-
-def _texts(stepping: Stream, facts: Mapping[str, Any], expected: Reference, rig: str, token: str) -> dict[str, bytes]:
-    time = expected.step * np.arange(expected.force.size, dtype=np.float64)
-    given = {"displacement": expected.displacement, "velocity": expected.velocity, "current": expected.current}
-    outputs = {
-        "force": expected.force,
-        **{f"outside_{flag}": expected.flags >> bit & 1 for bit, flag in enumerate(FLAGS)},
-    }
-    sources = c_sources(stepping, facts["name"], rig)
-    return all_texts({**facts, "token": token}, sources, "fmu_instance", "fmu_documentation", time, given, outputs)
 
 
 def all_texts(
@@ -207,9 +194,23 @@ def all_texts(
 ) -> dict[str, bytes]:
     """Collect the texts of an FMU by path: C sources and those of an instance, its description, its reference.
 
+    The token in them is a hash of the others.
     `facts` are for the templates, `instance` and `page` the templates of the FMI functions and of the documentation.
     `time` [s], `given` and `outputs` are the reference, (N,) each.
     """
+
+    def with_token(token: str) -> dict[str, bytes]:
+        return _texts({**facts, "token": token}, sources, instance, page) | tables
+
+    tables = {
+        "resources/reference_in.csv": _csv_table({"time": time, **given}),
+        "resources/reference_out.csv": _csv_table({"time": time, **outputs}),
+    }
+    return with_token(token_of(with_token("")))
+
+
+def _texts(facts: Mapping[str, Any], sources: Mapping[str, str], instance: str, page: str) -> dict[str, bytes]:
+    """Fill the templates of an FMU."""
     name, fmi = facts["name"], facts["fmi"]
     sources = {
         **sources,
@@ -224,13 +225,11 @@ def all_texts(
         "modelDescription.xml": render(f"modelDescription_fmi{fmi}.xml.j2", **facts, source_files=listed),
         **{f"sources/{file}": text for file, text in sources.items()},
         "documentation/index.html": render(f"{page}.html.j2", **facts),
-        "resources/reference_in.csv": _csv_table({"time": time, **given}),
-        "resources/reference_out.csv": _csv_table({"time": time, **outputs}),
     }
     return {path: text.encode() for path, text in texts.items()}
 
 
-def _csv_table(columns: Mapping[str, np.ndarray]) -> str:
+def _csv_table(columns: Mapping[str, np.ndarray]) -> bytes:
     """Return rows of numbers under their names, with all digits."""
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return csv_text([dict(zip(columns, row, strict=True)) for row in rows])
+    return csv_text([dict(zip(columns, row, strict=True)) for row in rows]).encode()

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 from mrdamper.dampers.streaming import FLAGS, Stepper, Stream
 from mrdamper.data.parameters import ParameterInfo
@@ -39,28 +39,64 @@ class Variable:
 
     name: str
     description: str
-    symbol: str  # of its value reference in the C source
-    reference: int  # of its value
-    index: int  # index among the variables, from one
+    kind: Literal["real", "flag", "choice"]
     causality: str  # as the standard names them
     variability: str
-    initial: str  # may be empty
-    kind: str  # "real", "flag" or "choice"
-    unit: str
-    attributes: tuple[tuple[str, str], ...]  # of its type: unit, start, bounds
+    unit: str = ""
+    start: float | None = None
+    low: float = -math.inf
+    high: float = math.inf
+    declared_type: str = ""  # of a choice
+    symbol: str = ""  # of its value reference in the C source; default: its name
+    reference: int = 0  # of its value
+    index: int = 0  # among the variables, from one
 
     @property
-    def fmi2_type(self) -> str:
-        return {"real": "Real", "flag": "Boolean", "choice": "Enumeration"}[self.kind]
+    def initial(self) -> str:
+        """How its first value is found, as the standard names it."""
+        return {"output": "calculated", "parameter": "exact", "local": "exact"}.get(self.causality, "")
 
     @property
-    def fmi3_type(self) -> str:
-        return {"real": "Float64", "flag": "Boolean", "choice": "Enumeration"}[self.kind]
+    def attributes(self) -> list[tuple[str, str]]:
+        """Declared type, unit, bounds and start."""
+        bounds = (("min", self.low), ("max", self.high))
+        texts = (("declaredType", self.declared_type), ("unit", self.unit), ("displayUnit", _SHOWN.get(self.unit)))
+        limits = [(word, repr(float(bound))) for word, bound in bounds if math.isfinite(bound)]
+        start = [("start", repr(self.start))] if self.start is not None else []
+        return [*((word, text) for word, text in texts if text), *limits, *start]
+
+    def type_in(self, fmi: int) -> str:
+        """Return its type as a version of the standard names it."""
+        return {"real": "Real" if fmi == 2 else "Float64", "flag": "Boolean", "choice": "Enumeration"}[self.kind]
 
 
-def description_facts(stepping: Stream, fmi: int, internal_step: float, current: float) -> dict[str, Any]:
-    """Collect the template values of an FMU beyond those of the C source."""
-    variables = _variables(stepping, fmi, internal_step, current)
+def numbered(variables: Sequence[Variable], fmi: int) -> list[Variable]:
+    """Give variables their value references, in this order, and their indices; time exists in FMI 3 only."""
+    shown = [replace(v, reference=at) for at, v in enumerate(variables) if fmi == 3 or v.name != "time"]
+    return [replace(v, index=index) for index, v in enumerate(shown, 1)]
+
+
+def description_facts(stepping: Stream, fmi: int, internal_step: float, members: Sequence[str]) -> dict[str, Any]:
+    """Collect the template values of an FMU beyond those of the C source, whose memory has these members."""
+    current = stepping.envelope.current_A[0] if stepping.envelope else 0.0
+    parameters = parameters_of_stream(stepping)
+    variables = numbered(
+        [
+            Variable("time", "Time", "real", "independent", "continuous", "s"),
+            Variable("displacement", "Displacement from mid-stroke", "real", "input", "continuous", "m", 0.0),
+            Variable("velocity", "Velocity; used with drive 2 and 3", "real", "input", "continuous", "m/s", 0.0),
+            Variable("current", "Coil current", "real", "input", "continuous", "A", current),
+            Variable("force", "Damper force", "real", "output", "continuous", "N"),
+            *(Variable(f"outside_{f}", f"The {f} lies outside the tested range", "flag", "output", "discrete")
+              for f in FLAGS),
+            Variable("status", "Outcome of the last step", "choice", "output", "discrete", declared_type="Status"),
+            Variable("drive", "What makes the motion", "choice", "parameter", "fixed", "", 1, declared_type="Drive"),
+            Variable("internal_step", "Longest internal step", "real", "parameter", "tunable", "s", internal_step,
+                     SHORTEST),
+            *(_parameter(stepping, info, tunable) for info, tunable in parameters),
+        ],
+        fmi,
+    )  # fmt: skip
     return {
         "variables": variables,
         "units": units_of(v.unit for v in variables if v.unit),
@@ -68,64 +104,24 @@ def description_facts(stepping: Stream, fmi: int, internal_step: float, current:
             {"name": "Drive", "description": "What makes the motion", "choices": DRIVES},
             {"name": "Status", "description": "Outcome of the last step", "choices": STATUSES},
         ),
+        "parameters": [{"name": i.name, "tunable": tunable, "bounds": _c_bounds(i)} for i, tunable in parameters],
         "drive_items": [(word, number) for word, number, _ in DRIVES],
         "status_texts": [text for _, _, text in STATUSES],
         "flags": FLAGS,
         "shortest": repr(SHORTEST),
         "current_start": repr(current),
         "internal_step": repr(internal_step),
+        **_serial_fields(members, [info.name for info, _ in parameters]),
     }
 
 
-def _variables(stepping: Stream, fmi: int, internal_step: float, current: float) -> list[Variable]:
-    """Return all variables in the order of their value references; time exists in FMI 3 only."""
-    named: list[dict[str, Any]] = []
-
-    def add(name: str, description: str, kind: str, causality: str, variability: str, **more: Any) -> None:
-        named.append({"name": name, "description": description, "kind": kind, "causality": causality}
-                     | {"variability": variability, "symbol": name} | more)  # fmt: skip
-
-    add("time", "Time", "real", "independent", "continuous", unit="s")
-    add("displacement", "Displacement from mid-stroke", "real", "input", "continuous", unit="m", start=0.0)
-    add("velocity", "Velocity; used with drive 2 and 3", "real", "input", "continuous", unit="m/s", start=0.0)
-    add("current", "Coil current", "real", "input", "continuous", unit="A", start=current)
-    add("force", "Damper force", "real", "output", "continuous", unit="N")
-    for flag in FLAGS:
-        add(f"outside_{flag}", f"The {flag} lies outside the tested range", "flag", "output", "discrete")
-    add("status", "Outcome of the last step", "choice", "output", "discrete", type="Status")
-    add("drive", "What makes the motion", "choice", "parameter", "fixed", type="Drive", start=1)
-    step = {"unit": "s", "start": internal_step, "low": SHORTEST}
-    add("internal_step", "Longest internal step", "real", "parameter", "tunable", **step)
-    for info, tunable in parameters_of_stream(stepping):
-        value, unit = getattr(stepping.model, info.name), unit_name(info, stepping)
-        kind = ("parameter", "tunable") if tunable else ("local", "constant")
-        bounds = {"low": info.bounds[0], "high": info.bounds[1]} if tunable else {}
-        meaning = info.meaning[:1].upper() + info.meaning[1:]
-        add(info.name, meaning, "real", *kind, unit=unit, start=value, symbol=f"p_{info.name}", **bounds)
-    shown = [(reference, v) for reference, v in enumerate(named) if fmi == 3 or v["name"] != "time"]
-    return [variable(v, reference, index) for index, (reference, v) in enumerate(shown, 1)]
-
-
-def variable(v: dict[str, Any], reference: int, index: int) -> Variable:
-    """Return a variable by its name."""
-    attributes = []
-    if "type" in v:
-        attributes.append(("declaredType", v["type"]))
-    unit = v.get("unit", "")
-    if unit:
-        attributes.append(("unit", unit))
-        if unit in _SHOWN:
-            attributes.append(("displayUnit", _SHOWN[unit]))
-    attributes += [
-        (word, repr(float(v[key])))
-        for word, key in (("min", "low"), ("max", "high"))
-        if math.isfinite(v.get(key, math.inf))
-    ]
-    if "start" in v:
-        attributes.append(("start", repr(v["start"])))
-    initial = {"output": "calculated", "parameter": "exact", "local": "exact"}.get(v["causality"], "")
-    own = {key: v[key] for key in ("name", "description", "symbol", "causality", "variability", "kind")}
-    return Variable(**own, reference=reference, index=index, initial=initial, unit=unit, attributes=tuple(attributes))
+def _parameter(stepping: Stream, info: ParameterInfo, tunable: bool) -> Variable:
+    """Describe a parameter of the model; one that must keep its value is a constant."""
+    meaning = info.meaning[:1].upper() + info.meaning[1:]
+    kind = ("parameter", "tunable") if tunable else ("local", "constant")
+    low, high = info.bounds if tunable else (-math.inf, math.inf)
+    value, unit = getattr(stepping.model, info.name), unit_name(info, stepping)
+    return Variable(info.name, meaning, "real", *kind, unit, value, low, high, symbol=f"p_{info.name}")
 
 
 def parameters_of_stream(stepping: Stream) -> list[tuple[ParameterInfo, bool]]:
@@ -183,7 +179,7 @@ def _registry() -> Any:
     return UnitRegistry()
 
 
-def serial_fields(members: Sequence[str], parameters: Sequence[str]) -> dict[str, Any]:
+def _serial_fields(members: Sequence[str], parameters: Sequence[str]) -> dict[str, Any]:
     """List the serialized state: how each number is read from the state and written to it."""
     fields: list[tuple[str, str, str]] = []  # get, set to, kept when
     inputs = [f"{group}.{name}" for group in ("set", "last") for name in ("displacement", "velocity", "current")]
@@ -213,7 +209,7 @@ def serial_fields(members: Sequence[str], parameters: Sequence[str]) -> dict[str
     }
 
 
-def c_bounds(info: ParameterInfo) -> str:
+def _c_bounds(info: ParameterInfo) -> str:
     """Write the bounds of a value as a condition in C; empty without bounds."""
     low, high = info.bounds
     checks = [f"value >= {float(low)!r}"] if math.isfinite(low) else []

@@ -12,12 +12,12 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.encoding import c_comment
-from mrdamper.exporters.base import Written, identifier, write_export
+from mrdamper.exporters.base import identifier, write_export
 from mrdamper.exporters.c import program_sources
-from mrdamper.exporters.fmu import MOST_STEPS, FMUExporter, all_texts, with_token
-from mrdamper.exporters.fmu_description import units_of, variable
+from mrdamper.exporters.fmu import MOST_STEPS, FMUExporter, all_texts
+from mrdamper.exporters.fmu_description import Variable, numbered, units_of
 from mrdamper.tracing import Program
-from mrdamper.tracing.python import python_functions
+from mrdamper.tracing.compiled import RecordProgram
 
 _REFERENCE_STEP_S = 2.0**-10  # s, of the reference if the program has no period
 _REFERENCE_ROWS = 401
@@ -42,12 +42,8 @@ def write_program_fmu(
     """
     kind, word = exporter or FMUExporter(), identifier(name)
     facts = _facts(traced, word, title, units, period, tuple(start) or (0.0,) * len(traced.outputs), kind.fmi)
-    sources, reference = program_sources(traced, word, facts["title"]), _reference(traced, facts)
-
-    def texts(token: str) -> dict[str, bytes]:
-        return all_texts({**facts, "token": token}, sources, "fmu_program", "fmu_program", *reference)
-
-    written: Written = kind.packed(with_token(texts), word)
+    sources = program_sources(traced, word, facts["title"])
+    written = kind.packed(all_texts(facts, sources, "fmu_program", "fmu_program", *_reference(traced, facts)), word)
     return write_export(written, out, kind.suffix), written.notes
 
 
@@ -60,23 +56,13 @@ def _facts(
     start: Sequence[float],
     fmi: Literal[2, 3],
 ) -> dict[str, Any]:
+
+    def described(name: str, causality: str, unit: str, start: float | None = None) -> Variable:
+        return Variable(name, name.replace("_", " ").capitalize(), "real", causality, "continuous", unit, start)
+
     signals = [name for name in traced.tape.inputs if name != "dt"]
-    named = [
-        ("time", "independent"),
-        *((name, "input") for name in signals),
-        *((name, "output") for name in traced.outputs),
-    ]
-    shown = [(reference, name, way) for reference, (name, way) in enumerate(named) if fmi == 3 or name != "time"]
-    variables = [
-        variable(
-            {"name": name, "description": name.replace("_", " ").capitalize(), "symbol": name, "kind": "real"}
-            | {"causality": way, "variability": "continuous", "unit": {"time": "s", **units}[name]}
-            | ({"start": 0.0} if way == "input" else {}),
-            reference,
-            index,
-        )
-        for index, (reference, name, way) in enumerate(shown, 1)
-    ]
+    signs = [described("time", "independent", "s"), *(described(name, "input", units[name], 0.0) for name in signals)]
+    variables = numbered([*signs, *(described(name, "output", units[name]) for name in traced.outputs)], fmi)
     place = {"independent": "time", "input": "set.{}", "output": "held.{}"}
     readable = [(v.reference, place[v.causality].format(v.name)) for v in variables]
     serial = [("real", f"program.{member}") for member in traced.tape.starts]
@@ -113,13 +99,8 @@ def _reference(traced: Program, facts: dict[str, Any]) -> tuple[Floats, dict[str
         v.name: _USUAL.get(v.unit, 1.0) * time / time[-1] * np.sin(2 * math.pi * (2 + 0.37 * i) * time / time[-1] * 2)
         for i, v in enumerate(v for v in facts["variables"] if v.causality == "input")
     }
-    prepare, advance = python_functions(traced)
-    parameters = tuple(float(e.value) for e in traced.tape.parameters.values())
-    _, derived = prepare(parameters)
-    memory = tuple(traced.tape.starts.values())
-    rows = [tuple(float(value) for _, value in facts["held"])]
-    for sample in list(zip(*(column.tolist() for column in given.values()), strict=True))[:-1]:
-        _, outputs, memory = advance(parameters, derived, memory, (*sample, step))
-        rows.append(outputs)
-    columns = (np.array(column) for column in zip(*rows, strict=True))
-    return time, given, dict(zip(traced.outputs, columns, strict=True))
+    record, channels = RecordProgram(traced), (*given.values(), np.full(time.size, step))
+    along = record.interpreted_along(traced.given, record.prepare(traced.given) or (), record.starts, channels)
+    before = np.array([[float(value)] for _, value in facts["held"]])
+    outputs = np.hstack([before, along.outputs[:, :-1]])
+    return time, given, dict(zip(traced.outputs, outputs, strict=True))

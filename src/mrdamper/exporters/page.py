@@ -15,9 +15,9 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.envelope import SLACK, Envelope
 from mrdamper.dampers.joint import damper_of
-from mrdamper.dampers.streaming import FLAGS, Stepper, Stream, stream
+from mrdamper.dampers.streaming import FLAGS, Stream, stream
 from mrdamper.exporters.base import Exporter, Written, identifier
-from mrdamper.exporters.c import TOLERANCE, c_facts, c_sources, reference_motion, shared_points
+from mrdamper.exporters.c import TOLERANCE, c_facts, c_sources, reference_force, shared_points
 from mrdamper.exporters.templates import render
 from mrdamper.exporters.toolchain import build_webassembly
 from mrdamper.models import Model
@@ -92,13 +92,9 @@ def _facts(damper: Damper | Model, stepping: Stream, name: str, library: bytes |
 
 def _vectors(stepping: Stream) -> dict[str, Any]:
     """Calculate a motion and the forces of the stepper with all digits, for the self-test of the page."""
-    x, current, step = reference_motion(stepping, _VECTORS)
-    stepper = Stepper(stepping)
-    force = [stepper.step(*sample, step) for sample in zip(x.tolist(), current.tolist(), strict=True)]
-    packed = {
-        name: base64.b64encode(np.asarray(values, "<f8").tobytes()).decode()
-        for name, values in (("displacement", x), ("current", current), ("force", force))
-    }
+    motion, force, step = reference_force(stepping, _VECTORS)
+    columns = dict(zip(("displacement", "current", "force"), (*zip(*motion, strict=True), force), strict=True))
+    packed = {name: base64.b64encode(np.array(values, "<f8").tobytes()).decode() for name, values in columns.items()}
     return {**packed, "step": step, "tolerance": TOLERANCE}
 
 
