@@ -10,7 +10,7 @@ from support.dampers import joint_damper
 from mrdamper.dampers.joint import JointFit, LocalMinimum
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition
-from mrdamper.report.limitations import RANGE, by_group, limitations
+from mrdamper.report.limitations import RANGE, limitations
 from mrdamper.statistics.metrics import Scores
 from mrdamper.statistics.stop_reason import StopReason
 from mrdamper.study.recipe import RecipeResult, whole_damper
@@ -19,8 +19,12 @@ from mrdamper.study.validation import RunScore, Validation
 NONE = Validation("none", ())
 
 
+def texts_of(groups):
+    return [text for texts in groups.values() for text in texts]
+
+
 def texts(fit):
-    return [one.text for one in limitations(scored(fit), ())]
+    return texts_of(limitations(scored(fit), ()))
 
 
 def scored(fit):
@@ -63,7 +67,7 @@ def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
     assert any("(interval one-sided): d (" in s for s in sentences)
     known = Uncertainty((), (), np.zeros((0, 0)), np.zeros(0), gain=0.0, offset=0.0, one_sided=("d",))
     stated = replace(fit.damper, uncertainty=known)
-    known = [one.text for one in limitations(replace(scored(fit), damper=stated), ())]
+    known = texts_of(limitations(replace(scored(fit), damper=stated), ()))
     assert [s.startswith("d (") for s in known if "one-sided" in s] == [True]  # once
     calm = replace(fit, nrmse_pp=np.array([0.02, 0.02, 0.03]), at_bounds=())
     assert not any("times the median" in s or "bound" in s for s in texts(calm))
@@ -72,10 +76,9 @@ def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
 def test_limitations_are_grouped_and_the_tested_range_stands_last():
     fit = JointFit(joint_damper(), np.array([0.02, 0.02, 0.09]), (), np.zeros(2), StopReason.SETTLED, 0.1)
     found = limitations(scored(fit), ())
-    groups = by_group(found)
-    assert list(groups)[-1] == RANGE
-    assert [one.text for one in found] == [text for texts in groups.values() for text in texts]
-    assert found[0].text.startswith("No validation runs")
+    assert list(found)[-1] == RANGE
+    assert all(found.values())
+    assert texts_of(found)[0].startswith("No validation runs")
 
 
 def test_the_worst_run_tells_its_kind_of_motion_apart_from_its_range():
@@ -84,10 +87,10 @@ def test_the_worst_run_tells_its_kind_of_motion_apart_from_its_range():
 
     runs = Validation("worst", (run(0.02), run(0.02), run(0.11, ("amplitude", "not a sine"))))
     fit = JointFit(joint_damper(), np.array([0.03, 0.04]), (), np.zeros(2), StopReason.SETTLED, 0.1)
-    text = next(s.text for s in limitations(replace(scored(fit), validation=runs), ()) if "Largest error" in s.text)
+    text = next(s for s in texts_of(limitations(replace(scored(fit), validation=runs), ())) if "Largest error" in s)
     assert "5.3 Hz, 1.7 mm, not a sine; amplitude outside the tested range)" in text
     crossed = replace(scored(fit), cross_validated=Validation("worst", (*runs.runs[:2], run(0.11, ("combination",)))))
-    text = next(s.text for s in limitations(crossed, ()) if "Largest error of a cross" in s.text)
+    text = next(s for s in texts_of(limitations(crossed, ())) if "Largest error of a cross" in s)
     assert "5.3 Hz, 1.7 mm; combination outside the range of the other tests)" in text  # it is a test itself
 
 
@@ -108,12 +111,12 @@ def test_what_the_design_of_the_tests_cannot_show_is_stated_first(conditions, sa
         SimpleNamespace(run_id=name, condition=at, motion=SimpleNamespace(is_sine=True, drift=0.0))
         for name, at in tests.items()
     ]
-    entries = limitations(replace(scored(fit), train=Validation("train", runs)), loops)
+    entries = texts_of(limitations(replace(scored(fit), train=Validation("train", runs)), loops))
     design = ("One current", "One motion", "Only")
-    assert [one.text.startswith(said) for one in entries if one.text.startswith(design)] == ([True] if said else [])
-    assert said is None or entries[0].text.startswith(said)
-    others = limitations(replace(scored(fit), train=Validation("train", runs)), loops[1:])
-    assert not any(one.text.startswith(design[:2]) for one in others)  # a record of other motion varies the rest
+    assert [text.startswith(said) for text in entries if text.startswith(design)] == ([True] if said else [])
+    assert said is None or entries[0].startswith(said)
+    others = texts_of(limitations(replace(scored(fit), train=Validation("train", runs)), loops[1:]))
+    assert not any(text.startswith(design[:2]) for text in others)  # a record of other motion varies the rest
 
 
 def test_tests_at_different_temperatures_are_a_limitation():
@@ -125,7 +128,7 @@ def test_tests_at_different_temperatures_are_a_limitation():
 
     def sentences(*temperatures):
         tests = [SimpleNamespace(id=n, notes={"temperature_C": t}) for n, t in zip(ids, temperatures, strict=True)]
-        return [one.text for one in limitations(train, (), tests) if "°C" in one.text]
+        return [text for text in texts_of(limitations(train, (), tests)) if "°C" in text]
 
     assert sentences("23.5", "", "41.02") == [
         "Tests at 24 to 41 °C: the temperature is no input of the model, and its effect counts as scatter between runs."

@@ -12,7 +12,9 @@ from support.browser import AUDIT, WIDE
 from typer.testing import CliRunner
 
 from mrdamper.cli import application
+from mrdamper.data.encoding import csv_text
 from mrdamper.report.plots.comparison import ranking
+from mrdamper.report.tables import score_rows
 from mrdamper.study.comparison import compare
 
 FIGURE_AUDIT = (Path(__file__).parents[1] / "support" / "figure_audit.js").read_text(encoding="utf-8")
@@ -165,7 +167,6 @@ def test_no_cell_of_a_printed_table_is_cut_inside_a_number(texts):
 
 def test_one_number_stands_everywhere(bundled, bundled_study, written, tmp_path, monkeypatch):
     """Terminal, table, page, comparison and app show the same scores of a model on the same runs."""
-    from mrdamper.report.study import _validation_table
     from mrdamper.web.api.identify import _candidate
 
     monkeypatch.setattr("mrdamper.study.workflow.run_study", lambda *args, **options: bundled_study)
@@ -173,7 +174,9 @@ def test_one_number_stands_everywhere(bundled, bundled_study, written, tmp_path,
     terminal = CliRunner().invoke(application(), ["study", "--verbose", "--out", str(tmp_path / "out")]).stdout
     page = (written / "report.html").read_text(encoding="utf-8")
     rows = list(csv.DictReader(io.StringIO((written / "validation.csv").read_text(encoding="utf-8"))))
-    assert rows == list(csv.DictReader(io.StringIO(_validation_table(bundled_study))))
+    sets = ("cross-validation", "validation")
+    scored = [r for rig in bundled_study.rigs for c in rig.candidates for r in score_rows(rig.dataset.name, c, *sets)]
+    assert rows == list(csv.DictReader(io.StringIO(csv_text(scored))))
     compared = {rig.rig: rig for rig in compare(bundled.rig("utfsm"), ["bingham"], jobs=1).rigs}
     for rig in bundled_study.rigs:
         chapter = page[page.index(f">{rig.rig}</h2>") :]

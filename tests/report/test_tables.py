@@ -18,8 +18,7 @@ from mrdamper.data.encoding import csv_text
 from mrdamper.identification.problem import RunUncertainty
 from mrdamper.models.bingham import Bingham
 from mrdamper.physics.motion.excitation import Excitation
-from mrdamper.report.study import _validation_table
-from mrdamper.report.tables import identification_rows, prediction_rows, score_row
+from mrdamper.report.tables import identification_rows, prediction_rows, score_row, score_rows
 from mrdamper.rig_files.dataset_folder import save_dataset
 from mrdamper.statistics.metrics import Scores
 from mrdamper.study.validation import RunScore, Validation
@@ -117,9 +116,8 @@ def test_left_out_and_held_out_errors_stand_in_their_own_rows():
         recipe=SimpleNamespace(name="dahl:joint"),
         train=scored("fitted", 0.3), cross_validated=scored("left", 0.1), validation=scored("held", 0.2),
     )  # fmt: skip
-    study = SimpleNamespace(rigs=(SimpleNamespace(dataset=SimpleNamespace(name="bench"), candidates=(candidate,)),))
-    rows = list(csv.DictReader(_validation_table(study).splitlines()))
-    told = [(r["rig"], r["model"], r["set"], r["run_id"], float(r["nrmse_pp"])) for r in rows]
+    rows = score_rows("bench", candidate, "cross-validation", "validation")
+    told = [(r["rig"], r["model"], r["set"], r["run_id"], r["nrmse_pp"]) for r in rows]
     assert told == [
         ("bench", "dahl:joint", "cross-validation", "left", 0.1),
         ("bench", "dahl:joint", "validation", "held", 0.2),

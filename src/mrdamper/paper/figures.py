@@ -23,6 +23,7 @@ from mrdamper.paper.results import SAME, Reproduction, function_of, motions, rat
 from mrdamper.physics.motion import equivalent_sine, measured_motion
 from mrdamper.physics.simulation import simulate
 from mrdamper.report.plots.comparison import overlaid_loops
+from mrdamper.report.plots.cycle import draw_loop, last_cycle
 from mrdamper.report.plots.figure import Axes, Figure
 from mrdamper.report.plots.rig_tests import test_analysis, test_matrix
 from mrdamper.report.plots.style import MEASURED, MM, PALETTE, Picture, current_colours, motion_name, powered, thin
@@ -30,7 +31,7 @@ from mrdamper.statistics.functions.fitting import fit_function
 from mrdamper.statistics.functions.forms import ParameterFunction, features
 from mrdamper.study.recipe import Progress
 
-_MOST_LOOPS, _LOOP_POINTS = 9, 400  # loops in one panel, points of a loop
+_MOST_LOOPS = 9  # in one panel
 _LINE, _SMALL = 0.9, 7  # width of a line, size of the letters of a legend [pt]
 _POINTS = {"mark": "o", "ms": 3.5, "lw": _LINE}
 
@@ -182,12 +183,8 @@ def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]
 
 def _plot_loop(panels: Sequence[Axes], run: Run, force: Floats, **look: Any) -> None:
     """Draw the last cycle of a force inside a run's steady window, over displacement and over velocity."""
-    end = run.window[1] if run.window else float(run.time[-1])
-    last = (run.time <= end) & (run.time >= end - 1.02 / equivalent_sine(run).condition.frequency_Hz)
-    motion = measured_motion(run)
-    x, v, force = (thin(channel[last], _LOOP_POINTS) for channel in (motion.displacement, motion.velocity, force))
-    for panel, across in zip(panels, (MM * x, v), strict=True):
-        panel.plot(across, force, lw=_LINE, **look)
+    last = last_cycle(run, equivalent_sine(run).condition.frequency_Hz)
+    draw_loop(panels, measured_motion(run).part(last), force[last], lw=_LINE, **look)
 
 
 def _methods_at_currents(study: Reproduction, axes: Texts) -> Drawing:

@@ -16,9 +16,10 @@ from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names, finite
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.comparison import overlaid_loops, ranking
+from mrdamper.report.plots.cycle import spread_out
 from mrdamper.report.plots.style import save_figure
 from mrdamper.report.summary import omission_lines
-from mrdamper.report.tables import score_row
+from mrdamper.report.tables import score_rows
 from mrdamper.study.comparison import RANKING, Comparison, RigComparison
 from mrdamper.study.recipe import Progress, RecipeResult
 
@@ -70,42 +71,38 @@ def run_rows(comparison: Comparison) -> list[dict[str, Any]]:
     rows = []
     for rig in comparison.rigs:
         for entry in rig.entries:
-            head = {"rig": rig.dataset.name, "model": entry.recipe.name}
+            head = {"rig": rig.dataset.name, "model": entry.recipe.name, "set": "per run"}
             fits = [{"run_id": one.run_id, "nrmse_pp": one.scores.nrmse_pp} for one in entry.identifications]
-            rows += [{**head, "set": "per run", **fit} for fit in fits]
-            sets = {"train": entry.train, "cross-validation": entry.cross_validated, "validation": entry.validation}
-            for name, validation in sets.items():
-                rows += [{**head, "set": name, **score_row(run)} for run in validation.runs]
+            rows += [head | fit for fit in fits]
+            rows += score_rows(rig.dataset.name, entry, "train", "cross-validation", "validation")
     return rows
 
 
 def _rows(rig: RigComparison) -> list[dict[str, Any]]:
-    rows = []
-    for rank, entry in enumerate(rig.entries, start=1):
-        rows.append(
-            {
-                "rig": rig.dataset.name,
-                "rank": rank,
-                "model": entry.recipe.name,
-                "title": entry.title,
-                "per_run_nrmse_pp": finite(entry.per_run),
-                "train_nrmse_pp": finite(entry.train.median()),
-                "cv_nrmse_pp": finite(entry.cross_validated.median()),
-                "cv_worst_nrmse_pp": finite(entry.cross_validated.worst_error()),
-                "validation_nrmse_pp": finite(entry.validation.median()),
-                "validation_worst_nrmse_pp": finite(entry.validation.worst_error()),
-                "validation_energy_error": finite(entry.validation.median("energy_error")),
-                "parameters_per_run": entry.parameters_per_run,
-                "parameters": entry.damper.parameter_count,
-                "conditions_needed": entry.conditions_needed,
-                "forces_computed_per_run": _evaluations(entry),
-                "seconds": entry.seconds,
-                "limits": entry.recipe.limits,
-                "source": entry.recipe.source,
-                "reason": _reason(entry, rig.entries),
-            }
-        )
-    return rows
+    return [
+        {
+            "rig": rig.dataset.name,
+            "rank": rank,
+            "model": entry.recipe.name,
+            "title": entry.title,
+            "per_run_nrmse_pp": finite(entry.per_run),
+            "train_nrmse_pp": finite(entry.train.median()),
+            "cv_nrmse_pp": finite(entry.cross_validated.median()),
+            "cv_worst_nrmse_pp": finite(entry.cross_validated.worst_error()),
+            "validation_nrmse_pp": finite(entry.validation.median()),
+            "validation_worst_nrmse_pp": finite(entry.validation.worst_error()),
+            "validation_energy_error": finite(entry.validation.median("energy_error")),
+            "parameters_per_run": entry.parameters_per_run,
+            "parameters": entry.damper.parameter_count,
+            "conditions_needed": entry.conditions_needed,
+            "forces_computed_per_run": _evaluations(entry),
+            "seconds": entry.seconds,
+            "limits": entry.recipe.limits,
+            "source": entry.recipe.source,
+            "reason": _reason(entry, rig.entries),
+        }
+        for rank, entry in enumerate(rig.entries, start=1)
+    ]
 
 
 def _evaluations(entry: RecipeResult) -> int | None:
@@ -122,11 +119,8 @@ def _reason(entry: RecipeResult, entries: Sequence[RecipeResult]) -> str:
         text += ": the lowest error"
     else:
         text += f", {100 * (own / best.cross_validated.median() - 1):.0f} % above the lowest"
-    leaner = [
-        e
-        for e in entries
-        if e.cross_validated.median() <= own and e.damper.parameter_count < entry.damper.parameter_count
-    ]
+    better = [e for e in entries if e.cross_validated.median() <= own]
+    leaner = [e for e in better if e.damper.parameter_count < entry.damper.parameter_count]
     if leaner and entry is not best:
         fewest = min(leaner, key=lambda e: e.damper.parameter_count)
         error = 100 * fewest.cross_validated.median()
@@ -168,5 +162,4 @@ def _shown(rig: RigComparison) -> list[Run]:
     entry = rig.entries[0]
     scored = entry.validation.only(rig.sines).runs or entry.train.runs
     ordered = sorted(scored, key=lambda run: (run.condition.current_A, run.condition.peak_velocity))
-    picks = np.unique(np.linspace(0, len(ordered) - 1, min(_LOOPS, len(ordered))).round().astype(int))
-    return [rig.dataset[ordered[i].run_id] for i in picks]
+    return [rig.dataset[run.run_id] for run in spread_out(ordered, _LOOPS)]

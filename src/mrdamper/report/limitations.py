@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
@@ -22,7 +21,6 @@ from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import Validation
 
 PREDICTION, TESTS, MODEL, PARAMETERS, RANGE = "Prediction", "Tests", "Model", "Parameters", "Range of validity"
-_GROUPS = (PREDICTION, PARAMETERS, MODEL, TESTS, RANGE)
 _WORDS = frozenset({"a", "A", "I"})  # parameter names that are also words of a sentence
 _SEARCHED = {"seat_share": "elastic displacement of the series spring over the free play"}
 _MAX_FUNCTION_ERROR = 0.9  # cross-validated error of a parameter function over the parameter's spread [-]
@@ -36,39 +34,26 @@ _SAME_TEMPERATURE_K = 5.0  # difference of temperatures that are one [K]
 _SAME_MOTION = 0.05  # relative difference of frequencies or amplitudes that are one
 
 
-@dataclass(frozen=True)
-class Limitation:
-    """A limitation in one sentence."""
-
-    group: str  # heading under which a report lists it
-    text: str
-
-
-def limitations(scored: RecipeResult, loops: Sequence[LoopAnalysis], runs: Iterable[Run] = ()) -> list[Limitation]:
-    """List the limitations of a model and of the tests it was identified from, the most serious first."""
-    entries = {
+def limitations(scored: RecipeResult, loops: Sequence[LoopAnalysis], runs: Iterable[Run] = ()) -> dict[str, list[str]]:
+    """List the limitations of a model and of its tests under their headings, the most serious first."""
+    groups = {
         PREDICTION: [
             *_design(loops, [run.run_id for run in scored.train.runs]),
             *_temperature(runs, {run.run_id for run in scored.train.runs}),
             *_prediction(scored.cross_validated, scored.validation),
         ],
-        TESTS: _tests(loops),
-        MODEL: [
-            *(_joint(scored.fit, scored.damper) if isinstance(scored.fit, JointFit) else ()),
-            *(_functions(scored.fit, scored.damper) if isinstance(scored.fit, ModifiedFit) else ()),
-        ],
         PARAMETERS: [
             *(uncertainty_warnings(scored.damper) if scored.damper.uncertainty else ()),
             *_identifications(scored.identifications),
         ],
+        MODEL: [
+            *(_joint(scored.fit, scored.damper) if isinstance(scored.fit, JointFit) else ()),
+            *(_functions(scored.fit, scored.damper) if isinstance(scored.fit, ModifiedFit) else ()),
+        ],
+        TESTS: _tests(loops),
         RANGE: [validity(scored.damper)],
     }
-    return _explained([Limitation(group, text) for group in _GROUPS for text in entries[group]], scored.damper)
-
-
-def by_group(entries: Sequence[Limitation]) -> Mapping[str, list[str]]:
-    """Group the sentences under their headings; headings without sentences are omitted."""
-    groups = {group: [one.text for one in entries if one.group == group] for group in _GROUPS}
+    _explain(list(groups.values()), scored.damper)
     return {group: texts for group, texts in groups.items() if texts}
 
 
@@ -84,18 +69,16 @@ def validity(damper: Damper) -> str:
     )
 
 
-def _explained(entries: Sequence[Limitation], damper: Damper) -> list[Limitation]:
+def _explain(groups: Sequence[list[str]], damper: Damper) -> None:
     """Add the meaning of each parameter where it is named first."""
     parameters = damper.model_at(damper.envelope.middle).parameters()
     meanings = {info.name: info.meaning for info in parameters if info.name not in _WORDS} | _SEARCHED
-    explained = list(entries)
     for name, meaning in meanings.items():
         named = re.compile(rf"(?<![\w.^/])(?<!\d ){re.escape(name)}(\.\d+)?(?![\w^])")
-        first = next((i for i, one in enumerate(explained) if named.search(one.text)), None)
-        if first is not None:
-            text = named.sub(lambda match, meaning=meaning: f"{match[0]} ({meaning})", explained[first].text, count=1)
-            explained[first] = replace(explained[first], text=text)
-    return explained
+        places = ((texts, i) for texts in groups for i, text in enumerate(texts) if named.search(text))
+        if first := next(places, None):
+            texts, i = first
+            texts[i] = named.sub(lambda match, meaning=meaning: f"{match[0]} ({meaning})", texts[i], count=1)
 
 
 def _design(loops: Sequence[LoopAnalysis], identified: Sequence[str]) -> list[str]:
@@ -221,11 +204,8 @@ def _identifications(identifications: Sequence[Identification]) -> list[str]:
             bound.setdefault(name, []).append(identification.run_id)
     for name, runs in bound.items():
         sentences.append(f"{name} at a bound of its range in {len(runs)} individual fits: {listed(runs, _MAX_RUNS)}.")
-    for note in dict.fromkeys(
-        n for identification in identifications for n in identification.notes if n.lower().startswith("mass")
-    ):
-        sentences.append(f"Individual fits: {note}.")
-    return sentences
+    notes = dict.fromkeys(note for identification in identifications for note in identification.notes)
+    return sentences + [f"Individual fits: {note}." for note in notes if note.lower().startswith("mass")]
 
 
 def _tests(loops: Sequence[LoopAnalysis]) -> list[str]:

@@ -24,8 +24,9 @@ from mrdamper.identification.intervals import written
 from mrdamper.models import Model
 from mrdamper.report.about import About, Limit, about_of, load_about, load_limits
 from mrdamper.report.damper_tests import facts_of_tests, figures_of_tests, force_rows, provenance
-from mrdamper.report.limitations import Limitation, by_group, limitations
+from mrdamper.report.limitations import PREDICTION, limitations
 from mrdamper.report.page import made_from, plain, render_page
+from mrdamper.report.plots.cycle import spread_out
 from mrdamper.report.plots.figure import Figure
 from mrdamper.report.plots.model import (
     BAND_LEVEL,
@@ -39,7 +40,7 @@ from mrdamper.report.plots.reversal import force_since_reversal
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
 from mrdamper.report.plots.style import MOST_NAMED, Picture
 from mrdamper.report.summary import error_sentence, omission_lines
-from mrdamper.report.tables import identification_rows, score_row
+from mrdamper.report.tables import identification_rows, score_rows
 from mrdamper.study.parallel import IN_PROCESS, Processes
 from mrdamper.study.recipe import Progress, RecipeResult
 from mrdamper.study.workflow import RigStudy, Study
@@ -59,38 +60,14 @@ def write_study(
     paper: str = "a4",
     processes: Processes = IN_PROCESS,
 ) -> list[Path]:
-    """Write report.html, model files, tables (identifications, parameters, validation, coverage, forces) and figures/.
+    """Write report.html, model files, tables and figures/ atomically, and return the files, the page first.
 
-    Parameters
-    ----------
-    study : Study
-    folder : path
-        Made if missing; files of the same names are replaced together at the end.
-    progress : callable
-        Called with the name of the step and the share done, 0...1.
-    about : About, mapping or path, optional
-        Head of the report: its fields, or a TOML file (`mrdamper init about`).
-    limits : sequence of Limit or path
-        Limits of the measured damping force, or a TOML file (`mrdamper init limits`); pass or fail is stated only
-        against these.
-    also : sequence of str
-        "png" and "pdf": every figure in that format, too; "pdf" adds report.pdf.
-    paper : str
-        Size of the pages of report.pdf: "a4" or "letter".
-    processes : Processes
-        Processes that draw the figures where they are written in more formats than SVG.
-
-    Returns
-    -------
-    list of Path
-        Written files, the report first.
-
-    Raises
-    ------
-    AboutError
-        If `about` or `limits` cannot be read, or has an unknown field.
-    OutputError
-        If the folder cannot be written to.
+    The folder is made if missing; files of the same names are replaced together at the end. The head of the report
+    `about` is given by its fields or as a TOML file (`mrdamper init about`), as are the `limits` of the measured force
+    (`mrdamper init limits`), against which alone pass or fail is stated. Every figure is also written in the formats of
+    `also`, "png" and "pdf", by the `processes`; "pdf" adds report.pdf, with pages of the size `paper`, "a4" or
+    "letter". Raises `AboutError` if `about` or `limits` cannot be read, or has an unknown field, and `OutputError`
+    if the folder cannot be written to.
     """
     head = _head(about)
     limits = load_limits(limits) if isinstance(limits, (str, Path)) else tuple(limits)
@@ -121,15 +98,21 @@ def write_study(
             from mrdamper.report.pdf import pdf_of
 
             (work / "report.pdf").write_bytes(pdf_of(page, vectors, paper))
-        if forces:
-            (work / "forces.csv").write_text(csv_text(forces), encoding="utf-8")
-        (work / "identifications.csv").write_text(
-            csv_text(identification_rows(_all_identifications(study), study.dataset.name)), encoding="utf-8"
-        )
-        (work / "parameters.csv").write_text(_parameters_table(study), encoding="utf-8")
-        (work / "validation.csv").write_text(_validation_table(study), encoding="utf-8")
-        covered = [{"rig": rig.dataset.name, **rig.interval_coverage} for rig in study.rigs if rig.interval_coverage]
-        (work / "coverage.csv").write_text(csv_text(covered), encoding="utf-8")
+        tables = {
+            "identifications": identification_rows(_all_identifications(study), study.dataset.name),
+            "parameters": _parameter_rows(study),
+            "validation": [
+                row
+                for rig in study.rigs
+                for candidate in rig.candidates
+                for row in score_rows(rig.dataset.name, candidate, "cross-validation", "validation")
+            ],
+            "coverage": [
+                {"rig": rig.dataset.name, **rig.interval_coverage} for rig in study.rigs if rig.interval_coverage
+            ],
+        }
+        for name, rows in (tables | ({"forces": forces} if forces else {})).items():
+            (work / f"{name}.csv").write_text(csv_text(rows), encoding="utf-8")
 
     took = {rig.dataset.name: {c.recipe.name: c.seconds for c in rig.candidates} for rig in study.rigs}
     written = publish(folder, "report.html", fill, ResultRecord(seconds={"in all": study.seconds, **took}))
@@ -158,17 +141,6 @@ def _all_identifications(study: Study) -> list[Identification]:
     """Collect every individual fit once; several candidates share them."""
     identifications = [i for rig in study.rigs for candidate in rig.candidates for i in candidate.identifications]
     return list({id(one): one for one in identifications}.values())
-
-
-def _validation_table(study: Study) -> str:
-    rows = []
-    for rig in study.rigs:
-        for candidate in rig.candidates:
-            head = {"rig": rig.dataset.name, "model": candidate.recipe.name}
-            sets = {"cross-validation": candidate.cross_validated, "validation": candidate.validation}
-            for name, validation in sets.items():
-                rows += [{**head, "set": name, **score_row(run)} for run in validation.runs]
-    return csv_text(rows)
 
 
 def _figures(rig: RigStudy, limits: Sequence[Limit]) -> dict[str, Figure]:
@@ -208,8 +180,7 @@ def _shown(rig: RigStudy) -> list[Any]:
     if not runs:
         runs = [run for run in rig.dataset if run.id in sines]
     ordered = sorted(runs, key=lambda run: (sines[run.id].current_A, sines[run.id].peak_velocity))
-    picks = np.unique(np.linspace(0, len(ordered) - 1, min(_LOOPS_SHOWN, len(ordered))).round().astype(int))
-    return [ordered[i] for i in picks]
+    return spread_out(ordered, _LOOPS_SHOWN)
 
 
 @once_per_run
@@ -225,6 +196,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
     chosen = rig.chosen
     mapped, functions = _mapped(rig) or (None, None)
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
+    limits_of_use = limitations(chosen, rig.loops, rig.dataset)
     held = all(run.split == "validate" for run in _shown(rig))
     return {
         "rig": rig.dataset.name,
@@ -236,9 +208,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         "candidates": rig.candidates,
         "folds": rig.folds,
         "floor": float(np.median(floors)) if floors else None,
-        "limitations": by_group(
-            [*limitations(chosen, rig.loops, rig.dataset), Limitation("Prediction", _scatter(rig))]
-        ),
+        "limitations": {PREDICTION: [*limits_of_use.pop(PREDICTION, []), _scatter(rig)], **limits_of_use},
         "loops": rig.loops,
         "contradictions": rig.contradictions,
         "omissions": omission_lines(rig.candidates, rig.omitted, len(rig.omitted)),
@@ -289,20 +259,19 @@ def _range(ends: tuple[float, float] | None, unit: str) -> str:
     return " to ".join(written(end, None, unit) for end in ends) if ends and ends[0] < ends[1] else ""
 
 
-def _parameters_table(study: Study) -> str:
+def _parameter_rows(study: Study) -> list[dict[str, Any]]:
     """Tabulate the parameters of the chosen dampers, their 95 % intervals and their range in cross-validation.
 
     Cells are empty where there are none.
     """
     names = {"low": "low_95", "high": "high_95"}
-    rows = [
+    return [
         {"rig": rig.dataset.name}
         | {names.get(k, k): "" if v != v else v for k, v in row.items() if k != "written"}
         | dict(zip(_CV_RANGE, rig.chosen.spread.get(row["name"], ("", "")), strict=True))
         for rig in study.rigs
         for row in table(rig.damper)
     ]
-    return csv_text(rows)
 
 
 def _scatter(rig: RigStudy) -> str:

@@ -120,12 +120,12 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
         )
     if verbose:
         lines += [f"  {row['name']} = {row['written']}" for row in table(rig.damper)]
-    entries = limitations(chosen, rig.loops, rig.dataset)
+    entries = [text for texts in limitations(chosen, rig.loops, rig.dataset).values() for text in texts]
     listed = entries if verbose else entries[:shown]
     if listed:
         more = len(entries) - len(listed)
         lines.append(f"  limitations{f' ({more} more with --verbose)' if more else ''}:")
-        lines += [f"  - {one.text}" for one in listed]
+        lines += [f"  - {text}" for text in listed]
     return lines, len(listed)
 
 

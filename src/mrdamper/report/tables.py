@@ -8,6 +8,7 @@ from typing import Any
 from mrdamper.dampers.bands import Band
 from mrdamper.dampers.prediction import Prediction
 from mrdamper.identification import Identification
+from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import SCORES, RunScore
 
 
@@ -15,10 +16,11 @@ def identification_rows(identifications: Sequence[Identification], dataset: str 
     """One row per identification: condition, parameters, scores, message; `dataset` if a run names no rig."""
     rows = []
     for identification in identifications:
+        model = identification.model
         row: dict[str, Any] = {
             "run_id": identification.run_id,
             "rig": identification.rig or dataset,
-            "model": identification.model.name,
+            "model": model.name,
             "method": identification.method,
             "current_A": identification.condition.current_A,
             "frequency_Hz": identification.condition.frequency_Hz,
@@ -26,7 +28,7 @@ def identification_rows(identifications: Sequence[Identification], dataset: str 
             "nrmse_pp": identification.scores.nrmse_pp,
             "repeatability_nrmse_pp": identification.floor,
             "wape": identification.scores.wape,
-            **{f"{name} [{unit}]": value for name, unit, value in _values(identification)},
+            **{f"{info.name} [{info.unit}]": getattr(model, info.name) for info in model.parameters()},
             **{f"standard error {name}": value for name, value in identification.standard_errors.items()},
             **_ends(identification),
             **{f"effective samples {name}": value for name, value in identification.uncertainty.effective.items()},
@@ -64,15 +66,16 @@ def score_row(run: RunScore) -> dict[str, Any]:
     }
 
 
+def score_rows(rig: str, result: RecipeResult, *sets: str) -> list[dict[str, Any]]:
+    """One row per scored run of some sets: "train", "cross-validation", "validation"."""
+    scores = {"train": result.train, "cross-validation": result.cross_validated, "validation": result.validation}
+    head = {"rig": rig, "model": result.recipe.name}
+    return [{**head, "set": name, **score_row(run)} for name in sets for run in scores[name].runs]
+
+
 def _ends(identification: Identification) -> dict[str, float | None]:
     """Return ends of the 95 % intervals of the free parameters."""
     columns: dict[str, float | None] = {}
     for name in (info.name for info in identification.model.parameters() if info.name in identification.free):
         columns[f"{name} low 95 %"], columns[f"{name} high 95 %"] = identification.interval(name) or (None, None)
     return columns
-
-
-def _values(identification: Identification) -> list[tuple[str, str, float]]:
-    return [
-        (info.name, info.unit, getattr(identification.model, info.name)) for info in identification.model.parameters()
-    ]

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 from mrdamper.data import Dataset
 from mrdamper.identification.characteristics import Characteristics
-from mrdamper.identification.loop_analysis import whole_cycles
-from mrdamper.physics.motion import analyse_motion, measured_motion
+from mrdamper.physics.motion import centred_motion
+from mrdamper.report.plots.cycle import draw_loop, last_cycle
 from mrdamper.report.plots.figure import Figure
-from mrdamper.report.plots.style import MM, current_colours, motion_name, thin
+from mrdamper.report.plots.style import current_colours, motion_name
 
 _MARKS = ("o", "s", "^", "D", "v", "P")
 
@@ -55,16 +55,10 @@ def continuous_velocity_plot(dataset: Dataset, specimen: Characteristics) -> Fig
     colours = current_colours(list(specimen.currents))
     for current in specimen.currents:
         stroke = specimen.at(current)[-1]
-        run = dataset[stroke.run_id].steady()
-        motion = measured_motion(run).about(analyse_motion(run).series.mean)
-        whole = whole_cycles(run.time, stroke.condition.frequency_Hz)
-        one = whole_cycles(run.time[: whole.stop], stroke.condition.frequency_Hz / 1.02)
-        size = min(one.stop, round(whole.stop / max(1.0, analyse_motion(run).cycles)) + 1)
-        last = slice(max(0, whole.stop - size), whole.stop)
-        x, v, force = (thin(array[last]) for array in (motion.displacement, motion.velocity, run.force))
+        run = dataset[stroke.run_id]
+        last = last_cycle(run, stroke.condition.frequency_Hz)
         name = f"{current:g} A, {motion_name(stroke.condition)}"
-        axes[0].plot(v, force, color=colours[current], label=name)
-        axes[1].plot(MM * x, force, color=colours[current], label=name)
+        draw_loop(axes[::-1], centred_motion(run).part(last), run.force[last], color=colours[current], label=name)
     axes[0].label("Velocity (m/s)", "Force (N)")
     axes[1].label("Displacement (mm)", "Force (N)")
     low, high = axes[0].ends()[1]

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Run
 from mrdamper.physics.motion import centred_motion, equivalent_sine
+from mrdamper.report.plots.cycle import draw_loop, last_cycle
 from mrdamper.report.plots.figure import Figure, room_beside
-from mrdamper.report.plots.style import MEASURED, MM, PALETTE
+from mrdamper.report.plots.style import MEASURED, PALETTE
 
 
 def ranking(scores: Mapping[str, tuple[float, float, float]]) -> Figure:
@@ -36,22 +36,14 @@ def overlaid_loops(runs: Sequence[Run], dampers: Mapping[str, Damper]) -> Figure
     """Draw the last measured cycle of each run, one per row, with the loops of some dampers."""
     figure = Figure(len(runs), 2, 0.7 + 2.5 * len(runs))
     for row, run in enumerate(runs):
-        sine = equivalent_sine(run)
-        motion = centred_motion(run)
-        last = int(np.flatnonzero(run.in_window)[-1])
-        first = int(np.searchsorted(run.time, run.time[last] - 1 / sine.condition.frequency_Hz))
-        cycle = slice(max(first - 1, 0), last + 1, max(1, (last - first) // 400))
-        curves: list[tuple[str, Any, dict[str, Any]]] = [
-            ("measured", run.force, {"color": MEASURED, "lw": 1.8, "alpha": 0.55})
-        ]
+        condition, motion = equivalent_sine(run).condition, centred_motion(run)
+        last = last_cycle(run, condition.frequency_Hz)
+        left, right = panels = figure.axes[2 * row : 2 * row + 2]
+        draw_loop(panels, motion.part(last), run.force[last], label="measured", color=MEASURED, lw=1.8, alpha=0.55)
         for number, (title, damper) in enumerate(dampers.items()):
-            style = {"color": PALETTE[1 + number % (len(PALETTE) - 2)], "lw": 0.9}
-            curves.append((title, damper.force_along(motion, sine.condition), style))
-        left, right = figure.axes[2 * row : 2 * row + 2]
-        for title, force, style in curves:
-            left.plot(MM * motion.displacement[cycle], force[cycle], label=title, **style)
-            right.plot(motion.velocity[cycle], force[cycle], **style)
-        left.label("Displacement (mm)", "Force (N)", str(sine.condition))
+            force, colour = damper.force_along(motion, condition)[last], PALETTE[1 + number % (len(PALETTE) - 2)]
+            draw_loop(panels, motion.part(last), force, label=title, color=colour, lw=0.9)
+        left.label("Displacement (mm)", "Force (N)", str(condition))
         right.label("Velocity (m/s)", "Force (N)")
     figure.axes[0].legend(size=6.5)
     return figure

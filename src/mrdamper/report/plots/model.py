@@ -12,10 +12,10 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.data import Floats, Run, same_motion
 from mrdamper.physics.motion import equivalent_sine
+from mrdamper.report.plots.cycle import draw_loop, last_cycle
 from mrdamper.report.plots.figure import Figure, room_beside
 from mrdamper.report.plots.style import (
     MEASURED,
-    MM,
     MOST_NAMED,
     PALETTE,
     PREDICTED,
@@ -24,7 +24,6 @@ from mrdamper.report.plots.style import (
     motion_name,
     powered,
     speed_colours,
-    thin,
 )
 from mrdamper.study.validation import Validation
 
@@ -49,21 +48,17 @@ def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
     axes = figure.axes
     for number, run in enumerate(runs):
         row, column = divmod(number, columns)
-        over_x, over_v = axes[2 * row * columns + column], axes[(2 * row + 1) * columns + column]
+        over_x, over_v = panels = axes[2 * row * columns + column], axes[(2 * row + 1) * columns + column]
         prediction = damper.predict(run)
-        period = 1 / prediction.condition.frequency_Hz
-        end = run.window[1] if run.window else float(run.time[-1])
-        last = (run.time <= end) & (run.time >= end - 1.02 * period)
-        motion = prediction.motion
-        x, v = thin(motion.displacement[last]), thin(motion.velocity[last])
+        last = last_cycle(run, prediction.condition.frequency_Hz)
+        motion = prediction.motion.part(last)
         curves: list[tuple[Floats, dict[str, Any]]] = [(run.force[last], {"color": MEASURED, "label": "measured"})]
         if around := band(damper, prediction, BAND_LEVEL, last):
             edge = {"color": PREDICTED, "lw": 0.6, "ls": ":"}
             curves += [(around.low, edge), (around.high, {**edge, "label": f"{100 * BAND_LEVEL:.0f} % interval"})]
         curves.append((prediction.force[last], {"color": PREDICTED, "label": "predicted"}))
         for force, look in curves:
-            over_x.plot(MM * x, thin(force), **look)
-            over_v.plot(v, thin(force), **look)
+            draw_loop(panels, motion, force, **look)
         over_x.size = over_v.size = 9.0 if columns == 2 else 7.0  # a condition as title fits its column
         over_x.label("Displacement (mm)", "Force (N)" if column == 0 else "", str(prediction.condition))
         over_v.label("Velocity (m/s)", "Force (N)" if column == 0 else "")

@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from mrdamper.data import Dataset, same_motion
-from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, whole_cycles
-from mrdamper.physics.motion import measured_motion
+from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis
+from mrdamper.physics.motion import centred_motion
+from mrdamper.report.plots.cycle import draw_loop, last_cycle, spread_out
 from mrdamper.report.plots.drawing import INCH
 from mrdamper.report.plots.figure import Axes, Figure
-from mrdamper.report.plots.style import KN, MM, MOST_NAMED, current_colours, levels, motion_name, speed_colours, thin
+from mrdamper.report.plots.style import KN, MM, MOST_NAMED, current_colours, levels, motion_name, speed_colours
 
 _BESIDE = 0.07  # inches between the marks of two currents
 _MOST_MOTIONS = 5  # of the loops at one current
@@ -113,17 +114,12 @@ def _over_motion(loops: Sequence[LoopAnalysis]) -> list[LoopAnalysis]:
     common = max(sorted(set(steps)), key=steps.count)
     chosen = [loop for step, loop in zip(steps, loops, strict=True) if step == common]
     chosen.sort(key=lambda loop: loop.condition.peak_velocity)
-    picks = np.unique(np.linspace(0, len(chosen) - 1, min(_MOST_MOTIONS, len(chosen))).round().astype(int))
-    return [chosen[i] for i in picks]
+    return spread_out(chosen, _MOST_MOTIONS)
 
 
 def _draw_loop(left: Axes, right: Axes, dataset: Dataset, loop: LoopAnalysis, name: str, colour: str) -> None:
-    run = dataset[loop.run_id].steady()
-    motion = measured_motion(run).about(loop.motion.series.mean)
-    cycle = whole_cycles(run.time, loop.condition.frequency_Hz)
-    last = slice(max(0, cycle.stop - round(cycle.stop / max(1, loop.motion.cycles))) - 1, cycle.stop)
-    x, v, force = (thin(array[last]) for array in (motion.displacement, motion.velocity, run.force))
-    left.plot(MM * x, force, color=colour, label=name)
-    right.plot(v, force, color=colour, label=name)
+    run = dataset[loop.run_id]
+    last = last_cycle(run, loop.condition.frequency_Hz)
+    draw_loop((left, right), centred_motion(run).part(last), run.force[last], color=colour, label=name)
     left.label("Displacement (mm)", "Force (N)")
     right.label("Velocity (m/s)", "Force (N)")
