@@ -8,6 +8,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer
+
 from mrdamper.errors import InputError, OutputError
 
 if TYPE_CHECKING:
@@ -35,6 +37,12 @@ def put_text(text: str, out: Path | None) -> None:
 
     with write_file(out) as target:
         target.write_text(text, encoding="utf-8")
+
+
+def warn(lines: Iterable[object]) -> None:
+    """Print lines on standard error."""
+    for line in lines:
+        typer.echo(line, err=True)
 
 
 def figure_kind(path: Path) -> str:

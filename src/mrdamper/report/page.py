@@ -13,8 +13,16 @@ import numpy as np
 from markupsafe import Markup
 
 from mrdamper.data import Dataset
+from mrdamper.errors import UnknownNameError
 
 PAPERS = ("a4", "letter")  # sizes of the pages of a PDF
+
+
+def paper_size(name: str) -> str:
+    """Return the size of the pages of a PDF as it is known here; raises `UnknownNameError` if it is not."""
+    if name.lower() not in PAPERS:
+        raise UnknownNameError.of("paper size", name, PAPERS)
+    return name.lower()
 
 
 def render_page(template: str, title: str, footer: str, **facts: object) -> str:
@@ -61,9 +69,9 @@ def median_worst(median: float | None, worst: float | None) -> str:
     return text if text == "–" else f"{text} ({percent(worst)})"
 
 
-def percent(share: float | None, digits: int = 1) -> str:
+def percent(share: float | None) -> str:
     """Format a share in per cent; a dash where there is none."""
-    return "–" if share is None or not np.isfinite(share) else f"{100 * share:.{digits}f}"
+    return "–" if share is None or not np.isfinite(share) else f"{100 * share:.1f}"
 
 
 _ENVIRONMENT = jinja2.Environment(

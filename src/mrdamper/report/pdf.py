@@ -19,9 +19,8 @@ from typing import Any
 from fpdf import FPDF, FontFace
 from fpdf.enums import Align, TableBordersLayout, TextEmphasis
 
-from mrdamper.errors import UnknownNameError
 from mrdamper.report.fonts import Fallback, fallback_fonts
-from mrdamper.report.page import PAPERS
+from mrdamper.report.page import paper_size
 
 _MARGIN = 18.0  # mm
 _INK, _FAINT, _RULE = (27, 31, 36), (91, 101, 112), (217, 222, 227)
@@ -114,15 +113,13 @@ def pdf_of(page: str, figures: Mapping[str, bytes], paper: str = "a4") -> bytes:
     bundled font does not contain are set in an installed font; those of no installed font are named on the last page.
     Raises `UnknownNameError` if there is no such paper size.
     """
-    if paper not in PAPERS:
-        raise UnknownNameError.of("paper size", paper, PAPERS)
     tree = _Tree()
     tree.feed(page)
     logging.getLogger("fpdf").setLevel(logging.ERROR)  # a character without a font is drawn as a box
     logging.getLogger("fontTools").setLevel(logging.ERROR)
     title = next(tree.root.elements("h1")).text
     fallback = fallback_fonts(tree.root.text, str(_fonts() / "DejaVuSans.ttf"))
-    sheet = _Paper(title, paper, fallback)
+    sheet = _Paper(title, paper_size(paper), fallback)
     sheet.set_title(title)
     sheet.set_creation_date(datetime(1980, 1, 1, tzinfo=UTC))  # fixed date: the same page gives the same bytes
     sheet.set_text_color(*_INK)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mrdamper.cli.output import aligned, figure_kind, finding_lines, put, put_figure
+from mrdamper.cli.output import aligned, figure_kind, finding_lines, put, put_figure, warn
 from mrdamper.cli.progress import watched
 from mrdamper.errors import InputError
 
@@ -63,14 +63,12 @@ def check(
         figure_kind(figure)
     verdicts = quality_table(record_of(run) for run in watched(load_dataset(data).runs, "run"))
     put([row(verdict) for verdict in verdicts], None, as_json, _text_table)
-    for verdict in verdicts:
-        if verdict.refusal is not None:
-            typer.echo(f"refused: {verdict.refusal}", err=True)
-    for line in finding_lines(((v.record.id, finding) for v in verdicts for finding in v.findings), verbose):
-        typer.echo(line, err=True)
+    refused = [f"refused: {verdict.refusal}" for verdict in verdicts if verdict.refusal is not None]
+    found = finding_lines(((v.record.id, finding) for v in verdicts for finding in v.findings), verbose)
+    warn([*refused, *found])
     if figure is not None:
         _draw(verdicts, figure)
-    if any(verdict.refusal is not None for verdict in verdicts):
+    if refused:
         raise typer.Exit(2)
 
 

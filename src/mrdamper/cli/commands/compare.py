@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from mrdamper.cli.output import aligned, parse_gas, parse_pairs, shortened
+from mrdamper.cli.output import aligned, parse_gas, parse_pairs, shortened, warn
 from mrdamper.cli.progress import progress_on_stderr
 
 if TYPE_CHECKING:
@@ -82,8 +82,7 @@ def _print(result: Comparison, rows: list[dict[str, Any]], name: str, verbose: b
         for line in omission_lines(rig.entries, rig.not_identified, len(rig.dataset) if verbose else 3)
     ]
     notes += [f"not determined: {model}: {why}" for rig in result.rigs for model, why in rig.refused.items()]
-    for note in shortened(notes, _NOTES, verbose):
-        typer.echo(note, err=True)
+    warn(shortened(notes, _NOTES, verbose))
     for rig in result.rigs:
         print(f"{rig.dataset.name}: nrmse_pp [%], median and largest")
         head, *models = _ranking([row for row in rows if row["rig"] == rig.dataset.name])
@@ -93,11 +92,9 @@ def _print(result: Comparison, rows: list[dict[str, Any]], name: str, verbose: b
 
 def _ranking(rows: list[dict[str, Any]]) -> list[str]:
     """Return the lines of the ranking, best first."""
-    cells: list[tuple[str, ...]] = [
-        ("", "model", "per run", "ident.", "CV", "worst", "valid.", "worst", "parameters", "s")
-    ]
+    cells = [["", "model", "per run", "ident.", "CV", "worst", "valid.", "worst", "parameters", "s"]]
     for row in rows:
         errors = [row[f"{name}_nrmse_pp"] for name in _ERRORS]
         shown = ("–" if error is None else f"{100 * error:.2f}" for error in errors)
-        cells.append((str(row["rank"]), row["title"], *shown, str(row["parameters"]), f"{row['seconds']:.1f}"))
+        cells.append([str(row["rank"]), row["title"], *shown, str(row["parameters"]), f"{row['seconds']:.1f}"])
     return aligned(cells, (1,))

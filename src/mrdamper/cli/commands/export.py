@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from mrdamper.cli.output import warn
 from mrdamper.cli.progress import progress_soon
 from mrdamper.errors import InputError
 
@@ -37,8 +38,7 @@ def export(
     kind = exporter(to)
     if fmi is not None and to != "fmu":
         raise InputError(f"--fmi {fmi} with --to {to}", remedy="leave --fmi out, or export --to fmu", code="E_OPTION")
-    options = {} if fmi is None else {"fmi": fmi}
-    format_writer = kind(**options)
+    format_writer = kind() if fmi is None else kind(fmi=fmi)
     require_writable(out)
     damper = load_model(model)
     called = identifier(name or damper.rig or "damper")
@@ -50,8 +50,7 @@ def export(
             paths, notes = write_export(written, out, kind.suffix), written.notes
     for path in paths:
         typer.echo(path)
-    for note in notes:
-        typer.echo(f"note: {note}", err=True)
+    warn(f"note: {note}" for note in notes)
 
 
 def _inverse(damper: Damper, name: str, to: str, exporter: Exporter, out: Path) -> tuple[list[Path], tuple[str, ...]]:

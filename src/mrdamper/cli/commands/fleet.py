@@ -6,11 +6,11 @@ import json
 import os
 import signal
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
-from mrdamper.cli.output import shortened
+from mrdamper.cli.output import shortened, warn
 from mrdamper.cli.progress import progress_on_stderr
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ def fleet(
 
     An interrupted run continues when the same command is given again.
     """
+    from mrdamper.fleet.page import write_page
     from mrdamper.fleet.profile import load_fleet_profile, load_limits
     from mrdamper.fleet.run import run_fleet
 
@@ -64,8 +65,6 @@ def fleet(
                 progress=progress,
             )
             progress("page", 1.0)
-            from mrdamper.fleet.page import write_page
-
             page = outcome.table.with_name("fleet.html")
             text = write_page(outcome.table, outcome.plan, bounds, page)
     except KeyboardInterrupt:
@@ -77,21 +76,13 @@ def fleet(
 
 
 def _print(outcome: Fleet, page: Path, messages: list[str], verbose: bool, as_json: bool) -> None:
-    for line in shortened([f"{status}: {name}: {reason}" for name, status, reason in outcome.troubled], 8, verbose):
-        typer.echo(line, err=True)
+    warn(shortened([f"{status}: {name}: {reason}" for name, status, reason in outcome.troubled], 8, verbose))
     if as_json:
-        print(json.dumps({**_summary(outcome), "page": str(page), "messages": messages}, indent=1, ensure_ascii=False))
+        summary = {name: getattr(outcome, name) for name in ("dampers", "done", "already")}
+        troubled = [dict(zip(("name", "status", "reason"), one, strict=True)) for one in outcome.troubled]
+        summary |= {"troubled": troubled, "table": str(outcome.table), "page": str(page), "messages": messages}
+        print(json.dumps(summary, indent=1, ensure_ascii=False))
         return
     print(f"{outcome.done} of {outcome.dampers} dampers identified ({outcome.already} in an earlier run)")
     print("".join(f"{line}\n" for line in shortened(messages, 8, verbose)), end="")
     print(f"table: {outcome.table}\npage: {page}")
-
-
-def _summary(result: Fleet) -> dict[str, Any]:
-    return {
-        "dampers": result.dampers,
-        "done": result.done,
-        "already": result.already,
-        "troubled": [{"name": n, "status": s, "reason": r} for n, s, r in result.troubled],
-        "table": str(result.table),
-    }

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import typer
 
-from mrdamper.cli.output import parse_gas, parse_numbers, parse_pairs, put
-from mrdamper.cli.progress import progress_on_stderr
+from mrdamper.cli.output import parse_gas, parse_numbers, parse_pairs, put, warn
+from mrdamper.cli.progress import watched
 
 _MAX_WARNINGS = 10  # number of lines on the terminal
 
@@ -47,28 +47,13 @@ def identify(
     if run:
         dataset = dataset.only([dataset[name] for name in run])
     sines, refused = usable_sines(dataset, clipped)
-    identifications = []
-    with progress_on_stderr() as progress:
-        for number, entry in enumerate(sines):
-            progress(f"run {entry.id}", number / len(sines))
-            identifications.append(
-                identification.identify(
-                    entry,
-                    chosen_model,
-                    chosen_method,
-                    free=free,
-                    fixed=fixed,
-                    gas=spring,
-                    with_delay=delay,
-                    clipped=clipped,
-                )
-            )
-        progress("identified", 1.0)
-    for name, why in refused.items():
-        typer.echo(f"not identified: {name}: {why}", err=True)
+    options = {"free": free, "fixed": fixed, "gas": spring, "with_delay": delay, "clipped": clipped}
+    identifications = [
+        identification.identify(entry, chosen_model, chosen_method, **options) for entry in watched(sines, "run")
+    ]
+    warn(f"not identified: {name}: {why}" for name, why in refused.items())
     put(identification_rows(identifications, dataset.name), out, as_json, csv_text)
     doubts = [f"warning: run {one.run_id}: {doubt}" for one in identifications for doubt in one.doubts]
-    for line in doubts[:_MAX_WARNINGS]:
-        typer.echo(line, err=True)
+    warn(doubts[:_MAX_WARNINGS])
     if len(doubts) > _MAX_WARNINGS:
         typer.echo(f"warning: {len(doubts) - _MAX_WARNINGS} more of this kind in the column notes", err=True)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mrdamper.cli.output import finding_lines, put_text, shortened
+from mrdamper.cli.output import finding_lines, put_text, shortened, warn
 from mrdamper.cli.progress import progress_on_stderr
 from mrdamper.errors import InputError, OutputError, listed
 
@@ -113,8 +113,7 @@ def _write_tests(files: list[Path], settings: Profile, target: Path) -> None:
     from mrdamper.rig_files.tests_table import tests_text
 
     records, refusals = found_tests(files, settings)
-    for line in _refused_lines(refusals):
-        typer.echo(f"not in the table: {line}", err=True)
+    warn(f"not in the table: {line}" for line in _refused_lines(refusals))
     if not records:
         raise InputError("no test can be read", remedy="correct the files listed above, or give a profile")
     put_text(tests_text(records), target)
@@ -251,9 +250,7 @@ def _reads_alike(one: Run, other: Run) -> bool:
 def _print_tree(files: list[Path], settings: Profile) -> None:
     from mrdamper.rig_files.preview import tree_lines
 
-    print("In the files:")
-    for line in tree_lines(files, settings):
-        print(f"  {line}")
+    print("\n  ".join(["In the files:", *tree_lines(files, settings)]))
 
 
 def _asked(

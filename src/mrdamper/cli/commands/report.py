@@ -33,8 +33,9 @@ def report(
     from mrdamper.data.atomic import require_writable
     from mrdamper.report.about import load_about, load_limits, parse_ladder
     from mrdamper.report.damper_tests import write_test_report
+    from mrdamper.report.page import paper_size
 
-    ladder = parse_ladder(velocities)
+    ladder, page_size = parse_ladder(velocities), paper_size(paper)
     head = load_about(about) if about else None
     bands = load_limits(limits) if limits else ()
     require_writable(out)
@@ -42,7 +43,7 @@ def report(
         progress("reading", 0.0)
         loaded = dict(_specimen(text) for text in specimens)
         progress("report", 0.4)
-        written = write_test_report(loaded, out, about=head, limits=bands, ladder=ladder, png=png, paper=paper.lower())
+        written = write_test_report(loaded, out, about=head, limits=bands, ladder=ladder, png=png, paper=page_size)
         progress("written", 1.0)
     print(f"report: {written[0]}")
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from mrdamper.cli.output import parse_named, shortened
+from mrdamper.cli.output import parse_named, shortened, warn
 from mrdamper.cli.progress import progress_soon
 from mrdamper.errors import InputError
 
@@ -79,8 +79,7 @@ def simulate(
             compared = compare_controllers(*given, others, done.step, highest, tell) if others else None
             tell("writing", 1.0)
             paths = write_simulation(done, out, compared, bands)
-    for line in shortened([f"{path}" for path in paths], 2, verbose):
-        typer.echo(line, err=True)
+    warn(shortened([f"{path}" for path in paths], 2, verbose))
     if as_json:
         print(json.dumps(_figures(done, dampers) | _banded(bands), indent=1))
         return
@@ -117,8 +116,7 @@ def _export_law(loop: SystemLoop, folder: Path | None, fmu: Path | None) -> None
     if fmu is not None:
         path, notes = write_program_fmu(law, name, title, loop.control.units, fmu, loop.period, loop.control.start)
         paths += path
-    for line in (*paths, *(f"note: {note}" for note in notes)):
-        typer.echo(f"{line}", err=True)
+    warn([*paths, *(f"note: {note}" for note in notes)])
 
 
 def _all_of(names: list[str]) -> list[str]:

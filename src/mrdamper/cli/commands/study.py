@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mrdamper.cli.output import parse_gas, parse_pairs
+from mrdamper.cli.output import parse_gas, parse_pairs, warn
 from mrdamper.cli.progress import in_two, progress_on_stderr
-from mrdamper.errors import IdentificationError, InputError, UnknownNameError
+from mrdamper.errors import IdentificationError, InputError
 
 if TYPE_CHECKING:
     from mrdamper.data import Dataset
@@ -51,6 +51,7 @@ def study(
     """
     from mrdamper.data.atomic import require_writable
     from mrdamper.report.about import load_about, load_limits
+    from mrdamper.report.page import paper_size
     from mrdamper.report.study import write_study
     from mrdamper.report.summary import omission_lines, study_lines
     from mrdamper.rig_files.dataset_folder import load_dataset
@@ -61,7 +62,7 @@ def study(
     head, bands = load_about(about) if about else None, load_limits(limits) if limits else ()
     also = [kind for kind, wanted in (("pdf", pdf or about is not None), ("png", png)) if wanted]
     require_writable(out)
-    page_size = _paper_size(paper)
+    page_size = paper_size(paper)
     dataset = load_dataset(data)
     if lag:
         _require_switched_current(dataset)
@@ -74,8 +75,7 @@ def study(
     for rig in result.rigs:
         lines = [f"excluded: {one.run_id}: {one}" for one in rig.contradictions]
         lines += omission_lines(rig.candidates, rig.omitted, len(dataset) if verbose else 3)
-        for line in [*lines, *(f"note: {note}" for note in rig.chosen.recipe.notes)]:
-            typer.echo(line, err=True)
+        warn([*lines, *(f"note: {note}" for note in rig.chosen.recipe.notes)])
     if as_json:
         print(json.dumps(_summary(result, [str(p) for p in written]), indent=1))
         return
@@ -104,14 +104,6 @@ def _require_switched_current(dataset: Dataset) -> None:
             remedy="add a run in which the current is switched, or omit --lag",
             code="E_LAG",
         )
-
-
-def _paper_size(name: str) -> str:
-    from mrdamper.report.page import PAPERS
-
-    if name.lower() not in PAPERS:
-        raise UnknownNameError.of("paper size", name, PAPERS)
-    return name.lower()
 
 
 def _summary(result, written: list[str]) -> dict:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mrdamper.cli.output import put
+from mrdamper.cli.output import put, warn
 from mrdamper.cli.progress import watched
 from mrdamper.errors import InputError, UnknownNameError
 
@@ -62,20 +62,15 @@ def validate(
         sessions_known(damper, [whole[n] for n in check_run], own_sessions) if check_run or own_sessions else None
     )
     validation = score(damper, watched([run for run in runs if run.id not in check_run], "run"), sessions=sessions)
-    for run_id, why in validation.refused.items():
-        typer.echo(f"not scored: {run_id}: {why}", err=True)
+    warn(f"not scored: {run_id}: {why}" for run_id, why in validation.refused.items())
     if not validation.runs:
         raise InputError("no run could be scored", where=f"rig {name}", remedy="see the lines above")
     by_id = {run.id: run for run in runs}
-    peaks = {
-        run.run_id: peak_band(
-            damper,
-            by_id[run.run_id],
-            level,
-            sessions and sessions.expected(RecordingTime.of(by_id[run.run_id]), run.run_id),
-        )
+    expected = {
+        run.run_id: sessions and sessions.expected(RecordingTime.of(by_id[run.run_id]), run.run_id)
         for run in validation.runs
     }
+    peaks = {name: peak_band(damper, by_id[name], level, session) for name, session in expected.items()}
     put([{**score_row(run), **peaks[run.run_id]} for run in validation.runs], out, as_json, csv_text)
     _note_identification_runs(damper, [run for run in validation.runs if by_id[run.run_id].split == "train"])
     _print_summary(damper, validation, name, peaks.values(), level)
