@@ -19,7 +19,6 @@ from mrdamper.paper.output import all_tables, method_rows
 from mrdamper.paper.results import GeneticCheck, GeneticEnd
 from mrdamper.paper.sensitivity import OneAtATime, Sobol
 from mrdamper.paper.virtual_rig import VirtualRig
-from mrdamper.report.plots.style import Picture
 from mrdamper.statistics.functions.fitting import FunctionFit
 from mrdamper.statistics.functions.forms import ParameterFunction
 from mrdamper.statistics.metrics import Scores
@@ -154,7 +153,7 @@ def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
 
     def drawn(study, also, names, progress):
         asked.append((also, names))
-        return {name: "one motion" if name == "fig09" else Picture({"svg": name.encode()}) for name in names}
+        return {name: "one motion" if name == "fig09" else {"svg": name.encode()} for name in names}
 
     def render(template, title, about, **given):
         page.update(given, template=template, about=about)

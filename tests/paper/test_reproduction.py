@@ -8,7 +8,6 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,7 +30,6 @@ from mrdamper.paper.output import NUMBERED, all_tables, method_rows, parameter_r
 from mrdamper.paper.study import reproduce
 from mrdamper.paper.virtual_rig import VirtualRig, friction_test, virtual_dataset
 from mrdamper.physics.gas_spring import GasSpring
-from mrdamper.report.plots.style import Picture
 from mrdamper.statistics.functions.fitting import fit_function
 from mrdamper.statistics.functions.forms import ParameterFunction
 
@@ -52,8 +50,7 @@ def quick():
 @pytest.fixture
 def undrawn(monkeypatch):
     """Figures are made, but not drawn: that is looked at once, in a study that allows all of them."""
-    drawing = SimpleNamespace(of=lambda figure, also=(): Picture({"svg": b"<svg/>"}))
-    monkeypatch.setattr(figures, "Picture", drawing)
+    monkeypatch.setattr(figures, "picture_of", lambda figure, also=(): {"svg": b"<svg/>"})
 
 
 @pytest.fixture(scope="module")

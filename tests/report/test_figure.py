@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mrdamper.report.plots.figure import Axis, Figure
-from mrdamper.report.plots.style import Picture, current_colours
+from mrdamper.report.plots.style import current_colours, picture_of
 
 
 @pytest.fixture
@@ -33,17 +33,17 @@ def test_points_lie_in_proportion_to_their_numbers(figure):
 
 
 def test_an_svg_is_well_formed_escaped_and_the_same_each_time(figure):
-    picture = Picture.of(figure)
-    root = ElementTree.fromstring(picture.svg)
+    picture = picture_of(figure)
+    root = ElementTree.fromstring(picture["svg"])
     texts = ["".join(e.itertext()) for e in root.iter() if e.tag.endswith("text")]
     assert {"(a) one", "(b)", "a <b> & c", "Current (A)", "Force (N)", "1000"} <= set(texts)
-    assert picture.svg == Picture.of(figure).svg
-    assert "nan" not in picture.svg.decode()
+    assert picture["svg"] == picture_of(figure)["svg"]
+    assert "nan" not in picture["svg"].decode()
     assert b",a <b> & c,10.0,1.0\n" in picture.files["csv"]
 
 
 def test_a_gap_in_a_curve_is_a_gap_on_paper(figure):
-    (dashed,) = re.findall(r'd="([^"]*)" fill="none"[^>]*stroke-dasharray', Picture.of(figure).svg.decode())
+    (dashed,) = re.findall(r'd="([^"]*)" fill="none"[^>]*stroke-dasharray', picture_of(figure)["svg"].decode())
     assert dashed.count("M") == 2
 
 

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from typer.testing import CliRunner
 
 from mrdamper.cli import application
 from mrdamper.data import Dataset
-from mrdamper.report.plots.quality import LoopPanel, quality_figure
+from mrdamper.report.plots.quality import quality_figure
 from mrdamper.rig_files.dataset_folder import save_dataset
 from mrdamper.rig_files.quality.table import to_run
 
@@ -75,11 +76,9 @@ def test_a_figure_of_unknown_form_is_refused_at_once(folder, tmp_path):
 
 def test_flagged_samples_are_marked_and_names_are_text():
     x = np.linspace(-0.01, 0.01, 50)
-    panels = [
-        LoopPanel("$x^2$ <b>", "W_CLIPPED", x, 100 * x, np.arange(50) > 44),
-        LoopPanel("b", "", x, 100 * x, np.zeros(50, dtype=bool)),
-    ]
-    figure = quality_figure(panels)
+    records = [SimpleNamespace(id=name, displacement=x, force=100 * x) for name in ("$x^2$ <b>", "b")]
+    verdicts = [SimpleNamespace(record=one, codes=("W_CLIPPED",), refusal=None) for one in records]
+    figure = quality_figure(list(zip(verdicts, (np.arange(50) > 44, np.zeros(50, dtype=bool)), strict=True)))
     first, second = figure.axes[:2]
     assert [one.x.size for one in first.series] == [50, 5]
     assert len(second.series) == 1

@@ -19,7 +19,7 @@ from mrdamper.fleet.profile import ColumnLimits
 from mrdamper.fleet.verdicts import FEATURES, clock_findings, drift, suspects, with_features
 from mrdamper.report.page import render_page
 from mrdamper.report.plots.figure import Figure
-from mrdamper.report.plots.style import PALETTE, Picture
+from mrdamper.report.plots.style import PALETTE, picture_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -130,7 +130,7 @@ def _described(line: pl.DataFrame, name: str, about: tuple[str, str]) -> dict[st
     return {
         "title": about[0], "unit": about[1], "quantiles": quantiles, "what": what,
         "signals": (len(first.signals), len(ranges.signals), len(average.signals)),
-        "picture": Picture.of(_chart(values, first, ranges, average, about)).files["svg"],
+        "picture": picture_of(_chart(values, first, ranges, average, about))["svg"],
     }  # fmt: skip
 
 
@@ -183,4 +183,4 @@ def _worst(table: Path, line: pl.DataFrame, plan: Plan | None) -> dict[str, Any]
                 place.plot(speed, loop, color=PALETTE[2], lw=0.6, alpha=0.8)
         place.plot(speed, plan.loops[number], color=PALETTE[0], lw=1.4)
         place.label("velocity (mm/s)", "force (N)" if number == 0 else "", f"{current:g} A, {frequency:.3g} Hz")
-    return {"rows": far.rows(named=True), "picture": Picture.of(figure).files["svg"]}
+    return {"rows": far.rows(named=True), "picture": picture_of(figure)["svg"]}

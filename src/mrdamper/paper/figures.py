@@ -26,7 +26,17 @@ from mrdamper.report.plots.comparison import overlaid_loops
 from mrdamper.report.plots.cycle import draw_loop, last_cycle
 from mrdamper.report.plots.figure import Axes, Figure
 from mrdamper.report.plots.rig_tests import test_analysis, test_matrix
-from mrdamper.report.plots.style import MEASURED, MM, PALETTE, Picture, current_colours, motion_name, powered, thin
+from mrdamper.report.plots.style import (
+    MEASURED,
+    MM,
+    PALETTE,
+    Picture,
+    current_colours,
+    motion_name,
+    picture_of,
+    powered,
+    thin,
+)
 from mrdamper.statistics.functions.fitting import fit_function
 from mrdamper.statistics.functions.forms import ParameterFunction, features
 from mrdamper.study.recipe import Progress
@@ -64,7 +74,7 @@ def pictures(
     for number, name in enumerate(names):
         progress(f"figure {name}", number / len(names))
         figure = FIGURES[name].make(study, FIGURES[name].axes)
-        drawn[name] = figure if isinstance(figure, str) else Picture.of(figure, also)
+        drawn[name] = figure if isinstance(figure, str) else picture_of(figure, also)
     return drawn
 
 

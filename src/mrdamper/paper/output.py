@@ -24,7 +24,7 @@ from mrdamper.paper.figures import FIGURES, caption, pictures
 from mrdamper.paper.options import ALI, CONSISTENT, DIRECT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import Reproduction, cost_per_run, rate_rows
 from mrdamper.report.page import made_from, render_page
-from mrdamper.report.plots.style import Picture
+from mrdamper.report.plots.style import Picture, save_picture
 from mrdamper.report.tables import identification_rows
 from mrdamper.study.parallel import IN_PROCESS, Processes
 from mrdamper.study.recipe import Progress
@@ -59,9 +59,9 @@ def write_reproduction(
         for part in ("figures", "tables"):
             (work / part).mkdir()
         shown = {
-            name: (caption(name), picture.save(work / "figures" / name))
+            name: (caption(name), save_picture(picture, work / "figures" / name))
             for name in names
-            if isinstance(picture := drawn[name], Picture)
+            if not isinstance(picture := drawn[name], str)
         }
         for name, rows in (tables | {"seconds": time_rows(study)}).items():
             (work / "tables" / f"{name}.csv").write_text(csv_text(rows), encoding="utf-8")

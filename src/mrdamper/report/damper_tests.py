@@ -19,7 +19,7 @@ from mrdamper.report.about import About, Limit
 from mrdamper.report.page import made_from, number, plain, render_page
 from mrdamper.report.plots.characteristics import continuous_velocity_plot, figures_over_current, peak_velocity_plot
 from mrdamper.report.plots.figure import Figure
-from mrdamper.report.plots.style import Picture
+from mrdamper.report.plots.style import picture_of, save_picture
 
 _SOURCES = ("source", "file", "source_file")  # keys of a run's notes that name its source
 _CURRENT_TOLERANCE = 0.03  # relative difference [-] up to which a current counts as that of a limit
@@ -53,10 +53,9 @@ def write_test_report(
     def fill(work: Path) -> None:
         (work / "figures").mkdir()
         also = ("pdf", "png") if png else ("pdf",)
-        pictures = {
-            key: Picture.of(figure, also) for key, figure in figures_of_tests(first, characteristics, limits).items()
-        }
-        saved = {key: picture.save(work / "figures" / key) for key, picture in pictures.items()}
+        figures = figures_of_tests(first, characteristics, limits)
+        pictures = {key: picture_of(figure, also) for key, figure in figures.items()}
+        saved = {key: save_picture(picture, work / "figures" / key) for key, picture in pictures.items()}
         page = render_page(
             "tests.html.j2",
             about.title or f"Damper test report: {', '.join(characteristics)}",
@@ -66,12 +65,10 @@ def write_test_report(
             lead=facts["summary"],
             t=facts,
             pictures=saved,
-            passed_over={
-                run: why for specimen in characteristics.values() for run, why in specimen.passed_over.items()
-            },
+            passed_over={run: why for one in characteristics.values() for run, why in one.passed_over.items()},
         )
         (work / "report.html").write_text(page, encoding="utf-8")
-        (work / "report.pdf").write_bytes(pdf_of(page, {key: p.files["pdf"] for key, p in pictures.items()}, paper))
+        (work / "report.pdf").write_bytes(pdf_of(page, {key: p["pdf"] for key, p in pictures.items()}, paper))
         (work / "forces.csv").write_text(csv_text(force_rows(facts)), encoding="utf-8")
         (work / "tests.csv").write_text(csv_text(_test_rows(characteristics)), encoding="utf-8")
 
@@ -225,9 +222,8 @@ def _both_sides(specimen: Characteristics, stroke: Stroke) -> float:
 
 
 def _verdict(name: str, specimen: Characteristics, limit: Limit) -> dict[str, Any]:
-    near = [
-        c for c in specimen.currents if abs(c - limit.current_A) <= 5e-3 + _CURRENT_TOLERANCE * abs(limit.current_A)
-    ]
+    tolerance = 5e-3 + _CURRENT_TOLERANCE * abs(limit.current_A)
+    near = [current for current in specimen.currents if abs(current - limit.current_A) <= tolerance]
     side = SIDES.index(limit.side)
     force = specimen.at_velocity(near[0], limit.velocity_m_s, side) if near else float("nan")
     verdict = "not tested" if np.isnan(force) else "pass" if limit.lower_N <= force <= limit.upper_N else "fail"

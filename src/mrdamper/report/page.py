@@ -69,9 +69,9 @@ def median_worst(median: float | None, worst: float | None) -> str:
     return text if text == "–" else f"{text} ({percent(worst)})"
 
 
-def percent(share: float | None) -> str:
+def percent(share: float | None, digits: int = 1) -> str:
     """Format a share in per cent; a dash where there is none."""
-    return "–" if share is None or not np.isfinite(share) else f"{100 * share:.1f}"
+    return "–" if share is None or not np.isfinite(share) else f"{100 * share:.{digits}f}"
 
 
 _ENVIRONMENT = jinja2.Environment(

@@ -18,7 +18,6 @@ from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names
 from mrdamper.data.runs import once_per_run
 from mrdamper.errors import IdentificationError
-from mrdamper.identification import Identification
 from mrdamper.identification.characteristics import Characteristics, characterise
 from mrdamper.identification.intervals import written
 from mrdamper.models import Model
@@ -38,7 +37,7 @@ from mrdamper.report.plots.model import (
 )
 from mrdamper.report.plots.reversal import force_since_reversal
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
-from mrdamper.report.plots.style import MOST_NAMED, Picture
+from mrdamper.report.plots.style import MOST_NAMED, Picture, picture_of, save_picture
 from mrdamper.report.summary import error_sentence, omission_lines
 from mrdamper.report.tables import identification_rows, score_rows
 from mrdamper.study.parallel import IN_PROCESS, Processes
@@ -69,7 +68,9 @@ def write_study(
     "letter". Raises `AboutError` if `about` or `limits` cannot be read, or has an unknown field, and `OutputError`
     if the folder cannot be written to.
     """
-    head = _head(about)
+    if isinstance(about, (str, Path)):
+        about = load_about(about)
+    head = about if isinstance(about, About) else about_of(about or {}, "about")
     limits = load_limits(limits) if isinstance(limits, (str, Path)) else tuple(limits)
     # Figures as SVG alone cost less here than sending the study to a process, with what this one knows of its runs.
     painters = processes if also else IN_PROCESS
@@ -81,10 +82,11 @@ def write_study(
         vectors, forces = {}, []
         for rig, pictures in zip(study.rigs, drawn, strict=True):
             suffix = f"-{parts[rig.rig]}" if len(study.rigs) > 1 else ""
-            saved = {name: picture.save(work / "figures" / f"{name}{suffix}") for name, picture in pictures.items()}
+            stems = {name: work / "figures" / f"{name}{suffix}" for name in pictures}
+            saved = {name: save_picture(picture, stems[name]) for name, picture in pictures.items()}
             save_model(rig.damper, work / f"model{suffix}.json")
             key = f"rig-{len(chapters) + 1}"
-            vectors |= {f"{key}-{name}": p.files["pdf"] for name, p in pictures.items() if "pdf" in p.files}
+            vectors |= {f"{key}-{name}": p["pdf"] for name, p in pictures.items() if "pdf" in p}
             chapters.append({**_chapter(rig, saved, limits), "key": key})
             forces += force_rows(chapters[-1]["measured"] or {})
         footer = f"{made_from(study.dataset)}."
@@ -98,8 +100,10 @@ def write_study(
             from mrdamper.report.pdf import pdf_of
 
             (work / "report.pdf").write_bytes(pdf_of(page, vectors, paper))
+        # Several candidates share individual fits.
+        fits = {id(one): one for rig in study.rigs for c in rig.candidates for one in c.identifications}
         tables = {
-            "identifications": identification_rows(_all_identifications(study), study.dataset.name),
+            "identifications": identification_rows(list(fits.values()), study.dataset.name),
             "parameters": _parameter_rows(study),
             "validation": [
                 row
@@ -120,27 +124,13 @@ def write_study(
     return written
 
 
-def _head(about: About | Mapping[str, Any] | str | Path | None) -> About:
-    """Return the head of a report in the form in which it is printed."""
-    if isinstance(about, (str, Path)):
-        return load_about(about)
-    return about if isinstance(about, About) else about_of(about or {}, "about")
-
-
 def _draw(rig: RigStudy, progress: Progress, *, also: tuple[str, ...], limits: tuple[Limit, ...]) -> dict[str, Picture]:
     """Draw every figure of a rig, by name."""
-    figures = _figures(rig, limits)
-    pictures = {}
+    figures, pictures = _figures(rig, limits), {}
     for number, (name, figure) in enumerate(figures.items()):
         progress(f"{rig.rig or 'rig'}: figure {name}", number / len(figures))
-        pictures[name] = Picture.of(figure, also)
+        pictures[name] = picture_of(figure, also)
     return pictures
-
-
-def _all_identifications(study: Study) -> list[Identification]:
-    """Collect every individual fit once; several candidates share them."""
-    identifications = [i for rig in study.rigs for candidate in rig.candidates for i in candidate.identifications]
-    return list({id(one): one for one in identifications}.values())
 
 
 def _figures(rig: RigStudy, limits: Sequence[Limit]) -> dict[str, Figure]:
@@ -151,23 +141,18 @@ def _figures(rig: RigStudy, limits: Sequence[Limit]) -> dict[str, Figure]:
         if candidate.validation.runs:
             scores[f"{candidate.title}, validation"] = candidate.validation
     train = [rig.dataset[run.run_id] for run in chosen.cross_validated.runs]
-    measured = _measured(rig)
+    measured, loops = _measured(rig), {}
+    if rig.loops:
+        loops = {"matrix": test_matrix(rig.loops), "loops": measured_loops(rig.dataset, rig.loops)}
+        loops["analysis"] = test_analysis(rig.loops, rig.ranges)
     return {
         **(figures_of_tests(rig.dataset, measured, limits) if measured else {}),
-        **(_figures_of_loops(rig) if rig.loops else {}),
+        **loops,
         "scores": score_strip(scores),
-        **({"parameters": parameter_curves(mapped[1])} if (mapped := _mapped(rig)) else {}),
+        **({"parameters": parameter_curves(mapped)} if (mapped := _mapped(rig)[1]) else {}),
         "predicted": predicted_loops(chosen.damper, _shown(rig)),
         "residuals": residual_map(chosen.damper, train),
         "reversal": force_since_reversal(train, chosen.damper),
-    }
-
-
-def _figures_of_loops(rig: RigStudy) -> dict[str, Figure]:
-    return {
-        "matrix": test_matrix(rig.loops),
-        "loops": measured_loops(rig.dataset, rig.loops),
-        "analysis": test_analysis(rig.loops, rig.ranges),
     }
 
 
@@ -194,7 +179,8 @@ def _measured(rig: RigStudy) -> dict[str, Characteristics]:
 
 def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limit]) -> dict[str, Any]:
     chosen = rig.chosen
-    mapped, functions = _mapped(rig) or (None, None)
+    mapped, functions = _mapped(rig)
+    first = mapped.identifications[0] if mapped else None
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
     limits_of_use = limitations(chosen, rig.loops, rig.dataset)
     held = all(run.split == "validate" for run in _shown(rig))
@@ -213,7 +199,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         "contradictions": rig.contradictions,
         "omissions": omission_lines(rig.candidates, rig.omitted, len(rig.omitted)),
         "identifications": mapped.identifications if mapped else (),
-        "parameter_names": _free_names(mapped.identifications[0]) if mapped else (),
+        "parameter_names": [name for name in first.model.values() if name in first.free] if first else (),
         "mapped": mapped,
         "every_motion_drawn": functions is not None and len(motions_of(functions)) <= MOST_NAMED,
         "joint": _joint_table(chosen, chosen.fit.damper.model) if isinstance(chosen.fit, JointFit) else (),
@@ -231,13 +217,9 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
     }
 
 
-def _free_names(identification: Identification) -> list[str]:
-    return [name for name in identification.model.values() if name in identification.free]
-
-
-def _mapped(rig: RigStudy) -> tuple[RecipeResult, ModifiedFit] | None:
+def _mapped(rig: RigStudy) -> tuple[RecipeResult, ModifiedFit] | tuple[None, None]:
     """Return the best candidate with parameter functions, if any: its curves are drawn."""
-    return next(((c, c.fit) for c in rig.candidates if isinstance(c.fit, ModifiedFit)), None)
+    return next(((c, c.fit) for c in rig.candidates if isinstance(c.fit, ModifiedFit)), (None, None))
 
 
 def _joint_table(chosen: RecipeResult, model: Model) -> list[dict[str, Any]]:

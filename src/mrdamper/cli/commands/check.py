@@ -13,10 +13,7 @@ from mrdamper.cli.progress import watched
 from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from mrdamper.cli.output import Rows
-    from mrdamper.rig_files.quality.table import Quality
 
 _HEADINGS = {
     "run_id": "run",
@@ -67,7 +64,11 @@ def check(
     found = finding_lines(((v.record.id, finding) for v in verdicts for finding in v.findings), verbose)
     warn([*refused, *found])
     if figure is not None:
-        _draw(verdicts, figure)
+        from mrdamper.report.plots.quality import quality_figure
+        from mrdamper.rig_files.quality.flat import flagged_samples
+        from mrdamper.rig_files.quality.view import View
+
+        put_figure(quality_figure([(verdict, flagged_samples(View(verdict.record))) for verdict in verdicts]), figure)
     if refused:
         raise typer.Exit(2)
 
@@ -87,22 +88,3 @@ def _text_table(rows: Rows) -> str:
     cells = [["–" if row[name] is None else str(row[name]) for name in _HEADINGS] for row in rows]
     lines = aligned([list(_HEADINGS.values()), *cells], (0, len(_HEADINGS) - 2, len(_HEADINGS) - 1))
     return "".join(f"{line}\n" for line in lines)
-
-
-def _draw(verdicts: Sequence[Quality], path: Path) -> None:
-    from mrdamper.report.plots.quality import LoopPanel, quality_figure
-    from mrdamper.rig_files.quality.flat import flagged_samples
-    from mrdamper.rig_files.quality.view import View
-
-    panels = [
-        LoopPanel(
-            verdict.record.id,
-            " ".join(verdict.codes),
-            verdict.record.displacement,
-            verdict.record.force,
-            flagged_samples(View(verdict.record)),
-            verdict.refusal is not None,
-        )
-        for verdict in verdicts
-    ]
-    put_figure(quality_figure(panels), path)

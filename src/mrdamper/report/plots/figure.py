@@ -305,19 +305,10 @@ def room_beside(texts: Iterable[str]) -> float:
 
 
 class Figure:
-    """Panels in rows, with margins in inches.
+    """Panels in rows, on a sheet of two journal columns; all lengths in inches.
 
-    Parameters
-    ----------
-    rows, columns : int
-    height, width : float
-        [inch]
-    left, right, top, bottom, gap : float
-        Margins, and distance between panels [inch].
-    share_y : bool
-        Give all panels one vertical axis, named on the left.
-    lettered : bool
-        Put (a), (b), ... before the titles where there are several panels.
+    With `share_y` all panels have one vertical axis, named on the left; `lettered` puts (a), (b), ... before the titles
+    where there are several panels.
     """
 
     def __init__(
@@ -326,7 +317,6 @@ class Figure:
         columns: int,
         height: float,
         *,
-        width: float = WIDTH,
         left: float = 0.78,
         right: float = 0.12,
         top: float = 0.28,
@@ -335,9 +325,9 @@ class Figure:
         share_y: bool = False,
         lettered: bool = True,
     ):
-        self.width, self.height = width * INCH, height * INCH
+        self.width, self.height = WIDTH * INCH, height * INCH
         down = gap + 0.1 if gap > 0.3 else gap
-        wide = (width - left - right - (columns - 1) * gap) / columns * INCH
+        wide = (WIDTH - left - right - (columns - 1) * gap) / columns * INCH
         tall = (height - top - bottom - (rows - 1) * down) / rows * INCH
         self.axes = [
             Axes(left * INCH + column * (wide + gap * INCH), top * INCH + row * (tall + down * INCH), wide, tall)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mrdamper.data import Floats
 from mrdamper.report.plots.figure import Figure
-from mrdamper.report.plots.style import MEASURED, MM, PALETTE
+from mrdamper.report.plots.style import MEASURED, MM, PALETTE, thin
+from mrdamper.rig_files.quality.table import Quality
 
 _COLUMNS = 4
 _MOST_POINTS = 2000  # of a loop's line
@@ -18,34 +18,20 @@ _MOST_PANELS = 80  # of one figure
 _FLAG, _REFUSED = PALETTE[2], PALETTE[4]
 
 
-@dataclass(frozen=True, eq=False)
-class LoopPanel:
-    """One record's loop."""
-
-    title: str  # name of the record
-    note: str  # codes of findings; empty for a good record
-    # displacement and force: (N,) [m], [N], NaN where a sample is missing
-    displacement: Floats
-    force: Floats
-    flagged: np.ndarray  # (N,) samples to be marked
-    refused: bool = False
-
-
-def quality_figure(panels: Sequence[LoopPanel]) -> Figure:
-    """Draw the loops of the first eighty records, refused ones in another colour, flagged samples marked."""
+def quality_figure(panels: Sequence[tuple[Quality, NDArray[np.bool_]]]) -> Figure:
+    """Draw the loops of the first eighty records, refused ones in another colour, with the samples that are flagged."""
     shown = panels[:_MOST_PANELS]
     columns = min(_COLUMNS, max(1, len(shown)))
     rows = max(1, math.ceil(len(shown) / columns))
     figure = Figure(rows, columns, 0.75 + 1.95 * rows)
-    for panel, place in zip(shown, figure.axes, strict=False):
-        thin = slice(None, None, max(1, panel.displacement.size // _MOST_POINTS))
-        place.plot(
-            MM * panel.displacement[thin], panel.force[thin], color=_REFUSED if panel.refused else MEASURED, lw=0.6
-        )
-        if panel.flagged.any():
-            place.plot(MM * panel.displacement[panel.flagged], panel.force[panel.flagged], ".", color=_FLAG, ms=3)
-        place.title, place.size, place.tick_size, place.raised = _short(panel.title), 7.5, 6.5, 12.0
-        place.text(0, 1.03, panel.note, size=6, color=_FLAG)
+    for (verdict, flagged), place in zip(shown, figure.axes, strict=False):
+        x, force = MM * verdict.record.displacement, verdict.record.force
+        colour = MEASURED if verdict.refusal is None else _REFUSED
+        place.plot(thin(x, _MOST_POINTS), thin(force, _MOST_POINTS), color=colour, lw=0.6)
+        if flagged.any():
+            place.plot(x[flagged], force[flagged], ".", color=_FLAG, ms=3)
+        place.title, place.size, place.tick_size, place.raised = _short(verdict.record.id), 7.5, 6.5, 12.0
+        place.text(0, 1.03, " ".join(verdict.codes), size=6, color=_FLAG)
         place.x.most, place.y.most = 3, 4
     for i, place in enumerate(figure.axes):
         if i + columns >= len(shown):

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 
@@ -67,28 +65,20 @@ def thin(array: Floats, most: int = 400) -> Floats:
     return array[:: max(1, array.size // most)]
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A figure as files: an SVG, its data as CSV, and further formats on request."""
+Picture = Mapping[str, bytes]  # files of a figure by their suffix: an SVG, its data as CSV, further formats
 
-    files: Mapping[str, bytes]  # by suffix of the file
 
-    @classmethod
-    def of(cls, figure: Figure, also: Sequence[str] = ()) -> Self:
-        """Draw a figure; `also` "png" or "pdf" beside the SVG, each of which takes fifty times as long."""
-        drawing = figure.drawn()
-        return cls({kind: drawing.file(kind) for kind in ("svg", *also)} | {"csv": figure_data(figure).encode()})
+def picture_of(figure: Figure, also: Sequence[str] = ()) -> Picture:
+    """Draw a figure; `also` "png" or "pdf" beside the SVG, each of which takes fifty times as long."""
+    drawing = figure.drawn()
+    return {kind: drawing.file(kind) for kind in ("svg", *also)} | {"csv": figure_data(figure).encode()}
 
-    @property
-    def svg(self) -> bytes:
-        """The picture for a page."""
-        return self.files["svg"]
 
-    def save(self, stem: Path) -> bytes:
-        """Write the files of the figure; return the SVG."""
-        for kind, data in self.files.items():
-            stem.with_name(f"{stem.name}.{kind}").write_bytes(data)
-        return self.svg
+def save_picture(picture: Picture, stem: Path) -> bytes:
+    """Write the files of a figure; return the SVG."""
+    for kind, data in picture.items():
+        stem.with_name(f"{stem.name}.{kind}").write_bytes(data)
+    return picture["svg"]
 
 
 def figure_data(figure: Figure) -> str:
@@ -105,4 +95,4 @@ def figure_data(figure: Figure) -> str:
 
 def save_figure(figure: Figure, stem: Path, also: Sequence[str] = ()) -> bytes:
     """Write a figure as SVG and CSV, and in further formats; returns the SVG."""
-    return Picture.of(figure, also).save(stem)
+    return save_picture(picture_of(figure, also), stem)
