@@ -221,7 +221,7 @@ def test_tests_and_searches_stand_in_their_columns():
 
 def test_sensitivities_and_functions_stand_in_their_columns():
     numbers = [np.array([k + 0.1, k + 0.2]) for k in (1, 2, 3, 4)]
-    indices = Sobol(("c", "n"), *numbers, 0.2)
+    indices = Sobol(("c", "n"), *numbers)
     single = (OneAtATime("n", 0.1, 0.7, 0.02), OneAtATime("A", 0.1, 0.5, float("nan")))
     made, _ = tables(sensitivity=single, sobol=indices)
     assert made["sensitivity"] == [

@@ -39,7 +39,7 @@ def test_an_svg_is_well_formed_escaped_and_the_same_each_time(figure):
     assert {"(a) one", "(b)", "a <b> & c", "Current (A)", "Force (N)", "1000"} <= set(texts)
     assert picture["svg"] == picture_of(figure)["svg"]
     assert "nan" not in picture["svg"].decode()
-    assert b",a <b> & c,10.0,1.0\n" in picture.files["csv"]
+    assert b",a <b> & c,10.0,1.0\n" in picture["csv"]
 
 
 def test_a_gap_in_a_curve_is_a_gap_on_paper(figure):

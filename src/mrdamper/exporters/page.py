@@ -48,15 +48,12 @@ class PageExporter(Exporter):
 
     def export(self, damper: Damper | Model, name: str) -> Written:
         stepping, name = stream(damper), identifier(name)
-        built = build_webassembly(_web_sources(stepping, name))
+        wrapper = render("page_damper.c.j2", name=name, upper=name.upper())
+        sources = {**c_sources(stepping, name, ""), f"{name}_page.c": wrapper}
+        built = build_webassembly({file: text.encode() for file, text in sources.items()})
         notes = () if built.library else (f"computed in JavaScript, not WebAssembly: {built.reason}",)
         page = render("page.html.j2", **_facts(damper, stepping, name, built.library))
         return Written({f"{name}{self.suffix}": page.encode()}, notes)
-
-
-def _web_sources(stepping: Stream, name: str) -> dict[str, bytes]:
-    wrapper = render("page_damper.c.j2", name=name, upper=name.upper())
-    return {file: text.encode() for file, text in {**c_sources(stepping, name, ""), f"{name}_page.c": wrapper}.items()}
 
 
 def _facts(damper: Damper | Model, stepping: Stream, name: str, library: bytes | None) -> dict[str, Any]:

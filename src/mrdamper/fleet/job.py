@@ -17,15 +17,7 @@ from mrdamper.dampers.joint import JointFit, JointProblem
 from mrdamper.data import Dataset, Floats, Run
 from mrdamper.errors import InputError
 from mrdamper.fleet.item import FleetError, Item, digest_of
-from mrdamper.fleet.loops import (
-    Test,
-    by_test,
-    deviation,
-    gas_and_friction,
-    measured_loop,
-    shape_deviation,
-    velocity_ladder,
-)
+from mrdamper.fleet.loops import by_test, deviation, gas_and_friction, measured_loop, shape_deviation, velocity_ladder
 from mrdamper.fleet.plan import Plan
 from mrdamper.identification.covariance import spread
 from mrdamper.models import Model
@@ -143,7 +135,8 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
     lane = "reference" if plan is None else "cold" if settings.cold else "fast"
     start = np.array(plan.start) if plan is not None and lane == "fast" else None
     fit = _fit(problem, start)
-    tests = [_test_of(run) for run in train]
+    conditions = [equivalent_sine(run).condition for run in train]
+    tests = [(c.current_A, c.frequency_Hz, c.amplitude_m) for c in conditions]
     loops = np.array([measured_loop(run) for run in train])
     more: dict[str, Any] = {}
     if plan is not None:
@@ -165,7 +158,7 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
                 "stands_for": [_stands_for(fit.damper.model, axis.name) for axis in problem.axes],
                 "curvature": _curvature(problem, fit),
             }
-    row: dict[str, Any] = {
+    return {
         "rig": dataset.rigs[0],
         "lane": lane,
         "model": settings.model,
@@ -181,16 +174,10 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
         "loops": np.round(loops, 3).tolist(),
         **more,
     }
-    return row
 
 
 def _fit(problem: JointProblem, start: Floats | None) -> JointFit:
     return problem.fit(start=start, rounds=_ROUNDS, most_steps=_MAX_STEPS, settled=_COST_TOLERANCE)
-
-
-def _test_of(run: Run) -> Test:
-    condition = equivalent_sine(run).condition
-    return condition.current_A, condition.frequency_Hz, condition.amplitude_m
 
 
 def _beside_the_line(fit: JointFit, own: list[Floats | None], plan: Plan) -> dict[str, Any]:
@@ -198,7 +185,7 @@ def _beside_the_line(fit: JointFit, own: list[Floats | None], plan: Plan) -> dic
     ladder = velocity_ladder(fit.damper.model, plan.currents, plan.speeds, plan.amplitude)
     gas, friction = gas_and_friction(ladder, plan.speeds)
     return {
-        "ladder": [force for pair in ladder.values() for force in pair],
+        "ladder": ladder.ravel().tolist(),
         "gas_force_N": gas,
         "friction_N": friction,
         "tests_missing": sum(loop is None for loop in own),

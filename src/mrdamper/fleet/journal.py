@@ -60,8 +60,7 @@ class Journal:
 
     def result(self, key: str) -> dict[str, Any] | None:
         """Return the row stored under a key."""
-        row = self._kept("SELECT row FROM results WHERE key = ?", key)
-        return None if row is None else json.loads(row)
+        return json.loads(self._kept("SELECT row FROM results WHERE key = ?", key) or "null")
 
     def status(self, key: str) -> str | None:
         """Return the status of that row."""
@@ -73,8 +72,7 @@ class Journal:
 
     def plan(self, key: str) -> dict[str, Any] | None:
         """Return the plan stored under a key."""
-        plan = self._kept("SELECT plan FROM plans WHERE key = ?", key)
-        return None if plan is None else json.loads(plan)
+        return json.loads(self._kept("SELECT plan FROM plans WHERE key = ?", key) or "null")
 
     def keep_plan(self, key: str, plan: dict[str, Any]) -> None:
         """Make a plan durable; raises as `keep`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -54,28 +54,20 @@ def shape_deviation(loop: Floats, reference: Floats) -> float:
     return deviation(columns @ np.linalg.lstsq(columns, reference, rcond=None)[0], reference)
 
 
-def velocity_ladder(
-    model: Model, currents: Iterable[float], speeds: Sequence[float], amplitude: float
-) -> dict[tuple[float, float], tuple[float, float]]:
-    """Rebound and compression force [N] at mid-stroke of a sine, by current [A] and speed [m/s]."""
-    steps = [(current, speed) for current in currents for speed in speeds]
-    conditions = [Condition(current, speed / (2 * np.pi * amplitude), amplitude) for current, speed in steps]
+def velocity_ladder(model: Model, currents: Sequence[float], speeds: Sequence[float], amplitude: float) -> Floats:
+    """(C, S, 2) rebound and compression force [N] at mid-stroke of a sine, by current [A] and speed [m/s]."""
+    frequencies = [speed / (2 * np.pi * amplitude) for speed in speeds]
+    conditions = [Condition(current, frequency, amplitude) for current in currents for frequency in frequencies]
     force = simulate(model, concatenate(sine(c, 2, _PER_CYCLE) for c in conditions)).force
-    last = np.arange(len(steps)) * (2 * _PER_CYCLE + 1) + 2 * _PER_CYCLE
-    rebound, compression = force[last], force[last - _PER_CYCLE // 2]
-    return {step: (float(up), float(down)) for step, up, down in zip(steps, rebound, compression, strict=True)}
+    last = np.arange(len(conditions)) * (2 * _PER_CYCLE + 1) + 2 * _PER_CYCLE
+    return np.stack([force[last], force[last - _PER_CYCLE // 2]], axis=1).reshape(len(currents), len(speeds), 2)
 
 
-def gas_and_friction(
-    ladder: dict[tuple[float, float], tuple[float, float]], speeds: Sequence[float]
-) -> tuple[float, float]:
-    """Gas force and friction [N] at the lowest current, extrapolated to zero velocity.
+def gas_and_friction(ladder: Floats, speeds: Sequence[float]) -> tuple[float, float]:
+    """Gas force and friction [N] at the lowest current, which is the first, extrapolated to zero velocity.
 
     The gas force is the mean of rebound and compression, friction half their difference.
     """
-    current = min(c for c, _ in ladder)
-    (up1, down1), (up2, down2) = ladder[current, speeds[0]], ladder[current, speeds[1]]
-    share = speeds[0] / (speeds[1] - speeds[0])
-    half1, half2 = (up1 - down1) / 2, (up2 - down2) / 2
-    middle1, middle2 = (up1 + down1) / 2, (up2 + down2) / 2
-    return middle1 - share * (middle2 - middle1), half1 - share * (half2 - half1)
+    slow, fast = ladder[0, :2]
+    rebound, compression = slow - speeds[0] / (speeds[1] - speeds[0]) * (fast - slow)
+    return float(rebound + compression) / 2, float(rebound - compression) / 2

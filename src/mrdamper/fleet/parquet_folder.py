@@ -23,11 +23,8 @@ if TYPE_CHECKING:
 
 def is_parquet_folder(paths: Sequence[Path], profile: FleetProfile) -> bool:
     """Tell if the first readable of these files has a column for the serial number."""
-    for path in paths:
-        names = _columns(path)
-        if names is not None:
-            return profile.column_of("serial", names) is not None
-    return False
+    readable = (names for path in paths if (names := _columns(path)) is not None)
+    return profile.column_of("serial", next(readable, ())) is not None
 
 
 def parquet_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
@@ -43,7 +40,7 @@ def parquet_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
         names = _columns(path)
         error = _refusal(path, names, profile)
         if names is None or error is not None:
-            refused.append(Item(path.stem, kind="lake", paths=(str(path),), error=error))
+            refused.append((path, error))
             continue
         columns = {fact: c for fact in FACTS if (c := profile.column_of(fact, names))}
         keys = [pl.col(column).cast(pl.String).alias(fact) for fact, column in columns.items()]
@@ -53,7 +50,7 @@ def parquet_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
             with _refusing_damage(path):
                 table = table.collect()
         except FleetError as damaged:
-            refused.append(Item(path.stem, kind="lake", paths=(str(path),), error=damaged))
+            refused.append((path, damaged))
             continue
         for row in table.sort(list(columns)).iter_rows(named=True):
             first, last = row.pop("first"), row.pop("last")
@@ -61,15 +58,15 @@ def parquet_items(paths: Sequence[Path], profile: FleetProfile) -> list[Item]:
                 error = FleetError(
                     "rows without a serial number", where=str(path), remedy="fill it in", code="E_FLEET_NAME"
                 )
-                refused.append(Item(path.stem, kind="lake", paths=(str(path),), error=error))
+                refused.append((path, error))
                 continue
             picks = tuple((columns[f], row[f] or "") for f in ("serial", "session", "date") if f in columns)
             item = make_item(row, profile, kind="lake", picks=picks)
             places_of.setdefault(item, []).append((str(path), (int(first), int(last - first + 1))))
-    items = []
+    items = [Item(path.stem, kind="lake", paths=(str(path),), error=error) for path, error in refused]
     for item, places in places_of.items():
         items.append(replace(item, paths=tuple(p for p, _ in places), rows=tuple(r for _, r in places)))
-    return items + refused
+    return items
 
 
 def parquet_dataset(item: Item) -> Dataset:

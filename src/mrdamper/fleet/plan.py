@@ -125,24 +125,17 @@ def holding(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
 
 def settled(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
     """Make the plan from the results of the reference dampers under its draft."""
-    start = np.median([row["point"] for row in rows], axis=0)
+    start = tuple(np.median([row["point"] for row in rows], axis=0).tolist())
     error, error_spread = _middle(np.array([row["nrmse_pp"] for row in rows]))
     away, away_spread = _middle(np.array([row["loop_deviation"] for row in rows]))
-    return replace(
-        plan,
-        start=tuple(start.tolist()),
-        error=float(error),
-        error_spread=float(error_spread),
-        deviation=float(away),
-        deviation_spread=float(away_spread),
-        draft=False,
-    )
+    middles = {"error": error, "error_spread": error_spread, "deviation": away, "deviation_spread": away_spread}
+    return replace(plan, start=start, draft=False, **middles)
 
 
-def _middle(values: Floats) -> tuple[Floats, Floats]:
+def _middle(values: Floats) -> tuple[float, float]:
     """Median, and 1.48 times the median deviation from it: robust estimates of mean and standard deviation."""
-    middle = np.median(values, axis=0)
-    return middle, 1.4826 * np.median(np.abs(values - middle), axis=0)
+    middle = float(np.median(values))
+    return middle, 1.4826 * float(np.median(np.abs(values - middle)))
 
 
 def _matrix(tests: list[Test], dampers: int) -> tuple[Test, ...]:

@@ -112,10 +112,9 @@ def run_fleet(
     journal = Journal(out)
     try:
         line = _Line(items, settings, journal, progress)
-        engine = cluster_engine(scheduler, limits or JobLimits(), tls, patience) if scheduler else local_engine(
-            workers, limits or JobLimits()
-        )  # fmt: skip
-        with engine as (submit, slots):
+        bounds = limits or JobLimits()
+        cluster = cluster_engine(scheduler, bounds, tls, patience) if scheduler else None
+        with cluster or local_engine(workers, bounds) as (submit, slots):
             line.run(submit, slots)
         return line.written(out / "dampers.parquet", parameters)
     finally:
@@ -167,11 +166,8 @@ class _Line:
             return refused(error)
         if number in self._failed:
             return self._failed[number]
-        for plan in (self.plan, None):
-            row = self._journal.result(self._key(number, plan))
-            if row is not None:
-                return row
-        raise AssertionError(f"no row for {self._items[number].name}")
+        rows = (self._journal.result(self._key(number, plan)) for plan in (self.plan, None))
+        return next(row for row in rows if row is not None)
 
     def _make_plan(self, submit: Submit, slots: int) -> None:
         """Make the plan from the first dampers that can be identified, in an order by the hash of their names."""
@@ -235,10 +231,9 @@ class _Line:
         return plan is not None and self._journal.status(self._key(number, None)) == "refused"
 
     def _keep(self, rows: Iterable[tuple[int, dict[str, Any]]], plan: Plan | None) -> None:
-        good = []
-        for number, row in rows:
-            stamp = datetime.now(UTC).isoformat(timespec="seconds")
-            row = {**row, "finished_time_utc": stamp}
+        good, stamp = [], datetime.now(UTC).isoformat(timespec="seconds")
+        for number, found in rows:
+            row = {**found, "finished_time_utc": stamp}
             if row["status"] == "failed":
                 self._failed[number] = row
             else:

@@ -49,7 +49,6 @@ class Sobol:
     # first_confidence and total_confidence: (P,) half-widths at 95 %
     first_confidence: Floats
     total_confidence: Floats
-    spread: float  # every parameter was varied by ± this share
 
 
 def one_at_a_time(
@@ -113,7 +112,7 @@ def sobol(
     redrawn = [indices(rng.integers(samples, size=samples)) for _ in range(_BOOTSTRAP_SAMPLES)]
     low, high = np.quantile(redrawn, (0.025, 0.975), axis=0)
     first_half, total_half = (high - low) / 2
-    return Sobol(tuple(names), first, total, first_half, total_half, spread)
+    return Sobol(tuple(names), first, total, first_half, total_half)
 
 
 def _varied(model: BoucWen, factors: Mapping[str, float]) -> BoucWen:

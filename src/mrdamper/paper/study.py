@@ -17,7 +17,7 @@ import numpy as np
 
 from mrdamper.data import Dataset, Run
 from mrdamper.errors import IdentificationError, InputError, validate_arguments
-from mrdamper.identification import Identification, conclude
+from mrdamper.identification import conclude
 from mrdamper.identification.basis import Basis
 from mrdamper.identification.harmonic_balance import SineRecord, read_force
 from mrdamper.identification.loop_analysis import analyse_loop
@@ -114,12 +114,13 @@ def reproduce(
         name, why = next(iter(refused.items()))
         raise IdentificationError(f"no method could be followed; {name}: {why}", where=study.dataset.name)
     bases = {recipe.title: recipe.basis for recipe, _ in steps}
+    compared = [(title, basis) for title in (LITERAL, CONSISTENT) if (basis := bases[title])]
     one_by_one, indices, left_out = done[0]
     progress("reproduced", 1.0)
     return replace(
         study,
         contenders=tuple(contenders),
-        there=_identified_there({title: bases[title] for title in (LITERAL, CONSISTENT)}, held_out, cache),
+        there={(title, run.id): cache.runs[basis, run.id][0] for title, basis in compared for run in held_out},
         genetic=tuple(part for part in done if isinstance(part, GeneticCheck)),
         ended=_genetic_ends(searches, bases[LITERAL], cache),
         direct={run: n for (basis, run), n in cache.to_settle.items() if basis == bases.get(DIRECT)},
@@ -135,14 +136,6 @@ def reproduce(
         ),
         seconds=time.perf_counter() - begin,
     )
-
-
-def _identified_there(
-    bases: Mapping[str, Basis | None], held_out: Sequence[Run], cache: _Identified
-) -> dict[tuple[str, str], Identification | str]:
-    """Return the identifications of the validation runs, by title of the recipe and id of the run."""
-    by_title = [(title, basis) for title, basis in bases.items() if basis]
-    return {(title, run.id): cache.runs[basis, run.id][0] for title, basis in by_title for run in held_out}
 
 
 def _over_seeds(seeds: Sequence[_Seed]) -> dict[str, Any]:

@@ -140,22 +140,10 @@ class VirtualRig:
 def virtual_dataset(
     rig: VirtualRig | None = None, currents: Sequence[float] = CURRENTS, seed: int = 0, cycles: int = 4
 ) -> Dataset:
-    """Test the paper's matrix on the virtual rig; synthetic, the same for the same seed.
+    """Test the paper's matrix on the virtual rig; synthetic, the same for the same `seed` of the sensor noise.
 
-    Parameters
-    ----------
-    rig : VirtualRig, optional
-    currents : sequence of float
-        [A]
-    seed : int
-        Of the sensor noise; every run draws its own.
-    cycles : int
-        Steady cycles in each run, after one cycle of run-in.
-
-    Returns
-    -------
-    Dataset
-        20 mm at 1.0, 1.5, 2.0 Hz and 50 mm at 0.5, 1.0, 1.5 Hz for identification, 80 mm at 1 Hz for validation.
+    20 mm at 1.0, 1.5, 2.0 Hz and 50 mm at 0.5, 1.0, 1.5 Hz are for identification, 80 mm at 1 Hz for validation, each
+    at all `currents` [A], with some steady cycles after one cycle of run-in.
     """
     chosen = rig or VirtualRig()
     runs = []

@@ -187,13 +187,11 @@ class Inverse:
         self, time: Floats, displacement: Floats, velocity: Floats, acceleration: Floats, wanted: Floats
     ) -> tuple[Floats, Floats, Floats, Floats]:
         """Calculate current [A], force and reachable interval [N] (N,) along a motion, from the present state."""
-        t, *motion = series(
-            time=time, displacement=displacement, velocity=velocity, acceleration=acceleration, wanted=wanted
-        )
-        channels = (*motion, steps_of(t))
-        rows = [self.step(*sample) for sample in zip(*(c.tolist() for c in channels), strict=True)]
-        table = np.array([[r.current, r.force, r.lowest, r.highest] for r in rows])
-        return table[:, 0], table[:, 1], table[:, 2], table[:, 3]
+        named = {"displacement": displacement, "velocity": velocity, "acceleration": acceleration, "wanted": wanted}
+        t, *motion = series(time=time, **named)
+        rows = [self.step(*sample) for sample in zip(*(c.tolist() for c in (*motion, steps_of(t))), strict=True)]
+        current, force, lowest, highest = np.array([list(vars(row).values()) for row in rows]).T
+        return current, force, lowest, highest
 
 
 @validate_arguments()
@@ -228,5 +226,4 @@ def invert(damper: Damper, highest: float | None = None) -> Inverse:
     wanted = inputs.pop("wanted")
     most = damper.envelope.current_A[1] if highest is None else highest
     demand = invert_on(tape, damper, "", inputs, wanted, width, most)
-    outputs = {"current": demand.current, "force": demand.force, "lowest": demand.lowest, "highest": demand.highest}
-    return Inverse(program(tape, outputs), f"inverse of {damper.title}")
+    return Inverse(program(tape, vars(demand)), f"inverse of {damper.title}")

@@ -107,8 +107,8 @@ def simulate_system(
 class SystemLoop:
     """A system with its links and controller, prepared; `run` may be called repeatedly.
 
-    `system`, `source`, `dampers`, `controller`, `highest`: as `simulate_system`; `period`: time between two evaluations
-    of the control law [s]; `free`: allow other parameters of the dampers in each run.
+    `system`, `source`, `dampers`, `controller`, `highest`: as `simulate_system`; `free`: allow other parameters of the
+    dampers in each run.
     """
 
     def __init__(
@@ -118,11 +118,10 @@ class SystemLoop:
         dampers: Mapping[str, Damper],
         controller: Controller,
         highest: float | None = None,
-        period: float = PERIOD,
         free: bool = False,
     ):
         _fit(system, source, dampers)
-        self.system, self.source, self.controller, self.period = system, source, controller, period
+        self.system, self.source, self.controller = system, source, controller
         self.links = tuple(link for link in system.links if link.role != "damper" or link.name in dampers)
         self.stages = [
             damper_stage(dampers[link.name], free) if link.role == "damper" else contact_stage(link)
@@ -133,7 +132,7 @@ class SystemLoop:
         self.dampers = dict(dampers)
         self.B = np.array([row for row, _ in rows]).reshape(len(rows), len(system.coordinates))
         self.D = np.array([road for _, road in rows]).reshape(len(rows), len(system.channels))
-        self.control = controller.prepare(system, self.links, dampers, period, highest)
+        self.control = controller.prepare(system, self.links, dampers, PERIOD, highest)
         self._walks: dict[bool, Any] = {}
 
     @property
@@ -141,7 +140,7 @@ class SystemLoop:
         """Initial step: that of the input, a share of the period of the highest mode, or a millisecond."""
         highest = float(self.system.frequencies_Hz().max())
         step = min(_MAX_STEP_S, self.source.step, 1 / (_STEPS_PER_PERIOD * highest) if highest else _MAX_STEP_S)
-        whole = self.period if self.control.program else self.source.step
+        whole = PERIOD if self.control.program else self.source.step
         return whole / math.ceil(whole / step - 1e-9)
 
     def run(self, dt: float, machine: bool | None = None, numbers: ElementParameters | None = None) -> Simulation:
@@ -166,7 +165,7 @@ class SystemLoop:
         numbers, control = numbers or self.numbers, ElementParameters.of(self._controllers)
         memory = (numbers.given, numbers.derived, numbers.start.copy(), control.given, control.derived, control.start)
         memory = (*memory, *slope_and_scale(len(self.links)))
-        every = max(1, round(self.period / dt))
+        every = max(1, round(PERIOD / dt))
         # In blocks that fit the processor's cache, each of whole periods of the control law.
         size = samples if isinstance(self.controller, NonCausalOptimum) else every * max(1, PART // every)
         for begin in range(0, samples - 1, size):

@@ -8,8 +8,9 @@ written once, for arrays, and exported from the same code.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Sequence
-from functools import wraps
+from functools import reduce, wraps
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -123,7 +124,7 @@ class Tape:
         """Record an operation once; small integer powers as products."""
         args = tuple(plain(a) for a in args)
         if op == "power" and isinstance(args[1], int | float) and args[1] in range(_UNROLLED + 1):
-            return self._product(args[0], int(args[1]))
+            return reduce(operator.mul, [args[0]] * int(args[1])) if args[1] else 1.0
         if (simple := _simplified(op, args)) is not None:
             return simple
         return self._note(op, args)
@@ -150,12 +151,6 @@ class Tape:
         loop.going, updates = body(*(Expression(self, "carry", (loop, i), SAMPLE) for i in range(len(loop.start))))
         loop.updates = tuple(plain(value) for value in updates)
         return tuple(Expression(self, "result", (loop, i), SAMPLE) for i in range(len(loop.start)))
-
-    def _product(self, base: Any, power: int) -> Any:
-        result: Any = base if power else 1.0
-        for _ in range(power - 1):
-            result = result * base
-        return result
 
     def _note(self, op: str, args: tuple[Any, ...]) -> Expression:
         for arg in args:

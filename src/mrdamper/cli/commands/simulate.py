@@ -108,13 +108,14 @@ def _export_law(loop: SystemLoop, folder: Path | None, fmu: Path | None) -> None
     """Return the law of a loop as C99 in a folder, and as an FMU."""
     from mrdamper.exporters.c import write_program
     from mrdamper.exporters.fmu_program import write_program_fmu
+    from mrdamper.systems.simulate import PERIOD
 
     law, (name, title) = loop.control.program, (type(loop.controller).name, type(loop.controller).title)
     if law is None:
         raise InputError(f"{name} has no law to export", remedy="give --control a law")
     paths, notes = [] if folder is None else write_program(law, name, title, folder), ()
     if fmu is not None:
-        path, notes = write_program_fmu(law, name, title, loop.control.units, fmu, loop.period, loop.control.start)
+        path, notes = write_program_fmu(law, name, title, loop.control.units, fmu, PERIOD, loop.control.start)
         paths += path
     warn([*paths, *(f"note: {note}" for note in notes)])
 

@@ -147,16 +147,13 @@ class Controller(ABC):
     ) -> Control:
         """Trace the law of every damper into one program; `highest` caps the current [A]."""
         ready, tape, outputs, shared = self.designed(system, links, period), Tape(), {}, {}
-        start = []
         for link in links:
             command: Any = 0.0
             if link.role == "damper":
                 damper = dampers[link.name]
-                see = Sensors(tape, link, damper, *current_range(damper, highest), period, shared)
+                most = damper.envelope.current_A[1] if highest is None else highest
+                see = Sensors(tape, link, damper, 0.0, most, period, shared)
                 command = ready.law(see)
-                start.append(see.low)
-            else:
-                start.append(0.0)
             outputs[identifier(f"{link.name}.current", outputs)] = command
         if not tape.inputs and not tape.memory:
             return Control(None, (), tuple(float(value) for value in outputs.values()))
@@ -164,9 +161,4 @@ class Controller(ABC):
         dt = signals.pop("dt", None)
         tape.inputs.pop("dt", None)
         tape.inputs["dt"] = tape.input("dt") if dt is None else dt  # comes last
-        return Control(program(tape, outputs), tuple(signals), tuple(start), shared.get("limits", {}))
-
-
-def current_range(damper: Damper, highest: float | None) -> tuple[float, float]:
-    """Currents a damper may be given [A]: from none to the highest requested or tested."""
-    return 0.0, damper.envelope.current_A[1] if highest is None else highest
+        return Control(program(tape, outputs), tuple(signals), (0.0,) * len(links), shared.get("limits", {}))
