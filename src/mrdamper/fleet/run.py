@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -132,6 +132,8 @@ class _Line:
         self._already = 0
 
     def run(self, submit: Submit, slots: int) -> None:
+        """Make the plan and measure all dampers; `slots` jobs run at once."""
+        self._submit, self._slots = submit, slots
         for number, item in enumerate(self._items):
             if item.error is None:
                 try:
@@ -141,9 +143,9 @@ class _Line:
                     self._failed[number] = refused(InputError(reason, where=item.paths[0], remedy=remedy))
             if number % 100 == 0:
                 self._progress(f"reading {len(self._items)} dampers", 0.0)
-        self._make_plan(submit, slots)
+        self._make_plan()
         if self.plan is not None:
-            self._measure(list(self._digests), self.plan, submit, slots, count=True)
+            self._measure(list(self._digests), self.plan, count=True)
 
     def written(self, table: Path, parameters: Sequence[str]) -> Fleet:
         """Write the table: one row per damper, in the order of serial numbers and sessions."""
@@ -169,7 +171,7 @@ class _Line:
         rows = (self._journal.result(self._key(number, plan)) for plan in (self.plan, None))
         return next(row for row in rows if row is not None)
 
-    def _make_plan(self, submit: Submit, slots: int) -> None:
+    def _make_plan(self) -> None:
         """Make the plan from the first dampers that can be identified, in an order by the hash of their names."""
         key = hash_of("plan", vars(self._for(None)), VERSION, FORMAT)
         kept = self._journal.plan(key)
@@ -180,7 +182,7 @@ class _Line:
         references: dict[str, dict[str, Any]] = {}
         for begin in range(0, len(order), REFERENCES):
             some = order[begin : begin + REFERENCES]
-            self._measure(some, None, submit, slots)
+            self._measure(some, None)
             for number in some:
                 row = self._row(number)
                 if row["status"] == "done" and len(references) < REFERENCES:
@@ -188,23 +190,19 @@ class _Line:
             if len(references) >= REFERENCES:
                 break
         if references:
-            tried = [(plan, self._under(plan, order, references, submit, slots)) for plan in drafts(references)]
+            tried = [(plan, self._under(plan, order, references)) for plan in drafts(references)]
             draft = holding(*min(tried, key=lambda t: sum(row["cost"] for row in t[1])))
-            self.plan = settled(draft, self._under(draft, order, references, submit, slots))
+            self.plan = settled(draft, self._under(draft, order, references))
             self._journal.keep_plan(key, self.plan.document)
 
-    def _under(
-        self, plan: Plan, order: Sequence[int], references: dict[str, dict[str, Any]], submit: Submit, slots: int
-    ) -> list[dict[str, Any]]:
+    def _under(self, plan: Plan, order: Sequence[int], references: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Return the rows of the reference dampers under a draft of the plan."""
         numbers = [n for n in order if self._items[n].name in references]
-        self._measure(numbers, plan, submit, slots)
+        self._measure(numbers, plan)
         rows = [self._journal.result(self._key(n, plan)) for n in numbers]
         return [row for row in rows if row is not None and row["status"] == "done"]
 
-    def _measure(
-        self, numbers: Sequence[int], plan: Plan | None, submit: Submit, slots: int, count: bool = False
-    ) -> None:
+    def _measure(self, numbers: Sequence[int], plan: Plan | None, count: bool = False) -> None:
         """Run the jobs whose rows are not in the journal; rows that finish together are stored together."""
         waiting = [n for n in numbers if n not in self._failed and not self._is_kept(n, plan)]
         if count:
@@ -212,9 +210,9 @@ class _Line:
         running: dict[Future[dict[str, Any]], int] = {}
         todo, done, begin = iter(waiting), 0, time.monotonic()
         while True:
-            while len(running) < _QUEUED_PER_WORKER * slots and (number := next(todo, None)) is not None:
+            while len(running) < _QUEUED_PER_WORKER * self._slots and (number := next(todo, None)) is not None:
                 job = as_job(self._items[number], self._digests[number], self._for(plan), plan)
-                running[submit(job)] = number
+                running[self._submit(job)] = number
             if not running:
                 return
             finished = wait(running, return_when=FIRST_COMPLETED).done

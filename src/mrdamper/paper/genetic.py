@@ -24,10 +24,7 @@ GENERATIONS_OF_MANY = 60  # generations of a search in a study of many runs
 class GeneticSettings:
     """Settings of the search; the defaults are the paper's.
 
-    Raises
-    ------
-    ParameterError
-        If a share lies outside 0...1 or a count is too small.
+    Raises `ParameterError` if a share lies outside 0...1 or a count is too small.
     """
 
     population: int = 100

@@ -12,6 +12,7 @@ from base64 import b64decode
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import cached_property
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,12 @@ class _Element:
                 else:
                     yield from child.elements(*tags)
 
-    @property
+    @cached_property
+    def classes(self) -> set[str]:
+        """Return the classes of the element."""
+        return set((self.attributes.get("class") or "").split())
+
+    @cached_property
     def text(self) -> str:
         """Return the text inside, with line breaks."""
         parts = [c if isinstance(c, str) else "\n" if c.tag == "br" else c.text for c in self.children]
@@ -145,12 +151,11 @@ class _Writer:
         """Set an element; children of an element that is no block are set separately."""
         if element.tag in ("style", "script", "nav"):
             return
-        writers = {"h1": self.heading, "h2": self.heading, "h3": self.heading, "table": self.table}
+        writers = {"h1": self.heading, "h2": self.heading, "h3": self.heading, "table": self.table, "img": self.logo}
         writers |= {"figure": self.figure, "li": self.item, "p": self.paragraph, "summary": self.folded}
-        writers |= {"img": self.logo}
         if element.tag in writers:
             writers[element.tag](element)
-        elif "big" in (element.attributes.get("class") or ""):
+        elif "big" in element.classes:
             self.numbers(element)
         else:
             loose = [c for c in element.children if isinstance(c, str) or c.tag in _INLINE]
@@ -210,8 +215,7 @@ class _Writer:
     def paragraph(self, element: _Element, size: float = _SIZES["p"], indent: float = 0.0) -> None:
         """Draw running text, with bold and code inside."""
         paper = self.paper
-        faint = (element.attributes.get("class") or "") in ("faint", "caption")
-        paper.set_text_color(*(_FAINT if faint else _INK))
+        paper.set_text_color(*(_FAINT if {"faint", "caption"} & element.classes else _INK))
         paper.set_left_margin(_MARGIN + indent)
         paper.set_x(_MARGIN + indent)
         self._runs(element, size, "")
@@ -279,7 +283,7 @@ class _Writer:
     def table(self, element: _Element) -> None:
         """Draw a table with its headings on every page."""
         caption = next(element.elements("caption"), None)
-        rows = _cells(element)
+        rows = [list(row.elements("th", "td")) for row in element.elements("tr")]
         if not rows:
             return
         parts = self._parts(rows)
@@ -292,8 +296,7 @@ class _Writer:
     def _parts(self, rows: list[list[_Element]]) -> list[list[list[_Element]]]:
         """Split the columns of a table that is too wide for the page; every part has the first column."""
         columns = len(rows[0])
-        texts = [[cell.text for cell in row] for row in rows]
-        if columns < 4 or any(len(row) != columns for row in rows) or self._fitted(texts, rows)[0] >= _SMALLEST:
+        if columns < 4 or any(len(row) != columns for row in rows) or self._fitted(rows)[0] >= _SMALLEST:
             return [rows]
         half = (columns + 1) // 2
         left, right = [row[:half] for row in rows], [[row[0], *row[half:]] for row in rows]
@@ -301,8 +304,7 @@ class _Writer:
 
     def _part(self, rows: list[list[_Element]]) -> None:
         """Set rows of cells that fit the width of the page."""
-        paper, texts = self.paper, [[cell.text for cell in row] for row in rows]
-        size, widths = self._fitted(texts, rows)
+        paper, (size, widths) = self.paper, self._fitted(rows)
         size = max(size, _SMALLEST)
         paper.set_font("text", size=size)
         paper.set_draw_color(*_RULE)
@@ -317,26 +319,24 @@ class _Writer:
             line_height=0.5 * size,
             padding=(0.4, 0.8),
         ) as table:
-            for row, words in zip(rows, texts, strict=True):
+            for row in rows:
                 line = table.row()
-                for cell, text in zip(row, words, strict=True):
-                    line.cell(text, align=_alignment(cell, first=cell is row[0]))
+                for cell in row:
+                    left = cell is row[0] or {"text", "wrap"} & cell.classes
+                    line.cell(cell.text, align="LEFT" if left else "RIGHT")
         paper.ln(2)
 
-    def _fitted(self, texts: list[list[str]], rows: list[list[_Element]]) -> tuple[float, list[float]]:
+    def _fitted(self, rows: list[list[_Element]]) -> tuple[float, list[float]]:
         """Size of type at which a table fits the page, and its columns' widths [mm]."""
         paper, size = self.paper, _SIZES["table"]
-        columns = max(len(row) for row in texts)
+        columns = max(len(row) for row in rows)
         while True:
             paper.set_font("text", "B", size)
             widths, words, wraps = [0.0] * columns, [0.0] * columns, [False] * columns
-            for row, cells in zip(texts, rows, strict=True):
-                for i, (text, cell) in enumerate(zip(row, cells, strict=True)):
-                    wide = max(paper.get_string_width(line) for line in text.split("\n")) + _PADDING
-                    wraps[i] |= "wrap" in (cell.attributes.get("class") or "")
-                    widths[i] = max(widths[i], wide)
-                    longest = max((paper.get_string_width(word) for word in text.split()), default=0.0)
-                    words[i] = max(words[i], longest + _PADDING)
+            for i, cell in ((i, cell) for row in rows for i, cell in enumerate(row)):
+                wraps[i] |= "wrap" in cell.classes
+                widths[i] = max(widths[i], *(paper.get_string_width(line) + _PADDING for line in cell.text.split("\n")))
+                words[i] = max([words[i], *(paper.get_string_width(word) + _PADDING for word in cell.text.split())])
             free = sum(w for w, wrap in zip(widths, wraps, strict=True) if wrap)
             kept = sum(w for w, wrap in zip(widths, wraps, strict=True) if not wrap)
             room = paper.epw - kept
@@ -354,15 +354,6 @@ class _Writer:
                 share = (paper.epw - sum(fair)) / more
                 return _SMALLEST - 0.1, [f + share * (w - f) for f, w in zip(fair, widths, strict=True)]
             size -= 0.5
-
-
-def _cells(table: _Element) -> list[list[_Element]]:
-    return [list(row.elements("th", "td")) for row in table.elements("tr")]
-
-
-def _alignment(cell: _Element, *, first: bool) -> str:
-    kinds = (cell.attributes.get("class") or "").split()
-    return "LEFT" if first or "text" in kinds or "wrap" in kinds else "RIGHT"
 
 
 def _size_of(figure: bytes) -> tuple[float, float]:

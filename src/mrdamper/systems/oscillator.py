@@ -117,21 +117,9 @@ def identify_oscillator(
     delay acts as negative damping: with one sample of delay the damping of a lightly damped mass ends at zero. Raises
     `RecordError` if the records do not fit together or nothing moves, or the largest delay is negative.
 
-    Parameters
-    ----------
-    force, displacement : (N,) arrays
-        One period, or the mean of several [N], [m].
-    sample_rate : float
-        [Hz]
-    n : float
-        Sharpness of the yield, held.
-    most_delay : float
-        Largest delay between the channels in either direction [samples]; zero for simultaneous sampling.
-
-    Warns
-    -----
-    BoundWarning
-        If a parameter ends at a bound.
+    `force` and `displacement` (N,) are one period, or the mean of several [N], [m], at `sample_rate` [Hz]; `n` is the
+    sharpness of the yield, which is held; `most_delay` is the largest delay between the channels in either direction
+    [samples], zero for simultaneous sampling. Warns with `BoundWarning` if a parameter ends at a bound.
 
     Examples
     --------

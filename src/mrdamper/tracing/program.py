@@ -17,6 +17,7 @@ from mrdamper.tracing.tape import Tape, TracedLoop
 
 _LEAVES = ("parameter", "input", "memory", "carry")
 Scope = tuple[tuple[int, int], ...]
+Use = tuple[Scope, bool]  # block in which a node is needed, and if that is before the first sample
 
 
 @dataclass
@@ -80,14 +81,6 @@ def program(tape: Tape, outputs: Mapping[str, Any]) -> Program:
     return result
 
 
-@dataclass(frozen=True)
-class _Use:
-    """Block in which a node is needed, and if that is before the first sample."""
-
-    scope: Scope
-    early: bool
-
-
 def dependencies(node: Expression | TracedLoop) -> Iterator[tuple[Any, int | None]]:
     """List the nodes a node is computed from; a number marks the inner block in which each is needed."""
     if isinstance(node, TracedLoop):
@@ -120,23 +113,23 @@ def postorder(roots: list[Any]) -> list[Any]:
     return order
 
 
-def _scopes(roots: list[tuple[Any, bool]], order: list[Any]) -> tuple[dict[int, Scope], dict[int, list[_Use]]]:
+def _scopes(roots: list[tuple[Any, bool]], order: list[Any]) -> tuple[dict[int, Scope], dict[int, list[Use]]]:
     """Find the innermost block that all users of a node share, and the uses."""
     scopes: dict[int, Scope] = {}
-    uses: dict[int, list[_Use]] = defaultdict(list)
+    uses: dict[int, list[Use]] = defaultdict(list)
 
-    def used(part: Any, use: _Use) -> None:
+    def used(part: Any, scope: Scope, early: bool) -> None:
         if isinstance(part, Expression | TracedLoop):
-            uses[id(part)].append(use)
-            scopes[id(part)] = _common(scopes.get(id(part), use.scope), use.scope)
+            uses[id(part)].append((scope, early))
+            scopes[id(part)] = _common(scopes.get(id(part), scope), scope)
 
     for root, early in roots:
-        used(root, _Use((), early))
+        used(root, (), early)
     for node in reversed(order):
         here = scopes[id(node)]
-        early = all(use.early for use in uses[id(node)]) if here else _early(node)
+        early = all(early for _, early in uses[id(node)]) if here else _early(node)
         for part, block in dependencies(node):
-            used(part, _Use(here if block is None else (*here, (id(node), block)), early))
+            used(part, here if block is None else (*here, (id(node), block)), early)
     return scopes, uses
 
 
@@ -151,7 +144,7 @@ def _early(node: Any) -> bool:
     return isinstance(node, Expression) and node.stage <= PARAMETER
 
 
-def _name(result: Program, order: list[Any], scopes: dict[int, Scope], uses: dict[int, list[_Use]]) -> None:
+def _name(result: Program, order: list[Any], scopes: dict[int, Scope], uses: dict[int, list[Use]]) -> None:
     """Name leaves, branches, loops, and what is used more than once or in another block.
 
     Expressions computed before the first sample and used later are derived constants; an expression used once, in its
@@ -165,10 +158,10 @@ def _name(result: Program, order: list[Any], scopes: dict[int, Scope], uses: dic
             result.names[id(node)] = node.name
             continue
         users, scope = uses[id(node)], scopes[id(node)]
-        derived = not scope and _early(node) and any(not use.early for use in users)
+        derived = not scope and _early(node) and not all(early for _, early in users)
         if derived:
             result.derived.append(node)
-        elsewhere = len(users) > 1 or users[0].scope != scope
+        elsewhere = len(users) > 1 or users[0][0] != scope
         if derived or elsewhere or node.op in ("select", "carry", "result") or id(node) in stored:
             result.names[id(node)] = f"{'d' if derived else 't'}{len(result.names)}"
 

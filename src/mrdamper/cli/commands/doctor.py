@@ -6,7 +6,9 @@ import json
 import platform
 import time
 import warnings
+from functools import partial
 from importlib.metadata import version
+from timeit import repeat
 from typing import Any
 
 import typer
@@ -93,12 +95,8 @@ def _gain() -> float | None:
     motion = (0.01 * np.sin(turns), 0.06 * np.cos(turns), -0.36 * np.sin(turns), np.zeros(1500), np.full(1500, 2e-3))
     if record.compiled_along(given, derived, record.starts, motion) is None:
         return None
-    seconds = []
-    for run in (record.interpreted_along, record.compiled_along):
-        times = []
-        for _ in range(3):
-            begin = time.process_time()
-            run(given, derived, record.starts, motion)
-            times.append(time.process_time() - begin)
-        seconds.append(min(times))
-    return seconds[0] / max(seconds[1], 1e-9)
+    interpreted, compiled = (
+        min(repeat(partial(run, given, derived, record.starts, motion), timer=time.process_time, repeat=3, number=1))
+        for run in (record.interpreted_along, record.compiled_along)
+    )
+    return interpreted / max(compiled, 1e-9)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from mrdamper.data import Dataset
 from mrdamper.identification.characteristics import Characteristics
@@ -24,17 +24,15 @@ def peak_velocity_plot(
     """
     figure = Figure(1, 1, 4.2, right=1.9)
     (axes,) = figure.axes
-    colours = current_colours([c for specimen in specimens.values() for c in specimen.currents])
-    for mark, (name, specimen) in zip(_MARKS * len(specimens), specimens.items(), strict=False):
-        for current in specimen.currents:
-            strokes = specimen.at(current)
-            for side, sign in ((0, 1.0), (1, -1.0)):
-                x = [s.peak_velocity[side] for s in strokes]
-                y = [sign * specimen.damping_force(s, side) for s in strokes]
-                speeds, forces = specimen.curve(current, side)
-                key = "" if side else _key(name, current, specimens)
-                axes.plot(speeds, sign * forces, ls="-" if mark == _MARKS[0] else "--", lw=1.0, color=colours[current])
-                axes.plot(x, y, mark, label=key, ms=3.5, color=colours[current])
+    colours = _colours(specimens)
+    for mark, key, specimen, current in _series(specimens):
+        strokes = specimen.at(current)
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            x = [s.peak_velocity[side] for s in strokes]
+            y = [sign * specimen.damping_force(s, side) for s in strokes]
+            speeds, forces = specimen.curve(current, side)
+            axes.plot(speeds, sign * forces, ls="-" if mark == _MARKS[0] else "--", lw=1.0, color=colours[current])
+            axes.plot(x, y, mark, label="" if side else key, ms=3.5, color=colours[current])
     for current, velocity, lower, upper in limits:
         near = min(colours, key=lambda level: abs(level - current))
         axes.plot([velocity, velocity], [lower, upper], color=colours[near], lw=1.4)
@@ -71,15 +69,13 @@ def figures_over_current(specimens: Mapping[str, Characteristics]) -> Figure:
     """Draw mean resisting force and zero-force velocity over peak velocity, one line per current."""
     figure = Figure(1, 2, 3.2, right=1.9)
     axes = figure.axes
-    colours = current_colours([c for specimen in specimens.values() for c in specimen.currents])
-    for mark, (name, specimen) in zip(_MARKS * len(specimens), specimens.items(), strict=False):
-        for current in specimen.currents:
-            strokes = specimen.at(current)
-            speed = [s.condition.peak_velocity for s in strokes]
-            style = {"mark": mark, "ms": 3.5, "color": colours[current]}
-            axes[0].plot(speed, [s.energy / (4 * s.condition.amplitude_m) for s in strokes], **style)
-            named = _key(name, current, specimens)
-            axes[1].plot(speed, [1e3 * s.zero_force_velocity for s in strokes], label=named, **style)
+    colours = _colours(specimens)
+    for mark, key, specimen, current in _series(specimens):
+        strokes = specimen.at(current)
+        speed = [s.condition.peak_velocity for s in strokes]
+        style = {"mark": mark, "ms": 3.5, "color": colours[current], "label": key}
+        axes[0].plot(speed, [s.energy / (4 * s.condition.amplitude_m) for s in strokes], **style)
+        axes[1].plot(speed, [1e3 * s.zero_force_velocity for s in strokes], **style)
     axes[0].label("Peak velocity (m/s)", "Mean force, W / 4X (N)")
     axes[1].label("Peak velocity (m/s)", "Zero-force velocity (mm/s)")
     for panel in axes:
@@ -88,5 +84,13 @@ def figures_over_current(specimens: Mapping[str, Characteristics]) -> Figure:
     return figure
 
 
-def _key(name: str, current: float, specimens: Mapping[str, Characteristics]) -> str:
-    return f"{current:g} A" if len(specimens) == 1 else f"{name}, {current:g} A"
+def _colours(specimens: Mapping[str, Characteristics]) -> dict[float, str]:
+    return current_colours([current for specimen in specimens.values() for current in specimen.currents])
+
+
+def _series(specimens: Mapping[str, Characteristics]) -> Iterator[tuple[str, str, Characteristics, float]]:
+    """Mark, name in the legend, specimen and current of every series."""
+    for mark, (name, specimen) in zip(_MARKS * len(specimens), specimens.items(), strict=False):
+        for current in specimen.currents:
+            key = f"{current:g} A" if len(specimens) == 1 else f"{name}, {current:g} A"
+            yield mark, key, specimen, current
