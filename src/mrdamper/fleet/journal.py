@@ -46,7 +46,9 @@ class Journal:
         self._lock = -1
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            _refuse_network(folder)
+            kind = file_system(folder)
+            if kind.startswith(_NETWORK) and kind != "9p":  # a 9p disk may be local: its locks are tested
+                raise _untrusted(folder, f"a network file system ({kind})")
             self._lock = _locked(folder / "journal.lock")
         except OSError as error:
             raise OutputError(
@@ -174,12 +176,6 @@ def _locked(path: Path) -> int:
     os.ftruncate(lock, 0)
     os.pwrite(lock, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
     return lock
-
-
-def _refuse_network(folder: Path) -> None:
-    kind = file_system(folder)
-    if kind.startswith(_NETWORK) and kind != "9p":  # a 9p disk may be local: its locks are tested
-        raise _untrusted(folder, f"a network file system ({kind})")
 
 
 def _untrusted(folder: Path, why: str) -> JournalError:

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, Field, field_validator, model_validator
 
 from mrdamper.rig_files.profile import ProfileError
 from mrdamper.rig_files.strict_toml import COLUMN_LIMITS, load_part, load_toml
@@ -25,11 +25,7 @@ _TRUE = ("true", "yes", "1")
 _HELP = "correct it; docs/how-to/fleet.md shows every key"
 
 
-class _ProfileTable(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class FleetProfile(_ProfileTable):
+class FleetProfile(BaseModel, extra="forbid", frozen=True):
     """The fleet profile, a TOML file; every key may be left out."""
 
     # pattern of the names of folders or files: {serial}, {session}, {batch}, {date}, and * for anything:
@@ -88,7 +84,7 @@ class FleetProfile(_ProfileTable):
         return facts["serial"] in self.golden or facts.get("golden", "").lower() in _TRUE
 
 
-class ColumnLimits(_ProfileTable):
+class ColumnLimits(BaseModel, extra="forbid", frozen=True):
     """Lowest and highest allowed value of a column; one of them may be left out."""
 
     lower: float | None = Field(default=None, allow_inf_nan=False)

@@ -31,12 +31,11 @@ class Fallback:
 
 def fallback_fonts(text: str, bundled: str) -> Fallback:
     """Find installed fonts for the characters of a text that the font it is set in, `bundled`, does not contain."""
-    missing = {c for c in text if c.isprintable() and not c.isspace()} - _characters(bundled, 0)
+    missing = {c for c in text if c.isprintable() and not c.isspace()} - _characters(bundled)[0]
     files = []
     for path in installed_fonts() if missing else ():
-        for index in range(_collection_size(path)):
-            covered = missing & _characters(path, index)
-            if covered:
+        for index, characters in enumerate(_characters(path)):
+            if covered := missing & characters:
                 files.append((path, index))
                 missing -= covered
         if not missing:
@@ -54,23 +53,15 @@ def installed_fonts() -> list[str]:
 
 
 @cache
-def _characters(path: str, index: int) -> frozenset[str]:
-    from fontTools.ttLib import TTFont, TTLibError
+def _characters(path: str) -> tuple[frozenset[str], ...]:
+    """Return the characters of every font in a file; a damaged or unsupported file has none and is not used."""
+    from fontTools.ttLib import TTCollection, TTFont, TTLibError
 
     try:
-        with TTFont(path, fontNumber=index, lazy=True) as font:
-            return frozenset(map(chr, font.getBestCmap() or ()))
+        if path.lower().endswith(".ttc"):
+            with TTCollection(path, lazy=True) as collection:
+                return tuple(frozenset(map(chr, font.getBestCmap() or ())) for font in collection.fonts)
+        with TTFont(path, lazy=True) as font:
+            return (frozenset(map(chr, font.getBestCmap() or ())),)
     except (TTLibError, OSError, ValueError, AssertionError):
-        return frozenset()  # a damaged or unsupported font file is not used
-
-
-def _collection_size(path: str) -> int:
-    if not path.lower().endswith(".ttc"):
-        return 1
-    from fontTools.ttLib import TTCollection, TTLibError
-
-    try:
-        with TTCollection(path, lazy=True) as collection:
-            return len(collection.fonts)
-    except (TTLibError, OSError, ValueError):
-        return 0
+        return ()

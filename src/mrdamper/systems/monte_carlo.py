@@ -46,9 +46,9 @@ class Bands:
         """Number of draws with a solution."""
         return len(next(iter(self.peaks.values())))
 
-    def quantiles(self, levels: Sequence[float] = LEVELS) -> dict[str, Floats]:
-        """(L, ·) quantiles of every peak and (L,) of every measure."""
-        return {name: np.quantile(rows, levels, axis=0) for name, rows in {**self.peaks, **self.measures}.items()}
+    def quantiles(self) -> dict[str, Floats]:
+        """(L, ·) quantiles at `LEVELS` of every peak and (L,) of every measure."""
+        return {name: np.quantile(rows, LEVELS, axis=0) for name, rows in {**self.peaks, **self.measures}.items()}
 
 
 def draw(dampers: Mapping[str, Damper], count: int, seed: int = 1) -> list[dict[str, Draw]]:

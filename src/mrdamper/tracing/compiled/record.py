@@ -60,7 +60,7 @@ class RecordProgram:
         size = arrays[0].size
         self._walked += size * self.lines
         if self._walked > _MIN_COMPILED_LINES and (library := self._library) is not None:
-            return _compiled_along(library, self.program, given, derived, memory, arrays)
+            return self._run(library, given, derived, memory, arrays)
         return self.interpreted_along(given, derived, memory, arrays)
 
     def compiled_along(
@@ -79,7 +79,7 @@ class RecordProgram:
         if (library := self._library) is None:
             return None
         arrays = [np.asarray(channel, dtype=float) for channel in channels]
-        return _compiled_along(library, self.program, given, derived, memory, arrays, picked, begins)
+        return self._run(library, given, derived, memory, arrays, picked, begins)
 
     def interpreted_along(
         self, given: Sequence[float], derived: Sequence[float], memory: Sequence[float], arrays: Sequence[Floats]
@@ -95,6 +95,32 @@ class RecordProgram:
                 return Along(outputs, held, i)
             outputs[:, i], held = out, after
         return Along(outputs, held, -1)
+
+    def _run(
+        self,
+        library: ctypes.CDLL,
+        given: Sequence[float],
+        derived: Sequence[float],
+        memory: Sequence[float],
+        arrays: Sequence[Floats],
+        picked: NDArray[np.intp] | None = None,
+        begins: NDArray[np.intp] | None = None,
+    ) -> Along:
+        p, d, s = (np.array([*values, 0.0], dtype=float) for values in (given, derived, memory))
+        size = arrays[0].size
+        outputs = np.empty((len(self.program.outputs), size if picked is None else picked.size))
+        places = np.array([array.ctypes.data for array in arrays], dtype=np.uintp)
+        strides = np.array([array.strides[0] // 8 for array in arrays], dtype=np.int64)
+        indices = None if picked is None else np.ascontiguousarray(picked, dtype=np.int64)
+        restarts = None if begins is None else np.append(begins, size).astype(np.int64)
+        along = library.along
+        along.restype = ctypes.c_longlong
+        failed = along(
+            address(p), address(d), address(s), ctypes.c_longlong(size), address(places), address(strides),
+            None if indices is None else address(indices), ctypes.c_longlong(outputs.shape[1]),
+            None if restarts is None else address(restarts), address(outputs),
+        )  # fmt: skip
+        return Along(outputs, tuple(s[:-1].tolist()), int(failed))
 
     @cached_property
     def lines(self) -> int:
@@ -121,7 +147,7 @@ class RecordProgram:
         derived = self.prepare(given)
         if derived is None:
             return True
-        outputs = _compiled_along(library, self.program, given, derived, self.starts, arrays)
+        outputs = self._run(library, given, derived, self.starts, arrays)
         expected = self.interpreted_along(given, derived, self.starts, arrays)
         size = _COMPARED_SAMPLES if expected.failed < 0 else expected.failed
         if 0 <= outputs.failed < size:  # a division by zero raises in the interpreter, and may have no effect in C
@@ -136,30 +162,3 @@ class RecordProgram:
 def address(array: np.ndarray) -> ctypes.c_void_p:
     """Return where the elements of an array are stored; the caller keeps the array until the call has ended."""
     return ctypes.c_void_p(array.ctypes.data)
-
-
-def _compiled_along(
-    library: ctypes.CDLL,
-    program: Program,
-    given: Sequence[float],
-    derived: Sequence[float],
-    memory: Sequence[float],
-    arrays: Sequence[Floats],
-    picked: NDArray[np.intp] | None = None,
-    begins: NDArray[np.intp] | None = None,
-) -> Along:
-    p, d, s = (np.array([*values, 0.0], dtype=float) for values in (given, derived, memory))
-    size = arrays[0].size
-    outputs = np.empty((len(program.outputs), size if picked is None else picked.size))
-    places = np.array([array.ctypes.data for array in arrays], dtype=np.uintp)
-    strides = np.array([array.strides[0] // 8 for array in arrays], dtype=np.int64)
-    indices = None if picked is None else np.ascontiguousarray(picked, dtype=np.int64)
-    restarts = None if begins is None else np.append(begins, size).astype(np.int64)
-    along = library.along
-    along.restype = ctypes.c_longlong
-    failed = along(
-        address(p), address(d), address(s), ctypes.c_longlong(size), address(places), address(strides),
-        None if indices is None else address(indices), ctypes.c_longlong(outputs.shape[1]),
-        None if restarts is None else address(restarts), address(outputs),
-    )  # fmt: skip
-    return Along(outputs, tuple(s[:-1].tolist()), int(failed))
