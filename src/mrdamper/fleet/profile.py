@@ -13,7 +13,6 @@ from pydantic import BaseModel, Field, field_validator, model_validator
 from mrdamper.rig_files.profile import ProfileError
 from mrdamper.rig_files.strict_toml import COLUMN_LIMITS, load_part, load_toml
 
-FACTS = ("serial", "session", "batch", "date", "golden")
 COLUMNS: dict[str, tuple[str, ...]] = {
     "serial": ("serial", "serial_number", "serial_no", "sn"),
     "session": ("session", "session_id"),
@@ -21,6 +20,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "date": ("date", "tested_at", "recorded_at"),
     "golden": ("golden",),
 }
+FACTS = tuple(COLUMNS)
 _TRUE = ("true", "yes", "1")
 _HELP = "correct it; docs/how-to/fleet.md shows every key"
 

@@ -13,6 +13,7 @@ from mrdamper.data.encoding import csv_text
 from mrdamper.report.page import render_page
 from mrdamper.report.plots.simulation import histories, spectra
 from mrdamper.report.plots.style import save_figure
+from mrdamper.report.tables import rows_of
 from mrdamper.systems.controller_comparison import ControllerComparison
 from mrdamper.systems.measures import benchmark_ratios, measures
 from mrdamper.systems.monte_carlo import LEVELS, Bands
@@ -76,8 +77,7 @@ def history_rows(done: Simulation) -> list[dict[str, float]]:
         if link.role == "damper":
             table[f"{link.name}.current_A"] = done.current[:, i]
     every = slice(None, None, -(-done.time.size // _ROWS))
-    lists = [column[every].tolist() for column in table.values()]
-    return [dict(zip(table, row, strict=True)) for row in zip(*lists, strict=True)]
+    return rows_of({name: column[every] for name, column in table.items()})
 
 
 def _ratios(runs: Mapping[str, Simulation], beside: ControllerComparison | None) -> dict[str, dict[str, float]]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mrdamper.dampers.bands import Band
 from mrdamper.dampers.prediction import Prediction
+from mrdamper.data import Floats
 from mrdamper.identification import Identification
 from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import SCORES, RunScore
@@ -44,15 +45,15 @@ def identification_rows(identifications: Sequence[Identification], dataset: str 
 
 def prediction_rows(prediction: Prediction, band: Band | None = None) -> list[dict[str, Any]]:
     """One row per sample, in the columns of the command-line contract, with prediction interval, if any, and flags."""
-    columns = dict(prediction.table)
-    if band is not None:
-        columns |= {"force_low_N": band.low, "force_high_N": band.high}
-    flag = " ".join(prediction.extrapolation)
-    names = list(columns)
-    return [
-        {**dict(zip(names, values, strict=True)), "extrapolation": flag}
-        for values in zip(*(c.tolist() for c in columns.values()), strict=True)
-    ]
+    ends = {} if band is None else {"force_low_N": band.low, "force_high_N": band.high}
+    flag = {"extrapolation": " ".join(prediction.extrapolation)}
+    return [row | flag for row in rows_of({**prediction.table, **ends})]
+
+
+def rows_of(columns: Mapping[str, Floats]) -> list[dict[str, Any]]:
+    """Return columns of equal length as rows."""
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def score_row(run: RunScore) -> dict[str, Any]:

@@ -57,15 +57,13 @@ class Oscillator:
             if not good:
                 raise ParameterError(f"{name} = {getattr(self, name):g}", where="oscillator", remedy=remedy)
 
-    def response(self, force: Floats, sample_rate: float, *, periodic: bool = False) -> Floats:
+    def response(self, force: Floats, sample_rate: float, *, periodic: bool = False, steps: int = _STEPS) -> Floats:
         """Return the displacement [m] under a force (N,) [N], from rest; of a periodic force, over one steady period.
 
-        The force is sampled at `sample_rate` [Hz], band-limited between samples where it is periodic, else smooth.
+        The force is sampled at `sample_rate` [Hz], band-limited between samples where it is periodic, else smooth, and
+        integrated in so many steps between two samples.
         Raises `RecordError` if it is no record of numbers, and `StepError` (E_RUNAWAY) if the state diverges.
         """
-        return self._response(force, sample_rate, periodic, _STEPS)
-
-    def _response(self, force: Floats, sample_rate: float, periodic: bool, steps: int) -> Floats:
         force = np.asarray(force, dtype=float)
         if force.ndim != 1 or force.size < 8 or not np.isfinite(force).all():
             raise RecordError("a force of under 8 samples, or not finite", remedy="give an (N,) array of forces [N]")
@@ -203,7 +201,7 @@ class _OscillatorSearch:
         """(N,) error of the displacement over its spread and the root of its samples."""
         size = self.displacement.size
         try:
-            response = self.oscillator(point)._response(self.force, self.sample_rate, True, self._steps)
+            response = self.oscillator(point).response(self.force, self.sample_rate, periodic=True, steps=self._steps)
         except StepError:
             return np.full(size, 1e3)
         late = np.fft.irfft(np.fft.rfft(response) * np.exp(-1j * self._omega * self.delay(point)), size)

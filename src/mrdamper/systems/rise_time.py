@@ -27,10 +27,8 @@ def rise_times(damper: Damper) -> dict[str, float]:
     travel = 3.0  # time at constant speed beyond the yield point before the switch
     begin = np.linspace(-travel * _SETTLE * lag, 0.0, 2000)
     still = [steps.step_motion(velocity * t, velocity, 0.0, 0.0, begin[1] - begin[0]) for t in begin.tolist()][-1]
-    forces = np.empty(2 * half)
-    for i in range(2 * half):
-        on = current if i < half else 0.0
-        forces[i] = steps.step_motion(velocity * (i + 1) * dt, velocity, 0.0, on, dt)
+    on = np.where(np.arange(2 * half) < half, current, 0.0).tolist()
+    forces = np.array([steps.step_motion(velocity * i * dt, velocity, 0.0, now, dt) for i, now in enumerate(on, 1)])
     # The effect of the stroke, such as a gas spring, is subtracted as a straight line.
     end = forces[-1]
     forces -= still + (end - still) * (np.arange(2 * half) + 1) / (2 * half)

@@ -77,7 +77,7 @@ def unusable_reason() -> str:
 
 def clear_cache() -> int:
     """Remove all compiled libraries; how many there were."""
-    files = [*_libraries(cache_folder()), *cache_folder().glob("failed-*.txt")]
+    files = [*(path for *_, path in _libraries(cache_folder())), *cache_folder().glob("failed-*.txt")]
     for path in files:
         with suppress(OSError):
             path.unlink()
@@ -87,10 +87,7 @@ def clear_cache() -> int:
 
 def cache_size() -> tuple[int, int]:
     """Return the number of compiled libraries, and their size [bytes]."""
-    sizes: list[int] = []
-    for path in _libraries(cache_folder()):
-        with suppress(OSError):
-            sizes.append(path.stat().st_size)
+    sizes = [size for _, size, _ in _libraries(cache_folder())]
     return len(sizes), sum(sizes)
 
 
@@ -107,8 +104,13 @@ def private(folder: Path) -> bool:
     return status.st_uid == os.getuid() and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
-def _libraries(folder: Path) -> list[Path]:
-    return sorted(folder.glob(f"*-*{_SUFFIX}"))
+def _libraries(folder: Path) -> list[tuple[float, int, Path]]:
+    """List time of the last use [s], size [bytes] and path of the libraries, the least recently used first."""
+    files: list[tuple[float, int, Path]] = []
+    for path in folder.glob(f"*-*{_SUFFIX}"):
+        with suppress(OSError):
+            files.append((path.stat().st_mtime, path.stat().st_size, path))
+    return sorted(files)
 
 
 def _kept(key: str) -> ctypes.CDLL | None:
@@ -238,11 +240,7 @@ def _bound(folder: Path) -> None:
             if time.time() - path.stat().st_mtime > _DAY:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
     kept = 0
-    sizes: list[tuple[float, int, Path]] = []
-    for path in _libraries(folder):
-        with suppress(OSError):
-            sizes.append((path.stat().st_mtime, path.stat().st_size, path))
-    for _, size, path in sorted(sizes, key=lambda entry: entry[0], reverse=True):
+    for _, size, path in reversed(_libraries(folder)):
         kept += size
         if kept > _MAX_CACHE_BYTES:
             with suppress(OSError):

@@ -51,17 +51,17 @@ class Compiler:
         """The command as it is typed."""
         return " ".join(self.command)
 
-    def compile(self, source: str, parent: Path | None = None, patience: float = _COMPILE_TIMEOUT_S) -> Built:
-        """Make a shared library of one source in a folder beneath `parent`; stops after `patience` [s]."""
+    def compile(self, source: str, parent: Path | None = None) -> Built:
+        """Make a shared library of one source in a folder beneath `parent`."""
         with tempfile.TemporaryDirectory(prefix=SCRATCH, dir=parent, ignore_cleanup_errors=True) as name:
             folder = Path(name)
             (folder / "program.c").write_text(source, encoding="utf-8")
             if self.is_visual:
                 command = [*self.command, *_VISUAL, "program.c", "/Fe:program.lib.dll"]
-                return compiled_file(command, folder, "program.lib.dll", patience)
+                return compiled_file(command, folder, "program.lib.dll", _COMPILE_TIMEOUT_S)
             maths = () if sys.platform == "win32" else ("-lm",)
             command = [*self.command, *_FLAGS, "program.c", "-o", "program.lib", *maths]
-            return compiled_file(command, folder, "program.lib", patience)
+            return compiled_file(command, folder, "program.lib", _COMPILE_TIMEOUT_S)
 
 
 def find_compiler() -> Compiler | None:
