@@ -210,4 +210,5 @@ def _envelope(stepping: Stream) -> list[tuple[str, str, str]]:
     if stepping.envelope is None:
         return []
     names = ("current_A", "frequency_Hz", "amplitude_m", "peak_velocity_m_s")
-    return [(name.upper(), *(repr(float(end)) for end in getattr(stepping.envelope, name))) for name in names]
+    ranges = [(name, getattr(stepping.envelope, name)) for name in names]
+    return [(name.upper(), repr(float(low)), repr(float(high))) for name, (low, high) in ranges]

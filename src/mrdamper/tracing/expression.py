@@ -35,7 +35,8 @@ def sign(x: float) -> float:
     return 1.0 if x > 0 else (-1.0 if x < 0 else 0.0)
 
 
-_LOGICAL: dict[str, Callable[..., Any]] = {
+_Value = Callable[[Any], Any] | Callable[[Any, Any], Any]  # of an operation on floats
+_LOGICAL: dict[str, _Value] = {
     "less": operator.lt,
     "less_equal": operator.le,
     "greater": operator.gt,
@@ -47,11 +48,11 @@ _LOGICAL: dict[str, Callable[..., Any]] = {
     "logical_not": operator.not_,
     "isfinite": math.isfinite,
 }
-OPERATIONS: dict[str, Callable[..., Any]] = {  # with the values for floats
+OPERATIONS: dict[str, _Value] = {
     "add": operator.add,
     "subtract": operator.sub,
     "multiply": operator.mul,
-    "divide": operator.truediv,
+    "divide": lambda a, b: a / b,
     "power": math.pow,
     "negative": operator.neg,
     "absolute": abs,

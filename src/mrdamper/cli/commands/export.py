@@ -38,7 +38,8 @@ def export(
     kind = exporter(to)
     if fmi is not None and to != "fmu":
         raise InputError(f"--fmi {fmi} with --to {to}", remedy="leave --fmi out, or export --to fmu", code="E_OPTION")
-    format_writer = kind() if fmi is None else kind(fmi=fmi)
+    options = {} if fmi is None else {"fmi": fmi}
+    format_writer = kind(**options)
     require_writable(out)
     damper = load_model(model)
     called = identifier(name or damper.rig or "damper")
