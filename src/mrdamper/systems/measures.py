@@ -100,8 +100,7 @@ def benchmark_ratios(done: Simulation, uncontrolled: Simulation) -> dict[str, fl
         f"J{i}": np.sqrt((ours[k] ** 2).mean(axis=0)).max() / np.sqrt((theirs[k] ** 2).mean(axis=0)).max()
         for i, k in enumerate(ours, start=4)
     }
-    dampers = [i for i, link in enumerate(done.links) if link.role == "damper"]
-    if dampers:
+    if dampers := done.damper_columns:
         weight = GRAVITY * float(np.trace(done.system.M))
         ratios["J7"] = np.abs(done.force[:, dampers]).max() / weight
         ratios["J8"] = np.abs(done.stroke[:, dampers]).max() / np.abs(theirs["drift"]).max()

@@ -59,6 +59,11 @@ class Simulation:
         """The dampers of the simulation."""
         return tuple(link for link in self.links if link.role == "damper")
 
+    @property
+    def damper_columns(self) -> list[int]:
+        """Columns of the dampers among those of the links."""
+        return [i for i, link in enumerate(self.links) if link.role == "damper"]
+
     @cached_property
     def _ways(self) -> tuple[Floats, Floats]:
         """Strokes of the links by coordinate (E, n) and by channel of the road (E, q)."""
@@ -93,14 +98,8 @@ class Simulation:
     @cached_property
     def peaks(self) -> dict[str, Floats]:
         """Largest magnitudes: displacement, drift, acceleration, force, by coordinate, span, damper."""
-        dampers = [i for i, link in enumerate(self.links) if link.role == "damper"]
-        series = (
-            _largest(self.x.T),
-            _largest(map(self.span, self.system.spans)),
-            _largest(self.a.T),
-            _largest(self.force[:, i] for i in dampers),
-        )
-        return dict(zip(self.PEAKS, series, strict=True))
+        series = (self.x.T, map(self.span, self.system.spans), self.a.T, self.force.T[self.damper_columns])
+        return dict(zip(self.PEAKS, map(_largest, series), strict=True))
 
     @validate_arguments()
     def span(self, name: str) -> Floats:
@@ -133,9 +132,9 @@ class Simulation:
         constant current are omitted.
         """
         times = {}
-        for i, link in enumerate(self.links):
-            current = self.current[:, i]
-            if link.role == "damper" and np.ptp(current) > 0:
+        for i in self.damper_columns:
+            link, current = self.links[i], self.current[:, i]
+            if np.ptp(current) > 0:
                 end, sign = (link.below, -1.0) if self.controller.calms == "below" else (link.above, 1.0)
                 row, road = self.system.point(end)
                 power = sign * self.force[:, i] * (self.v @ row + self.road_rate @ road)

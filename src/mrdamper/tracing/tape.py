@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])
 _GROUP: type[Any] = tuple
 _WITH_INFINITY = ("less", "less_equal", "greater", "greater_equal")
+_NEUTRAL = {"add": (0, 0), "subtract": (None, 0), "multiply": (1, 1), "divide": (None, 1)}  # left and right operand
 _UNROLLED = 6  # highest integer power written as products
 
 
@@ -195,13 +196,10 @@ def _simplified(op: str, args: tuple[Any, ...]) -> Any:
         return _value(op, (0.0, args[1]))
     if op == "logical_and" and not isinstance(args[0], Expression):
         return args[1] if args[0] else False
-    if op == "add" and isinstance(args[0], float | int) and args[0] == 0:
+    left, right = _NEUTRAL.get(op, (None, None))
+    if left is not None and isinstance(args[0], float | int) and args[0] == left:
         return args[1]
-    if op in ("add", "subtract") and isinstance(args[1], float | int) and args[1] == 0:
-        return args[0]
-    if op == "multiply" and isinstance(args[0], float | int) and args[0] == 1:
-        return args[1]
-    if op in ("multiply", "divide") and isinstance(args[1], float | int) and args[1] == 1:
+    if right is not None and isinstance(args[1], float | int) and args[1] == right:
         return args[0]
     return None
 

@@ -27,9 +27,8 @@ def histories(runs: Mapping[str, Simulation]) -> Figure:
         every = slice(None, None, max(1, run.time.size // _POINTS))
         top.plot(run.time[every], run.a[every, point], color=colour, lw=0.8, label=title)
         middle.plot(run.time[every], MM * run.span(span)[every], color=colour, lw=0.8)
-        for i, link in enumerate(run.links):
-            if link.role == "damper":
-                bottom.plot(run.time[every], run.force[every, i], color=colour, lw=0.8)
+        for i in run.damper_columns:
+            bottom.plot(run.time[every], run.force[every, i], color=colour, lw=0.8)
     top.legend(columns=2)
     top.label("", "acceleration (m/s²)", first.system.coordinates[point])
     middle.label("", "displacement (mm)", span)
@@ -50,9 +49,8 @@ def spectra(runs: Mapping[str, Simulation]) -> Figure:
         inside = (f > 0) & (f < 60)
         left.plot(f[inside], density[inside], color=colour, lw=0.9, label=title)
         every = slice(None, None, -(-run.time.size // _LOOP_POINTS))
-        for i, link in enumerate(run.links):
-            if link.role == "damper":
-                right.plot(1e3 * run.stroke[every, i], run.force[every, i], color=colour, lw=0.5)
+        for i in run.damper_columns:
+            right.plot(1e3 * run.stroke[every, i], run.force[every, i], color=colour, lw=0.5)
     left.legend(size=6)
     left.label("frequency (Hz)", "PSD of acceleration (m²/s³)", first.system.coordinates[point])
     right.label("stroke (mm)", "force (N)", "damper")

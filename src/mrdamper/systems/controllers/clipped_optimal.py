@@ -59,7 +59,8 @@ class ClippedOptimal(Controller):
     def designed(self, system: System, links: Sequence[Link], period: float) -> Controller:
         from scipy.linalg import expm, solve_discrete_are
 
-        linear = linear_system(system, [link for link in links if link.role == "damper"])
+        dampers = [link for link in links if link.role == "damper"]
+        linear = linear_system(system, dampers)
         n, count = linear.B.shape
         coupled = np.hstack([linear.A, linear.B, linear.E])
         still = np.zeros((coupled.shape[1] - n, coupled.shape[1]))
@@ -79,7 +80,7 @@ class ClippedOptimal(Controller):
         W = E @ E.T / period + 1e-15 * np.eye(n)
         S = solve_discrete_are(A.T, C.T, W, V)
         L = np.linalg.solve(C @ S @ C.T + V, C @ S @ A.T).T
-        names = tuple(link.name for link in links if link.role == "damper")
+        names = tuple(link.name for link in dampers)
         return replace(self, design=Design(A, B, C, D, L, G, size, system.coordinates, names))
 
     def law(self, see: Sensors) -> Any:
