@@ -53,7 +53,7 @@ class Variable:
 
     @property
     def initial(self) -> str:
-        """How its first value is found, as the standard names it."""
+        """Origin of its first value, as the standard names it."""
         return {"output": "calculated", "parameter": "exact", "local": "exact"}.get(self.causality, "")
 
     @property

@@ -51,8 +51,8 @@ def compiler_for(wanted: Platform) -> tuple[str, ...]:
     The compiler of the system is preferred, then zig (`pip install ziglang`), which compiles for all platforms.
     """
     if wanted == here() and wanted.suffix != ".dll":
-        found = (path for name in ("cc", "gcc", "clang") if (path := shutil.which(name)))
-        if path := next(found, None):
+        compilers = (path for name in ("cc", "gcc", "clang") if (path := shutil.which(name)))
+        if path := next(compilers, None):
             return (path,)
     if importlib.util.find_spec("ziglang"):
         return (sys.executable, "-m", "ziglang", "cc", "-target", wanted.target)

@@ -230,8 +230,8 @@ class _Line:
 
     def _keep(self, rows: Iterable[tuple[int, dict[str, Any]]], plan: Plan | None) -> None:
         good, stamp = [], datetime.now(UTC).isoformat(timespec="seconds")
-        for number, found in rows:
-            row = {**found, "finished_time_utc": stamp}
+        for number, result in rows:
+            row = {**result, "finished_time_utc": stamp}
             if row["status"] == "failed":
                 self._failed[number] = row
             else:

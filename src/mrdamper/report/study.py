@@ -95,28 +95,29 @@ def write_study(
             from mrdamper.report.pdf import pdf_of
 
             (work / "report.pdf").write_bytes(pdf_of(page, vectors, paper))
-        # Several candidates share individual fits.
-        fits = {id(one): one for rig in study.rigs for c in rig.candidates for one in c.identifications}
-        tables = {
-            "identifications": identification_rows(list(fits.values()), study.dataset.name),
-            "parameters": _parameter_rows(study),
-            "validation": [
-                row
-                for rig in study.rigs
-                for candidate in rig.candidates
-                for row in score_rows(rig.dataset.name, candidate, "cross-validation", "validation")
-            ],
-            "coverage": [
-                {"rig": rig.dataset.name, **rig.interval_coverage} for rig in study.rigs if rig.interval_coverage
-            ],
-        }
-        for name, rows in (tables | ({"forces": forces} if forces else {})).items():
+        for name, rows in (_tables(study) | ({"forces": forces} if forces else {})).items():
             (work / f"{name}.csv").write_text(csv_text(rows), encoding="utf-8")
 
     took = {rig.dataset.name: {c.recipe.name: c.seconds for c in rig.candidates} for rig in study.rigs}
     written = publish(folder, "report.html", fill, ResultRecord(seconds={"in all": study.seconds, **took}))
     progress("written", 1.0)
     return written
+
+
+def _tables(study: Study) -> dict[str, list[dict[str, Any]]]:
+    """Return the rows of the tables by name; candidates share individual fits, which are listed once."""
+    fits = {id(one): one for rig in study.rigs for c in rig.candidates for one in c.identifications}
+    return {
+        "identifications": identification_rows(list(fits.values()), study.dataset.name),
+        "parameters": _parameter_rows(study),
+        "validation": [
+            row
+            for rig in study.rigs
+            for candidate in rig.candidates
+            for row in score_rows(rig.dataset.name, candidate, "cross-validation", "validation")
+        ],
+        "coverage": [{"rig": rig.dataset.name, **rig.interval_coverage} for rig in study.rigs if rig.interval_coverage],
+    }
 
 
 def _draw(rig: RigStudy, progress: Progress, *, also: tuple[str, ...], limits: tuple[Limit, ...]) -> dict[str, Picture]:

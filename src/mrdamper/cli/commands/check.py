@@ -61,8 +61,8 @@ def check(
     verdicts = quality_table(record_of(run) for run in watched(load_dataset(data).runs, "run"))
     put([row(verdict) for verdict in verdicts], None, as_json, _text_table)
     refused = [f"refused: {verdict.refusal}" for verdict in verdicts if verdict.refusal is not None]
-    found = finding_lines(((v.record.id, finding) for v in verdicts for finding in v.findings), verbose)
-    warn([*refused, *found])
+    lines = finding_lines(((v.record.id, finding) for v in verdicts for finding in v.findings), verbose)
+    warn([*refused, *lines])
     if figure is not None:
         from mrdamper.report.plots.quality import quality_figure
         from mrdamper.rig_files.quality.flat import flagged_samples
