@@ -51,6 +51,11 @@ class _Element:
                 else:
                     yield from child.elements(*tags)
 
+    @property
+    def name(self) -> str:
+        """Return the id of the element; empty if it has none."""
+        return self.attributes.get("id") or ""
+
     @cached_property
     def classes(self) -> set[str]:
         """Return the classes of the element."""
@@ -244,9 +249,9 @@ class _Writer:
 
     def _height(self, element: _Element | None, *, caption_only: bool = False) -> float:
         """Height of a figure with its caption, or of the caption [mm]; 0 of other blocks, which may run over pages."""
-        if element is None or element.tag != "figure" or element.attributes.get("id") not in self.figures:
+        if element is None or element.tag != "figure" or not (figure := self.figures.get(element.name)):
             return 0.0
-        wide, tall = _size_of(self.figures[str(element.attributes["id"])])
+        wide, tall = _size_of(figure)
         caption = next(element.elements("figcaption"), None)
         lines = len(caption.text) // 110 + 1 if caption else 0
         return 6.0 + 4.0 * lines + (0.0 if caption_only else tall * min(1.0, self.paper.epw / wide))
@@ -263,19 +268,17 @@ class _Writer:
 
     def figure(self, element: _Element) -> None:
         """Draw a figure and its caption, on one page: reduced if it nearly fits, otherwise later."""
-        name = element.attributes.get("id") or ""
-        paper = self.paper
-        scale = self._scale(element) if name in self.figures else 1.0
-        if not scale:
-            self.waiting.append(element)
-            return
-        caption = next(element.elements("figcaption"), None)
-        if name in self.figures:
-            wide, tall = _size_of(self.figures[name])
+        paper, figure, caption = self.paper, self.figures.get(element.name), next(element.elements("figcaption"), None)
+        if figure:
+            scale = self._scale(element)
+            if not scale:
+                self.waiting.append(element)
+                return
+            wide, tall = _size_of(figure)
             width = scale * min(paper.epw, wide)
             height = tall * width / wide
             bottom = paper.h - paper.get_y() - height
-            self.places.append((name, paper.page_no() - 1, _MARGIN, bottom, width))
+            self.places.append((element.name, paper.page_no() - 1, _MARGIN, bottom, width))
             paper.set_y(paper.get_y() + height + 1)
         if caption:
             self.paragraph(_Element("p", {"class": "caption"}, caption.children), _SIZES["caption"])

@@ -71,16 +71,9 @@ _ALIASES = {"true_divide": "divide", "bitwise_and": "logical_and", "bitwise_or":
 class Expression(NDArrayOperatorsMixin, Traced):
     """One number at one sample, made by a `Tape`. Its operators are NumPy's functions.
 
-    Attributes
-    ----------
-    op : str
-        An operation, or "parameter", "input", "memory", "select", "carry", "result".
-    args : tuple
-        Expressions and floats.
-    stage : int
-        Stage at which it is known: CONSTANT, PARAMETER or SAMPLE.
-    value : float or bool, optional
-        Its value for the present model, where it is known while tracing.
+    `op` is an operation, or "parameter", "input", "memory", "select", "carry", "result"; `args` are expressions and
+    floats. `stage` states when it is known: CONSTANT, PARAMETER or SAMPLE. `value` is that for the present model, where
+    it is known while tracing.
     """
 
     __slots__ = ("args", "name", "op", "stage", "tape", "value")

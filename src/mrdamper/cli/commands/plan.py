@@ -59,9 +59,8 @@ def plan(
             name = f"plan_{number:02d}_{c.current_A:.3g}A_{c.frequency_Hz:.3g}Hz_{1e3 * c.amplitude_m:.3g}mm.csv"
             motion, force = item.record(allowed, damper)
             table = np.column_stack([motion.time, motion.displacement, force, motion.current])
-            text = "time_s,displacement_m,force_N,current_A\n"
-            text += "".join(",".join(f"{v:.9g}" for v in row) + "\n" for row in table.tolist())
-            (folder / name).write_text(text, encoding="utf-8")
+            names = "time_s,displacement_m,force_N,current_A"
+            np.savetxt(folder / name, table, "%.9g", ",", header=names, comments="", encoding="utf-8")
             rows.append(asdict(PlanRow.of(number, item, name)))
         (folder / "plan.csv").write_text(csv_text(rows), encoding="utf-8")
     sessions = len({item.session for item in chosen})
