@@ -47,16 +47,13 @@ def changes_at_every_sample(view: View) -> Iterator[Finding]:
     if motion is None or view.noticed("W_FROZEN"):
         return
     for name in ("displacement", "force"):
-        moved = np.flatnonzero(np.diff(getattr(view.steady, name))) + 1
-        if not 20 <= moved.size <= view.steady.time.size / 2:
+        apart = np.diff(np.flatnonzero(np.diff(getattr(view.steady, name))))
+        if not 20 <= apart.size + 1 <= view.steady.time.size / 2:
             continue
-        apart = np.diff(moved)
         usual = int(np.median(apart))
-        if usual < _HELD:
-            continue
-        even = float(np.mean(apart % usual == 0))
+        even = np.mean(apart % usual == 0) > 0.9 and np.mean(apart == usual) > 0.6
         late = 0.5 * (usual - 1) * view.step * motion.condition.frequency_Hz
-        if even > 0.9 and float(np.mean(apart == usual)) > 0.6 and late > _HELD_LATE:
+        if usual >= _HELD and even and late > _HELD_LATE:
             yield Finding(
                 "W_HELD",
                 f"the {name} changes at every {usual}th sample only: it was recorded at a slower rate and is late by "
@@ -80,9 +77,8 @@ def is_not_stored_on_change(view: View) -> Iterator[Finding]:
         lines = np.diff(np.flatnonzero(bends))
         lines = lines[lines > _SHORT_LINE]
         slopes = np.unique(np.round(steps[1:][on_line] / (_SLOPE * span))).size
-        if slopes < _SLOPES * lines.size:
-            continue
-        if lines.size > _BENDS * motion.cycles and float(np.std(lines)) > _UNEVEN * float(np.mean(lines)):
+        many = slopes >= _SLOPES * lines.size and lines.size > _BENDS * motion.cycles
+        if many and float(np.std(lines)) > _UNEVEN * float(np.mean(lines)):
             yield Finding(
                 "W_HELD",
                 f"{100 * straight:.2g} % of the {name} lies on straight lines of uneven length: it was stored on "

@@ -228,12 +228,10 @@ def _without_cut_row(form: RowFormat, block: Block) -> tuple[Block, tuple[Findin
     stream.file.seek(block.stop - size)
     tail = stream.file.read(size)
     last = tail[tail.rfind(b"\n") + 1 :]
-    if block.stop < stream.stop or not last.strip():
+    if block.stop < stream.stop or not last.strip() or last.lstrip()[:1] in b"#%":
         return block, ()
     text = stream.decode(last)
     line = block.line + sum(line_feeds(chunk) for chunk in stream.chunks(block.start, block.stop))
-    if text.lstrip()[:1] in ("#", "%"):
-        return block, ()
     stream.check(last, line)
     if len(last) > LONGEST_LINE:
         raise too_long(stream.source, line)
@@ -246,9 +244,8 @@ def _without_cut_row(form: RowFormat, block: Block) -> tuple[Block, tuple[Findin
         ) from error
     before = stream.decode(tail[: len(tail) - len(last)].rstrip(b"\r\n").rpartition(b"\n")[2])
     ends_empty = len(cells) == width and before.rstrip().endswith(form.layout.separator)  # as the row above does
-    if len(cells) < width or (len(cells) == width and not cells[-1] and not ends_empty):
-        raise field_count(form, len([c for c in cells if c]), line, True)
-    if len(cells) > width + 1:
-        raise field_count(form, len(cells), line, True)
+    cut = len(cells) < width or (len(cells) == width and not cells[-1] and not ends_empty)
+    if cut or len(cells) > width + 1:
+        raise field_count(form, sum(map(bool, cells)) if cut else len(cells), line, True)
     finding = Finding("W_NO_EOL", f"the last row (line {line}) has no line end and may be cut: left out")
     return replace(block, stop=block.stop - len(last)), (finding,)

@@ -220,13 +220,12 @@ def _with_own_axes(tree: Mapping[str, Any]) -> Mapping[str, Any]:
         return tree
     axes = [{key.casefold(): value for key, value in axis.items()} for axis in axes]
     units = [_unit_of(axis, KEYS["unit"], "") for axis in axes]
-    if any(split_name("", unit).dimension not in (None, "time") for unit in units):
-        return tree
-    if not axes or not all(isinstance(axis.get("data"), Array) for axis in axes):
+    other = any(split_name("", unit).dimension not in (None, "time") for unit in units)
+    if other or not axes or not all(isinstance(axis.get("data"), Array) for axis in axes):
         return tree
     timed = []
     for channel in channels:
-        number = next((v for k, v in channel.items() if k.casefold() == "xindex" and isinstance(v, float)), 1.0)
+        number = _stated(channel, ("xindex",), float) or 1.0
         at = int(number) - 1 if 1 <= number <= len(axes) else 0
         timed.append({**channel, "xdata": axes[at]["data"], "xunit": units[at]})
     return {**{key: value for key, value in tree.items() if key not in (keys["x"], keys["y"])}, keys["y"]: timed}
