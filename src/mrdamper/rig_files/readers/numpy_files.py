@@ -12,6 +12,7 @@ import numpy as np
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import checked_zip, is_arrays, is_zip_of
 from mrdamper.rig_files.readers.arrays import (
+    Array,
     array_table,
     check_unpacked,
     expand,
@@ -61,7 +62,7 @@ class Npy(Reader):
         return tables
 
 
-def _column(array: np.ndarray, parts: list[int | None], column: int) -> np.ndarray:
+def _column(array: Array, parts: list[int | None], column: int) -> np.ndarray:
     return pick(array, parts[column])
 
 

@@ -43,7 +43,7 @@ def _grid_of(value: Any, channels: Mapping[int, int | None]) -> tuple[tuple[int,
     return (len(rows), len(flat) // len(rows)) if len(flat) > len(rows) else (len(rows),), flat
 
 
-def tests_of_array(array: np.ndarray) -> list[np.ndarray]:
+def tests_of_array(array: np.ndarray) -> list[Array]:
     """Return the matrices of an array over tests, samples and channels, of which the time tells the channels.
 
     Raises `RigFileError`, E_AMBIGUOUS, unless the longest dimension is that of the samples and one other has the time.
@@ -54,7 +54,7 @@ def tests_of_array(array: np.ndarray) -> list[np.ndarray]:
     return _matrices(array, (along, across))[1]
 
 
-def _matrices(array: np.ndarray, last: tuple[int, int]) -> tuple[tuple[int, ...], list[np.ndarray]]:
+def _matrices(array: np.ndarray, last: tuple[int, int]) -> tuple[tuple[int, ...], list[Array]]:
     """Return the conditions' dimensions of an array and the samples of each; `last`: those of samples and channels."""
     array = np.moveaxis(array, last, (-2, -1))
     outer, matrices = array.shape[:-2], np.reshape(array, (-1, *array.shape[-2:]))
