@@ -387,8 +387,8 @@ def _is_plain(value: Any) -> bool:
 
 def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
     """Keep single numbers and texts beside the columns of a node."""
-    number, unit = _stated(says, _VALUE, float), _stated(says, KEYS["unit"], str)
-    if above and number is not None and unit is not None:  # {"current": {"value": 0.5, "unit": "A"}}
+    number, unit = _stated(says, _VALUE, (float, str)), _stated(says, KEYS["unit"], str)
+    if above and isinstance(number, float) and unit is not None:  # {"current": {"value": 0.5, "unit": "A"}}
         says = {f"{above} [{unit}]": number}
     elif above and isinstance(number, str):
         says = {above: f"{number} {unit or ''}".rstrip()}
