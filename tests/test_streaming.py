@@ -174,3 +174,12 @@ def test_the_source_is_python_that_can_be_read():
     source = stepper(model_type("bingham")(c=1.0, fy=2.0)).source
     assert "c * velocity" in source
     assert "fy * sign(velocity)" in source
+
+
+def test_a_record_names_the_time_without_a_force():
+    motion = wander()
+    velocity = motion.velocity.copy()
+    velocity[700] = 1e306  # times the viscous damping of a thousand it is no number
+    stream = stepper(model_type("bingham")(c=1000.0, fy=300.0))
+    with pytest.raises(ExcitationError, match=f"no force at {motion.time[700]:g} s"):
+        stream.run(motion.time, motion.displacement, velocity, motion.acceleration, motion.current)

@@ -17,7 +17,7 @@ from mrdamper.data import Condition, Floats
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.physics.motion.traced import TracedMotion, TracedStep
 from mrdamper.tracing import Program, Tape, program
-from mrdamper.tracing.compiled.record import RecordProgram
+from mrdamper.tracing.compiled.record import Along, RecordProgram
 
 if TYPE_CHECKING:
     from mrdamper.dampers.protocols import DamperLike as Damper
@@ -122,13 +122,27 @@ def causal_force(damper: Damper, motion: Excitation) -> Floats:
     record = RecordProgram(trace(damper))
     given = tuple(float(e.value) for e in record.program.tape.parameters.values())
     derived = record.prepare(given) or ()
-    steps = np.diff(motion.time, prepend=2 * motion.time[0] - motion.time[1])
-    channels = (motion.displacement, motion.velocity, motion.acceleration, motion.current, steps)
-    outputs = record.along(given, derived, record.starts, channels)
-    force, failed = outputs.outputs[0], outputs.failed
-    if failed >= 0 or not np.isfinite(force).all():
-        at = failed if failed >= 0 else int(np.flatnonzero(~np.isfinite(force))[0])
+    channels = (motion.displacement, motion.velocity, motion.acceleration, motion.current, steps_of(motion.time))
+    return force_of(record.along(given, derived, record.starts, channels), motion.time, damper.title)
+
+
+def force_of(along: Along, time: Floats, title: str) -> Floats:
+    """(N,) force [N] of a program along a record of times [s]; raises `ExcitationError` if a sample has none."""
+    force = along.outputs[0]
+    without = [along.failed] if along.failed >= 0 else np.flatnonzero(~np.isfinite(force))
+    if len(without):
         raise ExcitationError(
-            f"no force at {motion.time[at]:.6g} s", where=damper.title, remedy="bring the motion nearer to the tests"
+            f"no force at {time[without[0]]:.6g} s", where=title, remedy="bring the motion nearer to the tests"
         )
     return force
+
+
+def steps_of(time: Floats) -> Floats:
+    """(N,) steps [s] to each sample, the first as long as the second.
+
+    Raises `ExcitationError` unless time increases, over two samples at least.
+    """
+    steps = np.diff(time, prepend=2 * time[0] - time[1]) if time.size > 1 else np.zeros(1)
+    if not np.all(steps > 0):
+        raise ExcitationError("time does not increase", remedy="sort the samples; two are the fewest")
+    return steps

@@ -15,7 +15,7 @@ import numpy as np
 
 from mrdamper.dampers.bands import PortableBand, portable_band
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.causal import trace
+from mrdamper.dampers.causal import force_of, steps_of, trace
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Floats
@@ -179,7 +179,7 @@ class Stepper:
         Raises `ExcitationError` if a value is not finite, dt is not positive, or the model has no solution there.
         """
         inputs = numbers(displacement, velocity, acceleration, current, dt)
-        self._check(inputs)
+        self._check(inputs, inputs[-1])
         try:
             status, (force, flags), memory = self._advance(self._given, self._derived, self._memory, inputs)
         except (ValueError, ArithmeticError):
@@ -195,15 +195,14 @@ class Stepper:
 
     def _driven(self, drive: str, value: float, current: float, dt: float) -> float:
         given = numbers(value, dt, current)
-        self._check(given, dt=given[1])
+        self._check(given, given[1])
         inputs = given[:2]
         _, (x, v, a), memory = self._drives[drive]((), (), self._drive_memory[drive], inputs)
         force = self.step_motion(x, v, a, current, dt)
         self._drive_memory[drive] = memory
         return force
 
-    def _check(self, inputs: Sequence[float], dt: float | None = None) -> None:
-        dt = inputs[-1] if dt is None else dt
+    def _check(self, inputs: Sequence[float], dt: float) -> None:
         if not (all(map(math.isfinite, inputs)) and dt > 0):
             raise ExcitationError(
                 f"sample {tuple(inputs)}, time step {dt:g} s",
@@ -221,15 +220,9 @@ class Stepper:
         t, *channels = series(
             time=time, displacement=displacement, velocity=velocity, acceleration=acceleration, current=current
         )
-        steps = steps_of(t)
-        record = self._record
-        outputs = record.along(self._given, self._derived, self._memory, (*channels, steps))
-        (force, flags), failed = outputs.outputs, outputs.failed
-        if failed >= 0 or not np.isfinite(force).all():
-            raise ExcitationError(
-                f"no force at sample {failed}", where=self.stream.title, remedy="check the motion there"
-            )
-        self._memory, self._flags = outputs.memory, int(flags[-1])
+        along = self._record.along(self._given, self._derived, self._memory, (*channels, steps_of(t)))
+        force = force_of(along, t, self.stream.title)
+        self._memory, self._flags = along.memory, int(along.outputs[1, -1])
         return force
 
     @cached_property
@@ -240,17 +233,6 @@ class Stepper:
     def source(self) -> str:
         """The program as Python."""
         return python_source(self.stream.step)
-
-
-def steps_of(time: Floats) -> Floats:
-    """(N,) steps [s] to each sample, the first as long as the second.
-
-    Raises `ExcitationError` unless time increases, over two samples at least.
-    """
-    steps = np.diff(time, prepend=2 * time[0] - time[1]) if time.size > 1 else np.zeros(1)
-    if not np.all(steps > 0):
-        raise ExcitationError("time does not increase", remedy="sort the samples; two are the fewest")
-    return steps
 
 
 def stepper(damper: Damper | Model) -> Stepper:

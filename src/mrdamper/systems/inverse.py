@@ -15,8 +15,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.causal import steps_of
 from mrdamper.dampers.coil import Coil, field_step
-from mrdamper.dampers.streaming import steps_of, stream
+from mrdamper.dampers.streaming import stream
 from mrdamper.data import Floats
 from mrdamper.errors import ParameterError, numbers, series, validate_arguments
 from mrdamper.tracing import Program, Tape, program
