@@ -15,7 +15,7 @@ from mrdamper.cli import application
 from mrdamper.data import Dataset, Run
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 from mrdamper.rig_files.rig_import import import_files, to_dataset
-from mrdamper.study.contradictions import ContradictionError, find_contradictions
+from mrdamper.study.contradictions import ContradictionError, compare_runs, find_contradictions
 from mrdamper.study.contradictions.evidence import AssumedScatter, Evidence
 from mrdamper.study.contradictions.explanations import Explanation, Trial, completed_matrix_odds
 from mrdamper.study.contradictions.findings import describe
@@ -364,8 +364,8 @@ def test_runs_of_which_none_agrees_with_another_are_refused(sound):
         find_contradictions([replace(run, force=g * run.force) for run, g in zip(sound, factors, strict=True)])
 
 
-def test_a_bypass_that_carries_the_slow_motions_accuses_no_run():
-    """A dashpot over a spring below the yield force: slow loops have no yield displacement, which a leak describes."""
+def past_a_bypass(leak, viscous=1700.0):
+    """Tests of a dashpot over a spring below the yield force, whose fluid leaks past it by a function of the force."""
     points = [(i, f, a) for i in (0.0, 0.4, 0.8, 1.2, 1.5) for a in (0.008, 0.02) for f in (0.5, 1.5, 4.0)]
     current, frequency, amplitude = np.array(points).T
     yield_force = 60 + 1150 * (current / 1.5) ** 1.4
@@ -374,7 +374,7 @@ def test_a_bypass_that_carries_the_slow_motions_accuses_no_run():
     for k in range(1, len(force)):
         v = 2 * np.pi * frequency * amplitude * np.cos(2 * np.pi * k / steps)
         before = force[k - 1]
-        flow = before / 3e4 + np.sign(before) * np.maximum(np.abs(before) - yield_force, 0) / 1700
+        flow = np.sign(before) * (leak(np.abs(before)) + np.maximum(np.abs(before) - yield_force, 0) / viscous)
         force[k] = before + 2e6 * (v - flow) * dt
     rng, runs = np.random.default_rng(1), []
     for n, (i, f, a) in enumerate(points):
@@ -382,7 +382,23 @@ def test_a_bypass_that_carries_the_slow_motions_accuses_no_run():
         gain, noise = 1 + 0.01 * rng.normal(), 4 * rng.normal(size=time.size)
         x, own = a * np.sin(2 * np.pi * f * time), force[::20, n]
         runs.append(Run(f"t{n:02d}", time, x, gain * own + 900 * x + 25 + noise, np.full(time.size, i)))
-    assert find_contradictions(runs) == []
+    return runs
+
+
+def test_a_bypass_that_carries_the_slow_motions_accuses_no_run():
+    """Slow loops of a linear bypass have no yield displacement, which a leak describes."""
+    assert find_contradictions(past_a_bypass(lambda force: force / 3e4)) == []
+
+
+def test_an_orifice_that_carries_the_slow_motions_accuses_no_run_and_hides_no_open_coil():
+    """Its flow grows with the root of the force: slow loops are alike at all currents but the lowest."""
+    runs = past_a_bypass(lambda force: (np.sqrt(700**2 + 4.4e5 * force) - 700) / 2.2e5)
+    comparison = compare_runs(runs)
+    assert comparison.contradictions == []
+    assert "0.5 Hz and 8 mm" in comparison.undescribed
+    assert "4 Hz and 20 mm" not in comparison.undescribed
+    (found,) = find_contradictions(changed(runs, 5, current=runs[23].current))  # without current, at 4 Hz and 20 mm
+    assert (found.run_id, found.code, found.value) == ("t05", "E_OTHER_CURRENT", 0.0)
 
 
 @pytest.mark.parametrize("current", [0.0, 0.5])

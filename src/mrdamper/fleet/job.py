@@ -251,9 +251,9 @@ def _study(dataset: Dataset) -> dict[str, Any]:
 
 def _usable(dataset: Dataset) -> list[Run]:
     """Return the identification runs that are accepted, agree and move; raise the first cause if there is none."""
-    agreed, contradictions = without_contradictions(dataset.only(dataset.split("train")))
+    agreed, comparison = without_contradictions(dataset.only(dataset.split("train")))
     kept, refused = accepted_runs(agreed)
-    refused |= {one.run_id: str(one) for one in contradictions}
+    refused |= {one.run_id: str(one) for one in comparison.contradictions}
     runs, unusable = runs_for_global_fit(kept)
     if runs:
         return runs

@@ -34,8 +34,13 @@ _SAME_TEMPERATURE_K = 5.0  # difference of temperatures that are one [K]
 _SAME_MOTION = 0.05  # relative difference of frequencies or amplitudes that are one
 
 
-def limitations(scored: RecipeResult, loops: Sequence[LoopAnalysis], runs: Iterable[Run] = ()) -> dict[str, list[str]]:
-    """List the limitations of a model and of its tests under their headings, the most serious first."""
+def limitations(
+    scored: RecipeResult, loops: Sequence[LoopAnalysis], runs: Iterable[Run] = (), undescribed: str = ""
+) -> dict[str, list[str]]:
+    """List the limitations of a model and of its tests under their headings, the most serious first.
+
+    `undescribed` is the sentence on motions at which the comparison of the runs fails.
+    """
     groups = {
         PREDICTION: [
             *_design(loops, [run.run_id for run in scored.train.runs]),
@@ -50,7 +55,7 @@ def limitations(scored: RecipeResult, loops: Sequence[LoopAnalysis], runs: Itera
             *(_joint(scored.fit, scored.damper) if isinstance(scored.fit, JointFit) else ()),
             *(_functions(scored.fit, scored.damper) if isinstance(scored.fit, ModifiedFit) else ()),
         ],
-        TESTS: _tests(loops),
+        TESTS: [*filter(None, [undescribed]), *_tests(loops)],
         RANGE: [validity(scored.damper)],
     }
     _explain(list(groups.values()), scored.damper)

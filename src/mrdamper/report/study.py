@@ -178,7 +178,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
     mapped, functions = _mapped(rig)
     first = mapped.identifications[0] if mapped else None
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
-    limits_of_use = limitations(chosen, rig.loops, rig.dataset)
+    limits_of_use = limitations(chosen, rig.loops, rig.dataset, rig.undescribed)
     held = all(run.split == "validate" for run in _shown(rig))
     return {
         "rig": rig.dataset.name,

@@ -12,7 +12,7 @@ from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import refuse_unusable
 from mrdamper.physics.motion import analyse_motion, equivalent_sine
 from mrdamper.rig_files.quality.table import check_run, with_findings
-from mrdamper.study.contradictions import Contradiction, find_contradictions
+from mrdamper.study.contradictions import Comparison, compare_runs
 
 _MIN_SAMPLES_PER_CYCLE = 8  # below, velocity and loop are not determined
 _MAX_DISTORTION = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
@@ -45,7 +45,7 @@ class UsableRuns:
     """The runs of one rig that models are identified from and tested on."""
 
     dataset: Dataset  # without those that contradict the others
-    contradictions: tuple[Contradiction, ...]
+    comparison: Comparison  # of the runs with each other
     sines: Sequence[Run]  # steady, at one current
     train: Sequence[Run]  # of the sines, those to identify from
     everything: Sequence[Run]  # for a global fit: any motion and current
@@ -56,7 +56,7 @@ class UsableRuns:
     @classmethod
     def of(cls, dataset: Dataset, keep: Collection[str] = ()) -> UsableRuns:
         """Classify the runs of a rig; `keep` names some that may contradict the others."""
-        dataset, contradictions = without_contradictions(dataset, keep)
+        dataset, comparison = without_contradictions(dataset, keep)
         sines, refused = usable_sines(dataset)
         accepted, reasons = accepted_runs(dataset)
         everything, unusable = runs_for_global_fit(run for run in accepted if run.split == "train")
@@ -64,25 +64,25 @@ class UsableRuns:
         refused = {name: unusable.get(name, why) for name, why in refused.items()}
         return cls(
             dataset,
-            contradictions,
+            comparison,
             sines,
             [run for run in sines if run.split == "train"],
             everything,
             [run for run in accepted if run.split == "validate"],
             unusable,
-            {one.run_id: str(one) for one in contradictions} | refused,
+            {one.run_id: str(one) for one in comparison.contradictions} | refused,
         )
 
 
-def without_contradictions(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, tuple[Contradiction, ...]]:
+def without_contradictions(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, Comparison]:
     """Set aside the runs of a rig that contradict the others.
 
     Raises `ContradictionError` if more than a third of the identification runs contradict the others, or their forces
     differ as those of two dampers do.
     """
-    contradictions = tuple(find_contradictions(accepted_runs(dataset)[0], keep))
-    aside = {one.run_id for one in contradictions}
-    return dataset.only([run for run in dataset if run.id not in aside]), contradictions
+    comparison = compare_runs(accepted_runs(dataset)[0], keep)
+    aside = {one.run_id for one in comparison.contradictions}
+    return dataset.only([run for run in dataset if run.id not in aside]), comparison
 
 
 def accepted_runs(dataset: Iterable[Run]) -> tuple[list[Run], dict[str, str]]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.study.contradictions.evidence import Evidence, Posterior, RowProducts
-from mrdamper.study.contradictions.tracks import Track, irregularity
+from mrdamper.study.contradictions.tracks import SAME_CURRENT, Track, irregularity
 
 Cause = Literal["force", "offset", "current", "displacement", "time", "sign", "damper", "shifted"]
 
@@ -33,6 +33,9 @@ MAX_IRREGULARITY = 0.5  # repeated and missing tests of a matrix that is nearly 
 _EDGE_ODDS = 14.0  # increase of a factor or another current for the only run at the lowest or highest current
 _USUAL_STEP = 3.0  # the same of the time between two samples
 _SAME_STEP = 0.01  # relative difference of times between samples that are one
+
+_SAME_FORCE = 1.08  # ratio of two forces at a motion up to which they may be one
+_OTHER_FORCE = 1.15  # the same from which they are two, whatever the sessions
 
 # Sizes below which an explanation is within the differences between sessions and tests.
 MIN_FACTOR = 1.25  # of a force or a displacement
@@ -236,6 +239,37 @@ class ExplanationCandidate:
         else:
             size = float(np.ptp(self.track.displacement)) / 2 / self.evidence.amplitude
         return abs(np.log(size * factor)) < abs(np.log(size))
+
+
+def unproven_currents(tracks: Sequence[Track], apparent: Mapping[int, float]) -> set[int]:
+    """Find runs, by position, that look like another current [A] because the model fails at their motion.
+
+    Runs at the motion show it. Either one at the apparent current has another force; or a bypass or a compliance limits
+    the force: the run has the largest force there, as has one whose current is nearer to the stated than to the
+    apparent one. If the force is limited anywhere, runs that have the largest force of their motion are no evidence for
+    a lower current, nor are those beside them.
+    """
+    refuted, largest, limited = set[int](), set[int](), set[int]()
+    for k, current in apparent.items():
+        run, stated = tracks[k], float(tracks[k].current[0])
+        beside = [i for i, t in enumerate(tracks) if i != k and not t.current_changes and t.is_at_motion(run)]
+        others = [(i, float(tracks[i].current[0]), tracks[i].half_range / run.half_range) for i in beside]
+        if any(
+            i not in apparent and abs(at - current) <= SAME_CURRENT and not _alike(r, _OTHER_FORCE)
+            for i, at, r in others
+        ):
+            refuted.add(k)
+        if others and max(ratio for *_, ratio in others) <= _SAME_FORCE:
+            if any(abs(at - stated) < abs(at - current) and _alike(ratio, _SAME_FORCE) for _, at, ratio in others):
+                limited.add(k)
+            if current < stated:
+                largest.add(k)
+    of_a_limit = limited | largest if limited else limited
+    return refuted | {k for k in apparent if any(tracks[k].is_at_motion(tracks[other]) for other in of_a_limit)}
+
+
+def _alike(ratio: float, most: float) -> bool:
+    return 1 / most <= ratio <= most
 
 
 def completed_matrix_odds(odds: float, tracks: Sequence[Track], moved: Mapping[int, Track]) -> float:

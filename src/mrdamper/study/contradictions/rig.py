@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from mrdamper.data import Run
-from mrdamper.errors import InputError
+from mrdamper.errors import InputError, listed
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.contradictions.copies import find_copies
 from mrdamper.study.contradictions.findings import Contradiction, corrected_unit, describe, describe_copy
@@ -23,6 +23,7 @@ _MAX_MISFIT_FACTOR = 4.0  # factor of the usual model error at which runs do not
 _INVERSE_TOLERANCE = 0.1  # logarithm of the product of two factors up to which one is the inverse of the other
 _MIN_GAIN = 1e-3  # gain of a run at least, for its logarithm
 _CLUSTERS_REMEDY = "tests of two dampers need two names in the column rig of runs.csv; --keep RUN keeps a run as it is"
+_MAX_MOTIONS = 4  # motions named in one sentence
 _MILLIAMPERE_RATIO = 50.0  # ratio of a current to the usual one from which it is in milliamperes
 
 
@@ -32,8 +33,21 @@ class ContradictionError(InputError):
     code = "E_CONTRADICTIONS"
 
 
-@on_one_blas_thread
+@dataclass(frozen=True)
+class Comparison:
+    """What a comparison of the runs of one rig with each other shows."""
+
+    contradictions: list[Contradiction]
+    undescribed: str = ""  # sentence on the motions at which the model of the comparison fails
+
+
 def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list[Contradiction]:
+    """Find the runs of one rig that contradict the others; arguments and errors as `compare_runs`."""
+    return compare_runs(runs, keep).contradictions
+
+
+@on_one_blas_thread
+def compare_runs(runs: Sequence[Run], keep: Collection[str] = ()) -> Comparison:
     """Find the runs of one rig, accepted by the quality checks, that contradict the others, except those to keep.
 
     The comparison is of identification runs with each other. A validation run is compared with them afterwards, and
@@ -47,9 +61,10 @@ def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list
     tracks = [t for t in tracks_of([run for run in runs if run.id not in contradictions])]
     tracks, milliamperes = _in_amperes(tracks, keep)
     contradictions |= milliamperes
-    train = [track for track in tracks if track.run.split == "train"]
+    train, undescribed = [track for track in tracks if track.run.split == "train"], ""
     if len(train) >= MIN_RUNS:
-        contradictions |= _among(train, keep)
+        among, undescribed = _among(train, keep)
+        contradictions |= among
         trusted = [track for track in train if track.run.id not in contradictions]
         validation = [
             t for t in tracks if t.run.split != "train" and t.run.id not in keep and t.run.id not in contradictions
@@ -61,10 +76,11 @@ def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list
         if len(trusted) >= MIN_RUNS:
             agreeing = {track.run.id for track in doubted} - set(_beside(doubted, trusted))
             contradictions = {name: one for name, one in contradictions.items() if name not in agreeing}
-    return [contradictions[run.id] for run in runs if run.id in contradictions]
+    return Comparison([contradictions[run.id] for run in runs if run.id in contradictions], undescribed)
 
 
-def _among(train: Sequence[Track], keep: Collection[str]) -> dict[str, Contradiction]:
+def _among(train: Sequence[Track], keep: Collection[str]) -> tuple[dict[str, Contradiction], str]:
+    """Contradictions among identification runs, and a sentence on the motions that their comparison fails at."""
     search = Search(train)
     search.run(int(_MAX_SHARE * len(train)))
     contradictions = {
@@ -80,7 +96,17 @@ def _among(train: Sequence[Track], keep: Collection[str]) -> dict[str, Contradic
     )
     if len(contradictions) > _MAX_SHARE * len(train) or incoherent or _opposed(list(contradictions.values())):
         raise _disagreement(train, contradictions)
-    return contradictions
+    return contradictions, _undescribed([train[k] for k in sorted(search.unproven)])
+
+
+def _undescribed(tracks: Sequence[Track]) -> str:
+    if not tracks:
+        return ""
+    motions = dict.fromkeys(f"{track.frequency:.3g} Hz and {1e3 * track.amplitude:.3g} mm" for track in tracks)
+    return (
+        f"At {listed(list(motions), _MAX_MOTIONS)}, the current changes the force otherwise than at the other "
+        "motions, which the comparison of the runs does not describe: a wrong current may not be found there."
+    )
 
 
 def _opposed(contradictions: Sequence[Contradiction]) -> bool:

@@ -27,6 +27,7 @@ from mrdamper.study.contradictions.explanations import (
     ExplanationCandidate,
     Trial,
     completed_matrix_odds,
+    unproven_currents,
 )
 from mrdamper.study.contradictions.gains import gain_differences
 from mrdamper.study.contradictions.tracks import SAME_CURRENT, Track, irregularity
@@ -85,6 +86,7 @@ class Search:
         self.found: dict[int, Explanation] = {}  # runs that contradict the others, by position
         # gains of the other runs, by position, if too many differ to identify the wrong ones
         self.differing: dict[int, float] = {}
+        self.unproven: set[int] = set()  # runs whose motion the model does not describe, instead of another current
         self.evidence = Evidence(tracks)
         self._products = self.evidence.products(tracks)
         self._candidates = [ExplanationCandidate(i, tracks, self.evidence, p) for i, p in enumerate(self._products)]
@@ -103,6 +105,11 @@ class Search:
             if not best.explanations or self.differing:
                 break
             self._accept(best.explanations)
+        self.unproven = self._unproven(self.found)
+        for i in self.unproven:
+            del self.found[i]
+            self._products[i] = self._candidates[i].own
+            self._members[i] = self.posterior([i]).weigh([self._products[i]])[0]
         self._review()
 
     def posterior(self, but: Iterable[int] = ()) -> Posterior:
@@ -115,7 +122,15 @@ class Search:
             len(self.tracks), [*self.tracks, track], self.evidence, *self.evidence.products([track])
         )
         best = next(iter(candidate.explanations(self.posterior())), None)
-        return best if best is not None and best.gain >= self._threshold({len(self.tracks): best}) else None
+        found = {} if best is None else {len(self.tracks): best}
+        if best is None or best.gain < self._threshold(found) or self._unproven(found, track):
+            return None
+        return best
+
+    def _unproven(self, found: Mapping[int, Explanation], *further: Track) -> set[int]:
+        """Positions of explained runs, a further one the last, for whose other current there is no evidence."""
+        apparent = {k: explanation.trial.value for k, explanation in found.items() if explanation.cause == "current"}
+        return unproven_currents([*self.tracks, *further], apparent)
 
     def _threshold(self, explanations: Mapping[int, Explanation]) -> float:
         """Logarithm of the odds from which explanations are far better than none.
