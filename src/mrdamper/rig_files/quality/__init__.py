@@ -68,6 +68,13 @@ CHECKS: tuple[Check, ...] = (
     loop.repeats,
     motion.changes,
 )
+_OF_A_FORCE = (  # what a force does that stands still is no finding
+    disturbance.force_lines,
+    disturbance.force_is_fine,
+    unsteady.cycles_are_steady,
+    lag.force_channel,
+    loop.repeats,
+)
 
 
 @cache
@@ -91,7 +98,8 @@ def checked(view: View, without: Collection[Check] = ()) -> Record:
     """Run every check on a view of a record, which goes on to hold what they have analysed; else `check_record`."""
     record = view.record
     for check in (*CHECKS, *_dropped_in()):
-        view.found.extend((check(view) if check not in without else None) or ())
+        if check not in without and not (check in _OF_A_FORCE and flat.force_stops(view)):
+            view.found.extend(check(view) or ())
     findings = (*record.findings, *view.found)
     return replace(record, findings=findings, segments=view.segments, steady=loop.steady_part(view))
 

@@ -32,6 +32,7 @@ FLAT = 5  # samples in a row that make a flat top or a frozen stretch
 _BEND = 1.5e-4  # of the channel's range: a channel that would have moved less may have stood still
 _LEVELS = 6  # resolution steps it must have missed
 _COARSE = 1e-5  # a resolution step of this share of the range shows in a force that is held by friction
+_FINE, _MOSTLY = 2e-3, 0.25  # resolution step over the range, and share of the samples at either of its ends
 _LEAP = 0.03  # of the range: a channel that leaves a flat top with such a step was not clipped but frozen
 _NEAR = 100  # samples on either side from which the noise is taken
 _ROUNDING = 1e-9  # of the channel's range: less is no noise
@@ -92,7 +93,10 @@ def flat_tops(view: View, name: str) -> dict[float, np.ndarray]:
     for level in (channel.high, channel.low):
         at = channel.equal[(channel.values[channel.equal[:, 0]] == level) & ~channel.leaps(channel.equal)]
         inner = (at[:, 0] > 0) & (at[:, 1] < channel.values.size)
-        at = at[channel.odd(at, kinks=kinks) | (inner & channel.piled_up(level) if len(at) else inner)]
+        at = at[
+            channel.odd(at, kinks and channel.mostly_at_its_ends, kinks)
+            | (inner & channel.piled_up(level) if len(at) else inner)
+        ]
         if len(at):
             tops[level] = at
     return tops
@@ -120,6 +124,14 @@ def frozen_stretches(view: View, name: str) -> np.ndarray:
         spread > (np.nanmax(other) - np.nanmin(other)) / 3
     )
     return stretches[channel.odd(stretches, long_while)]
+
+
+def force_stops(view: View) -> bool:
+    """Tell whether the force stands still for half a period: its sensor failed, and its changes are no damper's."""
+    if not view.noticed("W_FROZEN") or view.strokes.period is None:
+        return False
+    lengths = np.diff(view.record.time[np.minimum(frozen_stretches(view, "force"), view.record.time.size - 1)])
+    return bool(np.any(lengths > 0.5 * view.strokes.period))
 
 
 def flagged_samples(view: View) -> np.ndarray:
@@ -164,6 +176,12 @@ class _Channel:
     @property
     def span(self) -> float:
         return self.high - self.low
+
+    @cached_property
+    def mostly_at_its_ends(self) -> bool:
+        """Most samples of a fine channel are exactly those at its two ends: friction repeats no reading as often."""
+        shares = [np.mean(self.values == end) for end in (self.low, self.high)]
+        return 0 < self.level < _FINE * self.span and min(shares) > _MOSTLY
 
     def odd(self, stretches: np.ndarray, sure: np.ndarray | bool = False, kinks: bool = True) -> np.ndarray:
         """(K,) mask of the stretches that are sure, or that neither motion nor noise makes."""
