@@ -464,6 +464,7 @@ def test_where_a_line_gives_the_sense_of_one_channel_the_sign_of_the_other_is_as
         (['"Test date","2023-05-10"'], {"recorded_at": "2023-05-10"}),
         (["Date,2024/03/12", "Time,2:05:10.25 PM"], {"recorded_at": "2024-03-12T14:05:10"}),
         (["# Recorded: 5 Mar 2024"], {"recorded_at": "2024-03-05"}),
+        (["# Damper rig; specimen warm; test date: 2024-03-10 09:23"], {"recorded_at": "2024-03-10T09:23:00"}),
         (["Date: 31/12/2024 7:00"], {"recorded_at": "2024-12-31T07:00:00"}),
         (["Date: 03/04/2024 7:00"], {"session": "03/04/2024"}),  # of March or of April
         (["Calibration date: 2020-01-01"], {}),

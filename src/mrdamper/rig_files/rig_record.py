@@ -325,13 +325,13 @@ def _run_id(table: RawTable, path: Path) -> str:
 def recording_time(lines: Iterable[str]) -> dict[str, str]:
     """Return the note `recorded_at` (ISO 8601) of a test, or `session`, the date as written, where it is ambiguous.
 
-    A line that names a date and nothing else counts ("Test date: 2024-05-31 14:05"), with the time of day in the same
-    line or in one of its own. 03/04/2024 is a day, and the same day in all files of a rig, but not known to be of March
+    A line, or a part of one after a semicolon, that names a date and nothing else counts ("Test date: 2024-05-31
+    14:05"), with the time of day in the same line or in one of its own. 03/04/2024 is a day, and the same day in all files of a rig, but not known to be of March
     or April. Lines that state different days (a report printed later) state none.
     """
     days, times = dict[str, str](), dict[str, None]()
-    for line in lines:
-        keyed = _KEYED.match(line)
+    for fact in (fact for line in lines for fact in (line, *line.split("; ")[1:])):
+        keyed = _KEYED.match(fact)
         if keyed is None:
             continue
         key, value = " ".join(keyed["key"].casefold().split()), keyed["value"]
