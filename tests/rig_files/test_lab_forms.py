@@ -247,6 +247,16 @@ def test_a_heading_that_states_another_amplitude_is_reported(tmp_path):
     assert "W_NAME" not in [finding.code for finding in read_run(tmp_path / "b.csv").findings]
 
 
+@pytest.mark.parametrize("stated", [10, 20])
+def test_half_the_length_of_a_name_is_reported_where_the_other_names_state_amplitudes(tmp_path, stated):
+    head = "Time (s),Displacement (mm),Force (N)\n"
+    for k in range(4):
+        (tmp_path / f"{stated}mm_0.{k}A.csv").write_text(head + rows(T, X, force(0.1 * k, k)))
+    (tmp_path / "20mm_0.5A.csv").write_text(head + rows(T, X, force(0.5, 5)))
+    found = {r.id: [f.code for f in r.findings] for r in import_files([tmp_path]).records}
+    assert ["W_NAME" in codes for codes in found.values()] == [stated == 10 and run == "20mm_0.5A" for run in found]
+
+
 def test_channels_in_volts_are_refused_with_the_scale_that_is_missing(tmp_path):
     head = "Vertical Units,V,V,\nLabel,LVDT,Load cell,\n\nTIME,CH1,CH2\n"
     (tmp_path / "tek_0.5A.csv").write_text(head + rows(T, X / 2, force(0.5) / 200))

@@ -31,6 +31,7 @@ from mrdamper.rig_files.mapping.companions import (
     part_of,
     repeated,
     results_of,
+    stated_as_amplitudes,
     tests_by,
     within_times,
 )
@@ -282,6 +283,11 @@ class _Intake:
         self.copies = [path for i, (path, _) in enumerate(tests) if i in again]
         self._found = [test for i, test in enumerate(tests) if i not in again]
         self._refuse(contradictions([record for _, record in self.tests()]))
+        tests = self.tests()
+        for i, finding in stated_as_amplitudes([record for _, record in tests]).items():
+            path, record = tests[i]
+            tests[i] = path, replace(record, findings=(*record.findings, finding))
+        self._found = tests
         return used
 
     def _refuse_contradicted(self, stated: Sequence[tuple[float, str]]) -> None:

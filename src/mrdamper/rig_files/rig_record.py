@@ -326,7 +326,8 @@ def recording_time(lines: Iterable[str]) -> dict[str, str]:
     """Return the note `recorded_at` (ISO 8601) of a test, or `session`, the date as written, where it is ambiguous.
 
     A line, or a part of one after a semicolon, that names a date and nothing else counts ("Test date: 2024-05-31
-    14:05"), with the time of day in the same line or in one of its own. 03/04/2024 is a day, and the same day in all files of a rig, but not known to be of March
+    14:05"), with the time of day in the same line or in one of its own. 03/04/2024 is a day, and the same day in all
+    files of a rig, but not known to be of March
     or April. Lines that state different days (a report printed later) state none.
     """
     days, times = dict[str, str](), dict[str, None]()

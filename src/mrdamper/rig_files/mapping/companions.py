@@ -24,6 +24,7 @@ from mrdamper.rig_files.mapping.description import short_lines, with_notes
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
 from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
 from mrdamper.rig_files.profile import Channel, FileForm, Profile
+from mrdamper.rig_files.quality.motion import stated_motion
 from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.arrays import array_table
@@ -38,6 +39,7 @@ _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
 _ALIKE = 0.1  # relative difference of frequency and amplitude within which two motions are one
 _ALIKE_A = 0.03  # difference of the current within which two tests have the same [A]
+_FEWEST_AGREEING = 3  # tests of the amplitude that they state, for every one of half of it
 _SEVERAL = 2.0  # ratio of peak-to-peak forces at equal conditions that no repetition explains
 _ROUNDING = 1e-3  # of the largest value: two exports of one test differ by less, two tests by more
 _ROUNDING_A = 5.5e-3  # [A] so much a current of two decimals differs from one of more
@@ -309,6 +311,24 @@ def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:
                     refused.setdefault(i, _refusal(records[i], points[i], records[j], points[j]))
                     refused.setdefault(j, _refusal(records[j], points[j], records[i], points[i]))
     return refused
+
+
+def stated_as_amplitudes(records: Sequence[Record]) -> dict[int, Finding]:
+    """Return, by their place, tests of half the amplitude that their name states, where names state no strokes."""
+    stated = {i: length for i, record in enumerate(records) if (length := stated_motion(record, "mm")) is not None}
+    points = {i: point for i in stated if (point := _point(records[i])) is not None}
+    halves = {i for i, point in points.items() if abs(2e3 * point[1] / stated[i] - 1) < _ALIKE}
+    agreeing = sum(abs(1e3 * point[1] / stated[i] - 1) < _ALIKE for i, point in points.items())
+    if agreeing < _FEWEST_AGREEING * len(halves):
+        return {}
+    return {
+        i: Finding(
+            "W_NAME",
+            f"the name or heading states {stated[i]:g} mm and the record has an amplitude of {1e3 * points[i][1]:.3g} "
+            f"mm, where {agreeing} other tests have what theirs state: check the unit of displacement, or the name",
+        )
+        for i in halves
+    }
 
 
 def _copies(records: Sequence[Record], points: Mapping[int, _Point]) -> dict[int, QualityError]:

@@ -211,6 +211,13 @@ def _peak_to_peak(values: np.ndarray) -> float:
     return float(np.nanmax(values) - np.nanmin(values))
 
 
+def stated_motion(record: Record, unit: str) -> float | None:
+    """Return the one frequency in Hz, or the one length in mm, that a name or heading of a record states."""
+    notes = record.provenance
+    stated = motions_in(f"{notes.get('file', '')} {record.id} {notes.get('motion_stated', '')}", unit)
+    return stated.pop() if len(stated) == 1 and 0.0 not in stated else None
+
+
 def agrees_with_its_name(view: View) -> Iterator[Finding]:
     """Report a motion of another frequency or amplitude than a name or heading states.
 
@@ -219,11 +226,8 @@ def agrees_with_its_name(view: View) -> Iterator[Finding]:
     motion = view.motion
     if motion is None:
         return
-    notes = view.record.provenance
-    name = f"{notes.get('file', '')} {view.record.id} {notes.get('motion_stated', '')}"
     measured = motion.condition
-    values = (motions_in(name, unit) for unit in ("Hz", "mm"))
-    frequency, amplitude = (own.pop() if len(own) == 1 and 0.0 not in own else None for own in values)
+    frequency, amplitude = (stated_motion(view.record, unit) for unit in ("Hz", "mm"))
     contradictions = []
     if frequency is not None and abs(measured.frequency_Hz / frequency - 1) > _SAME_FREQUENCY:
         contradictions.append((f"{frequency:g} Hz", f"{measured.frequency_Hz:.3g} Hz", "time"))
@@ -233,7 +237,7 @@ def agrees_with_its_name(view: View) -> Iterator[Finding]:
     if not contradictions:
         return
     stated, has, channels = (" and ".join(words) for words in zip(*contradictions, strict=True))
-    states, rate = f"the name or heading states {stated}", notes.get("time_from", "")
+    states, rate = f"the name or heading states {stated}", view.record.provenance.get("time_from", "")
     if len(contradictions) > 1:
         problem = f"{states}, and the record has {has}: the record of another test?"
         raise view.refused("E_MOTION_CONTRADICTS", problem, f"correct the name or heading, or the units of {channels}")
