@@ -21,7 +21,7 @@ from mrdamper.errors import IdentificationError
 from mrdamper.identification.characteristics import Characteristics, characterise
 from mrdamper.identification.intervals import written
 from mrdamper.models import Model
-from mrdamper.report.about import About, Limit
+from mrdamper.report.about import About, Limit, about_of, load_about, load_limits
 from mrdamper.report.damper_tests import facts_of_tests, figures_of_tests, force_rows, provenance
 from mrdamper.report.limitations import PREDICTION, limitations
 from mrdamper.report.page import made_from, plain, render_page
@@ -53,23 +53,28 @@ def write_study(
     folder: str | Path,
     progress: Progress = lambda what, share: None,
     *,
-    about: About | None = None,
-    limits: Sequence[Limit] = (),
+    about: About | Mapping[str, Any] | str | Path | None = None,
+    limits: Sequence[Limit] | str | Path = (),
     also: Sequence[str] = (),
     paper: str = "a4",
     processes: Processes = IN_PROCESS,
 ) -> list[Path]:
     """Write report.html, model files, tables and figures/ atomically, and return the files, the page first.
 
-    The folder is made if missing; files of the same names are replaced together at the end. `about` is the head of the
-    report; pass or fail is stated only against `limits` of the measured force. Every figure is also written in the
-    formats of `also`, "png" and "pdf", by the `processes`; "pdf" adds report.pdf, with pages of the size `paper`, "a4"
-    or "letter". Raises `OutputError` if the folder cannot be written to.
+    The folder is made if missing; files of the same names are replaced together at the end. The head of the report
+    `about` is given by its fields or as a TOML file (`mrdamper init about`), as are the `limits` of the measured force
+    (`mrdamper init limits`), against which alone pass or fail is stated. Every figure is also written in the formats of
+    `also`, "png" and "pdf", by the `processes`; "pdf" adds report.pdf, with pages of the size `paper`, "a4" or
+    "letter". Raises `AboutError` if `about` or `limits` cannot be read, or has an unknown field, and `OutputError`
+    if the folder cannot be written to.
     """
-    head = about or About()
+    if isinstance(about, (str, Path)):
+        about = load_about(about)
+    head = about if isinstance(about, About) else about_of(about or {}, "about")
+    limits = load_limits(limits) if isinstance(limits, (str, Path)) else tuple(limits)
     # Figures as SVG alone cost less here than sending the study to a process, with what this one knows of its runs.
     painters = processes if also else IN_PROCESS
-    drawn = painters.map(partial(_draw, also=tuple(also), limits=tuple(limits)), study.rigs, progress)
+    drawn = painters.map(partial(_draw, also=tuple(also), limits=limits), study.rigs, progress)
 
     def fill(work: Path) -> None:
         (work / "figures").mkdir()

@@ -106,7 +106,7 @@ def test_a_compiler_that_hangs_is_ended_with_its_children_and_not_tried_by_the_n
     own_cache, tmp_path, monkeypatch
 ):
     fake_compiler(tmp_path, f"sleep 60 & echo $! > {tmp_path}/child; wait", monkeypatch)
-    monkeypatch.setattr(compilers.Compiler.compile, "__defaults__", (None, 0.5))
+    monkeypatch.setattr(compilers, "_COMPILE_TIMEOUT_S", 0.5)
     begin = time.monotonic()
     with pytest.warns(cache.CompilerWarning, match="did not end"):
         along(lag())

@@ -234,12 +234,12 @@ def currents_listed(path: Path, tests: Sequence[tuple[Path, Record]]) -> list[tu
     for file in dict.fromkeys(files) if len(listed) == 1 else ():
         own = [i for i, of in enumerate(files) if of == file]
         rows = [Results(min(listed), tuple((f"{n + k}",) for n in range(len(min(listed)))), "", ("",)) for k in (0, 1)]
-        found = [of for row in rows if (of := row.by_test([(tests[i][1].id,) for i in own]))]
-        currents = {own[at]: current for at, current in (found or [{}])[0].items()}
+        by_test = next((of for row in rows if (of := row.by_test([(tests[i][1].id,) for i in own]))), {})
+        currents = {own[at]: current for at, current in by_test.items()}
         points = [_point(with_stated_current(tests[i][1], current, "", "")) for i, current in currents.items()]
-        known = sorted((point for point in points if point), key=lambda point: point[2])
-        if all(one[3] < other[3] and _are_near(one, other) for one, other in pairwise(known)):
-            stated |= currents if len(known) == len(own) else {}
+        rising = sorted((point for point in points if point), key=lambda point: point[2])
+        if all(one[3] < other[3] and _are_near(one, other) for one, other in pairwise(rising)):
+            stated |= currents if len(rising) == len(own) else {}
     title = f"{path.name}, a list of as many currents as tests"
     return [(stated[i], title) for i in range(len(tests))] if len(stated) == len(tests) else None
 

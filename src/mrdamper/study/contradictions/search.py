@@ -122,14 +122,14 @@ class Search:
             len(self.tracks), [*self.tracks, track], self.evidence, *self.evidence.products([track])
         )
         best = next(iter(candidate.explanations(self.posterior())), None)
-        found = {} if best is None else {len(self.tracks): best}
-        if best is None or best.gain < self._threshold(found) or self._unproven(found, track):
+        explained = {} if best is None else {len(self.tracks): best}
+        if best is None or best.gain < self._threshold(explained) or self._unproven(explained, track):
             return None
         return best
 
-    def _unproven(self, found: Mapping[int, Explanation], *further: Track) -> set[int]:
+    def _unproven(self, explained: Mapping[int, Explanation], *further: Track) -> set[int]:
         """Positions of explained runs, a further one the last, for whose other current there is no evidence."""
-        apparent = {k: explanation.trial.value for k, explanation in found.items() if explanation.cause == "current"}
+        apparent = {k: one.trial.value for k, one in explained.items() if one.cause == "current"}
         return unproven_currents([*self.tracks, *further], apparent)
 
     def _threshold(self, explanations: Mapping[int, Explanation]) -> float:
