@@ -24,6 +24,7 @@ CODES = {
     "shifted": "E_SHIFTED_ROWS",
     "copy": "E_TWICE",
 }
+_MAX_POWER = 20  # of ten, up to which odds are told
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,9 @@ def describe(run: Run, explanation: Explanation, others: int) -> Contradiction:
         "sign": _sign, "damper": _damper, "shifted": _shifted,
     }[explanation.cause]  # fmt: skip
     contradiction, remedy = text(run, explanation.trial)
-    against = f"contradicts the other {others} runs: {contradiction} (log odds {explanation.gain:.0f})"
+    power = explanation.gain / np.log(10)
+    odds = f"10^{power:.0f}" if power < _MAX_POWER else f"over 10^{_MAX_POWER}"
+    against = f"contradicts the other {others} runs: {contradiction} (odds of {odds} to 1)"
     return Contradiction(run.id, explanation.cause, explanation.trial.value, explanation.gain, against, remedy)
 
 
@@ -87,15 +90,12 @@ def _displacement(run: Run, e: Trial) -> tuple[str, str]:
 def _misread(run: Run, channel: str, usual: str, e: Trial) -> tuple[str, str]:
     """Describe a channel in the usual unit that was read in another, or the reverse."""
     true, read = (usual, e.unit[4:]) if e.unit.startswith("not ") else (e.unit, usual)
-    text = f"its {channel} is {1 / e.value:.3g} times what the others show, as if {true} had been read as {read}"
+    text = f"its {channel} is {1 / e.value:.3g} times what the others show, the ratio of {read} to {true}"
     return text, _corrected(run, channel, e.value, true, read=read)
 
 
 def _offset(run: Run, e: Trial) -> tuple[str, str]:
-    unit, of = _unit_read(run, "force")
-    offset, scale = _sign_read(run, "force") * e.value / of.factor, _scale_read(run, "force")
-    line = f'[channels.force] unit = "{unit}" and scale = {scale:g} and offset = {offset:.3g}'
-    return f"the zero of its force is off by {-e.value:.3g} N", _own_profile(run, line)
+    return f"the zero of its force is off by {-e.value:.3g} N", _shifted_by(run, "force", e.value)
 
 
 def _current(run: Run, e: Trial) -> tuple[str, str]:
@@ -152,6 +152,13 @@ def _corrected(run: Run, channel: str, factor: float, unit: str = "", *, read: s
     return _own_profile(run, f'[channels.{channel}] unit = "{stated}" and scale = {scale:.3g}')
 
 
+def _shifted_by(run: Run, channel: str, value: float) -> str:
+    """State how a value in SI units is added to a channel."""
+    unit, of = _unit_read(run, channel)
+    offset, scale = _sign_read(run, channel) * value / of.factor, _scale_read(run, channel)
+    return _own_profile(run, f'[channels.{channel}] unit = "{unit}" and scale = {scale:g} and offset = {offset:.3g}')
+
+
 def _sign_read(run: Run, channel: str) -> int:
     """Return the sign with which the import read a channel."""
     return -1 if channel in run.notes.get("sign_changed", "").split(", ") else 1
@@ -184,7 +191,12 @@ def corrected_unit(run: Run, current: float) -> str:
 
 
 def _repeated(run: Run, current: float) -> str:
-    return f"{_stated_current(run, current)}, or repeat the test" if _is_stated(run) else "repeat the test"
+    """State how another current is corrected, the measured one by an offset, or that the test is wrong."""
+    remedy = _stated_current(run, current)
+    if not _is_stated(run):
+        offset = np.copysign(current, run.mean_current) - run.mean_current
+        remedy = f"correct a current that the file name states, and {_shifted_by(run, 'current', offset)}"
+    return f"{remedy}, or repeat the test"
 
 
 def _is_stated(run: Run) -> bool:
