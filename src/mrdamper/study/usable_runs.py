@@ -12,7 +12,7 @@ from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import refuse_unusable
 from mrdamper.physics.motion import analyse_motion, equivalent_sine
 from mrdamper.rig_files.quality.table import check_run, with_findings
-from mrdamper.study.contradictions import Comparison, compare_runs
+from mrdamper.study.contradictions import RunComparison, compare_runs
 
 _MIN_SAMPLES_PER_CYCLE = 8  # below, velocity and loop are not determined
 _MAX_DISTORTION = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
@@ -45,7 +45,7 @@ class UsableRuns:
     """The runs of one rig that models are identified from and tested on."""
 
     dataset: Dataset  # without those that contradict the others
-    comparison: Comparison  # of the runs with each other
+    comparison: RunComparison  # of the runs with each other
     sines: Sequence[Run]  # steady, at one current
     train: Sequence[Run]  # of the sines, those to identify from
     everything: Sequence[Run]  # for a global fit: any motion and current
@@ -74,7 +74,7 @@ class UsableRuns:
         )
 
 
-def without_contradictions(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, Comparison]:
+def without_contradictions(dataset: Dataset, keep: Collection[str] = ()) -> tuple[Dataset, RunComparison]:
     """Set aside the runs of a rig that contradict the others.
 
     Raises `ContradictionError` if more than a third of the identification runs contradict the others, or their forces

@@ -7,10 +7,10 @@ offset, another current, another damper, a copy) is far better than none, the ru
 from mrdamper.study.contradictions.findings import Contradiction
 from mrdamper.study.contradictions.rig import (
     MIN_RUNS,
-    Comparison,
     ContradictionError,
+    RunComparison,
     compare_runs,
     find_contradictions,
 )
 
-__all__ = ["MIN_RUNS", "Comparison", "Contradiction", "ContradictionError", "compare_runs", "find_contradictions"]
+__all__ = ["MIN_RUNS", "Contradiction", "ContradictionError", "RunComparison", "compare_runs", "find_contradictions"]

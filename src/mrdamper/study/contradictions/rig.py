@@ -34,8 +34,8 @@ class ContradictionError(InputError):
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """What a comparison of the runs of one rig with each other shows."""
+class RunComparison:
+    """Result of a comparison of the runs of one rig with each other."""
 
     contradictions: list[Contradiction]
     undescribed: str = ""  # sentence on the motions at which the model of the comparison fails
@@ -47,7 +47,7 @@ def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list
 
 
 @on_one_blas_thread
-def compare_runs(runs: Sequence[Run], keep: Collection[str] = ()) -> Comparison:
+def compare_runs(runs: Sequence[Run], keep: Collection[str] = ()) -> RunComparison:
     """Find the runs of one rig, accepted by the quality checks, that contradict the others, except those to keep.
 
     The comparison is of identification runs with each other. A validation run is compared with them afterwards, and
@@ -76,7 +76,7 @@ def compare_runs(runs: Sequence[Run], keep: Collection[str] = ()) -> Comparison:
         if len(trusted) >= MIN_RUNS:
             agreeing = {track.run.id for track in doubted} - set(_beside(doubted, trusted))
             contradictions = {name: one for name, one in contradictions.items() if name not in agreeing}
-    return Comparison([contradictions[run.id] for run in runs if run.id in contradictions], undescribed)
+    return RunComparison([contradictions[run.id] for run in runs if run.id in contradictions], undescribed)
 
 
 def _among(train: Sequence[Track], keep: Collection[str]) -> tuple[dict[str, Contradiction], str]:

@@ -122,14 +122,14 @@ class Search:
             len(self.tracks), [*self.tracks, track], self.evidence, *self.evidence.products([track])
         )
         best = next(iter(candidate.explanations(self.posterior())), None)
-        explained = {} if best is None else {len(self.tracks): best}
-        if best is None or best.gain < self._threshold(explained) or self._unproven(explained, track):
+        explanations = {} if best is None else {len(self.tracks): best}
+        if best is None or best.gain < self._threshold(explanations) or self._unproven(explanations, track):
             return None
         return best
 
-    def _unproven(self, explained: Mapping[int, Explanation], *further: Track) -> set[int]:
+    def _unproven(self, explanations: Mapping[int, Explanation], *further: Track) -> set[int]:
         """Positions of explained runs, a further one the last, for whose other current there is no evidence."""
-        apparent = {k: one.trial.value for k, one in explained.items() if one.cause == "current"}
+        apparent = {k: e.trial.value for k, e in explanations.items() if e.cause == "current"}
         return unproven_currents([*self.tracks, *further], apparent)
 
     def _threshold(self, explanations: Mapping[int, Explanation]) -> float:
