@@ -780,3 +780,17 @@ def test_two_currents_in_a_line_over_one_test_are_asked_about(tmp_path, line):
     (tmp_path / "a.csv").write_text(f"{line}\nTime [s],disp [mm],force [N]\n" + rows(T, X, force(0.5)))
     (refusal,) = import_files([tmp_path]).refusals
     assert refusal.error.code == "E_CURRENT_MISSING"
+
+
+def test_columns_of_one_name_below_their_conditions_are_tests_and_a_number_leaves_none_out_in_silence(tmp_path):
+    head = ["test,I=0A,I=0A,I=0.5A,I=0.5A", "signal,x_mm,F_N,x_mm,F_N", "t_s,,,,"]  # pandas: columns of two levels
+    table = rows(T, X, force(0.0), X + 0.01, force(0.5))
+    (tmp_path / "sine.csv").write_text("\n".join([*head, table]))
+    assert currents(import_files([tmp_path]).records) == [0.0, 0.5]
+    (tmp_path / "sine.csv").write_text("\n".join(["t_s,x_mm,F_N,x_mm,F_N", table]))
+    assert {r.error.code for r in import_files([tmp_path]).refusals} == {"E_DUPLICATE_COLUMN"}
+    numbers = "[channels.displacement]\ncolumn = 2\n[channels.force]\ncolumn = 3\n[current]\nvalue = 0.0"
+    (record,) = import_files([tmp_path], parse_profile(numbers)).records
+    told = [f.text for f in record.findings]
+    assert any("of 2 columns called 'F' one is taken as the force, not 5;" in text for text in told)
+    assert any("of 2 columns called 'x' one is taken as the displacement, not 4;" in text for text in told)

@@ -182,13 +182,20 @@ def measured_beside_others(table: RawTable, profile: Profile, assigned: Mapping[
     return taken
 
 
-def forces_not_taken(table: RawTable, assigned: Mapping[str, Assigned]) -> list[str]:
-    """Return which columns are not taken that are named after currents as that of the force is: further tests."""
+def tests_not_taken(table: RawTable, assigned: Mapping[str, Assigned]) -> list[str]:
+    """Return which columns are not taken that may be further tests: named after currents, or as the one that is."""
     named = named_after_currents(table.names)
     others = [table.names[i] for i in named if i != assigned["force"].column]
     taken = assigned["force"].column in named
     text = f"the tests of {len(others)} columns named after other currents are not taken: {', '.join(others)}; "
-    return [f"{text}to take each, leave [channels.force] column out of the profile"] if taken and others else []
+    told = [f"{text}to take each, leave [channels.force] column out of the profile"] if taken and others else []
+    for role in [role for role in SIGNED if role in assigned]:
+        own = assigned[role].column
+        same = _differing(table, own)
+        others = ", ".join(str(i + 1) for i in same if i != own)
+        text = f"of {len(same)} columns called {table.headers[own].name!r} one is taken as the {role}, not {others}; "
+        told += [f"{text}if these are further tests, write the condition of each into its name"] if same else []
+    return told
 
 
 def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
@@ -397,15 +404,17 @@ def _refuse_two_values(table: RawTable, role: str, column: int, profile: Profile
     """Columns of one name must hold one thing, in whatever units."""
     if role not in REQUIRED or role in table.chosen or isinstance(profile.channel(role).column, int):
         return
-    own = table.headers[column]
-    keys = [(header.name.casefold(), header.role, header.dimension) for header in table.headers]  # t is no T
-    same = [i for i, key in enumerate(keys) if own.name and key == keys[column]]
-    if len(same) < 2:
-        return
-    if not _are_alike(table, same):
-        problem = f"{len(same)} columns are called {own.name!r} and differ"
+    if same := _differing(table, column):
+        problem = f"{len(same)} columns are called {table.headers[column].name!r} and differ"
         remedy = "rename one, or set its number: column = 2 in a profile"
         raise table.source.refuse("E_DUPLICATE_COLUMN", problem, remedy, line=table.line, column=same[1] + 1)
+
+
+def _differing(table: RawTable, column: int) -> list[int]:
+    """Return the columns of one name, which is that of a column, where they hold different things; else none."""
+    keys = [(header.name.casefold(), header.role, header.dimension) for header in table.headers]  # t is no T
+    same = [i for i, key in enumerate(keys) if keys[column][0] and key == keys[column]]
+    return same if len(same) > 1 and not _are_alike(table, same) else []
 
 
 def _second_clock(table: RawTable, time: Assigned) -> list[InputError]:

@@ -27,11 +27,11 @@ from mrdamper.rig_files.column_names import Unit, role_of, words
 from mrdamper.rig_files.columns import (
     Assigned,
     assign,
-    forces_not_taken,
     index_of_samples,
     left_out,
     measured_beside_others,
     rate_of,
+    tests_not_taken,
 )
 from mrdamper.rig_files.conditions import stated_motion, stated_quantities
 from mrdamper.rig_files.mapping.clocks import past_midnight, refuse_two_rates
@@ -106,7 +106,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         remarks["motion_stated"] = stated_motion(stated_quantities(table.remarks, decimal=table.decimal))
     remarks = {key: text for key, text in remarks.items() if text}
     findings += [Finding("W_CHOSEN", text) for text in measured_beside_others(table, profile, assigned)]
-    findings += [Finding("W_COLUMN", text) for text in forces_not_taken(table, assigned)]
+    findings += [Finding("W_COLUMN", text) for text in tests_not_taken(table, assigned)]
     left_out_channels = left_out(table, profile, assigned).items()
     findings += [Finding("W_COLUMN", f"the {name} channel is not used: {why}") for name, why in left_out_channels]
     records = []

@@ -170,7 +170,7 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
         header, stated = split_name(key), [cell for cell in cells if cell and (key or not is_unit(cell))]
         merged = not all(table.names) and len(stated) > 1
         titled = {key.casefold(), key.casefold().rstrip("s")} & _TITLES or (not key and (merged or all(cells)))
-        if titled and len(cells) == width - 1:
+        if titled and len(cells) == width - 1 and (*cells,) != table.names[1:]:
             roles = {split_name(cell).role for cell in cells} - {None}
             if (key and len(roles) > 1) or (stated and all(map(currents_in, stated))):
                 names = [*table.names]
