@@ -10,6 +10,7 @@ import pytest
 
 from mrdamper import import_files
 from mrdamper.errors import InputError
+from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import read_run
 
 T = np.arange(1001) / 200.0
@@ -260,3 +261,17 @@ def test_a_table_of_latex_is_read_with_the_current_of_its_caption(before, tmp_pa
     (record,) = import_files([tmp_path]).records
     assert np.mean(record.current) == 0.5
     np.testing.assert_allclose(record.force, force(0.5), rtol=0, atol=1e-3)
+
+
+def test_messages_among_the_rows_of_a_running_clock_are_left_out_and_told_others_are_refused_with_their_text(tmp_path):
+    rows = lines(lambda i, t, x, f: f"{t:.3f},{x:.6f},{f:.4f}").splitlines(keepends=True)
+    (tmp_path / "a_0.5A.csv").write_text(
+        "".join(["time (s),x (mm),F (N)\n", *rows[:99], "WARN hx711 retry\n", *rows[99:]])
+    )
+    record = read_run(tmp_path / "a_0.5A.csv")
+    assert record.time.size == T.size
+    assert "messages and left out: 1, the first (line 101) 'WARN hx711 retry'" in str(record.findings)
+    plain = [row.partition(",")[2] for row in rows]  # a fixed rate: the line may stand for a sample
+    (tmp_path / "a_0.5A.csv").write_text("".join(["x (mm),F (N)\n", *plain[:99], "WARN hx711 retry\n", *plain[100:]]))
+    (refusal,) = import_files([tmp_path], parse_profile("[file]\nsample_rate_Hz = 200.0")).refusals
+    assert "line 101: 1 fields where the other rows have 2: 'WARN hx711 retry'" in str(refusal.error)

@@ -183,6 +183,10 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
     lines = values.pop(_LINES)
     if not lines.size:
         raise stream.source.refuse("E_NO_DATA", "a header without data", "export the file again")
+    if form.messages:
+        line, text = next(iter(form.messages.items()))
+        shown = f"lines of words among the rows, taken for messages and left out: {len(form.messages)}, the first "
+        findings = (*findings, Finding("W_CHOSEN", printable(f"{shown}(line {line}) {text[:40]!r}")))
     damaged = any(_ODD.search(name) for i, name in enumerate(layout.names) if i not in columns)
     if odd or damaged:
         text = f"bytes that are no {'UTF-8' if stream.encoding == 'utf-8' else 'ASCII'} in columns that are not needed"

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,9 +17,9 @@ from mrdamper.data import Floats
 from mrdamper.errors import CombinedError
 from mrdamper.rig_files.column_names import parse_unit
 from mrdamper.rig_files.readers.base import RigFileError, scratch
-from mrdamper.rig_files.text.layout import QUANTITY, SPACES, Layout, is_comment, split
+from mrdamper.rig_files.text.layout import QUANTITY, SPACES, Layout, is_comment, is_footer, split
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, too_long
-from mrdamper.rig_files.text.tokens import MISSING, NUMBER, number, stamp
+from mrdamper.rig_files.text.tokens import MISSING, NUMBER, looks_numeric, number, stamp
 
 _MARKS = "#%/"
 _MOST_SHOWN = 10  # wrong cells and rows of a file
@@ -47,6 +48,7 @@ class RowFormat:
     first: tuple[int, bool] | None = None  # time stamp, from which the others count
     wrong: dict[tuple[int | None, int | None], RigFileError] = field(default_factory=dict)
     more: int = 0  # beyond those that are shown
+    messages: dict[int, str] = field(default_factory=dict)  # lines of words among the rows, left out
 
     def note(self, error: RigFileError) -> None:
         """Keep a refusal, so that all of a file are told at once."""
@@ -80,7 +82,7 @@ def read_cells(block: bytes, line: int, form: RowFormat, *, final: bool = False)
     return Rows(values, np.array(lines, dtype=float), form.stream.is_odd(block))
 
 
-def field_count(form: RowFormat, fields: int, line: int, final: bool) -> RigFileError:
+def field_count(form: RowFormat, fields: int, line: int, final: bool, text: str = "") -> RigFileError:
     """Return the refusal of a row with another number of cells than the others."""
     width = form.layout.width
     if final and fields < width:
@@ -88,6 +90,7 @@ def field_count(form: RowFormat, fields: int, line: int, final: bool) -> RigFile
         remedy = "copy or export the file again, or remove the last line"
         return form.stream.source.refuse("E_TRUNCATED", problem, remedy, line=line)
     problem, remedy = f"{fields} fields where the other rows have {width}", "correct or remove this line"
+    problem += f": {text.strip()[:40]!r}" if text else ""
     if fields > width and form.layout.separator == ",":
         remedy = "correct this line; numbers with decimal commas need semicolons between the fields"
     return form.stream.source.refuse("E_FIELD_COUNT", problem, remedy, line=line)
@@ -96,12 +99,12 @@ def field_count(form: RowFormat, fields: int, line: int, final: bool) -> RigFile
 def split_rows(texts: Sequence[str], line: int, form: RowFormat, final: bool) -> tuple[list[list[str]], list[int]]:
     """Return the cells of every row among lines of text, and the lines they stand in.
 
-    Raises at E_QUOTE; rows of another width are left out and kept by the form.
+    Raises at E_QUOTE; rows of another width are left out and kept by the form, as are messages.
     """
     separator, width = form.layout.separator, form.layout.width + form.layout.trailing
     rows: list[list[str]] = []
     lines: list[int] = []
-    wrong: list[tuple[int, int]] = []
+    wrong: list[tuple[int, int, str]] = []
     last = 0
     for at, text in enumerate(texts, line):
         stripped = text.strip(" \t\r")
@@ -115,13 +118,29 @@ def split_rows(texts: Sequence[str], line: int, form: RowFormat, final: bool) ->
                 "E_QUOTE", "a quote is not closed, or text follows it", "close it or remove it", line=at
             ) from error
         if len(cells) != width and (len(cells) != form.layout.width):
-            wrong.append((at, len(cells)))
+            wrong.append((at, len(cells), text))
         elif any(cells):
             rows.append(cells)
             lines.append(at)
-    for at, count in wrong:
-        form.note(field_count(form, count, at, final and at == last))
+    goes_on = bool(wrong) and _goes_on([row[0] for row in rows], form)
+    for at, count, text in wrong:
+        if (
+            goes_on
+            and count < width
+            and is_footer(text, form.layout)
+            and not any(map(looks_numeric, split(text, separator)))
+        ):
+            form.messages[at] = text.strip()
+        else:
+            form.note(field_count(form, count, at, final and at == last, text))
     return rows, lines
+
+
+def _goes_on(cells: Sequence[str], form: RowFormat) -> bool:
+    """Tell if the cells of a column always increase, as those of a clock do: no row is missing where a line is none."""
+    is_stamp, mark = form.layout.kinds[0] == "stamp", form.layout.decimal
+    values = [(stamp(cell) or (math.nan,))[0] if is_stamp else number(cell, mark) for cell in cells]
+    return len(values) > 1 and all(a is not None and b is not None and a < b for a, b in pairwise(values))
 
 
 def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: RowFormat) -> Floats:
