@@ -219,3 +219,12 @@ def test_units_and_currents_that_lack_are_asked_for_at_once(tmp_path):
     profile = re.sub(r'#("[ab]") =', r"\1 = 0.5", profile.replace("#[current.values]", "[current.values]"))
     path = write(tmp_path, "rig.toml", profile[profile.index("rig =") :])
     assert run(tmp_path, "--profile", path, "--out", tmp_path / "out").exit_code == 0
+
+
+def test_the_guess_for_a_folder_is_that_of_its_refused_file_not_of_a_table_before_it(tmp_path):
+    write(tmp_path, "damper.csv", "id,serial,stroke_mm\n3,RD-4417,55\n")
+    write(tmp_path, "sample_0.5A.csv", text(header=("time_s,displacement_mm,force_x",)))
+    assert "refused: sample_0.5A.csv" in run(tmp_path, "--out", tmp_path / "out").output
+    profile = run(tmp_path, "--write-profile", "-").stdout
+    path = write(tmp_path, "rig.toml", profile.replace('column = "force_x"', 'column = "force_x"\nunit = "N"'))
+    assert run(tmp_path, "--profile", path, "--out", tmp_path / "out").exit_code == 0

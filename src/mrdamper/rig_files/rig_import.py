@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -105,11 +106,18 @@ def read_runs(path: str | Path, profile: Profile | str | Path | None = None) -> 
 
 
 @contextlib.contextmanager
-def first_file(paths: Sequence[str | Path]) -> Iterator[Path]:
-    """Yield the first file among files, folders and archives that is no README, for as long as the block goes."""
+def file_for_profile(paths: Sequence[str | Path], profile: Profile) -> Iterator[Path]:
+    """Yield the first refused file among files, folders and archives, for as long as the block goes.
+
+    Where none is refused it is the first that holds a test, else the first that is no README.
+    """
     with unpacked(paths) as given:
-        files = files_in(given)[0]
-        yield next((file for file in files if not is_readme(file)), files[0])
+        files = [file for file in files_in(given)[0] if not is_readme(file)] or files_in(given)[0]
+        result = import_files(given, profile) if len(files) > 1 else ImportResult(())
+        refused = {refusal.file.removesuffix(f": {refusal.run}") for refusal in result.refusals}
+        first = (file for file in files if without_temporary_folder(str(file)) in refused)
+        tests = (file for file in files if file.name not in result.left_out)
+        yield next(chain(first, tests), files[0])
 
 
 @validate_arguments("paths")

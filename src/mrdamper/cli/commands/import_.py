@@ -45,7 +45,7 @@ def import_(
         None, help="Table of tests: current, split, session of each; default: tests.csv of the folder."
     ),
     write_profile: Path | None = typer.Option(
-        None, help="Write how the first file was read as a profile; - for standard output."
+        None, help="Write how the first refused file, or the first file, was read as a profile; - for standard output."
     ),
     write_tests: Path | None = typer.Option(
         None, help="Write the tests found as a table to be completed; - for standard output."
@@ -124,9 +124,9 @@ def _write_tests(files: list[Path], settings: Profile, target: Path) -> None:
 def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
     from mrdamper.rig_files.preview import columns_of, guess_profile
     from mrdamper.rig_files.profile import profile_text
-    from mrdamper.rig_files.rig_import import first_file, read_runs
+    from mrdamper.rig_files.rig_import import file_for_profile, read_runs
 
-    with first_file(files) as first:
+    with file_for_profile(files, settings) as first:
         guess = guess_profile(first, settings)
         columns = columns_of(first, settings)
         text = profile_text(guess) + _alternatives(columns) + _missing_currents(files, guess, columns)
