@@ -794,3 +794,16 @@ def test_columns_of_one_name_below_their_conditions_are_tests_and_a_number_leave
     told = [f.text for f in record.findings]
     assert any("of 2 columns called 'F' one is taken as the force, not 5;" in text for text in told)
     assert any("of 2 columns called 'x' one is taken as the displacement, not 4;" in text for text in told)
+
+
+@pytest.mark.parametrize(("sense", "sign"), [("extension (tension)", 1), ("compression", -1)])
+def test_a_table_of_channels_in_a_readme_gives_names_scales_and_senses(tmp_path, sense, sign):
+    (tmp_path / "a_0.5A.csv").write_text("time_s,ai0,ai1\n" + rows(T, X / 4, sign * force(0.5) / 250))
+    table = "| channel | quantity | sensor | sensitivity | positive |\n|---|---|---|---|---|\n"
+    table += f"| ai0 | displacement | LVDT DC25 | 4 mm/V | extension |\n| ai1 | force | cell | 250 N/V | {sense} |\n"
+    (tmp_path / "README.md").write_text(f"# Tests\n\nAll channels in volts as acquired.\n\n{table}")
+    (record,) = import_files([tmp_path]).records
+    np.testing.assert_allclose(1e3 * record.displacement, X, atol=1e-3)
+    np.testing.assert_allclose(record.force, force(0.5), atol=1e-2)
+    (tmp_path / "README.md").write_text(f"# Tests\n\n{table}")
+    assert {r.error.code for r in import_files([tmp_path]).refusals} == {"E_UNITS_MISSING"}

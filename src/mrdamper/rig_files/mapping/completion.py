@@ -32,6 +32,7 @@ from mrdamper.rig_files.mapping.scales import (
     SCALE,
     scaled,
     scales_in,
+    senses_in,
     with_counts,
     with_scales,
     with_sense,
@@ -53,6 +54,10 @@ _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.I
 _TITLES = words("label") | words("notes")
 _UNITS_IN = rf"(?i:{'|'.join(words('unit'))}|unités|unidades|units)"
 _SI_UNITS = re.compile(rf"\bSI[- ](?:base[- ])?{_UNITS_IN}|{_UNITS_IN}\W*(?:(?:in|du|del|do)\W+)?SI\b")
+_ALL_VOLTS = re.compile(
+    r"(?i)\b(?:all|alle|todos|tous|tutti)\b(?: \w+)? (?:channels|signals|columns|kanäle|signale|canales|canaux|canali)"
+    r"(?: \w+){0,2} (?:in|en) (?:volts?|V)\b"
+)
 _EXCEPT = re.compile(r"(?i)\b(?:except|but|not|no|non|außer|nicht|kein\w*|sauf|salvo|excepto|tranne)\b")
 _AT = re.compile(r"\s(?:at|for|bei|mit|à|pour|con|com|en|vs\.?)\s")  # of a condition: force (N) at coil current
 _LABVIEW = ("Delta_X", "X_Dimension")
@@ -113,6 +118,11 @@ def states_si(line: str) -> bool:
         return False
     named = [parse_unit(word) for word in re.split(r"[\s,;:()\[\]=]+", line) if word != "in" and is_unit(word)]
     return all(unit is None or unit.factor == 1 for unit in named)
+
+
+def states_volts(line: str) -> bool:
+    """Tell if a line states that all channels are in volts: All channels in volts as acquired."""
+    return len(line) <= LONGEST_LINE and _ALL_VOLTS.search(line) is not None and not _EXCEPT.search(line)
 
 
 def _keyed_cells(table: RawTable, longest: int = LONGEST_LINE) -> Iterator[tuple[str, list[str]]]:
@@ -246,13 +256,13 @@ def _with_numbered_channels(table: RawTable) -> RawTable:
 
 def _with_explained_names(table: RawTable) -> RawTable:
     """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm; y0 = load, N."""
-    lines = [[cell.strip(' "') for cell in re.split(r"[,;|\t=:]", line)] for line in table.lines]
+    lines = [[cell.strip(' "') for cell in re.split(r"[,;|\t=:]", line.strip(" |"))] for line in table.lines]
     headings = {}
     for i, (name, header) in enumerate(zip(table.names, table.headers, strict=True)):
         called = {name.casefold(), header.name.casefold()} - {""}
         own = [cells[1:] for cells in lines if header.role is None and cells[0].casefold() in called]
         cells = own[0] if own and own.count(own[0]) == len(own) else []
-        named = [cell for cell in cells if split_name(cell).role]
+        named = [cell for cell in cells if split_name(cell).role and not senses_in(cell)]
         units = [] if any(map(scales_in, cells)) else [cell for cell in cells if is_unit(cell.strip("[]()"))]
         if len({split_name(cell).role for cell in named}) == 1 and len(units) < 2:
             headings[i] = named[0], (header.unit, *units, "")[0 if header.unit else 1].strip("[]()")
@@ -358,11 +368,10 @@ def item_of(text: str) -> Header:
 
 
 def _with_si_units(table: RawTable) -> RawTable:
-    """Units of the SI of channels without a unit, where a line states that all units are."""
-    if not any(map(states_si, table.remarks)):
-        return table
-    bare = {i: h.role for i, h in enumerate(table.headers) if not h.unit and h.role in SI}
-    return table.named({i: (table.names[i], SI[role]) for i, role in bare.items() if role})
+    """Units of channels without a unit, where a line states that all units are those of the SI, or that all are V."""
+    si, volts = any(map(states_si, table.remarks)), any(map(states_volts, table.remarks))
+    bare = {i: h.role for i, h in enumerate(table.headers) if not h.unit and h.role in SI and si != volts}
+    return table.named({i: (table.names[i], SI[role] if si else "V") for i, role in bare.items() if role})
 
 
 def _with_clocks_and_weights(table: RawTable) -> RawTable:

@@ -20,10 +20,11 @@ import numpy as np
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import DIMENSION, is_unit, parse_unit, split_name, words, words_of
 from mrdamper.rig_files.conditions import stated_by_lines
-from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, states_si
+from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, states_si, states_volts
 from mrdamper.rig_files.mapping.results import numbered_tests
 from mrdamper.rig_files.mapping.scales import (
     NUMBER_IS,
+    heads_senses,
     scaled_columns,
     scales_in,
     states_scale,
@@ -146,7 +147,7 @@ def _of_channels(line: str) -> str:
     if len(cells) > 1 and split_name(cells[0]).role and all(c.isascii() and c.isdigit() for c in cells[1:]):
         return f"channel {cells[1]}: {cells[0]}"  # a tag with its index, and its type
     units = [item_of(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]
-    stated = states_scale(line) or states_shift(line) or states_si(line)
+    stated = states_scale(line) or states_shift(line) or states_si(line) or states_volts(line)
     return line if stated or (any(map(is_unit, units)) and not stated_by_lines([line], ".")) else ""
 
 
@@ -221,8 +222,15 @@ def _by_headings(lines: list[str]) -> list[str]:
     Where a heading does not tell what a scale is per, the unit beside it is omitted: it may be that of the product.
     """
     written, heads, number, unit = [], list[str](), 0, 0
+    sense, width, place = "", 0, 0  # heading above the senses in which channels count, cells of its line, its place
     for line in lines:
-        cells = [cell.strip(' "') for cell in re.split(r"[,;\t|]", line.strip(" |"))]
+        cells = [cell.strip(' "') for cell in re.split(r"[,;\t|]", line.strip(" ").removeprefix("|").removesuffix("|"))]
+        at = next((i for i, cell in enumerate(cells) if len(cells) > 2 and heads_senses(cell)), None)
+        if at is not None or not line.strip():
+            sense, width, place = (cells[at], len(cells), at) if at is not None else ("", 0, 0)
+        elif sense and len(cells) == width and cells[place]:
+            cells[place] = f"{cells[place]} {sense}"
+            line = " | ".join(cells)
         keys = [{word.casefold() for word in words_of(cell)} for cell in cells]
         of, its = [next((i for i, key in enumerate(keys) if key & of), None) for of in (_VALUE | _SCALE, _UNIT)]
         if of is not None and its is not None:

@@ -72,6 +72,7 @@ _WORD_OR_SIGN = re.compile(r"[^\W\d_]+|(?<![\w+/-])[+-](?=\s*(?:[,;.)=]|$))")  #
 _PARTICLE = re.compile(r"とも|[とはがのを]")  # 変位と荷重は
 _CLAUSE = re.compile(r"[,;|\t，；。]|\.\s")
 _IS = {"i", "ist", "est", "e", "count"}  # without an s at the end: compression is positive
+_SHORT = 2  # words of a heading
 _MOVES = {"velocity": "displacement"}  # counts as
 
 
@@ -259,12 +260,12 @@ def with_stated_signs(table: RawTable) -> RawTable:
     """
     stated: dict[str, set[int]] = {}
     for whole in table.lines:
-        counted, clauses = _counted(whole), _CLAUSE.split(whole)
+        counted, clauses = senses_in(whole), _CLAUSE.split(whole)
         each = [clause for clause in clauses if _signs(_POLARITIES, clause)]
         apart = len(each) > 1 and all(_named(clause) & {*SIGNED} for clause in each) and counted
         for clause in clauses if apart or len(counted) > 1 else [whole]:
             named, others = _named(clause), _others(clause)
-            own = _counted(clause) if not named or named & {*SIGNED} else set()  # a pressure counts otherwise
+            own = senses_in(clause) if not named or named & {*SIGNED} else set()  # a pressure counts otherwise
             if not own and clause in each and (apart or (others & _CONVENTION and (not named or named & {*SIGNED}))):
                 own = {1, -1}  # in other words than those known
             general = others & _CONVENTION or others <= _IS | _SENSE_NAMES
@@ -283,7 +284,7 @@ def states_sign(line: str) -> bool:
     others = _others(line)
     if others & _CONVENTION:
         return bool(_signs(_POLARITIES, line))
-    return bool((others <= _IS | _SENSE_NAMES or _named(line) & {*SIGNED}) and _counted(line))
+    return bool((others <= _IS | _SENSE_NAMES or _named(line) & {*SIGNED}) and senses_in(line))
 
 
 def _others(clause: str) -> set[str]:
@@ -303,7 +304,12 @@ def _signs(stems: Mapping[int, tuple[str, ...]], clause: str) -> list[int]:
     return [sign for word in _WORD_OR_SIGN.findall(clause) if (sign := _sign(stems, word))]
 
 
-def _counted(clause: str) -> set[int]:
+def heads_senses(cell: str) -> bool:
+    """Tell if the cells below a heading say in which sense channels count positive: positive, positive direction."""
+    return len(cell.split()) <= _SHORT and bool(_signs(_POLARITIES, cell)) and not _signs(_SENSES, cell)
+
+
+def senses_in(clause: str) -> set[int]:
     """Return the senses that a clause counts positive: 1 for tension, -1 for compression."""
     senses, polarities = _signs(_SENSES, clause), _signs(_POLARITIES, clause)
     paired = zip(senses, polarities, strict=True) if len(senses) == len(polarities) else product(senses, polarities)
