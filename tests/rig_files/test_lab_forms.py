@@ -807,3 +807,15 @@ def test_a_table_of_channels_in_a_readme_gives_names_scales_and_senses(tmp_path,
     np.testing.assert_allclose(record.force, force(0.5), atol=1e-2)
     (tmp_path / "README.md").write_text(f"# Tests\n\n{table}")
     assert {r.error.code for r in import_files([tmp_path]).refusals} == {"E_UNITS_MISSING"}
+
+
+def test_the_force_and_currents_of_ambiguous_names_are_asked_for_at_once_and_a_zero_either_way_is_read(tmp_path):
+    for name, amperes in (("m_0_0A_1Hz", 0.0), ("m_0_5A_1Hz", 0.5)):
+        table = rows(T, X, force(amperes), force(amperes, 1))
+        (tmp_path / f"{name}.csv").write_text("t [s],x [mm],force upper [N],force lower [N]\n" + table)
+    zero, half = (refusal.error for refusal in import_files([tmp_path]).refusals)
+    assert (zero.code, half.code) == ("E_AMBIGUOUS", "E_AMBIGUOUS")
+    assert "and give the current of each test" in half.remedy
+    assert "current" not in zero.remedy
+    answer = '[channels.force]\ncolumn = "force upper [N]"\n[current.values]\n"m_0_5A*" = 0.5'
+    assert currents(import_files([tmp_path], parse_profile(answer)).records) == [0.0, 0.5]

@@ -32,7 +32,7 @@ from mrdamper.rig_files.record import Finding, Record
 
 _FEWEST_SLOW = 5  # samples of a current that is recorded more rarely than the force
 NO_CHANNEL = "the current channel is "  # beginning of the finding on a column of no current
-CURRENT_TOO = "and give the current of each test"  # within the remedy of a refusal of units
+CURRENT_TOO = "and give the current of each test"  # within the remedy of a refusal of units or columns
 _CALIBRATION = 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
 _OF_ANOTHER = re.compile("(?i)shunt|bridge|brücke")  # resistance or voltage
 _FOLDERS = 3  # above a file, whose names may state its current
@@ -142,10 +142,10 @@ def require_current(record: Record, path: Path = Path()) -> Record:
 
 
 def ask_current_too(error: InputError, table: RawTable, profile: Profile, path: Path) -> None:
-    """Add to a refusal of units that the file states no current either: one answer gives both."""
+    """Add to a refusal of units or columns that the file states no current either: one answer gives both."""
     last = getattr(error, "errors", (error,))[-1]
     channel = table.columns("current") or table.columns(dimension="current")
-    if channel or profile.current or not last.code.startswith("E_UNITS"):
+    if channel or profile.current or not last.code.startswith(("E_UNITS", "E_AMBIGUOUS", "E_DUPLICATE_COLUMN")):
         return
     with contextlib.suppress(InputError):
         if current_of(table, profile, path, None, slice(None))[0] is None:

@@ -140,9 +140,10 @@ def currents_in(text: str) -> tuple[float, ...]:
 def behind_digits(name: str) -> re.Match[str] | None:
     """Return the digits of a name that are a current or, with those before them, a decimal: MRD-7_0A, 0 or 7.0 A.
 
-    Two digits before them begin a decimal only behind a word for a current: at10_5A, but not run10_1A.
+    Two digits before them begin a decimal only behind a word for a current: at10_5A, but not run10_1A. 0_0A is 0 A
+    either way.
     """
-    matches = _BEHIND_DIGITS.finditer(name)
+    matches = (m for m in _BEHIND_DIGITS.finditer(name) if float(f"{m[1]}.{m[2]}") != float(m[2]))
     return next((m for m in matches if len(m[1]) == 1 or _means_current(_letters(name[: m.start()]))), None)
 
 
