@@ -188,14 +188,14 @@ def tests_not_taken(table: RawTable, assigned: Mapping[str, Assigned]) -> list[s
     others = [table.names[i] for i in named if i != assigned["force"].column]
     taken = assigned["force"].column in named
     text = f"the tests of {len(others)} columns named after other currents are not taken: {', '.join(others)}; "
-    told = [f"{text}to take each, leave [channels.force] column out of the profile"] if taken and others else []
+    texts = [f"{text}to take each, leave [channels.force] column out of the profile"] if taken and others else []
     for role in [role for role in SIGNED if role in assigned]:
         own = assigned[role].column
         same = _differing(table, own)
         others = ", ".join(str(i + 1) for i in same if i != own)
         text = f"of {len(same)} columns called {table.headers[own].name!r} one is taken as the {role}, not {others}; "
-        told += [f"{text}if these are further tests, write the condition of each into its name"] if same else []
-    return told
+        texts += [f"{text}if these are further tests, write the condition of each into its name"] if same else []
+    return texts
 
 
 def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:

@@ -346,8 +346,8 @@ def _refused_lines(all_refused: Sequence[Refusal]) -> list[str]:
         folder = Path(os.path.commonpath([file.parent for file in files]))
         shown = listed(list(dict.fromkeys(str(file.relative_to(folder)) for file in files)), 3)
         line = getattr(error, "line", None)
-        told = {(refusal.error.found, getattr(refusal.error, "line", None)) for refusal in refusals}
-        first = "" if len(told) == 1 else f"the first of them{f', line {line}' if line else ''}: "
+        texts = {(refusal.error.found, getattr(refusal.error, "line", None)) for refusal in refusals}
+        first = "" if len(texts) == 1 else f"the first of them{f', line {line}' if line else ''}: "
         remedy = f"; {error.remedy}" if error.remedy else ""
         tests = _tests(_refused_tests(refusals))
         lines.append(f"refused {tests} in {folder} ({shown}): {first}{error.found}{remedy} [{error.code}]")

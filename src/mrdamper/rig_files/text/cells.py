@@ -122,7 +122,8 @@ def split_rows(texts: Sequence[str], line: int, form: RowFormat, final: bool) ->
         elif any(cells):
             rows.append(cells)
             lines.append(at)
-    goes_on = bool(wrong) and _goes_on([row[0] for row in rows], form)
+    # Where rows name their values (`added`), a line that is no such row is a damaged one.
+    goes_on = bool(wrong) and not form.stream.source.added and _goes_on([row[0] for row in rows], form)
     for at, count, text in wrong:
         if (
             goes_on
