@@ -240,9 +240,10 @@ class Run(Displayable):
         return part
 
     def thinned(self, step: int, window: tuple[float, float]) -> Run:
-        """Return every `step`-th sample of motion, force and current as one segment, with another steady window [s]."""
-        channels = {name: getattr(self, name)[::step] for name in ("time", "displacement", "force", "current")}
-        return replace(self, **channels, velocity=None, further={}, segments=(), window=window)
+        """Return every `step`-th sample as one segment without further channels, with another steady window [s]."""
+        names = ("time", "displacement", "force", "current", *(("velocity",) if self.velocity is not None else ()))
+        channels = {name: getattr(self, name)[::step] for name in names}
+        return replace(self, **channels, further={}, segments=(), window=window)
 
     @property
     def _where(self) -> str:

@@ -22,9 +22,9 @@ from mrdamper.rig_files.conditions import (
     contradicts,
     current_behind_label,
     currents_in,
+    named_after_currents,
     stated_by_lines,
     stated_in_titles,
-    without_currents,
 )
 from mrdamper.rig_files.profile import Profile, current_in_name
 from mrdamper.rig_files.readers.base import RawTable
@@ -240,11 +240,8 @@ def _statements(table: RawTable, path: Path, profile: Profile, force: int | None
         stated = currents_in(text)
         if len(stated) == 1:
             statements.append(Statement(stated[0], whence if whence == "file name" else f"{whence} {text!r}"))
-    headings = [] if force is None else [table.names[force], *table.over[force : force + 1]]
-    for text in headings[:1] + [text for text in headings[1:] if split_name(without_currents(text)).role == "force"]:
-        stated = currents_in(text)
-        if len(stated) == 1 and abs(stated[0]) <= LARGEST_STATED:  # more is the name of a load cell
-            statements.append(Statement(stated[0], f"the column {text!r}"))
+    if force in named_after_currents(table.names):  # a current beside other words may be a load cell's name: U9C 5A
+        statements.append(Statement(currents_in(text)[0], f"the column {text!r}"))
     return statements
 
 

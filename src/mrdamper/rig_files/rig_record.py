@@ -53,9 +53,13 @@ _MOST_FURTHER = 12  # channels
 _LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged cell there costs the channel, not the run
 _DATES, _TIMES = words("date_line"), words("time_of_day")
 _KEYED = re.compile(r"^[\W_]*(?P<key>[^\W\d_][\w ./-]{0,40}?)[\"' ]*[:=;,\t]+[\"' ]*(?P<value>\S.{0,60})")
-_DAY = re.compile(  # 2024-05-31, 31/5/2024, 31 May 2024, May 31, 2024
-    r"(?<!\d)(?:(?:19|20)\d\d(?P<first>[-./])\d{1,2}(?P=first)\d{1,2}|\d{1,2}(?P<last>[-./])\d{1,2}(?P=last)(?:19|20)\d\d"
-    r"|(?<!\w)(?:\d{1,2}[. -]+[^\W\d_]{3,9}|[^\W\d_]{3,9}[. ]+\d{1,2})[., -]+(?:19|20)\d\d)(?!\d)"
+_DAYS = tuple(  # the surest form first: 2024-05-31, 31/5/2024, 31 May 2024 and May 31, 2024
+    re.compile(rf"(?<!\d){form}(?!\d)")
+    for form in (
+        r"(?:19|20)\d\d(?P<mark>[-./])\d{1,2}(?P=mark)\d{1,2}",
+        r"\d{1,2}(?P<mark>[-./])\d{1,2}(?P=mark)(?:19|20)\d\d",
+        r"(?<!\w)(?P<mark>)(?:\d{1,2}[. -]+[^\W\d_]{3,9}|[^\W\d_]{3,9}[. ]+\d{1,2})[., -]+(?:19|20)\d\d",
+    )
 )
 _TIME = re.compile(
     r"(?i)(?<![\d:])(?P<hour>\d{1,2}):(?P<minute>\d\d)(?::(?P<second>\d\d))?(?:[.,]\d+)?\s*(?P<half>[ap]m)?"
@@ -350,15 +354,16 @@ def recording_time(lines: Iterable[str]) -> dict[str, str]:
 
 def _day_in(text: str) -> tuple[str, str] | None:
     """Return a day as ISO 8601 ("?" and the text where day and month may be exchanged) and as written."""
-    match = _DAY.search(text)
+    match = next(filter(None, (form.search(text) for form in _DAYS)), None)
     if match is None:
         return None
     parts = re.split(r"[-./, ]+", match[0].casefold())
     numbers = [MONTHS.get(part[:3], 0) if part.isalpha() else int(part) for part in parts]
-    year, month, day = numbers if match["first"] else reversed(numbers)
-    if match["last"] in ("-", "/") and day != month and max(day, month) <= 12:
+    year_first = len(parts[0]) == 4 and parts[0].isdigit()
+    year, month, day = numbers if year_first else reversed(numbers)
+    if not year_first and match["mark"] in ("-", "/") and day != month and max(day, month) <= 12:
         return f"?{match[0]}", match[0]
-    if parts[0].isalpha() or (match["last"] and month > 12):
+    if parts[0].isalpha() or (not year_first and match["mark"] and month > 12):
         day, month = month, day
     try:
         return date(year, month, day).isoformat(), match[0]

@@ -46,10 +46,16 @@ def _grid_of(value: Any, channels: Mapping[int, int | None]) -> tuple[tuple[int,
 def tests_of_array(array: np.ndarray) -> list[Array]:
     """Return the matrices of an array over tests, samples and channels, of which the time tells the channels.
 
-    Raises `RigFileError`, E_AMBIGUOUS, unless the longest dimension is that of the samples and one other has the time.
+    Raises `RigFileError`, E_AMBIGUOUS, unless the time has its smallest steps along the longest dimension, and one
+    other has the channels.
     """
     along, across = _dimensions(array, {})
     if across is None or array.shape[along] < FEWEST_SAMPLES:
+        raise _refusal(array)
+    channels = np.moveaxis(array.astype(float), (across, along), (0, -1))
+    time = next(channel for channel in channels if (np.diff(channel) > 0).all())
+    steps = [np.diff(time, axis=i) for i in range(time.ndim) if time.shape[i] > 1]
+    if any((of > 0).all() and of.mean() < steps[-1].mean() for of in steps[:-1]):  # the time goes on along another
         raise _refusal(array)
     return _matrices(array, (along, across))[1]
 

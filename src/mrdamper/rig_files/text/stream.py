@@ -213,17 +213,19 @@ def _as_utf8(source: Source, encoding: str, mark: int) -> tuple[IO[bytes], int]:
     """Return the text in UTF-8 with line feeds, in memory or, if large, in a temporary file."""
     source.file.seek(mark)
     target, line = scratch(source.keep), 1
-    text = io.TextIOWrapper(source.file, encoding)  # any line end is read as a line feed
+    # Any line end is read as a line feed; half a character at the end, which a cut file has, is left out.
+    decoder = io.IncrementalNewlineDecoder(codecs.getincrementaldecoder(encoding)(), translate=True)
     try:
-        while block := text.read(CHUNK):
-            line += block.count("\n")
-            target.write(block.encode("utf-8"))
+        while block := source.file.read(CHUNK):
+            text = decoder.decode(block)
+            line += text.count("\n")
+            target.write(text.encode("utf-8"))
     except UnicodeDecodeError as error:
         problem = f"bytes that are no {encoding} ({error.reason})"
         remedy = "export the file again, as UTF-8 if you can choose"
         raise source.refuse("E_ENCODING", problem, remedy, line=line) from error
-    finally:
-        text.detach()
+    if decoder.getstate()[1] & 1:  # a carriage return at the end, which might have begun a line end of two characters
+        target.write(b"\n")
     return target, target.tell()
 
 
