@@ -819,3 +819,21 @@ def test_the_force_and_currents_of_ambiguous_names_are_asked_for_at_once_and_a_z
     assert "current" not in zero.remedy
     answer = '[channels.force]\ncolumn = "force upper [N]"\n[current.values]\n"m_0_5A*" = 0.5'
     assert currents(import_files([tmp_path], parse_profile(answer)).records) == [0.0, 0.5]
+
+
+def test_samples_of_several_tests_as_objects_with_stamps_and_objects_within_are_rows(tmp_path):
+    lines = []
+    for run, amperes in (("r01", 0.0), ("r02", 0.5)):
+        for t, x, f in zip(T, X, force(amperes), strict=True):
+            stamp = f"2024-05-06T09:{14 + (run == 'r02')}:{22 + t:06.3f}Z"
+            coil = {"set_A": amperes, "meas_A": amperes + 1e-3 * np.sin(t)}
+            lines.append(json.dumps({"ts": stamp, "run": run, "pos_mm": x, "force_N": f, "coil": coil}))
+    (tmp_path / "telemetry.jsonl").write_text("\n".join(lines))
+    records = import_files([tmp_path]).records
+    assert currents(records) == [0.0, 0.5]
+    np.testing.assert_allclose(records[1].time - records[1].time[0], T, atol=1e-9)
+    np.testing.assert_allclose(records[1].force, force(0.5))
+    uneven = [line.replace("pos_mm", "x") if i % 2 else line for i, line in enumerate(3 * lines)]
+    (tmp_path / "telemetry.jsonl").write_text("\n".join(uneven))
+    (refusal,) = import_files([tmp_path]).refusals
+    assert "samples as records with the same keys" in str(refusal.error)

@@ -13,8 +13,8 @@ import numpy as np
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import damaged, refuse_twice, whole
 from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, Source
-from mrdamper.rig_files.readers.nested import document_tables
-from mrdamper.rig_files.text.tokens import stamp
+from mrdamper.rig_files.readers.nested import document_tables, seconds_of
+from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES
 
 _SAVED_MODEL = "mrdamper-model"
 _FEWEST_ROWS = 8  # samples of a test
@@ -108,6 +108,14 @@ def _with_notes(lines: list[Any]) -> Any:
     return {**notes, **{key: [record[key] for record in records] for key in records[0]}}
 
 
+def _flat(record: dict[str, Any]) -> dict[str, Any]:
+    """Return a record with the cells of an object within it as its own: {"coil": {"set_A": 1}} has coil set_A."""
+    inner = {key: value for key, value in record.items() if isinstance(value, dict)}
+    cells = {f"{key} {name}": cell for key, own in inner.items() for name, cell in own.items()}
+    plain = all(isinstance(cell, (*_CELL, str)) for cell in cells.values()) and not cells.keys() & record.keys()
+    return {**{key: value for key, value in record.items() if key not in inner}, **cells} if plain else record
+
+
 def _tree(value: Any) -> Any:
     """Return the document with arrays for its lists of numbers; mappings from row numbers are lists."""
     if isinstance(value, dict):
@@ -121,14 +129,14 @@ def _tree(value: Any) -> Any:
     if not isinstance(value, list):
         return "" if value is None else value
     if len(value) > 1 and all(isinstance(item, str) for item in value):
-        stamps = [stamp(item) for item in value] if stamp(value[0]) is not None else [None]
-        stamped = [entry[0] for entry in stamps if entry is not None]
-        return (np.array(stamped) - stamped[0]) / 1e9 if len(stamped) == len(value) else value
+        seconds = seconds_of(value)
+        return value if seconds is None else seconds
     even = all(isinstance(item, list) and len(item) == len(value[0]) for item in value)
     if value and all(isinstance(cell, _CELL) for row in (value if even else [value]) for cell in row):
         return np.array(value, dtype=float)  # NaN for null
     items = [item for item in value if item is not None]
     records = len(items) >= _FEWEST_ROWS and all(isinstance(item, dict) for item in items)
+    items = list(map(_flat, items)) if records and len(items) >= FEWEST_SAMPLES else items
     if records and all(isinstance(v, (*_CELL, str)) for item in items for v in item.values()):
         return items
     return [_tree(item) for item in items]

@@ -21,6 +21,7 @@ from mrdamper.rig_files.conditions import CELL, stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, RigFileError, Source
 from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES, MOST_ITEMS, with_tests_apart
+from mrdamper.rig_files.text.tokens import stamp
 
 _VALUE, _NAMES = words("value"), words("channel")
 DEEPEST = 8  # levels
@@ -264,7 +265,8 @@ def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[s
         return [(key, records)]
     if len(items) > MOST_ITEMS and any(isinstance(item, (Mapping, Array)) for item in items):
         problem = f"a list of {len(items)} objects or arrays that are no records of one form"
-        raise RigFileError("E_BLOCKS", problem, remedy=f"export at most {MOST_ITEMS} tests a file")
+        remedy = f"export samples as records with the same keys, or tests, at most {MOST_ITEMS} a file"
+        raise RigFileError("E_BLOCKS", problem, remedy=remedy)
     channels = [_channel("", item) for item in mappings]
     if mappings and all(channels):
         node.columns += [column for channel in channels for column in channel]
@@ -310,11 +312,20 @@ def _records(items: list[Mapping[str, Any]]) -> dict[str, Any]:
         cells = [item[key] for item in items]
         if all(cell is None or isinstance(cell, (int, float)) for cell in cells):
             columns[key] = np.array(cells, dtype=float)  # NaN for null
+        elif all(isinstance(cell, str) for cell in cells) and (seconds := seconds_of(cells)) is not None:
+            columns[key if split_name(key).unit else f"{key} [s]"] = seconds
         elif all(isinstance(cell, str) for cell in cells):
             columns[key] = np.array([cell[:MOST_TEXT] for cell in cells])
         else:
             return {}
     return columns
+
+
+def seconds_of(cells: Sequence[str]) -> Array | None:
+    """Return the seconds of time stamps after the first of them; None if a text is no stamp, or the zones differ."""
+    stamps = [stamp(cell) for cell in cells] if cells and stamp(cells[0]) is not None else [None]
+    whole = [entry[0] for entry in stamps if entry is not None and stamps[0] and entry[1] == stamps[0][1]]
+    return np.array([own - whole[0] for own in whole]) / 1e9 if len(whole) == len(cells) else None
 
 
 def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
