@@ -837,3 +837,15 @@ def test_samples_of_several_tests_as_objects_with_stamps_and_objects_within_are_
     (tmp_path / "telemetry.jsonl").write_text("\n".join(uneven))
     (refusal,) = import_files([tmp_path]).refusals
     assert "samples as records with the same keys" in str(refusal.error)
+
+
+def test_a_plan_of_tests_states_their_currents_by_the_day_that_is_their_folder_and_their_number(tmp_path):
+    plan = {("2024-06-12", 1): 0.0, ("2024-06-12", 2): 0.4, ("2024-06-13", 1): 0.8, ("2024-06-13", 2): 0.6}
+    for (day, number), amperes in plan.items():
+        (tmp_path / day).mkdir(exist_ok=True)
+        (tmp_path / day / f"{number:02d}.csv").write_text("t [s],s [mm],F [N]\n" + rows(T, X, force(amperes)))
+    lines = [f"{day};{number};{amperes};10\n" for (day, number), amperes in plan.items()]
+    (tmp_path / "Versuchsplan.csv").write_text("".join(["Datum;Nr;Strom / A;Amplitude / mm\n", *lines]))
+    assert [round(float(np.mean(r.current)), 3) for r in import_files([tmp_path]).records] == [0.0, 0.4, 0.8, 0.6]
+    (tmp_path / "Versuchsplan.csv").write_text("".join(["Datum;Nr;Strom / A;Amplitude / mm\n", *lines[:-1]]))
+    assert {r.error.code for r in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}

@@ -195,6 +195,7 @@ def currents_beside(
     folders = [(file.parent.name,) for file, _ in tests]
     if results and len({*folders}) == len(tests):
         by_test = by_test or results.by_test(folders, by_number=False)
+    by_test = by_test or (results.by_folder([folder for (folder,) in folders], _called(tests)) if results else {})
     if results and len(by_test) == len(tests):
         return [(by_test[i], f"{path.name}, {results.title}") for i in range(len(tests))]
     lines = short_lines(path) if path.suffix.lower() in TEXTS else []
