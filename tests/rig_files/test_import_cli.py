@@ -228,3 +228,14 @@ def test_the_guess_for_a_folder_is_that_of_its_refused_file_not_of_a_table_befor
     profile = run(tmp_path, "--write-profile", "-").stdout
     path = write(tmp_path, "rig.toml", profile.replace('column = "force_x"', 'column = "force_x"\nunit = "N"'))
     assert run(tmp_path, "--profile", path, "--out", tmp_path / "out").exit_code == 0
+
+
+def test_refused_tests_of_one_file_are_told_with_the_line_and_the_text_of_the_first(tmp_path):
+    lines = text(header=("displacement_mm,force_N",), table=rows()[:, 1:]).splitlines()
+    blocks = [[f"# I = {amperes} A", lines[0], *lines[1:50], "retry", *lines[50:]] for amperes in (0.0, 0.5)]
+    write(tmp_path, "a.csv", "\n".join([*blocks[0], *blocks[1], ""]))
+    profile = write(tmp_path, "rig.toml", "[file]\nsample_rate_Hz = 500.0\n")
+    assert (
+        "the first of them, line 52: 1 fields where the other rows have 2: 'retry'"
+        in run(tmp_path, "--profile", profile).output
+    )
