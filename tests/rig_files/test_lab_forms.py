@@ -716,7 +716,9 @@ def test_columns_named_after_currents_under_a_heading_of_the_force_are_tests(tmp
     assert currents(import_files([tmp_path]).records) == [0.0, 0.5, 1.5]
 
 
-@pytest.mark.parametrize("heading", ["", "Force (N) vs displacement", "Preload force (N): 200", "Maximum force (N)"])
+@pytest.mark.parametrize(
+    "heading", ["", "Force (N) vs displacement", "Preload force (N)", "Static force in N", "Maximum force (N)"]
+)
 def test_columns_named_after_currents_are_asked_about_and_none_is_left_out_in_silence(tmp_path, heading):
     table = rows(T, X, *map(force, (0.0, 0.5, 1.5)))
     (tmp_path / "motion.csv").write_text(f"{heading}\nTime (s),Disp (mm),0 A,0.5 A,1.5 A\n{table}")

@@ -240,7 +240,8 @@ def _statements(table: RawTable, path: Path, profile: Profile, force: int | None
         stated = currents_in(text)
         if len(stated) == 1:
             statements.append(Statement(stated[0], whence if whence == "file name" else f"{whence} {text!r}"))
-    if force in named_after_currents(table.names):  # a current beside other words may be a load cell's name: U9C 5A
+    if force is not None and force in named_after_currents(table.names):  # a name such as U9C 5A is of a load cell
+        text = table.names[force]
         statements.append(Statement(currents_in(text)[0], f"the column {text!r}"))
     return statements
 

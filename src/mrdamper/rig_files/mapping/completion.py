@@ -62,6 +62,7 @@ _EXCEPT = re.compile(r"(?i)\b(?:except|but|not|no|non|außer|nicht|kein\w*|sauf|
 _AT = re.compile(r"\s(?:at|for|bei|mit|à|pour|con|com|en|vs\.?)\s")  # of a condition: force (N) at coil current
 _LABVIEW = ("Delta_X", "X_Dimension")
 _BEHIND_NAME = re.compile(r"\s*[:=|,]\s*|\s[-–—]\s|$")  # in front of what a name means: t - time
+_OTHER_FORCE = re.compile("(?i)" + "|".join(words("other_force")))  # than the damper's
 _FIGURE = re.compile("(?i)" + "|".join(words("figure")))  # in a line that is not about the columns
 _ASIDE = re.compile(r"\s*\([^()]*\)$")  # (tension positive)
 _MARK = re.compile(r"^(?:[\s#>•*|–-]|[0-9]{1,2}[.)]\s)+|[\s.|]+$")  # of a list or a table
@@ -272,12 +273,13 @@ def _with_explained_names(table: RawTable) -> RawTable:
 def _with_heading_of_currents(table: RawTable) -> RawTable:
     """Return columns named 0 A, 0.5 A, ... with the only heading of a force above them, cut off from theirs, as title.
 
-    Of a line with a number or another channel the force may be that of something else: preload (N): 200.
+    Of a line with a number or another channel the force may be that of something else, as preload (N): 200 is.
     """
     columns = named_after_currents(table.names)
     if not columns or table.over or table.columns("force"):
         return table
-    lines = {line.strip(' ,;\t|#%/"*') for line in table.lines if not RATING.search(line)}
+    own = [line for line in table.lines if not (RATING.search(line) or _OTHER_FORCE.search(line))]
+    lines = {line.strip(' ,;\t|#%/"*') for line in own}
     lines = [line for line in lines if {*map(role_of, words_of(line))} <= {"force", "current", None}]
     headings = [_AT.split(line)[0].strip() for line in lines if not re.search("[0-9;|\t]", line)]
     headings = [head for head in headings if (header := split_name(head)).role == header.dimension == "force"]

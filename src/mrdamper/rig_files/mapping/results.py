@@ -64,15 +64,15 @@ class Results:
     def by_folder(self, folders: Sequence[str], tests: Sequence[Iterable[str]]) -> dict[int, float]:
         """Return the current [A] of each test by its number, where one column names its folder and another itself."""
         for column in list(zip(*self.cells, strict=True))[1:]:
-            keys, found = [_key(cell) for cell in column], dict[int, float]()
+            keys, currents = [_key(cell) for cell in column], dict[int, float]()
             for folder in dict.fromkeys(folders) if {*map(_key, folders)} <= {*keys} else ():
                 rows = [row for row, key in enumerate(keys) if key == _key(folder)]
                 current, cells = (tuple(of[row] for row in rows) for of in (self.current, self.cells))
                 own = [i for i, its in enumerate(folders) if its == folder]
                 by_test = replace(self, current=current, cells=cells).by_test([tests[i] for i in own])
-                found |= {own[i]: value for i, value in by_test.items()}
-            if len(found) == len(tests):
-                return found
+                currents |= {own[i]: value for i, value in by_test.items()}
+            if len(currents) == len(tests):
+                return currents
         return {}
 
     def _counts_tests(self, columns: Sequence[Sequence[str]], tests: int) -> bool:
