@@ -758,6 +758,32 @@ def test_a_list_of_parameters_states_the_current_under_whatever_key_its_name_sta
     assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_CURRENT_MISSING"]
 
 
+@pytest.mark.parametrize(
+    "conditions",
+    [
+        [{"parameter": "current", "comment": "of the pump", "value": 2, "unit": "A"}],
+        [{"name": "current", "value": ".5", "unit": "A"}, {"name": "Current", "value": "2", "unit": "A"}],
+        [{"name": "current", "value": 0.5, "unit": "A"}, {"name": "Current", "value": 2, "unit": "A"}],
+    ],
+)
+def test_parameters_of_a_pump_or_that_contradict_each_other_are_no_coil_current(tmp_path, conditions):
+    table = {"time [s]": T.tolist(), "stroke [mm]": X.tolist(), "force [N]": force(0.5).tolist()}
+    (tmp_path / "S-1.json").write_text(json.dumps({"conditions": conditions, "data": table}))
+    (refusal,) = import_files([tmp_path]).refusals
+    assert refusal.error.code in ("E_CURRENT_MISSING", "E_AMBIGUOUS")
+
+
+@pytest.mark.parametrize("key", ["stamp", "name"])
+def test_rows_with_a_text_and_a_reading_beside_the_channels_are_no_list_of_parameters(tmp_path, key):
+    named = zip(("time [s]", "stroke [mm]", "force [N]"), (T, X, force(0.5)), strict=True)
+    columns = {name: values.tolist() for name, values in named} | {"reading": (7 + T).tolist()}
+    cells = enumerate(zip(*columns.values(), strict=True))
+    items = [{key: f"S{i}"} | dict(zip(columns, row, strict=True)) for i, row in cells]
+    (tmp_path / "a_0.5A.json").write_text(json.dumps({"data": items}))
+    (record,) = import_files([tmp_path]).records
+    np.testing.assert_allclose(record.force, force(0.5))
+
+
 def test_a_written_profile_has_the_sign_that_a_text_beside_states(tmp_path):
     (tmp_path / "a_0.5A.csv").write_text("Time [s],disp [mm],force [N]\n" + rows(T, X, -force(0.5)))
     (tmp_path / "README.txt").write_text("Damper bench. Force: compression positive.")

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import KEYS, is_unit, parse_unit, split_name, words
+from mrdamper.rig_files.column_names import KEYS, RATING, is_unit, parse_unit, split_name, words
 from mrdamper.rig_files.conditions import CELL, stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, RigFileError, Source
@@ -289,7 +289,8 @@ def _stated(says: Mapping[str, Any], names: Iterable[str], kind: Any) -> Any:
 def _parameters(items: list[Any]) -> dict[str, dict[str, Any]]:
     """Return value and unit by name of a list of parameters, some of them numbers; empty if it is no such list.
 
-    The name stands under a known key, or is the only text beside the value and the unit.
+    The name stands under a known key, or is the only text beside the value and the unit; what a comment says of a limit
+    or of another device belongs to it. An item with a number for a channel is a row of a table.
     """
     parameters: dict[str, dict[str, Any]] = {}
     for item in items:
@@ -297,8 +298,11 @@ def _parameters(items: list[Any]) -> dict[str, dict[str, Any]]:
         texts = {k: v for k, v in lower.items() if isinstance(v, str) and v and k not in (*_VALUE, *KEYS["unit"])}
         names = [text for key, text in texts.items() if key in KEYS["name"] or key in _NAMES] or [*texts.values()]
         value = _stated(lower, _VALUE, (float, str))
-        if len(names) == 1 and value is not None:
-            parameters[names[0]] = {"value": value, "unit": _stated(lower, KEYS["unit"], str)}
+        row = any(isinstance(v, float) and split_name(key).role for key, v in lower.items())
+        if len(names) == 1 and value is not None and not row:
+            others = [text for text in texts.values() if text != names[0] and RATING.search(text)]
+            value = re.sub(r"^([+-]?)(?=[.,][0-9])", r"\g<1>0", value) if isinstance(value, str) else value  # .5
+            parameters[" ".join([names[0], *others])] = {"value": value, "unit": _stated(lower, KEYS["unit"], str)}
     some = any(isinstance(item["value"], float) or CELL.fullmatch(item["value"]) for item in parameters.values())
     return parameters if some and len(parameters) == len(items) else {}
 
