@@ -773,6 +773,15 @@ def test_parameters_of_a_pump_or_that_contradict_each_other_are_no_coil_current(
     assert refusal.error.code in ("E_CURRENT_MISSING", "E_AMBIGUOUS")
 
 
+def test_the_sampling_rate_of_cameras_among_the_parameters_is_not_that_of_the_rows(tmp_path):
+    rates = [{"name": "sample rate", "value": 300, "unit": "Hz"}, {"name": "exposure", "value": 5, "unit": "ms"}]
+    table = {"stroke [mm]": X.tolist(), "force [N]": force(0.5).tolist()}
+    (tmp_path / "a_0.5A.json").write_text(json.dumps({"cameras": rates, **table}))
+    assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_COLUMN"]
+    (tmp_path / "a_0.5A.json").write_text(json.dumps({"parameters": rates, **table}))
+    assert import_files([tmp_path]).records[0].time[-1] == pytest.approx((T.size - 1) / 300)
+
+
 @pytest.mark.parametrize("key", ["stamp", "name"])
 def test_rows_with_a_text_and_a_reading_beside_the_channels_are_no_list_of_parameters(tmp_path, key):
     named = zip(("time [s]", "stroke [mm]", "force [N]"), (T, X, force(0.5)), strict=True)

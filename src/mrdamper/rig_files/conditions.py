@@ -81,6 +81,7 @@ _MOTIONS = {
 }
 _SAMPLING = "|".join(words("sampling"))
 _RATE = re.compile(rf"{_SAMPLING}|messrate|^(?:data )?rate$|scan|acquisition|^fs$|^f_s$", re.IGNORECASE)
+OTHER_DEVICE = re.compile("|".join(words("other_device")), re.IGNORECASE)
 _STEP = re.compile(
     rf"{_SAMPLING}|^dt$|^d_t$|^delta[ _]?[tx]|^[dΔ] ?[tx]$|time ?step|step ?time|zeitschritt|increment"
     r"|^interval$|^[hx][ _-]?(?:resolution|interval|increment|step|delta)$",
@@ -289,6 +290,8 @@ def stated_rate(quantities: Iterable[Quantity]) -> float | None:
     """Return the sampling rate [Hz] that is stated, as a rate or a step, or None; ValueError if there are two."""
     rates = []
     for key, value, unit in quantities:
+        if OTHER_DEVICE.search(key):
+            continue
         if value > 0 and unit.dimension == "frequency" and _RATE.search(key):
             rates.append(value)
         elif value > 0 and unit.dimension == "time" and _STEP.search(key):

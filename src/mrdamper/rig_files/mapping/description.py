@@ -19,7 +19,7 @@ import numpy as np
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import DIMENSION, is_unit, parse_unit, split_name, words, words_of
-from mrdamper.rig_files.conditions import stated_by_lines
+from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines
 from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, states_si, states_volts
 from mrdamper.rig_files.mapping.results import numbered_tests
 from mrdamper.rig_files.mapping.scales import (
@@ -65,6 +65,8 @@ _OTHER_RATES = re.compile(  # than that of the rows
     r"(?i)decim|dezim|resampl|down-?sampl|averaged (?:to|down)"
     r"|(?:temper|thermo|\bpress)[^.,;]{0,30}(?:sampl|record|acqui|logg|tast)|sampl\w* (?:of )?(?:temper|thermo|press)"
 )
+_DEVICE_BEFORE = re.compile(rf"(?i)(?:{OTHER_DEVICE.pattern})\w*,?[^.;,]*$")  # Camera, scan rate 300 Hz
+_DEVICE_BEHIND = re.compile(rf"(?i)[^.;,]{{0,30}}(?:{OTHER_DEVICE.pattern})")  # 100 samples per second moving average
 _README = re.compile(
     r"(?i)(?:read[_ ]?me|lies_?mich|lisez[-_ ]?moi|l[eé]eme|leggimi|leia[-_ ]?me|notes?|info|说明|説明|설명)\b.*"
 )
@@ -106,6 +108,8 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     timed = timed or any(h.dimension == "time" or (h.role == "time" and h.unit) for h in table.headers)
     if table.names and not timed and not any(map(_OTHER_RATES.search, lines)):
         rates = [match for line in lines for pattern in _RATES for match in pattern.finditer(line)]
+        rates = [m for m in rates if not _DEVICE_BEFORE.search(m.string[: m.start()])]
+        rates = [m for m in rates if not _DEVICE_BEHIND.match(m.string, m.end())]
         stated += [f"sample rate: {match['number']} {match['kilo']}Hz" for match in rates]
         table = table.noted(*(Finding("W_CHOSEN", f"a text beside the file says {match[0]!r}") for match in rates[:1]))
     calibrated = frozenset(role for role, channel in profile.channels.items() if channel.scale is not None)

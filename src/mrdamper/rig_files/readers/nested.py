@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.column_names import KEYS, RATING, is_unit, parse_unit, split_name, words
-from mrdamper.rig_files.conditions import CELL, stated_clock
+from mrdamper.rig_files.conditions import CELL, OTHER_DEVICE, stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, titles_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, RigFileError, Source
 from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES, MOST_ITEMS, with_tests_apart
@@ -418,7 +418,7 @@ def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
             node.constants[key if value_of == value else f"{above} {key}"] = value
         elif isinstance(value, list):
             for name, item in _parameters(value).items():
-                _tell(node, item, name)
+                _tell(node, item, f"{key} {name}" if OTHER_DEVICE.search(key) else name)
         elif isinstance(value, str) and len(node.remarks) < MOST_COLUMNS:
             node.remarks.append(f"{key}: {value}"[:MOST_TEXT])
 
