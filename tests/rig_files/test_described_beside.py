@@ -533,6 +533,43 @@ def test_a_list_of_currents_that_may_not_be_that_of_the_tests_is_asked_about(tmp
 
 
 @pytest.mark.parametrize(
+    "text",
+    [
+        "Coil current up to 1/2 A",
+        "Coil current 1/2 A",
+        "Earlier campaign in 2019: 0, 1 A",
+        "Currents of an earlier campaign: 0, 1 A",
+        "Tests of damper B were run at 0 and 1 A",
+        "Currents of damper B: 0 and 1 A",
+        "Currents that were not measured: 1 and 2 A",
+        "Sicherungen 6 und 10 A",
+        "Heizstrom 1 und 2 A",
+        "Solenoid valve currents 1 and 2 A",
+        "See chapters 2 and 3 A",
+        "Load cell 1/2 A",
+        "Currents of test 2: 0 and 1 A",
+        "Currents 0.2 and 0.9 A (test 2 and 1)",
+        "Zero current was not tested; 0 and 1 A are planned",
+    ],
+)
+def test_a_list_of_currents_of_something_else_than_the_tests_is_no_list_of_theirs(tmp_path, text):
+    for number, amperes in enumerate((0.2, 0.9), 1):
+        rows = "".join(f"{t},{x},{f}\n" for t, x, f in zip(T, X, force(amperes), strict=True))
+        (tmp_path / f"t{number}.csv").write_text(f"time [s],disp [mm],force [N]\n{rows}")
+    (tmp_path / "README.md").write_text(f"Damper bench\n{text}\n")
+    assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
+    for line in (
+        "Currents: 0.2 and 0.9 A",
+        "- coil currents of the 2 tests: 0.2, 0.9 A.",
+        "Spulenströme 0,2 und 0,9 A",
+    ):
+        (tmp_path / "README.md").write_text(f"Damper bench\n{line}\n")
+        assert [record.current[0] for record in import_files([tmp_path]).records] == [0.2, 0.9]
+    (tmp_path / "notes.txt").write_text("Coil currents: 0 and 1 A\n")
+    assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
+
+
+@pytest.mark.parametrize(
     ("heading", "cells", "codes"),
     [
         ("Supply current (A)", ("0", "0.5", "1.5"), set()),
@@ -540,6 +577,9 @@ def test_a_list_of_currents_that_may_not_be_that_of_the_tests_is_asked_about(tmp
         ("Supply current (A),Coil current (A)", ("2.0,0", "2.5,0.5", "3.5,1.5"), set()),
         ("Supply current (A)", ("2", "2", "2"), {"E_CURRENT_MISSING"}),
         ("Supply current limit (A)", ("1", "2", "3"), {"E_CURRENT_MISSING"}),
+        ("Supply current (A)", ("5.1", "5.0", "4.8"), {"E_CURRENT_MISSING"}),
+        ("24 V supply current (A)", ("0.5", "0.6", "0.7"), {"E_CURRENT_MISSING"}),
+        ("Supply current of the rig (A)", ("5.1", "5.3", "5.8"), {"E_CURRENT_MISSING"}),
     ],
 )
 def test_a_supplys_current_that_differs_between_tests_is_the_coils_where_no_other_is_listed(

@@ -18,6 +18,7 @@ from mrdamper.rig_files.column_names import (
     RATING,
     Unit,
     holds,
+    meanings,
     names_condition,
     parse_unit,
     role_of,
@@ -62,6 +63,10 @@ _SCALE = re.compile(  # 60 mV = 10 A, 1 A per V, 0.5 A/V * U - 0.2 A, 2 A corres
     r"|=\s*(?:\([A-Za-z]\w* ?[-−–+] ?[0-9.,]+\)|[A-Za-z]\w*) ?[/*×·] ?[0-9]"
     r"|\b(?:[Tt]ype?|[Mm]odel)\b[ :=]*[A-Za-z]+-[0-9.,]+ ?m?A\b"
 )
+_CURRENTS = words("currents") | {
+    w.casefold() for of in ("channels", "symbols") for w, m in meanings(of).items() if m == "current"
+}
+_AROUND_CURRENTS = words("around_currents") | COIL
 _NUMBER = r"[0-9]+(?:[.,xp][0-9]+)?"
 _LISTED = re.compile(  # 0, 1, 2 A; 0 to 2 A; 0-2A; 0.5-2A: of 3-2A, 3 may be the number of a test
     rf"(?:(-?{_NUMBER})[\s_-]*(?:([,;/])\s*{_NUMBER}\s*\2|(?<![A-Za-z])(?:and|und|et|to|bis)(?![A-Za-z])"
@@ -70,7 +75,7 @@ _LISTED = re.compile(  # 0, 1, 2 A; 0 to 2 A; 0-2A; 0.5-2A: of 3-2A, 3 may be th
 )
 _AND = r"(?:,?\s(?:and|und|et|y|e|en|och|og|i|и)\s|[;/、]\s*|,\s+)"
 _SERIES = re.compile(
-    rf"(?<![\w.,-])({_NUMBER}(?:(?:\s?m?A)?{_AND}{_NUMBER})+)\s?(m?A)(?![A-Za-z0-9/])"
+    rf"(?<![\w.,-])(?![0-9]/[0-9]\s?m?A)({_NUMBER}(?:(?:\s?m?A)?{_AND}{_NUMBER})+)\s?(m?A)(?![A-Za-z0-9/])"
 )  # 0, 0.5 and 1 A
 _LABELLED_RATING = re.compile(
     "|".join([r"fuse|suppl|amplif|rated|range|clamp|(?<![a-z])(?:max|limit)(?![a-z])", *words("probe")]), re.IGNORECASE
@@ -241,11 +246,19 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
 
 
 def series_in(line: str) -> tuple[float, ...]:
-    """Return the different currents [A] that a line lists in a row: 0, 0.5 and 1.0 A; empty if it lists none."""
-    series = [] if RATING.search(line) or _SCALE.search(line) else _SERIES.findall(line[:LONGEST_LINE])
-    listed = [amperes(number, series[0][1]) for number in re.findall(_NUMBER, series[0][0])] if len(series) == 1 else []
-    mixed = bool(listed) and {*re.findall("m?A", series[0][0])} - {series[0][1]}  # 500 mA, 1 A
+    """Return the different currents [A] that a line lists if it says nothing else: currents of tests: 0, 0.5, 1 A."""
+    series = None if RATING.search(line) or _SCALE.search(line) else _SERIES.search(line[:LONGEST_LINE])
+    if series is None or not names_only_currents(line[: series.start()]) or re.search(r"\w", line[series.end() :]):
+        return ()
+    listed = [amperes(number, series[2]) for number in re.findall(_NUMBER, series[1])]
+    mixed = {*re.findall("m?A", series[1])} - {series[2]}  # 500 mA, 1 A
     return tuple(listed) if len({*listed}) == len(listed) and not mixed else ()
+
+
+def names_only_currents(text: str) -> bool:
+    """Tell if a text names currents, of the coil, of tests, and nothing else: no device, other damper or negation."""
+    words_of_text = re.findall(r"[^\W_]+", re.sub(r"\b[0-9]{1,2} (?=[^\W\d_]{4})", "", text.casefold()))  # the 5 tests
+    return bool(_CURRENTS & {*words_of_text}) and {*words_of_text} <= _CURRENTS | _AROUND_CURRENTS
 
 
 def rate_in_name(name: str) -> float | None:

@@ -340,22 +340,36 @@ class _Intake:
             problem = f"no other file of test {self._shares[path][0]!r} has the rest of its channels on the same clock"
             error = ColumnError(problem, where=path.name, remedy="correct file = ... of the channels in the profile")
             self.refusals.append(Refusal(str(path), error))
-        pending = self._pending
         notes = [Path(note.file) for note in self.notes]
-        for path in [path for path in (*others, *notes, *texts) if pending and path not in used]:
+        paths = [path for path in (*others, *notes, *texts) if self._pending and path not in used]
+        return used | self._join_currents(paths)
+
+    def _join_currents(self, paths: Sequence[Path]) -> set[Path]:
+        """Give the tests without a current those that one of some files states; the file that was used.
+
+        A list or a supply's current counts only where no table or legend states the coil's, and no other such file
+        states others.
+        """
+        found: list[tuple[Path, Results | None, list[tuple[Path, Record]], list[tuple[float, str]]]] = []
+        for path in paths:
             results = self._results(path)
-            tests = self._numbered(results) if results else pending
-            stated = currents_beside(path, results, tests) or currents_listed(path, tests)
-            if stated:
-                both = zip(within_times(tests, results), stated, strict=True)
-                self._pending = [
-                    (file, with_stated_current(record, *own, file.name, f"its current is the {own[0]:g} A of {own[1]}"))
-                    for (file, record), own in both
-                ]
-                self.notes = [note for note in self.notes if Path(note.file) != path]
-                self._drop_refusals({path})
-                return used | {path}
-        return used
+            tests = self._numbered(results) if results else self._pending
+            stated = currents_beside(path, results, tests)
+            if stated and not (results and results.of_supply):
+                found = [(path, results, tests, stated)]
+                break
+            stated = stated or currents_listed(path, tests)
+            found += [(path, results, tests, stated)] if stated else []
+        if len({tuple(current for current, _ in stated) for *_, stated in found}) != 1:
+            return set()
+        path, results, tests, stated = found[0]
+        self._pending = [
+            (file, with_stated_current(record, *own, file.name, f"its current is the {own[0]:g} A of {own[1]}"))
+            for (file, record), own in zip(within_times(tests, results), stated, strict=True)
+        ]
+        self.notes = [note for note in self.notes if Path(note.file) != path]
+        self._drop_refusals({path})
+        return {path}
 
     def _drop_refusals(self, paths: Collection[Path]) -> None:
         self.refusals = [refusal for refusal in self.refusals if Path(refusal.file) not in paths]

@@ -6,7 +6,7 @@ import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -197,9 +197,13 @@ def currents_beside(
         by_test = by_test or results.by_test(folders, by_number=False)
     by_test = by_test or (results.by_folder([folder for (folder,) in folders], _called(tests)) if results else {})
     if results and len(by_test) == len(tests):
+        if results.of_supply and not _grow([(tests[i][1], current) for i, current in by_test.items()], _ALIKE_A):
+            return None
         return [(by_test[i], f"{path.name}, {results.title}") for i in range(len(tests))]
     lines = short_lines(path) if path.suffix.lower() in TEXTS else []
-    rows = zip(results.cells, results.current, strict=True) if results else ()  # Level, Current (A): L1, 0.35
+    rows = (
+        zip(results.cells, results.current, strict=True) if results and not results.of_supply else ()
+    )  # Level, Current (A): L1, 0.35
     lines += [f"{cells[1]}: {value:g} A" for cells, value in rows if len(cells) > 1]
     files = [{file.name.casefold(), file.stem.casefold()} for file, _ in tests]
     called = set().union(*files)
@@ -237,12 +241,23 @@ def currents_listed(path: Path, tests: Sequence[tuple[Path, Record]]) -> list[tu
         rows = [Results(min(listed), tuple((f"{n + k}",) for n in range(len(min(listed)))), "", ("",)) for k in (0, 1)]
         by_test = next((of for row in rows if (of := row.by_test([(tests[i][1].id,) for i in own]))), {})
         currents = {own[at]: current for at, current in by_test.items()}
-        points = [_point(with_stated_current(tests[i][1], current, "", "")) for i, current in currents.items()]
-        rising = sorted((point for point in points if point), key=lambda point: point[2])
-        if all(one[3] < other[3] and _are_near(one, other) for one, other in pairwise(rising)):
-            stated |= currents if len(rising) == len(own) else {}
+        if len(currents) == len(own) and _grow([(tests[i][1], current) for i, current in currents.items()]):
+            stated |= currents
     title = f"{path.name}, a list of as many currents as tests"
     return [(stated[i], title) for i in range(len(tests))] if len(stated) == len(tests) else None
+
+
+def _grow(stated: Sequence[tuple[Record, float]], repeated: float | None = None) -> bool:
+    """Tell if the forces of tests alike in motion grow as the currents [A] that are stated of them.
+
+    All have to be alike, or where the currents of some differ by no more than `repeated`, two of them.
+    """
+    points = [_point(with_stated_current(record, current, "", "")) for record, current in stated]
+    rising = sorted((point for point in points if point), key=lambda point: point[2])
+    pairs = list(combinations(rising, 2))
+    alike = [(one, other) for one, other in pairs if _are_near(one, other) and other[2] - one[2] > (repeated or 0.0)]
+    enough = len(alike) == len(pairs) if repeated is None else bool(alike)
+    return len(rising) == len(points) and enough and all(one[3] < other[3] for one, other in alike)
 
 
 def _meant(key: str, files: Collection[str]) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.rig_files.column_names import COIL, holds, names_condition, split_name, words, words_of
-from mrdamper.rig_files.conditions import contradicts, currents_in, quantity_in_cell
+from mrdamper.rig_files.conditions import contradicts, currents_in, names_only_currents, quantity_in_cell
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of, is_units
@@ -42,6 +42,7 @@ class Results:
     cells: tuple[tuple[str, ...], ...]  # of every row those beside the current, by column
     title: str  # heading of the column of currents
     keys: tuple[str, ...] = ()  # headings of the columns of `cells`; empty for the number of the row
+    of_supply: bool = False  # the coil's only if force grows with it
     counts_tests: bool = True  # so that a number in a test's name may be meant; Day 1: 0.5 A counts something else
 
     def by_test(self, tests: Sequence[Iterable[str]], *, by_number: bool = True) -> dict[int, float]:
@@ -143,7 +144,9 @@ def numbered_tests(lines: Iterable[str]) -> Results | None:
         return None
     cells = tuple((str(i), f"{name.split()[-1]}{number}", number) for i, (name, number, _) in enumerate(rows, 1))
     counts = any({word.casefold(), word.casefold().rstrip("s")} & _COUNTED for word in words_of(rows[0][0]))
-    return Results(tuple(row[2] for row in rows), cells, "a line for each test", ("", "", rows[0][0]), counts)
+    return Results(
+        tuple(row[2] for row in rows), cells, "a line for each test", ("", "", rows[0][0]), counts_tests=counts
+    )
 
 
 def form_of_tests(table: RawTable, form: FileForm) -> FileForm:
@@ -160,9 +163,12 @@ def with_results(tables: list[RawTable]) -> list[RawTable]:
     lines = list(dict.fromkeys(line for table in tables for line in table.remarks))
     results = results_in(lines) if len(lines) >= _FEWEST_ROWS else None
     others = tables
+    if results is not None and results.of_supply:
+        return others
     if results is None:
         tables = [table for table in tables if not table.fallback]
         stated = [(table, r) for table in tables if _may_be_results(table) and (r := results_in(lines_of(table)))]
+        stated = [(table, results) for table, results in stated if not results.of_supply]
         beside = [table for table, _ in stated]
         tables = [t for t in tables if t not in beside and (not any(t.names) or _names_channels(t))]
         stated = [r for _, r in stated if len(stated) == 1 or len(r.current) == len(tables)]  # no means over them
@@ -222,7 +228,7 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
         if sum(map(bool, row)) < 2:  # most lines are one cell where another character separates them
             continue
         columns = [i for i, cell in enumerate(row) if cell and not _NUMBER.fullmatch(cell) and _is_current(cell)]
-        supply = [] if columns else [i for i, cell in enumerate(row) if _is_current(_SUPPLY.sub("", cell))]
+        supply = [] if columns else [i for i, cell in enumerate(row) if _is_of_supply(cell)]
         columns = (
             columns or supply or [i for i, cell in enumerate(row) if holds(cell, COIL) and cell.isalpha()]
         )  # above 0.5 A
@@ -254,6 +260,7 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
             tuple((str(n), *(cells[i] for i in others)) for n, cells in enumerate(body, 1)),
             row[columns[0]],
             ("", *(row[i] for i in others)),
+            bool(supply),
         )
 
 
@@ -262,6 +269,11 @@ def _is_current(cell: str) -> bool:
     named = names_condition(header.name, "current") and header.dimension in (None, "current")
     named = named or (header.dimension == "current" and holds(header.name, COIL))  # coil_mA
     return named and not currents_in(cell)  # coil current 0.5 A heads no column
+
+
+def _is_of_supply(cell: str) -> bool:
+    bare = _SUPPLY.sub("", cell)
+    return bare != cell and _is_current(bare) and names_only_currents(split_name(bare).name)
 
 
 def _amperes(cell: str, unit: str) -> float | None:
