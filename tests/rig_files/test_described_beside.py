@@ -395,6 +395,8 @@ def test_a_rate_in_a_sentence_of_a_readme_times_counted_samples_and_two_rates_ar
         "Laser vibrometer scanned at 200 kHz",
         "Oil temperature at a scan rate of 200 kHz",
         "Camera: sampling rate 300 Hz",
+        "Gyro: 300 samples per second",
+        "## Camera\n- scan rate: 300 Hz",
     ],
 )
 def test_a_frequency_of_something_else_than_the_rows_is_no_sampling_rate(text, tmp_path):
@@ -404,7 +406,9 @@ def test_a_frequency_of_something_else_than_the_rows_is_no_sampling_rate(text, t
     found = import_files([tmp_path])
     assert not found.records
     assert found.refusals
-    (tmp_path / "README.txt").write_text("Camera. Temperature 23 C, sampling rate (all channels): 200 Hz, filter 50 Hz")
+    (tmp_path / "README.txt").write_text(
+        "Camera. Temperature 23 C, sampling rate (all channels): 200 Hz (laser 9 kHz), filter 50 Hz"
+    )
     assert import_files([tmp_path]).records[0].time[-1] == pytest.approx(5.0)
 
 

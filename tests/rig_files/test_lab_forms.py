@@ -778,6 +778,10 @@ def test_the_sampling_rate_of_cameras_among_the_parameters_is_not_that_of_the_ro
     table = {"stroke [mm]": X.tolist(), "force [N]": force(0.5).tolist()}
     (tmp_path / "a_0.5A.json").write_text(json.dumps({"cameras": rates, **table}))
     assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_COLUMN"]
+    (tmp_path / "a_0.5A.csv").write_text("stroke [mm],force [N]\n" + rows(X, force(0.5)))
+    (tmp_path / "a_0.5A.json").write_text(json.dumps({"camera": {"sample rate": "300 Hz"}}))
+    assert [r.error.code for r in import_files([tmp_path / "a_0.5A.csv"]).refusals] == ["E_COLUMN"]
+    (tmp_path / "a_0.5A.csv").unlink()
     (tmp_path / "a_0.5A.json").write_text(json.dumps({"parameters": rates, **table}))
     assert import_files([tmp_path]).records[0].time[-1] == pytest.approx((T.size - 1) / 300)
 

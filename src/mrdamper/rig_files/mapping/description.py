@@ -6,7 +6,7 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
@@ -66,7 +66,13 @@ _OTHER_RATES = re.compile(  # than that of the rows
     r"|(?:temper|thermo|\bpress)[^.,;]{0,30}(?:sampl|record|acqui|logg|tast)|sampl\w* (?:of )?(?:temper|thermo|press)"
 )
 _DEVICE_BEFORE = re.compile(rf"(?i)(?:{OTHER_DEVICE.pattern})\w*,?[^.;,]*$")  # Camera, scan rate 300 Hz
-_DEVICE_BEHIND = re.compile(rf"(?i)[^.;,]{{0,30}}(?:{OTHER_DEVICE.pattern})")  # 100 samples per second moving average
+_DEVICE_BEHIND = re.compile(
+    rf"(?i)[^.;,]{{0,30}}(?:{OTHER_DEVICE.pattern})(?![^.;,]*[0-9] ?k?Hz)"
+)  # 100 samples per second moving average
+_LABEL = re.compile(r"([^.;,:]+):\s*$")
+_RECORDER = re.compile(
+    rf"(?i)daq|logg|acqui|record|erfass|mess|data|daten|\badc\b|system|channel|kan[aä]l|rate|{'|'.join(words('sampling'))}"
+)
 _README = re.compile(
     r"(?i)(?:read[_ ]?me|lies_?mich|lisez[-_ ]?moi|l[eé]eme|leggimi|leia[-_ ]?me|notes?|info|说明|説明|설명)\b.*"
 )
@@ -107,13 +113,25 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     timed = profile.file.sample_rate_Hz or profile.channel("time").unit
     timed = timed or any(h.dimension == "time" or (h.role == "time" and h.unit) for h in table.headers)
     if table.names and not timed and not any(map(_OTHER_RATES.search, lines)):
-        rates = [match for line in lines for pattern in _RATES for match in pattern.finditer(line)]
-        rates = [m for m in rates if not _DEVICE_BEFORE.search(m.string[: m.start()])]
-        rates = [m for m in rates if not _DEVICE_BEHIND.match(m.string, m.end())]
+        rates = list(_rates_of_rows(lines))
         stated += [f"sample rate: {match['number']} {match['kilo']}Hz" for match in rates]
         table = table.noted(*(Finding("W_CHOSEN", f"a text beside the file says {match[0]!r}") for match in rates[:1]))
     calibrated = frozenset(role for role, channel in profile.channels.items() if channel.scale is not None)
     return replace(table, remarks=(*table.remarks, *filter(None, stated)), calibrated=calibrated)
+
+
+def _rates_of_rows(lines: Iterable[str]) -> Iterator[re.Match[str]]:
+    """Yield the rates that lines state, but those of other devices: on their line, behind their name, below it."""
+    of_device = False
+    for line in lines:
+        if line.startswith("#") or line.rstrip(" *").endswith(":") or not line.strip():
+            of_device = OTHER_DEVICE.search(line) is not None
+        for match in (match for pattern in _RATES for match in pattern.finditer(line) if not of_device):
+            before = line[: match.start()]
+            label = _LABEL.search(before) if match.re is _RATES[-1] else None  # DAQ: 200 scans per second
+            other = label is not None and not _RECORDER.search(label[1])
+            if not (other or _DEVICE_BEFORE.search(before) or _DEVICE_BEHIND.match(line, match.end())):
+                yield match
 
 
 @lru_cache(maxsize=64)  # every file of a folder asks
@@ -335,12 +353,15 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
             yield from (f"{i}={name};{own}" for i, (name, own) in enumerate(zip(names, its, strict=True), 1))
     own = next((lower[name] for name in ("units", "unit") if isinstance(lower.get(name), dict)), units)
     for name, value in node.items():
+        whole = f"{key} {name}" if OTHER_DEVICE.search(key) else str(name)  # camera: {sample rate: 300 Hz}
         if isinstance(value, (dict, list)):
-            yield from _stated(value, str(name), own, depth + 1)
+            yield from _stated(value, whole, own, depth + 1)
         elif not unit and not isinstance(value, np.ndarray):
             stated = own.get(name) if isinstance(own.get(name), str) and own is not node else None
             yield (
-                f"{name}: {value:g} {stated or ''}".rstrip() if isinstance(value, (int, float)) else f"{name}: {value}"
+                f"{whole}: {value:g} {stated or ''}".rstrip()
+                if isinstance(value, (int, float))
+                else f"{whole}: {value}"
             )
 
 
