@@ -350,19 +350,19 @@ class _Intake:
         A list or a supply's current counts only where no table or legend states the coil's, and no other such file
         states others.
         """
-        found: list[tuple[Path, Results | None, list[tuple[Path, Record]], list[tuple[float, str]]]] = []
+        candidates: list[tuple[Path, Results | None, list[tuple[Path, Record]], list[tuple[float, str]]]] = []
         for path in paths:
             results = self._results(path)
             tests = self._numbered(results) if results else self._pending
             stated = currents_beside(path, results, tests)
             if stated and not (results and results.of_supply):
-                found = [(path, results, tests, stated)]
+                candidates = [(path, results, tests, stated)]
                 break
             stated = stated or currents_listed(path, tests)
-            found += [(path, results, tests, stated)] if stated else []
-        if len({tuple(current for current, _ in stated) for *_, stated in found}) != 1:
+            candidates += [(path, results, tests, stated)] if stated else []
+        if len({tuple(current for current, _ in stated) for *_, stated in candidates}) != 1:
             return set()
-        path, results, tests, stated = found[0]
+        path, results, tests, stated = candidates[0]
         self._pending = [
             (file, with_stated_current(record, *own, file.name, f"its current is the {own[0]:g} A of {own[1]}"))
             for (file, record), own in zip(within_times(tests, results), stated, strict=True)
