@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mrdamper.dampers.bands import Band
 from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Floats
 from mrdamper.identification import Identification
-from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.validation import SCORES, RunScore
+
+if TYPE_CHECKING:  # commands that write tables of predictions need no study
+    from mrdamper.study.recipe import RecipeResult
 
 
 def identification_rows(identifications: Sequence[Identification], dataset: str = "") -> list[dict[str, Any]]:
