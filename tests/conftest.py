@@ -4,7 +4,9 @@ import base64
 import gc
 import json
 import os
+import shutil
 import sys
+import tempfile
 from functools import cache
 from pathlib import Path
 
@@ -15,6 +17,12 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 # Two processes read the same test files and start many commands: what one has compiled the others load.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# Tests write, synchronise and delete many small files, a seventh of their time on a disk: where the memory has room
+# for them they are written there.
+_memory = Path("/dev/shm")
+if "TMPDIR" not in os.environ and os.access(_memory, os.W_OK) and shutil.disk_usage(_memory).free > 4 << 30:
+    os.environ["TMPDIR"] = tempfile.tempdir = str(_memory)
 
 # What is imported and collected stays for good: looking through it again and again for what is rubbish is a fifth of
 # the time of small tests.
