@@ -392,6 +392,7 @@ def test_a_bypass_that_carries_the_slow_motions_accuses_no_run():
     assert find_contradictions(past_a_bypass(lambda force: force / 3e4)) == []
 
 
+@pytest.mark.slow
 def test_an_orifice_that_carries_the_slow_motions_accuses_no_run_and_hides_no_open_coil():
     """Its flow grows with the root of the force: slow loops are alike at all currents but the lowest."""
     runs = past_a_bypass(lambda force: (np.sqrt(700**2 + 4.4e5 * force) - 700) / 2.2e5)

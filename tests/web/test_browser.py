@@ -590,6 +590,10 @@ def test_opening_says_at_once_what_is_being_done(page, shoot):
     page.route("**/data/rigs/0", lambda route: held.append(route))
     held[0].continue_()
     page.get_by_role("status").filter(has_text="Analysing 34 runs").wait_for()
+    for _ in range(500):  # the request may follow the words that announce it
+        if len(held) > 1:
+            break
+        page.wait_for_timeout(10)
     held[1].continue_()
     page.locator(".matrix").wait_for()
 
