@@ -360,6 +360,14 @@ def test_so_many_contradictions_are_refused_with_both_groups(sound):
     assert refusal.value.code == "E_CONTRADICTIONS"
 
 
+def test_runs_are_not_named_by_currents_of_others_that_have_no_evidence():
+    """Five of twelve runs in lbf look like exchanged currents, by which a correct run would be the wrong one."""
+    (rebound,) = (damper for damper in SECOND if damper.kind == "rebound")
+    folder = next(f for f in second_set(rebound) if f.name == "40 % of the runs in lbf")
+    with pytest.raises(ContradictionError, match="E_FORCE_SCALE"):
+        find_contradictions(folder.runs)
+
+
 def test_runs_of_which_none_agrees_with_another_are_refused(sound):
     factors = np.exp(np.random.default_rng(4).uniform(-2, 2, len(sound)))
     with pytest.raises(ContradictionError):

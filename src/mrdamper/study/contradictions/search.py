@@ -87,6 +87,7 @@ class Search:
         # gains of the other runs, by position, if too many differ to identify the wrong ones
         self.differing: dict[int, float] = {}
         self.unproven: set[int] = set()  # runs whose motion the model does not describe, instead of another current
+        self._set_aside: set[int] = set()  # those of them without which the others are compared
         self.evidence = Evidence(tracks)
         self._products = self.evidence.products(tracks)
         self._candidates = [ExplanationCandidate(i, tracks, self.evidence, p) for i, p in enumerate(self._products)]
@@ -94,7 +95,38 @@ class Search:
         self._adapt()
 
     def run(self, most: int) -> None:
-        """Explain runs until the others agree, or more than `most` are explained."""
+        """Explain runs until the others agree, or more than `most` are explained.
+
+        Explanations of other runs may rest on currents without evidence: the runs with these are set aside then, and
+        the others are compared again.
+        """
+        tracks, apparent = list(self.tracks), dict[int, float]()
+        while True:
+            self._explain_until_agreement(most)
+            apparent |= _apparent_currents(self.found)
+            unproven = unproven_currents(tracks, apparent) - self.unproven
+            self.unproven |= unproven
+            if not unproven or set(self.found) <= unproven:
+                break
+            self._set_aside |= unproven
+            self.found, self.tracks = {}, list(tracks)
+            for candidate in self._candidates:
+                candidate.set_tracks(tracks)
+            self._products = [candidate.own for candidate in self._candidates]
+            self._adapt()
+        for i in self.unproven & set(self.found):
+            del self.found[i]
+            self._products[i] = self._candidates[i].own
+            self._members[i] = self.posterior([i]).weigh([self._products[i]])[0]
+        for i in self._set_aside:
+            explanations = self._candidates[i].explanations(self.posterior())
+            best = next((e for e in explanations if e.cause != "current"), None)
+            if best is not None and best.gain >= self._threshold({i: best}):
+                self.found[i] = best
+                self.unproven.discard(i)
+        self._review()
+
+    def _explain_until_agreement(self, most: int) -> None:
         while len(self.found) <= most:
             best = max(self._proposals(), key=self._rank, default=_NO_PROPOSAL)
             if not best.explanations or best.gain < self._threshold(best.explanations):
@@ -105,12 +137,6 @@ class Search:
             if not best.explanations or self.differing:
                 break
             self._accept(best.explanations)
-        self.unproven = self._unproven(self.found)
-        for i in self.unproven:
-            del self.found[i]
-            self._products[i] = self._candidates[i].own
-            self._members[i] = self.posterior([i]).weigh([self._products[i]])[0]
-        self._review()
 
     def posterior(self, but: Iterable[int] = ()) -> Posterior:
         """Coefficients determined by the runs as corrected, without some of them."""
@@ -123,14 +149,9 @@ class Search:
         )
         best = next(iter(candidate.explanations(self.posterior())), None)
         explanations = {} if best is None else {len(self.tracks): best}
-        if best is None or best.gain < self._threshold(explanations) or self._unproven(explanations, track):
+        if best is None or best.gain < self._threshold(explanations):
             return None
-        return best
-
-    def _unproven(self, explanations: Mapping[int, Explanation], *further: Track) -> set[int]:
-        """Positions of explained runs, a further one the last, for whose other current there is no evidence."""
-        apparent = {k: e.trial.value for k, e in explanations.items() if e.cause == "current"}
-        return unproven_currents([*self.tracks, *further], apparent)
+        return None if unproven_currents([*self.tracks, track], _apparent_currents(explanations)) else best
 
     def _threshold(self, explanations: Mapping[int, Explanation]) -> float:
         """Logarithm of the odds from which explanations are far better than none.
@@ -162,8 +183,8 @@ class Search:
         return [e.trial for e in self.found.values() if e.cause in _SHARED_CAUSES]
 
     def _agreeing(self, but: Iterable[int] = ()) -> list[int]:
-        aside = {k for k, explanation in self.found.items() if explanation.cause == "damper"} | set(but)
-        return [k for k in range(len(self.tracks)) if k not in aside]
+        of_another_damper = {k for k, explanation in self.found.items() if explanation.cause == "damper"}
+        return [k for k in range(len(self.tracks)) if k not in of_another_damper | self._set_aside | set(but)]
 
     def _accept(self, explanations: dict[int, Explanation]) -> None:
         self.found |= explanations
@@ -235,7 +256,7 @@ class Search:
     def _proposals(self) -> Iterator[JointExplanation]:
         posterior, prior = self.posterior(), self.evidence.prior
         self._base = self._adapted([self._products[k] for k in self._agreeing()], posterior)
-        left = [k for k in range(len(self.tracks)) if k not in self.found]
+        left = [k for k in range(len(self.tracks)) if k not in self.found and k not in self._set_aside]
         members = [self._members[k] for k in left]
         by_others = dict(zip(left, posterior.log_probabilities_by_others(members), strict=True))
         odds = {k: p - by_others[k] for k, p in zip(left, prior.log_probabilities(members), strict=True)}
@@ -499,7 +520,8 @@ class Search:
     def _of_currents(self, currents: dict[int, float], cause: Cause, odds: float) -> JointExplanation:
         trials = {k: Trial("current", current, "", odds) for k, current in currents.items()}
         moved = {k: self._candidates[k].changed(trial) for k, trial in trials.items()}
-        members = [replace(m, over=moved[k].over) if k in moved else m for k, m in enumerate(self._members)]
+        kept = {k: self._members[k] for k in self._agreeing()}
+        members = [replace(m, over=moved[k].over) if k in moved else m for k, m in kept.items()]
         gain = self.evidence.log_evidence(members) - self._own - odds
         return JointExplanation(
             {k: Explanation(replace(t, cause=cause), gain, moved[k]) for k, t in trials.items()}, gain
@@ -507,7 +529,7 @@ class Search:
 
     def _refined_rows(self, proposal: JointExplanation, posterior: Posterior) -> JointExplanation:
         moved = proposal.explanations
-        products = [moved[k].products if k in moved else p for k, p in enumerate(self._products)]
+        products = [moved[k].products if k in moved else self._products[k] for k in self._agreeing()]
         gain = self._adapted(products, posterior) - self._base - next(iter(moved.values())).trial.odds
         return JointExplanation({k: replace(e, gain=gain) for k, e in moved.items()}, gain)
 
@@ -531,3 +553,7 @@ class Search:
                 del self.found[i]
                 self._products[i] = self._candidates[i].own
             self._members[i] = others.weigh([self._products[i]])[0]
+
+
+def _apparent_currents(explanations: Mapping[int, Explanation]) -> dict[int, float]:
+    return {k: e.trial.value for k, e in explanations.items() if e.cause == "current"}
