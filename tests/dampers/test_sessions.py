@@ -9,7 +9,7 @@ import pytest
 
 from mrdamper.dampers.joint import damper_of
 from mrdamper.dampers.sessions import GainOffset, RecordingTime, RunScatter, Sessions, known_errors, sessions_known
-from mrdamper.dampers.uncertainty import Uncertainty
+from mrdamper.dampers.uncertainty import Uncertainty, uncertainty_warnings
 from mrdamper.data import Condition, Run
 from mrdamper.errors import InputError
 from mrdamper.models.bingham import Bingham
@@ -181,6 +181,21 @@ def test_other_runs_of_the_day_take_most_of_a_day_away():
     with pytest.raises(InputError, match="every session holds one run") as caught:
         known(shuffled, readings[:12])
     assert caught.value.code == "E_SESSION"
+
+
+def test_a_session_with_another_gain_is_named_and_sessions_that_scatter_are_not():
+    def gains(*shared):
+        rows = [(f"2024-05-0{day}", gain, k) for day, gain in enumerate(shared, 1) for k in range(3)]
+        runs = [recorded(f"{day}-{k}", f"{day}T{9 + k:02}:00:00") for day, _, k in rows]
+        readings = [reading(gain + 0.002 * (k - 1)) for _, gain, k in rows]
+        return Sessions.of(runs, readings, readings)
+
+    sessions = gains(1.003, 1.083, 0.997, 1.0)
+    assert sessions.deviating() == {"2024-05-02": pytest.approx(1.083, abs=1e-6)}
+    damper = replace(DAMPER, uncertainty=Uncertainty((), (), np.zeros((0, 0)), np.zeros(0), sessions=sessions))
+    assert "of session 2024-05-02 are 8.3 % above those of the other sessions" in " ".join(uncertainty_warnings(damper))
+    assert gains(0.95, 1.083, 1.03, 1.0).deviating() == {}
+    assert gains(0.997, 1.035, 1.003, 1.0).deviating() == {}
 
 
 def test_a_check_run_corrects_its_day_only_and_the_scores_say_so():

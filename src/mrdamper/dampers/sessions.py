@@ -29,6 +29,8 @@ _CORRELATION_HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # correlation times within a ses
 _MIN_RUN_SHARE = (
     0.2  # smallest share of the scatter of each run alone, because the model error differs at every condition
 )
+_MIN_DEVIATION = 0.04  # relative deviation of a session's gain from which it is named
+_DEVIATION_RATIO = 4.0  # the same, as a multiple of the standard deviation of the other sessions
 _REMEDY = "repeat a condition on each of three days or more; state recorded_at or session in runs.csv"
 
 
@@ -210,6 +212,24 @@ class Sessions:
         gain, gain_spread = self.gain.given(at, when, np.array([self.gains[i] for i in rows]) - 1)
         offset, offset_spread = self.offset.given(at, when, np.array([self.offsets[i] for i in rows]))
         return SessionCorrection(1 + gain, gain_spread, offset, offset_spread)
+
+    def deviating(self) -> dict[str, float]:
+        """Return the gains [-] of sessions that differ from the others far more than these from each other."""
+        gains: dict[str, list[float]] = {}
+        for when, gain in zip(self.when, self.gains, strict=True):
+            gains.setdefault(when.session or "", []).append(gain)
+        gains.pop("", None)
+        alone = float(np.hypot(self.gain.hour, self.gain.run))
+        ratios: dict[str, float] = {}
+        for name, own in gains.items():
+            others = [float(np.mean(values)) for other, values in gains.items() if other != name]
+            if len(others) + 1 < SESSIONS_NEEDED:
+                break
+            usual = float(np.median(others))
+            scatter = np.hypot(np.std(others, ddof=1), alone / np.sqrt(len(own)))
+            if abs(np.mean(own) - usual) > max(_MIN_DEVIATION, _DEVIATION_RATIO * float(scatter)) * usual:
+                ratios[name] = float(np.mean(own)) / usual
+        return ratios
 
     def seen(self, damper: Damper, runs: Iterable[Run], own: bool) -> Sessions:
         """Return the sessions with the gains and offsets of further runs, for example check runs of a day.

@@ -167,6 +167,11 @@ def uncertainty_warnings(damper: Damper) -> list[str]:
         )
     elif uncertainty.session_dof < 2:
         sentences.append("The scatter between sessions rests on fewer than two degrees of freedom.")
+    sentences += [
+        f"The forces of session {session} are {100 * abs(ratio - 1):.2g} % {'above' if ratio > 1 else 'below'} those "
+        "of the other sessions, which differ less from each other: check its load cell, temperature and preload."
+        for session, ratio in (uncertainty.sessions.deviating() if uncertainty.sessions else {}).items()
+    ]
     apart, wide, weak = list[int](), list[tuple[str, str]](), list[tuple[str, str]]()
     for i, name in enumerate(uncertainty.names):
         ends = uncertainty.ends(damper, name)
