@@ -13,7 +13,7 @@ from mrdamper.discovery import Registry
 from mrdamper.errors import InputError
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import opened
-from mrdamper.rig_files.readers.base import RawTable, Reader, Source
+from mrdamper.rig_files.readers.base import RawTable, Reader, RigFileError, Source
 from mrdamper.rig_files.sandbox import guarded_tables
 
 if TYPE_CHECKING:
@@ -44,7 +44,11 @@ def raw_tables(path: str | Path, form: FileForm | None = None) -> Iterator[list[
     with opened(Path(path)) as source:
         reader = reader_of(source)
         if not reader.library:
-            yield _renamed(reader.tables(source, form or FileForm()), form)
+            try:
+                tables = reader.tables(source, form or FileForm())
+            except RigFileError as error:  # of an array, which knows no file
+                raise error if error.file else source.refuse(error.code, error.found, error.remedy) from None
+            yield _renamed(tables, form)
             return
         with guarded_tables(source, reader, form or FileForm()) as tables:
             yield _renamed(tables, form)

@@ -159,9 +159,9 @@ def expand(name: str, shape: tuple[int, ...]) -> list[tuple[str, int | None]]:
     """Names of the columns of an array: one for a vector, numbered ones for a matrix, its samples the long way."""
     inner = [n for n in shape if n != 1]
     if len(inner) == 2 and inner[0] < inner[1] and inner[0] <= _MOST_ACROSS:
-        return [(f"{name}[{i + 1}]", i - inner[0]) for i in range(inner[0])]
+        return [(name and f"{name}[{i + 1}]", i - inner[0]) for i in range(inner[0])]
     if len(inner) == 2 and inner[1] <= MOST_COLUMNS:
-        return [(f"{name}[{i + 1}]", i) for i in range(inner[1])]
+        return [(name and f"{name}[{i + 1}]", i) for i in range(inner[1])]
     return [(name, None)] if len(inner) <= 1 else []
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import refusing_damage, whole
-from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, Reader, RigFileError, Source
+from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import document_tables
 from mrdamper.rig_files.readers.workbook import as_text, tables_of_sheets
 from mrdamper.rig_files.text.elements import Elements, Sheets, numbers_in
@@ -38,11 +38,8 @@ class Markup(Reader):
             page.feed(content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8", "replace"))
             return _of_cells(source, page.sheets, form)
         elements = Elements()
-        try:
-            with refusing_damage(source, self.title):
-                elements.read(content)
-        except RigFileError as error:
-            raise error if error.file else source.refuse(error.code, error.found, error.remedy) from None
+        with refusing_damage(source, self.title):
+            elements.read(content)
         if elements.sheets:
             return _of_cells(source, elements.sheets, form)
         return document_tables(source, elements.root, self.title)

@@ -59,10 +59,7 @@ def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, togeth
 
     The columns of all of them `together` are one more, for files with a node for each channel, if no node holds a test.
     """
-    try:
-        every = list(_walk(tree, _Node("")))
-    except RigFileError as error:  # which names no file
-        raise source.refuse(error.code, error.found, error.remedy) from None
+    every = list(_walk(tree, _Node("")))
     nodes = [node for node in every if node.columns]
     objects = [column.name for node in nodes for column in node.columns if column.array.dtype == object]
     if not any(column.array.dtype != object for node in nodes for column in node.columns):
@@ -96,8 +93,9 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     tree |= {key: own for key, own in lists.items() if all(isinstance(item, str) for item in own)}
     keys = {"name", "unit", "data"}
     channels = {key: value for key, value in tree.items() if isinstance(value, Mapping) and {*value} == keys}
-    arrays = {**tree, **{key: value["data"] for key, value in channels.items()}}
-    tree = _with_own_axes(with_tests_apart(tree, arrays))
+    data = {key: channel["data"] for key, channel in channels.items()}
+    apart = with_tests_apart({**tree, **data})
+    tree = _with_own_axes({k: channels[k] if k in data and v is data[k] else v for k, v in apart.items()})
     node.units = {**node.units, **_stated_units(tree), **_units({key: of["unit"] for key, of in channels.items()})}
     sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= FEWEST_SAMPLES}
     texts = [_LISTING.sub("", value) for value in tree.values() if isinstance(value, str)]
@@ -244,7 +242,7 @@ def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, A
     for key, value in tree.items():
         if key in pairs:
             partners[key] = {**tree[pairs[key]], "data": value}
-        elif isinstance(value, Array) and isinstance(tree.get(clocks.get(key, "")), Array):
+        elif isinstance(value, Array) and key in clocks and isinstance(tree[clocks[key]], Array):
             own = {"name": key, "unit": units.get(key, ""), "data": value, "time": tree[clocks[key]]}
             partners[key] = {**own, "timeunit": "s"} if seconds else own
         elif isinstance(value, Array) and key in units:
@@ -256,6 +254,7 @@ def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, A
 
 def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[str, Any]]]:
     """Nodes of their own among the items of a list; items that are channels become columns, records a table."""
+    items = [cell for item in items for cell in (item if isinstance(item, list) else [item])]
     mappings = [item for item in items if isinstance(item, Mapping)]
     if _parameters(items):
         _tell(node, {key: items}, "")
@@ -426,7 +425,8 @@ def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
 def _across(key: str, array: Array) -> list[_Column]:
     if array.dtype.kind == "O":
         return [_Column(key, "", array)]
-    return [_Column(name, "", array, part) for name, part in expand(key, array.shape)]
+    unit = "s" if array.dtype.kind in "Mm" else ""
+    return [_Column(name, unit, array, part) for name, part in expand(key, array.shape)]
 
 
 def _table(source: Source, node: _Node, title: str) -> RawTable:

@@ -3,26 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import checked_zip, is_arrays, is_zip_of
-from mrdamper.rig_files.readers.arrays import (
-    Array,
-    array_table,
-    check_unpacked,
-    expand,
-    pick,
-    refuse_twice,
-    refusing_damage,
-    stated_array,
-    value_of,
-)
-from mrdamper.rig_files.readers.base import RawTable, Reader, RigFileError, Source
+from mrdamper.rig_files.readers.arrays import check_unpacked, refuse_twice, refusing_damage, stated_array, value_of
+from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 from mrdamper.rig_files.readers.several_tests import tests_of_array
 
@@ -44,26 +32,13 @@ class Npy(Reader):
         with refusing_damage(source, self.title):
             source.file.seek(0)
             array = np.lib.format.read_array(source.file, allow_pickle=False)
-        if fields := dtype.names:
-            units = ["s" if dtype[name].kind in "Mm" else "" for name in fields]
-            return [array_table(source, fields, units, lambda column: array[fields[column]], self.title)]
-        try:
-            tests = tests_of_array(array) if array.squeeze().ndim > 2 and dtype.kind in "iuf" else [array]
-        except RigFileError as error:  # which names no file
-            raise source.refuse(error.code, error.found, error.remedy) from None
-        tables = []
-        for number, test in enumerate(tests, 1):
-            parts = [part for _, part in expand("", test.shape)]
-            if not parts:
-                raise source.refuse("E_NO_DATA", f"an array of {shape}", "save the channels as columns of a matrix")
-            names, load = [""] * len(parts), partial(_column, test, parts)
-            label = f"test_{number}" if len(tests) > 1 else ""
-            tables.append(replace(array_table(source, names, names, load, self.title), label=label))
-        return tables
-
-
-def _column(array: Array, parts: list[int | None], column: int) -> np.ndarray:
-    return pick(array, parts[column])
+        if dtype.names:
+            tree = {name: array[name] for name in dtype.names}
+        elif array.squeeze().ndim > 2 and dtype.kind in "iuf":
+            tree = {f"test_{i}": {"": test} for i, test in enumerate(tests_of_array(array), 1)}
+        else:
+            tree = {"": array}
+        return nested_tables(source, tree, self.title)
 
 
 class Npz(Reader):
@@ -83,11 +58,7 @@ class Npz(Reader):
             fields = _check_headers(source)
             source.file.seek(0)
             with np.load(source.file, allow_pickle=False) as archive:
-                arrays = {name: archive[name] for name in archive.files if name not in fields}
-                tree: dict[str, Any] = {
-                    name: {"unit": "s", "data": array} if array.dtype.kind in "Mm" else value_of(array)
-                    for name, array in arrays.items()
-                }
+                tree: dict[str, Any] = {n: value_of(archive[n]) for n in archive.files if n not in fields}
                 tree |= {field: archive[name][field] for name, inner in fields.items() for field in inner}
         return nested_tables(source, tree, self.title)
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -18,12 +19,40 @@ FEWEST_SAMPLES = 50  # of a test
 _OF_TESTS = re.compile(r"(?i)(?:s|_?(?:vec(?:tor)?|list|values|levels|array|grid|axis))(?=$|_m?a$|\s*[\[(])")
 
 
-def with_tests_apart(tree: Mapping[str, Any], arrays: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return what a node holds with a node for each test of its arrays; `arrays`: with channels as their samples."""
-    for split in (_concatenated_tests, _tests_of_arrays):
-        if (tests := split(arrays)) is not arrays:
-            return tests
-    return _tests_of_lists(tree)
+# Samples of each test by channel, the numbers of values of the conditions they stand over, and what all tests have.
+_Tests = tuple[Mapping[str, Sequence[Array]], tuple[int, ...], Mapping[str, Any]]
+
+
+def with_tests_apart(tree: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return what a node holds with a node for each test of its arrays, with its own of the numbers beside them.
+
+    Beside the samples stand vectors of conditions, one for every test or one for every dimension.
+    """
+    tests = _concatenated_tests(tree) or _tests_of_arrays(tree) or _tests_of_lists(tree)
+    if tests is None:
+        return tree
+    samples, outer, shared = tests
+    rest = {key: value for key, value in tree.items() if key not in (*samples, *shared)}
+    at, beside = np.indices(outer).reshape(len(outer), -1), {}
+    for key, array in _numeric(rest).items():
+        shape = _shape(array)
+        if shape == outer:
+            beside[_of_one_test(key)] = np.reshape(array, -1)
+        elif len(shape) == 1 and outer.count(*shape) == 1:
+            beside[_of_one_test(key)] = np.reshape(array, -1)[at[outer.index(*shape)]]
+    title = next(iter(samples)) if len(samples) == 1 else "test"
+    nodes = {f"{title}_{i + 1}": {**{k: v[i] for k, v in samples.items()}, **shared} for i in range(math.prod(outer))}
+    for i, node in enumerate(nodes.values()):
+        node |= {key: float(values[i]) for key, values in beside.items()}
+    return {**{key: value for key, value in rest.items() if _of_one_test(key) not in beside}, **nodes}
+
+
+def _numeric(tree: Mapping[str, Any]) -> dict[str, Array]:
+    return {key: v for key, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf" and v.size > 1}
+
+
+def _shape(array: Array) -> tuple[int, ...]:
+    return tuple(n for n in array.shape if n > 1)
 
 
 def _grid_of(value: Any, channels: Mapping[int, int | None]) -> tuple[tuple[int, ...], list[Array]]:
@@ -91,42 +120,23 @@ def _refusal(array: np.ndarray) -> RigFileError:
     return RigFileError("E_AMBIGUOUS", problem, remedy=remedy)
 
 
-def _tests_of_lists(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Split lists of arrays, or arrays over conditions, into a node a test, each with its own of the numbers beside.
+def _tests_of_lists(tree: Mapping[str, Any]) -> _Tests | None:
+    """Return the tests of a list of matrices, data[current, frequency, sample, channel], or several lists of vectors.
 
-    These are a list of matrices, data[current, frequency, sample, channel], or several lists of vectors: T{i, j},
-    X{i, j}. Beside them stand vectors of conditions, one for every test or one for every dimension.
+    Lists within a list are cells of two conditions: T{i, j}, X{i, j}.
     """
     words = {k: v for k, v in tree.items() if isinstance(v, list) and all(isinstance(i, str) for i in v)}
     named = [[split_name(name).role for name in names] for names in words.values()]
     channels = {len(r): r.index("time") if "time" in r else None for r in named if len(r) - r.count(None) > 1}
     grids = {key: grid for key, value in tree.items() if (grid := _grid_of(value, channels))[1]}
-    shapes = {key: [tuple(n for n in item.shape if n > 1) for item in items] for key, (_, items) in grids.items()}
-    flat = {k: grids[k][1] if k in grids and isinstance(v, list) else v for k, v in tree.items()}
+    shapes = {key: [_shape(item) for item in items] for key, (_, items) in grids.items()}
     chosen = [key for key, of in shapes.items() if {len(shape) for shape in of} == {2}]
     vectors = [key for key, of in shapes.items() if {len(shape) for shape in of} == {1}]
     if not chosen and sum(split_name(key).role is not None for key in vectors) > 1:
         chosen = vectors if all(shapes[key] == shapes[vectors[0]] for key in vectors) else []
     if not chosen or len({grids[key][0] for key in chosen}) > 1 or (len(chosen) > 1 and chosen is not vectors):
-        return flat
-    outer, count = grids[chosen[0]][0], len(grids[chosen[0]][1])
-    at = np.indices(outer).reshape(len(outer), -1)
-    beside = {}
-    for key, value in tree.items():
-        value = value["data"] if isinstance(value, Mapping) and {*value} == {"name", "unit", "data"} else value
-        if isinstance(value, Array) and value.dtype.kind in "iuf" and key not in chosen:
-            shape = tuple(n for n in value.shape if n > 1)
-            if shape == outer:
-                beside[_of_one_test(key)] = np.reshape(value, -1)
-            elif len(shape) == 1 and outer.count(*shape) == 1:
-                beside[_of_one_test(key)] = np.reshape(value, -1)[at[outer.index(*shape)]]
-    rest = {k: v for k, v in flat.items() if k not in chosen and _of_one_test(k) not in beside and k not in words}
-    title = chosen[0] if len(chosen) == 1 else "test"
-    own = [
-        {**{k: grids[k][1][i] for k in chosen}, **words, **{k: float(v[i]) for k, v in beside.items()}}
-        for i in range(count)
-    ]
-    return {**rest, **{f"{title}_{i}": node for i, node in enumerate(own, 1)}}
+        return None
+    return {key: grids[key][1] for key in chosen}, grids[chosen[0]][0], words
 
 
 def _of_one_test(key: str) -> str:
@@ -135,68 +145,54 @@ def _of_one_test(key: str) -> str:
     return one if names_condition(split_name(one).name, "current") else key
 
 
-def _tests_of_arrays(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Split arrays over conditions and samples, force[current, frequency, time], into a node a test.
+def _tests_of_arrays(tree: Mapping[str, Any]) -> _Tests | None:
+    """Return the tests of arrays over conditions and samples: force[current, frequency, time].
 
     Two arrays or more, no two dimensions of one length, each but that of the samples with a vector of a condition.
     The time may be the same for all or some conditions: time[frequency, sample].
     """
-    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf" and v.size > 1}
-    shapes = {key: tuple(n for n in array.shape if n != 1) for key, array in numeric.items()}
+    numeric = _numeric(tree)
+    shapes = {key: _shape(array) for key, array in numeric.items()}
     shape = max(shapes.values(), key=len, default=())
     times = {own for key, own in shapes.items() if split_name(key).role == "time"}
     times -= {(min(shape),)} if len(shape) == 2 and len(times) > 1 else set()  # when each test began
     if len(shape) < 2 or len({*shape}) < len(shape) or len(times) != 1 or not {*max(times)} <= {*shape}:
-        return tree
+        return None
     samples = max(max(times))
-    outer = [n for n in shape if n != samples]
+    outer = tuple(n for n in shape if n != samples)
     tables = [key for key, own in shapes.items() if len(own) > 1 and samples in own and {*own} <= {*shape}]
     clocks = {key: numeric[key] for key, own in shapes.items() if own == (samples,)}
-    conditions = {key: outer.index(*own) for key, own in shapes.items() if len(own) == 1 and own[0] in outer}
-    if (
-        {*conditions.values()} != {*range(len(outer))}
-        or {*tables, *clocks, *conditions} != {*shapes}
-        or len(tables) < 2
-    ):
-        return tree
+    conditions = {own for own in shapes.values() if len(own) == 1 and own[0] in outer}
+    others = [key for key, own in shapes.items() if key not in (*tables, *clocks) and own not in conditions]
+    if len(conditions) < len(outer) or others or len(tables) < 2:
+        return None
     rows = []
     for key in tables:
         there = [n for n in (*outer, samples) if n in shapes[key]]
         array = np.transpose(np.squeeze(numeric[key]), [shapes[key].index(n) for n in there])
         array = np.reshape(array, [n if n in there else 1 for n in (*outer, samples)])
         rows.append(np.broadcast_to(array, (*outer, samples)).reshape(-1, samples))
-    own = []
-    for i, at in enumerate(np.ndindex(*outer)):
-        test = np.array([row[i] for row in rows])
-        values = {_of_one_test(key): float(np.reshape(numeric[key], -1)[at[of]]) for key, of in conditions.items()}
-        own.append({**clocks, **dict(zip(tables, test if clocks else _unpadded(test), strict=True)), **values})
-    rest = {key: value for key, value in tree.items() if key not in shapes}
-    return {**rest, **{f"test_{i}": node for i, node in enumerate(own, 1)}}
+    tests = [np.array(test) if clocks else _unpadded(np.array(test)) for test in zip(*rows, strict=True)]
+    return dict(zip(tables, zip(*tests, strict=True), strict=True)), outer, clocks
 
 
-def _concatenated_tests(tree: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Split tests behind each other in long arrays into a node a test, by an array of their numbers of samples."""
-    numeric = {k: v for k, v in tree.items() if isinstance(v, Array) and v.dtype.kind in "iuf" and v.size in v.shape}
+def _concatenated_tests(tree: Mapping[str, Any]) -> _Tests | None:
+    """Return the tests that stand behind each other in long arrays, by an array of their numbers of samples."""
+    numeric = {key: array for key, array in _numeric(tree).items() if array.size in array.shape}
     samples = max((array.size for array in numeric.values()), default=0)
     long = [key for key, array in numeric.items() if array.size == samples]
-    small = {key: array for key, array in numeric.items() if 1 < array.size < samples / FEWEST_SAMPLES}
+    small = {key: array for key, array in numeric.items() if array.size < samples / FEWEST_SAMPLES}
     places = {key: ends for key, array in small.items() if (ends := _ends_of(array, samples)) is not None}
     if len(places) != 1 or sum(split_name(key).role is not None for key in long) < 2:
-        return tree
-    ((counts, ends),) = places.items()
+        return None
+    (ends,) = places.values()
     parts = {key: np.split(np.reshape(numeric[key], -1), ends[:-1]) for key in long}
-    short = {key: array for key, array in numeric.items() if array.size == ends.size and key != counts}
-    values = {_of_one_test(key): np.reshape(array, -1) for key, array in short.items()}
+    conditions = [_of_one_test(key) for key, array in small.items() if array.size == ends.size and key not in places]
     clocks = [of for key, of in parts.items() if split_name(key).role == "time"]
     goes_on = any(after[0] > before[-1] for of in clocks for before, after in pairwise(of))
-    if goes_on and not any(names_condition(split_name(key).name, "current") for key in values):  # cycles of one test
-        return tree
-    own = [
-        {key: of[i] for key, of in parts.items()} | {key: float(of[i]) for key, of in values.items()}
-        for i in range(ends.size)
-    ]
-    rest = {key: value for key, value in tree.items() if key not in (*long, *short, counts)}
-    return {**rest, **{f"test_{i}": node for i, node in enumerate(own, 1)}}
+    if goes_on and not any(names_condition(split_name(key).name, "current") for key in conditions):
+        return None  # cycles of one test
+    return parts, (ends.size,), {}
 
 
 def _ends_of(array: Array, samples: int) -> np.ndarray | None:
