@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from types import ModuleType
 from typing import IO, Any
 
@@ -155,32 +156,29 @@ def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floa
         return np.array(array, dtype=np.float64)
 
 
-def expand(name: str, shape: tuple[int, ...]) -> list[tuple[str, int | None]]:
-    """Names of the columns of an array: one for a vector, numbered ones for a matrix, its samples the long way."""
-    inner = [n for n in shape if n != 1]
-    if len(inner) == 2 and inner[0] < inner[1] and inner[0] <= _MOST_ACROSS:
-        return [(name and f"{name}[{i + 1}]", i - inner[0]) for i in range(inner[0])]
-    if len(inner) == 2 and inner[1] <= MOST_COLUMNS:
-        return [(name and f"{name}[{i + 1}]", i) for i in range(inner[1])]
-    return [(name, None)] if len(inner) <= 1 else []
+def columns_of(name: str, array: Array, texts: Iterable[Sequence[str]]) -> list[tuple[str, str, Array]]:
+    """Return name, unit and values of each column of an array: one of a vector, a matrix with its samples the long way.
 
-
-def pick(array: Array, part: int | None) -> np.ndarray:
-    """Return the column of an array that `expand` named."""
-    if part is None:
-        return np.asarray(array)
-    across = np.squeeze(np.asarray(array))
-    return across[part] if part < 0 else across[:, part]
-
-
-def titles_of(width: int, texts: Iterable[Sequence[str]]) -> tuple[Sequence[str], Sequence[str]] | None:
-    """Names and units of a matrix's columns, where lists of words beside it hold one a column; else None."""
+    The columns of a matrix have the names and units of the texts beside it that hold one a column, else numbers.
+    """
+    inner, unit = [n for n in array.shape if n != 1], "s" if array.dtype.kind in "Mm" else ""
+    if len(inner) < 2 or array.dtype.kind == "O":
+        return [(name, unit, array)]
+    axis = 0 if inner[0] < inner[1] and inner[0] <= _MOST_ACROSS else 1
+    width = inner[axis]
+    if len(inner) > 2 or width > MOST_COLUMNS:
+        return []
     fitting = [words for words in texts if len(words) == width]
     names = [words for words in fitting if sum(split_name(word).role is not None for word in words) >= _TELLING]
     units = [words for words in fitting if 2 * sum(map(is_unit, words)) >= width and words not in names]
     if not names or any(other != names[0] for other in names):
-        return None
-    return names[0], units[0] if units else [""] * width
+        names, units = [[name and f"{name}[{i}]" for i in range(1, width + 1)]], []
+    parts = [Stored((inner[1 - axis],), array.dtype, partial(_part, array, i, axis)) for i in range(width)]
+    return list(zip(names[0], units[0] if units else [unit] * width, parts, strict=True))
+
+
+def _part(array: Array, i: int, axis: int) -> np.ndarray:
+    return np.take(np.squeeze(np.asarray(array)), i, axis)
 
 
 def unpacked(says: Mapping[str, Any], values: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tempfile
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -82,6 +82,13 @@ class Source:
         start = self.file.read(size)
         self.file.seek(0)
         return start
+
+    def rewritten(self, lines: Iterable[bytes], added: int = 0) -> Source:
+        """Return the file with other lines, the first so many of which it did not have."""
+        file = scratch(self.keep)
+        for line in lines:
+            file.write(line)
+        return replace(self, file=file, size=file.tell(), added=added)
 
     def refuse(
         self, code: str, problem: str, remedy: str = "", *, line: int | None = None, column: int | None = None

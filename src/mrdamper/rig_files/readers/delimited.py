@@ -5,14 +5,16 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from mrdamper.errors import printable
 from mrdamper.rig_files.column_names import Header, split_name
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words, scratch
+from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.cells import RowFormat, Spool, field_count, read_bulk, read_cells, split_rows
 from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
@@ -98,12 +100,11 @@ def _plain(source: Source) -> Source:
     arrived = len(lines) > 1 and all(map(_ARRIVED.match, lines))
     if not arrived and 2 * sum(map(bool, map(_LATEX_ROW.match, lines))) <= len(lines):
         return source
-    file = scratch(source.keep)
     source.file.seek(0)
-    for line in source.file:
-        plain = b"" if arrived else _LATEX.sub(lambda of: b"\t" if of[1] else of[2] or b"", line.rstrip()) + b"\n"
-        file.write(_ARRIVED.sub(b"", line) if arrived else plain)
-    return replace(source, file=file, size=file.tell())
+    if arrived:
+        return source.rewritten(_ARRIVED.sub(b"", line) for line in source.file)
+    cells = partial(_LATEX.sub, lambda of: b"\t" if of[1] else of[2] or b"")
+    return source.rewritten(cells(line.rstrip()) + b"\n" for line in source.file)
 
 
 def _with_keys_above(source: Source) -> Source:
@@ -113,8 +114,13 @@ def _with_keys_above(source: Source) -> Source:
     names, count = keys.most_common(1)[0] if keys else ((), 0)
     if count < max(_FEWEST_KEYED, 0.5 * len(lines)):
         return source
-    file, above = scratch(source.keep), b"\t".join(names) + b"\n"
     source.file.seek(0)
+    return source.rewritten(_under_names(source, names), added=1)
+
+
+def _under_names(source: Source, names: tuple[bytes, ...]) -> Iterator[bytes]:
+    """Yield the lines of a file, the first row of values below their names; other names in another unit are scaled."""
+    above = b"\t".join(names) + b"\n"
     for at, line in enumerate(source.file, 1):
         own, values = _keyed(line)
         if own != names and len(own) == len(names) and line.endswith(b"\n"):  # else the row may be cut
@@ -122,9 +128,8 @@ def _with_keys_above(source: Source) -> Source:
             if all(one.name == other.name for one, other in zip(*headers, strict=True)):
                 values = [_rescaled(*each, source, at) for each in zip(values, *headers, strict=True)]
                 own = names
-        file.write(above + b"\t".join(values) + b"\n" if own == names else line)
+        yield above + b"\t".join(values) + b"\n" if own == names else line
         above = b"" if own == names else above
-    return replace(source, file=file, size=file.tell(), added=1)
 
 
 def _keyed(line: bytes) -> tuple[tuple[bytes, ...], list[bytes]]:

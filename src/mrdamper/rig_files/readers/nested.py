@@ -18,7 +18,7 @@ import numpy as np
 
 from mrdamper.rig_files.column_names import KEYS, RATING, is_unit, parse_unit, split_name, words
 from mrdamper.rig_files.conditions import CELL, OTHER_DEVICE, stated_clock
-from mrdamper.rig_files.readers.arrays import Array, array_table, expand, pick, titles_of
+from mrdamper.rig_files.readers.arrays import Array, array_table, columns_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, RigFileError, Source
 from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES, MOST_ITEMS, with_tests_apart
 from mrdamper.rig_files.text.tokens import stamp
@@ -38,7 +38,6 @@ class _Column:
     name: str
     unit: str
     array: Array
-    part: int | None = None
     over: str = ""  # the channel that a column of time belongs to
 
 
@@ -52,6 +51,10 @@ class _Node:
     constants: dict[str, float] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     units: Mapping[str, str] = field(default_factory=dict)  # by column, as this node or one above states them
+
+    def add(self, key: str, array: Array) -> None:
+        """Add the columns of an array."""
+        self.columns += [_Column(*column) for column in columns_of(key, array, self.lists)]
 
 
 def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, together: bool = False) -> list[RawTable]:
@@ -102,18 +105,20 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     node.lists += [re.split(r"\s*[,;]\s*", text.strip()) for text in texts if len(text) < MOST_TEXT]
     inner: list[tuple[str, Any]] = [(key, {"column": tree[key]}) for key in _matrices_of_tests(tree)]
     tree = {key: value for key, value in tree.items() if key not in dict(inner)}
+    words = {k: v for k, v in tree.items() if isinstance(v, list) and all(isinstance(item, str) for item in v)}
+    rows = {key for key, of in words.items() if split_name(key).role is not None or len(of) in sizes}
+    node.lists += [of for key, of in words.items() if of and key not in rows]
     for key, value in _paired(tree, node.units).items():
-        if isinstance(value, list) and all(isinstance(item, str) for item in value):
-            if split_name(key).role is not None or len(value) in sizes:
-                node.columns += _across(key, np.array([word[:MOST_TEXT] for word in value]))
-            elif value:
-                node.lists.append(value)
+        if key in rows:
+            node.add(key, np.array([word[:MOST_TEXT] for word in value]))
+        elif key in words:
+            continue
         elif isinstance(value, list):
             inner += _items(key, value, node)
         elif isinstance(value, Array):
-            node.columns += _across(key, value)
+            node.add(key, value)
         elif isinstance(value, Mapping):
-            channel = _channel(key, value)
+            channel = _channel(key, value, node.lists)
             if channel:
                 node.columns += channel
             elif _is_plain(value):
@@ -266,7 +271,7 @@ def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[s
         problem = f"a list of {len(items)} objects or arrays that are no records of one form"
         remedy = f"export samples as records with the same keys, or tests, at most {MOST_ITEMS} a file"
         raise RigFileError("E_BLOCKS", problem, remedy=remedy)
-    channels = [_channel("", item) for item in mappings]
+    channels = [_channel("", item, node.lists) for item in mappings]
     if mappings and all(channels):
         node.columns += [column for channel in channels for column in channel]
         return []
@@ -275,7 +280,7 @@ def _items(key: str, items: list[Any], node: _Node) -> list[tuple[str, Mapping[s
     nodes = [(name, item) for name, item in nodes if not _is_plain(item)]
     arrays = [item for item in items if isinstance(item, Array)]
     for i, array in enumerate(arrays, 1):
-        node.columns += _across(f"{key}_{i}" if len(arrays) > 1 else key, array)
+        node.add(f"{key}_{i}" if len(arrays) > 1 else key, array)
     return nodes
 
 
@@ -331,7 +336,7 @@ def seconds_of(cells: Sequence[str]) -> Array | None:
     return np.array([own - whole[0] for own in whole]) / 1e9 if len(whole) == len(cells) else None
 
 
-def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
+def _channel(key: str, says: Mapping[str, Any], lists: list[list[str]]) -> list[_Column]:
     """Return the columns of a mapping that is one channel: its data, and its own x before it; empty if it is none."""
     lower = {name.casefold(): value for name, value in says.items()}
     timed = any(name in lower for name in KEYS["time_unit"])
@@ -362,16 +367,17 @@ def _channel(key: str, says: Mapping[str, Any]) -> list[_Column]:
     name = _title(stated or key)
     if split_name(name).role is None and split_name(key).role is not None:
         name = key
-    columns = [_Column(c.name, unit if parse_unit(unit) else "", c.array, c.part, name) for c in _across(name, data)]
+    known = unit if parse_unit(unit) else ""
+    columns = [_Column(title, own or known, part, name) for title, own, part in columns_of(name, data, lists)]
     stated_step = stated_clock({key: value for key, value in says.items() if isinstance(value, float)})
     if time is None and stated_step is not None:
         step, start, clock = stated_step
-        return [_Column("time", clock, start + step * np.arange(max(data.shape)), None, name), *columns]
+        return [_Column("time", clock, start + step * np.arange(max(data.shape)), name), *columns]
     if time is None or time.size != max(data.shape):
         return columns
     clock = _unit_of(lower, KEYS["time_unit"], "timeinfo") or ("s" if "timeinfo" in lower else "")
     clock = {"seconds": "s", "milliseconds": "ms"}.get(clock, clock)
-    return [_Column("time", clock, time, None, name), *columns]
+    return [_Column("time", clock, time, name), *columns]
 
 
 def _unit_of(lower: Mapping[str, Any], names: Sequence[str], inside: str) -> str:
@@ -422,30 +428,11 @@ def _tell(node: _Node, says: Mapping[str, Any], above: str) -> None:
             node.remarks.append(f"{key}: {value}"[:MOST_TEXT])
 
 
-def _across(key: str, array: Array) -> list[_Column]:
-    if array.dtype.kind == "O":
-        return [_Column(key, "", array)]
-    unit = "s" if array.dtype.kind in "Mm" else ""
-    return [_Column(name, unit, array, part) for name, part in expand(key, array.shape)]
-
-
 def _table(source: Source, node: _Node, title: str) -> RawTable:
-    columns: list[_Column] = []
-    arrays = {id(column.array): column.array for column in node.columns}
-    for key in arrays:
-        across = [column for column in node.columns if id(column.array) == key]
-        titles = titles_of(len(across), node.lists) if len(across) > 1 else None
-        for i, column in enumerate(across):
-            name, unit = (titles[0][i], titles[1][i]) if titles else (column.name, column.unit)
-            columns.append(replace(column, name=name, unit=unit))
-    columns = _one_time(columns)
+    columns = _one_time(node.columns)
     names, units = [column.name for column in columns], [column.unit for column in columns]
     over = tuple(column.over or column.name for column in columns) if any(c.over for c in columns) else ()
-
-    def load(column: int) -> np.ndarray:
-        return pick(columns[column].array, columns[column].part)
-
-    table = array_table(source, names, units, load, title)
+    table = array_table(source, names, units, lambda column: np.asarray(columns[column].array), title)
     return replace(table, label=node.label, constants=node.constants, remarks=tuple(node.remarks), over=over)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from mrdamper.rig_files.column_names import is_unit, split_name
 from mrdamper.rig_files.readers.arrays import array_table
-from mrdamper.rig_files.readers.base import RawTable, Source, scratch
+from mrdamper.rig_files.readers.base import RawTable, Source
 from mrdamper.rig_files.text.layout import cells_of
 from mrdamper.rig_files.text.tokens import looks_numeric, number
 
@@ -37,12 +37,8 @@ def as_plain_table(source: Source) -> Source:
         return source
     source.file.seek(0)
     text = source.file.read().decode("latin-1").replace("\r\n", "\n").replace("\r", "\n")
-    lines = list(way(text))
-    if not lines:
-        return source
-    file = scratch(source.keep)
-    file.write("\n".join([*lines, ""]).encode("latin-1"))
-    return replace(source, file=file, size=file.tell())
+    lines = [f"{line}\n".encode("latin-1") for line in way(text)]
+    return source.rewritten(lines) if lines else source
 
 
 def _arff(text: str) -> Iterator[str]:
