@@ -17,7 +17,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import InputError, MissingExtraError
-from mrdamper.rig_files.column_names import is_unit, split_name
+from mrdamper.rig_files.column_names import KEYS, is_unit, split_name
 from mrdamper.rig_files.readers.base import (
     MOST_COLUMNS,
     MOST_RATIO,
@@ -112,6 +112,13 @@ def text_of(item: object) -> str:
     if isinstance(item, bytes):
         return item.decode("utf-8", "replace").strip()
     return f"{item:g}" if isinstance(item, float) else "" if item is None else str(item).strip()
+
+
+def unit_in(says: Mapping[str, Any], of: str = "") -> str:
+    """Return the unit that attributes or properties state, of all or of one of them; of a time without its date."""
+    names = {name.casefold(): name for name in says}
+    stated = (text_of(says[names[key]]) for key in (f"{of.casefold()}{unit}" for unit in KEYS["unit"]) if key in names)
+    return next(filter(None, stated), "").partition(" since ")[0]
 
 
 def texts_in(values: Any) -> list[str]:

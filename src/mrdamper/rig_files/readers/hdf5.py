@@ -19,6 +19,7 @@ from mrdamper.rig_files.readers.arrays import (
     refusing_damage,
     text_of,
     texts_in,
+    unit_in,
     unpacked,
 )
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
@@ -29,7 +30,6 @@ from mrdamper.rig_files.readers.nested import DEEPEST, MOST_TEXT, nested_tables
 HDF5_MARK = b"\x89HDF\r\n\x1a\n"
 _MOST_OBJECTS = 10_000
 MOST_STRUCTS = 2000  # of an array of structs
-_UNIT_NAMES = ("units", "unit", "Units", "Unit", "UNIT", "UNITS", "unit_string")
 _OF_MATLAB = ("#refs#", "#subsystem#")  # what lies there is met where its reference stands
 
 
@@ -106,7 +106,7 @@ class _Walk:
             references = np.reshape(item[()], -1) if _is_matlab(item) else []
             cells = [self._at(item.file, r, depth) for r in references] if len(references) <= MOST_STRUCTS else []
             return {name: cells or np.empty(2, dtype=object)}
-        unit = next((text_of(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), "")
+        unit = unit_in(item.attrs)
         kind = getattr(h5py.check_vlen_dtype(item.dtype), "kind", "")  # of vectors of samples
         if kind and kind in "iuf" and len(item.shape) == 1 and len(item) <= MOST_STRUCTS:
             return {name: list(item[()]), f"{name}_unit": unit}
@@ -128,7 +128,6 @@ class _Walk:
         numbers = {key: number for key, number in _attributes(item).items() if isinstance(number, float)}
         packed = item.dtype.kind in "iu" and counts_of(item.attrs) is None
         says = {f"{name}_{key}": number for key, number in numbers.items()} if packed else {}
-        unit = unit.partition(" since ")[0]  # netCDF counts time from a date
         clock = {} if timed or stated_clock(numbers) is None else numbers
         channel = {"name": name, "unit": unit, "data": value, **clock} if unit or clock else value
         return {name: channel, **says, **lists}
@@ -198,7 +197,7 @@ def _attributes(item: Any) -> dict[str, Any]:
     for name in list(item.attrs)[:MOST_COLUMNS]:
         value = np.asarray(item.attrs[name])
         if value.size == 1 and value.dtype.kind in "iuf":
-            unit = next((text_of(item.attrs[f"{name}_{u}"]) for u in _UNIT_NAMES if f"{name}_{u}" in item.attrs), "")
+            unit = unit_in(item.attrs, f"{name}_")
             says[f"{name} [{unit}]" if is_unit(unit) else name] = float(value.reshape(-1)[0])
         elif value.size == 1 and value.dtype.kind in "SUO":
             says[name] = text_of(item.attrs[name])[:MOST_TEXT]

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.arrays import check_unpacked, refusing_damage, text_of, unpacked
+from mrdamper.rig_files.readers.arrays import check_unpacked, refusing_damage, text_of, unit_in, unpacked, value_of
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 
@@ -28,22 +26,11 @@ class NetCdf(Reader):
 
             source.file.seek(0)
             file = netcdf_file(source.file, mmap=False)
-            arrays = {name: variable for name, variable in file.variables.items() if np.prod(variable.shape) > 1}
-            check_unpacked(source, 8 * sum(int(np.prod(variable.shape)) for variable in arrays.values()))
-            single = {
-                f"{name} [{_unit_of(variable)}]": float(np.reshape(variable[...], -1)[0])
-                for name, variable in file.variables.items()
-                if variable.shape == () and np.asarray(variable.data).dtype.kind in "iuf"
-            }
+            variables = {name: variable for name, variable in file.variables.items() if np.prod(variable.shape)}
+            check_unpacked(source, 8 * sum(int(np.prod(variable.shape)) for variable in variables.values()))
+            arrays = {name: np.array(v[...]) for name, v in variables.items()}
             says = {name: text_of(value) for name, value in file._attributes.items()}
-            columns = {
-                name: unpacked(v._attributes, np.array(v[:]).astype(v[:].dtype.newbyteorder("=")))
-                for name, v in arrays.items()
-            }
-        units = {name: _unit_of(variable) for name, variable in arrays.items()}
-        return nested_tables(source, {**says, **columns, **single, "units": units}, self.title)
-
-
-def _unit_of(variable: Any) -> str:
-    """Return the unit of a variable: that of a time is followed by the date it counts from."""
-    return text_of(getattr(variable, "units", "")).partition(" since ")[0]
+        native = {name: array.astype(array.dtype.newbyteorder("=")) for name, array in arrays.items()}
+        columns = {name: value_of(unpacked(variables[name]._attributes, array)) for name, array in native.items()}
+        units = {name: unit_in(variable._attributes) for name, variable in variables.items()}
+        return nested_tables(source, {**says, **columns, "units": units}, self.title)

@@ -8,14 +8,13 @@ import numpy as np
 
 from mrdamper.rig_files.column_names import holds, words
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.arrays import Stored, check_unpacked, damaged, load, refusing_damage
+from mrdamper.rig_files.readers.arrays import Stored, check_unpacked, damaged, load, refusing_damage, unit_in
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import nested_tables
 
 # pyright: reportMissingImports=false
 
 _SCALES = words("scale")
-_UNIT_NAMES = ("unit_string", "NI_UnitDescription", "unit", "units", "Unit", "Units")
 
 
 class Tdms(Reader):
@@ -60,11 +59,12 @@ def _group(group: Any, properties: dict[str, Any]) -> dict[str, Any]:
 def _channel(channel: Any, clock: dict[str, float]) -> dict[str, Any]:
     kind = getattr(channel.dtype, "kind", "")
     dtype = channel.dtype if kind in "iufMm" else np.dtype("U1")
+    unit = "s" if kind in "Mm" else unit_in(channel.properties)
 
     def load() -> np.ndarray:
         return np.asarray(channel[:]) if kind in "iufMm" else np.empty(len(channel), dtype)
 
-    return {"name": channel.name, "unit": _unit(channel), "data": Stored((len(channel),), dtype, load), **clock}
+    return {"name": channel.name, "unit": unit, "data": Stored((len(channel),), dtype, load), **clock}
 
 
 def _clock(channel: Any, begin: Any) -> dict[str, float]:
@@ -75,9 +75,3 @@ def _clock(channel: Any, begin: Any) -> dict[str, float]:
         return {}
     later = (properties["wf_start_time"] - begin) / np.timedelta64(1, "s") if "wf_start_time" in properties else 0.0
     return {"dt [s]": float(step), "t0 [s]": offset + float(later)}
-
-
-def _unit(channel: Any) -> str:
-    if getattr(channel.dtype, "kind", "") in "Mm":
-        return "s"
-    return next((str(channel.properties[n]) for n in _UNIT_NAMES if channel.properties.get(n)), "")
