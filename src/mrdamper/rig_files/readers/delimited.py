@@ -16,7 +16,7 @@ from mrdamper.rig_files.column_names import Header, split_name
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words
 from mrdamper.rig_files.record import Finding
-from mrdamper.rig_files.text.cells import RowFormat, Spool, field_count, read_bulk, read_cells, split_rows
+from mrdamper.rig_files.text.cells import LINES, RowFormat, Spool, field_count, read_bulk, read_cells, split_rows
 from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
 from mrdamper.rig_files.text.programs import as_plain_table, turned_table
 from mrdamper.rig_files.text.stream import LONGEST_LINE, Block, TextStream, find_blocks, line_feeds, open_text, too_long
@@ -39,7 +39,6 @@ _KEYED = re.compile(
 )
 _FEWEST_KEYED = 20  # rows
 _HEAD_LINES = 4000  # in which the data must have begun
-_LINES = -1  # stands for a column of the numbers of lines
 BULK_FROM = 2**16  # bytes; below, reading cell by cell takes less time than loading the fast reader
 
 
@@ -175,17 +174,16 @@ def _read(stream: TextStream, layout: Layout, block: Block, columns: tuple[int, 
     block, findings = _without_footer(form, block)
     block, cut = _without_cut_row(form, block)
     findings += cut
-    spool, odd = Spool((*columns, _LINES), stream.source.keep), False
+    spool, odd = Spool((*columns, LINES), stream.source.keep), False
     fast = block.stop - block.start > BULK_FROM
     for chunk, at, line in stream.numbered(block.start, block.stop, block.line):
         stream.check(chunk, line)
         rows = read_bulk(chunk, line, form) if fast else None
-        rows = rows or read_cells(chunk, line, form, final=at + len(chunk) >= stream.stop)
-        spool.add({**rows.values, _LINES: rows.lines})
-        odd |= rows.odd
+        spool.add(rows or read_cells(chunk, line, form, final=at + len(chunk) >= stream.stop))
+        odd |= stream.is_odd(chunk)  # in a cell that was not asked for: others are refused
     form.refuse_wrong()
     values = spool.arrays()
-    lines = values.pop(_LINES)
+    lines = values.pop(LINES)
     if not lines.size:
         raise stream.source.refuse("E_NO_DATA", "a header without data", "export the file again")
     if form.messages:

@@ -27,15 +27,7 @@ _MOST_STRAY = 0.05  # above this share, reading the whole block cell by cell is 
 _ALLOWED = bytes(range(256))
 _COMMA_MARK = _ALLOWED.replace(b",", b"\0").replace(b".", b"\x01").replace(b"\0", b".")
 LARGE = 16 * 2**20  # bytes
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Rows:
-    """Cells of adjacent rows as numbers."""
-
-    values: dict[int, Floats]  # by column
-    lines: Floats  # (N,), of every row
-    odd: bool = False  # a cell that was not asked for holds bytes that are not in the text's encoding
+LINES = -1  # stands for a column of the numbers of lines
 
 
 @dataclass(eq=False, slots=True)
@@ -65,8 +57,8 @@ class RowFormat:
         CombinedError.raise_from(errors)
 
 
-def read_cells(block: bytes, line: int, form: RowFormat, *, final: bool = False) -> Rows:
-    """Read every row of a block of whole lines, which starts at a line and may be the text's final one.
+def read_cells(block: bytes, line: int, form: RowFormat, *, final: bool = False) -> dict[int, Floats]:
+    """Read the columns of a block of whole lines, which starts at a line and may be the text's final one.
 
     Raises at E_LINE_TOO_LONG, E_QUOTE and E_AMBIGUOUS; wrong cells and rows are kept by the form.
     """
@@ -74,12 +66,12 @@ def read_cells(block: bytes, line: int, form: RowFormat, *, final: bool = False)
     if max(map(len, raw)) > LONGEST_LINE:
         raise too_long(form.stream.source, line + next(i for i, r in enumerate(raw) if len(r) > LONGEST_LINE))
     rows, lines = split_rows(form.stream.decode(block).split("\n"), line, form, final)
-    values = {}
+    values = {LINES: np.array(lines, dtype=float)}
     for column in form.wanted:
         cells = [row[column] for row in rows]
         read = _stamps if form.layout.kinds[column] == "stamp" else _numbers
         values[column] = read(cells, column, lines, form)
-    return Rows(values, np.array(lines, dtype=float), form.stream.is_odd(block))
+    return values
 
 
 def field_count(form: RowFormat, fields: int, line: int, final: bool, text: str = "") -> RigFileError:
@@ -210,8 +202,8 @@ def _named(form: RowFormat, column: int) -> str:
     return f"column {form.layout.names[column][:40]!r}" if form.layout.names[column] else f"column {column + 1}"
 
 
-def read_bulk(block: bytes, line: int, form: RowFormat) -> Rows | None:
-    """Read a block of whole lines; None if it is not plain enough."""
+def read_bulk(block: bytes, line: int, form: RowFormat) -> dict[int, Floats] | None:
+    """Read the columns of a block of whole lines; None if it is not plain enough."""
     layout = form.layout
     slow = any(layout.kinds[c] == "stamp" or layout.behind[c] for c in form.wanted)
     if slow or layout.separator == SPACES or b'"' in block:
@@ -226,12 +218,11 @@ def read_bulk(block: bytes, line: int, form: RowFormat) -> Rows | None:
     for row in stray:
         start = int(ends[row - 1]) + 1 if row else 0
         cells = read_cells(block[start : int(ends[row])], line + int(row), form)
-        if not cells.lines.size:
+        if not cells[LINES].size:
             return None
         for value, column in zip(values, form.wanted, strict=True):
-            value[row] = cells.values[column][0]
-    lines = np.arange(line, line + ends.size, dtype=float)
-    return Rows(dict(zip(form.wanted, values, strict=True)), lines, form.stream.is_odd(block))
+            value[row] = cells[column][0]
+    return {LINES: np.arange(line, line + ends.size, dtype=float), **dict(zip(form.wanted, values, strict=True))}
 
 
 def _even_lines(block: bytes, separator: int, count: int) -> np.ndarray | None:
