@@ -319,6 +319,28 @@ def test_a_session_is_cut_at_rests_at_steps_of_the_current_and_where_the_logger_
     assert currents(read_runs(path)) == [0.0, 0.0, 0.5, 0.5]
 
 
+@pytest.mark.parametrize("kind", ["h5", "mat"])
+@pytest.mark.parametrize(
+    "places",
+    [("clock/t_s", "rod/x_mm", "cell/F_N"), ("rig/time_s", "rig/x_mm", "cell/F_N"), ("t_s", "rig/x_mm", "a/b/F_N")],
+)
+def test_channels_of_several_groups_follow_the_only_time(places, kind, tmp_path):
+    import h5py
+    from scipy.io import savemat
+
+    tree: dict = {}
+    with h5py.File(tmp_path / "run_0.5A.h5", "w") as file:
+        for place, values in zip(places, (T, X, force(0.5)), strict=True):
+            *groups, name = place.split("/")
+            node = tree
+            for group in groups:
+                node = node.setdefault(group, {})
+            node[name] = file[place] = values
+    savemat(tmp_path / "run_0.5A.mat", tree)
+    record = read_run(tmp_path / f"run_0.5A.{kind}")
+    np.testing.assert_allclose((record.time, 1e3 * record.displacement, record.force), (T, X, force(0.5)), atol=1e-9)
+
+
 def test_channels_of_other_lengths_in_one_group_are_no_table_of_results(tmp_path):
     import h5py
 

@@ -44,6 +44,8 @@ def test_a_clock_has_the_name_of_its_channel_in_any_language(tmp_path):
     head = "Čas_Síla [s];Síla [N];Čas_Zdvih [s];Zdvih [mm];Čas_Proud [s];Proud cívky [A]\n"
     (tmp_path / "mereni.csv").write_text(head + body, "utf-8")
     expect(tmp_path, 0.6)
+    (finding,) = (f for f in import_files(tmp_path).records[0].findings if f.code == "W_RASTER")
+    assert finding.text.endswith("the force's: Proud cívky")  # the clock of Zdvih is the same
 
 
 def test_a_sheet_of_means_over_the_tests_is_no_table_of_results(tmp_path):

@@ -111,7 +111,7 @@ def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
     tables = with_joined_rasters([with_time_stated(completed(with_channels_as_columns(table))) for table in tables])
     tables = [with_one_clock(table) for table in tables]
     forms = [form_of_tests(table, profile.file) for table in tables]
-    parts = [part for t, form in zip(tables, forms, strict=True) for part in ([t] if t.fallback else tests_of(t, form))]
+    parts = [part for t, form in zip(tables, forms, strict=True) for part in tests_of(t, form)]
     stated = {name: channel.column for name, channel in profile.channels.items() if channel.column is not None}
     timed = [with_integrated_velocity(with_unit_of_time(table)) for table in with_results(parts)]
     return [with_channels_by_physics(table, stated) for table in timed]
@@ -124,22 +124,17 @@ def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawT
     """
     if len(tables) == 1:
         return tables, []
-    first = None
-    for fallback in (False, True):
-        fitting: list[RawTable] = []
-        others: list[tuple[RawTable, InputError]] = []
-        for table in tables:
-            if table.fallback is not fallback:
-                continue
-            try:
-                assign(table, profile)
-                fitting.append(table)
-            except InputError as error:
-                others.append((table, error))
-        if fitting:
-            return fitting, [_incomplete(t, error) for t, error in others if _resembles_a_test(t, fitting, profile)]
-        first = first or next((error for _, error in others), None)
-    raise first or RigFileError("E_NO_DATA", "no table in this file")
+    fitting: list[RawTable] = []
+    others: list[tuple[RawTable, InputError]] = []
+    for table in tables:
+        try:
+            assign(table, profile)
+            fitting.append(table)
+        except InputError as error:
+            others.append((table, error))
+    if not fitting:
+        raise others[0][1] if others else RigFileError("E_NO_DATA", "no table in this file")
+    return fitting, [_incomplete(t, error) for t, error in others if _resembles_a_test(t, fitting, profile)]
 
 
 def _resembles_a_test(table: RawTable, tests: list[RawTable], profile: Profile) -> bool:

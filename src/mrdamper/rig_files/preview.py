@@ -122,7 +122,7 @@ def tree_lines(paths: Iterable[str | Path], profile: Profile | str | Path | None
         for path in files_in(given)[0]:
             try:
                 with raw_tables(path, profile.file) as tables:
-                    for table in [table for table in tables if not table.fallback]:
+                    for table in tables:
                         beside = [*(f"{name} = {value:g}" for name, value in table.constants.items()), *table.remarks]
                         names, _ = alike.setdefault(table.headers, ([], beside))
                         names.append(f"{path.name}: {table.label}" if table.label else path.name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache, lru_cache
 
@@ -42,29 +42,28 @@ def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
     """Tables of a file, those that hold channels of one test with clocks of their own joined to one table.
 
     Beside each other in one group lie a table of each channel, or of each sampling rate. They are joined
-    where none of them is a whole test, or where the one that is has no current and another holds it.
+    where none of them is a whole test, or where the one that is has no current and another holds it. Where no more
+    than one has a time, all follow it.
     """
     groups: dict[str, list[RawTable]] = {}
     for table in tables:
-        if not table.fallback:
-            groups.setdefault(table.label.rpartition("/")[0], []).append(table)
+        groups.setdefault(table.label.rpartition("/")[0], []).append(table)
     joined: dict[int, RawTable] = {}
     dropped: set[int] = set()
-    for label, members in groups.items():
-        timed = [table for table in members if table.columns("time")]
-        roles = [{h.channel for h in _named(table).headers} for table in timed]
+    for label, members in [*groups.items(), ("", tables)]:  # at last those that lie in groups of different depth
+        of = {table: {header.channel for header in _named(table).headers} - {None} for table in members}
+        timed = [table for table in of if table.columns("time")]
+        parts = timed if len(timed) > 1 else [*timed, *(t for t in of if of[t] and t not in timed)]
+        roles = [of[table] for table in parts]
         whole = [i for i, roles_of in enumerate(roles) if {"displacement", "force"} <= roles_of]
-        every = [role for roles_of in roles for role in roles_of if role not in ("time", None)]
+        every = [role for roles_of in roles for role in roles_of if role != "time"]
         needed = {"displacement", "force"} <= set(every) and len(set(every)) == len(every)
-        lacks = not whole or ("current" in every and "current" not in roles[whole[0]])
-        if len(timed) < 2 or len(whole) > 1 or not needed or not lacks:
+        lacks = not whole or ("current" in every and "current" not in roles[whole[0]] and len(timed) > 1)
+        if len(parts) < 2 or len(whole) > 1 or not needed or not lacks or not joined.keys().isdisjoint(map(id, parts)):
             continue
-        joined[id(timed[0])] = _joined(label, timed)
-        dropped |= {id(table) for table in timed[1:]}
-    if not joined:
-        return tables
-    kept = [table for table in tables if id(table) not in dropped and not table.fallback]
-    return [joined.get(id(table), table) for table in kept]
+        joined[id(parts[0])] = _joined(label, parts)
+        dropped |= {id(table) for table in parts[1:]}
+    return [joined.get(id(table), table) for table in tables if id(table) not in dropped]
 
 
 def _named(table: RawTable) -> RawTable:
@@ -73,16 +72,16 @@ def _named(table: RawTable) -> RawTable:
     names = [
         title if split_name(name).role is None and split_name(title).role is not None else name for name in table.names
     ]
-    return replace(table, names=tuple(names)) if len(table.names) == 2 else table
+    return replace(table, names=tuple(names)) if len(table.names) <= 2 else table
 
 
 def _joined(label: str, tables: Sequence[RawTable]) -> RawTable:
     """Return one table of several, the time of each before its channels."""
-    places = [
-        (_named(t), i)
-        for t in tables
-        for i in sorted(range(len(t.names)), key=lambda i, t=t: t.columns("time")[0] != i)
+    clocks = [table.columns("time")[:1] for table in tables]
+    orders = [
+        sorted(range(len(t.names)), key=lambda i, of=of: i not in of) for t, of in zip(tables, clocks, strict=True)
     ]
+    places = [(_named(table), i) for table, order in zip(tables, orders, strict=True) for i in order]
 
     def read(columns: Sequence[int]) -> Content:
         return Content({c: table.read([i]).values[i] for c, (table, i) in ((c, places[c]) for c in columns)})
@@ -144,32 +143,28 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
     def columns_of(columns: Sequence[int]) -> Content:
         return Content({i: on_clock(kept[i]) for i in columns})
 
-    names = sorted({table.headers[i].name for i in kept if owner.get(i, i) != clock and table.headers[i].channel})
+    apart = {other: _apart(table, clock, other) for other in {*owner.values()} - {clock}}
+    apart = {other: gap for other, gap in apart.items() if gap > _SAME}
+    names = sorted({table.headers[i].name for i in kept if owner.get(i) in apart and table.headers[i].channel})
     own, text = "on clocks of their own", f"interpolated onto the force's: {', '.join(names[:6])}"
-    apart = _apart(table, clock, {*owner.values()} - {clock})
-    if apart is not None and apart > _SAME:
-        own += f", up to {1e3 * apart:.4g} ms apart"
+    if max(apart.values(), default=np.inf) < np.inf:
+        own += f", up to {1e3 * max(apart.values()):.4g} ms apart"
     resampled_table = table.picked(kept, columns_of).named({0: ("time", table.headers[clock].unit)})
-    same = not names or (apart is not None and apart <= _SAME)
-    return resampled_table if same else resampled_table.noted(Finding("W_RASTER", f"{own}, {text}"))
+    return resampled_table.noted(Finding("W_RASTER", f"{own}, {text}")) if names else resampled_table
 
 
-def _apart(table: RawTable, clock: int, others: Iterable[int]) -> float | None:
-    """Largest difference of the stamps of a row between a clock and others [s]; None where they have no common rows."""
-    values = table.try_read(clock, *others)
-    if values is None:
-        return None
-    first, *rest = (_filled(values[i]) * table.headers[i].factor for i in (clock, *others))
-    if any(other.size != first.size for other in rest):
-        return None
-    return max((float(np.nanmax(np.abs(other - first))) for other in rest), default=0.0)
+def _apart(table: RawTable, clock: int, other: int) -> float:
+    """Largest difference of the stamps of a row between two clocks [s]; infinite where they have no common rows."""
+    values = table.try_read(clock, other)
+    first, second = (_filled(values[i]) * table.headers[i].factor if values else np.empty(0) for i in (clock, other))
+    return float(np.nanmax(np.abs(second - first))) if second.size == first.size > 0 else np.inf
 
 
 def _with_clocks_compared(table: RawTable) -> RawTable:
     """Note a second clock of a table that starts a little earlier or later than the one that all channels follow."""
     clocks = table.columns("time", "time")
-    apart = _apart(table, clocks[0], clocks[1:2]) if len(clocks) == 2 else None
-    if apart is None or not _SAME < apart < _TWO_STARTS:
+    apart = _apart(table, *clocks) if len(clocks) == 2 else 0.0
+    if not _SAME < apart < _TWO_STARTS:
         return table
     one, two = (table.headers[i].name for i in clocks)
     text = (

@@ -166,7 +166,6 @@ def with_results(tables: list[RawTable]) -> list[RawTable]:
     if results is not None and results.of_supply:
         return others
     if results is None:
-        tables = [table for table in tables if not table.fallback]
         stated = [(table, r) for table in tables if _may_be_results(table) and (r := results_in(lines_of(table)))]
         stated = [(table, results) for table, results in stated if not results.of_supply]
         beside = [table for table, _ in stated]

@@ -126,7 +126,6 @@ class RawTable:
     line: int | None = None  # of the header
     label: str = ""  # tells apart several tables of one file
     form: Mapping[str, str | int] = field(default_factory=dict)  # what was sniffed, in the words of `FileForm`
-    fallback: bool = False  # looked at only if no other table of the file holds a test
     constants: Mapping[str, float] = field(default_factory=dict)  # single numbers the file holds beside the columns
     odd: tuple[str, ...] = ()  # where it is known, what stands in a column instead of numbers, else empty
     remarks: tuple[str, ...] = ()  # what the file says beside the columns: lines above them, attributes, properties

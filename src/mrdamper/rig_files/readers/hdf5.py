@@ -43,7 +43,7 @@ class Hdf5(Reader):
     marks = (HDF5_MARK,)
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
-        """One table a group of datasets, and one of all together if no group holds a test."""
+        """One table a group of datasets."""
         return hdf5_tables(source, self.title)
 
 
@@ -54,7 +54,7 @@ def hdf5_tables(source: Source, title: str) -> list[RawTable]:
         file = h5py.File(source.path, "r")
         source.keep.callback(file.close)
         tree = _Walk(source).group(file, 0)
-    return nested_tables(source, tree, title, together=True)
+    return nested_tables(source, tree, title)
 
 
 class _Walk:

@@ -16,7 +16,7 @@ from mrdamper.rig_files.readers.nested import nested_tables
 
 
 class Mdf(Reader):
-    """One table a channel group with its master; all together if no group holds a test."""
+    """One table a channel group with its master."""
 
     name = "mdf"
     title = "MDF"
@@ -37,7 +37,7 @@ class Mdf(Reader):
             source, max((8 * channels[0]["data"].size for channels in groups.values() if channels), default=0)
         )
         tree = {name: {"channels": channels} for name, channels in groups.items() if len(channels) > 1}
-        return nested_tables(source, tree, self.title, together=True)
+        return nested_tables(source, tree, self.title)
 
 
 def _channels(file: Any, group: int) -> list[dict[str, Any]]:

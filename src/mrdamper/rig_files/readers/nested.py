@@ -57,22 +57,14 @@ class _Node:
         self.columns += [_Column(*column) for column in columns_of(key, array, self.lists)]
 
 
-def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, together: bool = False) -> list[RawTable]:
-    """Return the tables of a nested structure, in the order they appear; E_NO_DATA or E_UNSAFE if it holds no array.
-
-    The columns of all of them `together` are one more, for files with a node for each channel, if no node holds a test.
-    """
-    every = list(_walk(tree, _Node("")))
-    nodes = [node for node in every if node.columns]
+def nested_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[RawTable]:
+    """Return the tables of a nested structure, in the order they appear; E_NO_DATA or E_UNSAFE if it holds no array."""
+    nodes = [node for node in _walk(tree, _Node("")) if node.columns]
     objects = [column.name for node in nodes for column in node.columns if column.array.dtype == object]
     if not any(column.array.dtype != object for node in nodes for column in node.columns):
         code, what = ("E_UNSAFE", f"only objects ({objects[0]})") if objects else ("E_NO_DATA", "no array of numbers")
         raise source.refuse(code, what, "save the channels as arrays of numbers")
-    tables = [_table(source, node, title) for node in nodes]
-    if together and len(nodes) > 1:
-        whole = replace(every[0], columns=[column for node in nodes for column in node.columns], remarks=[])
-        tables.append(replace(_table(source, whole, title), fallback=True))
-    return tables
+    return [_table(source, node, title) for node in nodes]
 
 
 def document_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[RawTable]:
