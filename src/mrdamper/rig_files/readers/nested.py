@@ -359,8 +359,8 @@ def _channel(key: str, says: Mapping[str, Any], lists: list[list[str]]) -> list[
     name = _title(stated or key)
     if split_name(name).role is None and split_name(key).role is not None:
         name = key
-    known = unit if parse_unit(unit) else ""
-    columns = [_Column(title, own or known, part, name) for title, own, part in columns_of(name, data, lists)]
+    unit = unit if parse_unit(unit) else ""
+    columns = [_Column(title, own or unit, part, name) for title, own, part in columns_of(name, data, lists)]
     stated_step = stated_clock({key: value for key, value in says.items() if isinstance(value, float)})
     if time is None and stated_step is not None:
         step, start, clock = stated_step
