@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 T = TypeVar("T", bound=np.generic)
-CHUNK = 2**20  # samples
+CHUNK = 2**18  # samples
 
 
 def chunks(values: NDArray[T], overlap: int = 0) -> Iterator[tuple[int, NDArray[T]]]:

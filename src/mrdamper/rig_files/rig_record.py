@@ -281,8 +281,7 @@ def _aligned(channels: dict[str, Floats], assigned: dict[str, Assigned], lines):
     """Take known delays off, by linear interpolation; samples without a partner are left out."""
     delays = {name: entry.delay for name, entry in assigned.items() if entry.delay and name != "time"}
     time = channels["time"]
-    finite = np.isfinite(time)
-    if not delays or not finite.any():
+    if not delays or not (finite := np.isfinite(time)).any():
         return channels, lines
     shifted = {
         name: np.interp(time + delay, time[finite], channels[name][finite], left=np.nan, right=np.nan)
