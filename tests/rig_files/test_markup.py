@@ -96,7 +96,8 @@ def test_samples_units_and_current_of_a_document(tmp_path, name, text, encoding)
     ("text", "code"),
     [
         ('<?xml version="1.0"?><!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>', "E_UNSAFE"),
-        ("<a>" * 10**5, "E_FORMAT"),
+        ("<a>" * 10**5 + "</a>" * 10**5, "E_FORMAT"),
+        ("<a>" * 10**5, "E_TRUNCATED"),
         (_records()[:-20], "E_FORMAT"),
         ('<?xml version="1.0" encoding="klingon"?><a/>', "E_FORMAT"),
         (_workbook().replace('ss:Index="4"', 'ss:Index="nan"'), "E_FORMAT"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, lru_cache, partial
 from itertools import pairwise
@@ -102,24 +103,16 @@ def _rows_of(codes: np.ndarray, code: int) -> slice | np.ndarray:
 
 def _remembered(table: RawTable) -> Callable[[tuple[int, ...]], Content]:
     """Keep the table's columns while its tests are taken out one by one; of a small file all are read in one pass."""
-    if table.source.size > _SMALL:
-        return lru_cache(maxsize=2)(lambda columns: table.read(columns))
+    read = lru_cache(maxsize=3)(lambda columns: table.read(columns))
+    every = tuple(i for i, header in enumerate(table.headers) if header.role is not None or header.dimension)
 
-    @cache
-    def every() -> Content | None:
-        try:
-            return table.read(
-                [i for i, header in enumerate(table.headers) if header.role is not None or header.dimension]
-            )
-        except InputError:
-            return None  # one of them cannot be read, which matters only if it is asked for
+    def remembered(columns: tuple[int, ...]) -> Content:
+        if table.source.size <= _SMALL and {*columns} <= {*every}:
+            with suppress(InputError):  # one of them cannot be read, which matters only if it is asked for
+                return read(every)
+        return read(columns)
 
-    @lru_cache(maxsize=2)
-    def read(columns: tuple[int, ...]) -> Content:
-        result = every()
-        return result if result is not None and set(columns) <= set(result.values) else table.read(columns)
-
-    return read
+    return remembered
 
 
 def _part(

@@ -34,7 +34,7 @@ from mrdamper.rig_files.mapping.scales import (
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding
-from mrdamper.rig_files.text.elements import Elements, numbers_in
+from mrdamper.rig_files.text.elements import numbers_in, root_of, tree_of
 from mrdamper.rig_files.text.stream import decoded
 
 _MOST = 200  # lines
@@ -274,12 +274,6 @@ def _by_headings(lines: list[str]) -> list[str]:
     return written
 
 
-def _elements(text: str) -> dict[str, Any]:
-    elements = Elements()
-    elements.read(text)
-    return elements.root
-
-
 @lru_cache(maxsize=16)  # every file of a folder asks
 def _tree_of_yaml(text: str) -> Any:
     """Return what the documents of a YAML text hold, its numbers as those of other texts: 010 is ten, on is a word.
@@ -307,7 +301,7 @@ def _with_numbers(node: Any) -> Any:
 
 
 _STRUCTURED: Mapping[str, Callable[[str], Any]] = MappingProxyType(
-    {".json": json.loads, ".xml": _elements, ".yaml": _tree_of_yaml, ".yml": _tree_of_yaml}
+    {".json": json.loads, ".xml": lambda text: tree_of(root_of(text)), ".yaml": _tree_of_yaml, ".yml": _tree_of_yaml}
 )
 
 

@@ -12,7 +12,7 @@ from mrdamper.rig_files.readers.arrays import refusing_damage, whole
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import document_tables
 from mrdamper.rig_files.readers.workbook import as_text, tables_of_sheets
-from mrdamper.rig_files.text.elements import Elements, Sheets, numbers_in
+from mrdamper.rig_files.text.elements import Sheets, numbers_in, root_of, sheets_of, tree_of
 
 _BEGINS = re.compile(rb"\s*<[?!A-Za-z]")
 _PAGE = re.compile(rb"\s*(?:<!--.*?-->\s*)?<(?:!doctype\s+html|html|head|body|table|meta)\b", re.IGNORECASE | re.DOTALL)
@@ -37,12 +37,10 @@ class Markup(Reader):
             page = _Page()
             page.feed(content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8", "replace"))
             return _of_cells(source, page.sheets, form)
-        elements = Elements()
         with refusing_damage(source, self.title):
-            elements.read(content)
-        if elements.sheets:
-            return _of_cells(source, elements.sheets, form)
-        return document_tables(source, elements.root, self.title)
+            root = root_of(content)
+            sheets, tree = sheets_of(root), tree_of(root)
+        return _of_cells(source, sheets, form) if sheets else document_tables(source, tree, self.title)
 
 
 def _plain(head: bytes) -> bytes:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from typing import Any
 from xml.etree import ElementTree
 
@@ -22,72 +21,66 @@ _MOST_LEVELS = 100
 Sheets = list[tuple[str, list[list[str]]]]  # rows of cells by the name of the sheet
 
 
-class Elements:
-    """A target of the parser that keeps the value of every element, and the cells of workbooks of Excel 2003."""
-
-    def __init__(self) -> None:
-        self.root: dict[str, Any] = {}
-        self.sheets: Sheets = []
-        self._levels: list[tuple[dict[str, Any], dict[str, list[Any]], list[str]]] = [({}, {}, [])]
-
-    def read(self, content: bytes | str) -> None:
-        """Read a text; raises `RigFileError` if it may be hostile, `SyntaxError` if it is no XML."""
-        parser = ElementTree.XMLParser(target=self)
-        parser.feed(content)
-        parser.close()
+class _Builder(ElementTree.TreeBuilder):
+    """Builder of elements without a document type, which defines entities."""
 
     def doctype(self, name: str, public: str | None, system: str | None) -> None:
-        """Refuse a document type: it defines entities."""
+        """Refuse a document type."""
         raise RigFileError("E_UNSAFE", f"XML with a document type ({name})", remedy="export it without one")
 
-    def start(self, tag: str, attributes: Mapping[str, str]) -> None:
-        """Begin an element, or a sheet or row of a workbook."""
-        if len(self._levels) > _MOST_LEVELS:
-            raise RigFileError("E_FORMAT", "XML nested too deeply", remedy="export it as CSV")
-        own = {_local(key): numbers_in(text) for key, text in attributes.items()}
-        self._levels.append((own, {}, []))
-        if tag == f"{_SHEETS}Worksheet":
-            self.sheets.append((str(own.get("Name", "")), []))
-        elif tag == f"{_SHEETS}Row" and self.sheets:
-            rows = self.sheets[-1][1]
-            rows += [[] for _ in range(min(_place(own) - len(rows), MOST_COLUMNS))] or [[]]
 
-    def data(self, text: str) -> None:
-        """Add to the text of the element."""
-        self._levels[-1][2].append(text)
-
-    def end(self, tag: str) -> None:
-        """Hand the value of the element to the one around it."""
-        own, within, texts = self._levels.pop()
-        if self.sheets and tag.startswith(_SHEETS):
-            rows = self.sheets[-1][1]
-            if tag == f"{_SHEETS}Cell" and rows:
-                rows[-1] += [""] * min(_place(own) - len(rows[-1]) - 1, MOST_COLUMNS)
-                rows[-1].append(str(within.get("Data", [""])[0]))
-            elif tag == f"{_SHEETS}Data":
-                self._levels[-1][1]["Data"] = ["".join(texts).strip()]
-            return
-        value = numbers_in("".join(texts).strip())
-        inner = {name: _together(values) for name, values in within.items()}
-        name = _local(tag)
-        units = [u for key, u in own.items() if key.casefold() in KEYS["unit"] and isinstance(u, str) and is_unit(u)]
-        if isinstance(value, float) and len(units) == len(own) == 1 and not inner:
-            name = f"{name} [{units[0]}]"
-        elif own or inner:
-            text = {"data" if isinstance(value, np.ndarray) else "value": value}
-            value = {**own, **inner, **({} if isinstance(value, str) and not value else text)}
-        self._levels[-1][1].setdefault(name, []).append(value)
-
-    def close(self) -> None:
-        """Take what the outermost element holds."""
-        self.root = {name: _together(values) for name, values in self._levels[0][1].items()}
-        self.root = next((value for value in self.root.values() if isinstance(value, dict)), self.root)
+def root_of(content: bytes | str) -> ElementTree.Element:
+    """Return the outermost element; raises `RigFileError` if it may be hostile, `SyntaxError` if it is no XML."""
+    parser = ElementTree.XMLParser(target=_Builder())
+    parser.feed(content)
+    return parser.close()
 
 
-def _place(attributes: Mapping[str, Any]) -> int:
-    """Return the number of a row or cell, where the workbook states it because others before it are empty."""
-    stated = attributes.get("Index", 0)
-    return int(stated) if isinstance(stated, float) else 0
+def tree_of(root: ElementTree.Element) -> dict[str, Any]:
+    """Return the values of the outermost element by name."""
+    name, value = _value(root)
+    return value if isinstance(value, dict) else {name: value}
+
+
+def _value(element: ElementTree.Element, depth: int = 0) -> tuple[str, Any]:
+    """Return the name and the value of an element: what it lists, or its attributes and the elements within it."""
+    if depth > _MOST_LEVELS:
+        raise RigFileError("E_FORMAT", "XML nested too deeply", remedy="export it as CSV")
+    own = {_local(key): numbers_in(text) for key, text in element.attrib.items()}
+    within: dict[str, list[Any]] = {}
+    for name, value in (_value(child, depth + 1) for child in element):
+        within.setdefault(name, []).append(value)
+    inner = {name: _together(values) for name, values in within.items()}
+    name, texts = _local(element.tag), (element.text, *(child.tail for child in element))
+    value = numbers_in("".join(filter(None, texts)).strip())
+    units = [u for key, u in own.items() if key.casefold() in KEYS["unit"] and isinstance(u, str) and is_unit(u)]
+    if isinstance(value, float) and len(units) == len(own) == 1 and not inner:
+        name = f"{name} [{units[0]}]"
+    elif own or inner:
+        text = {"data" if isinstance(value, np.ndarray) else "value": value}
+        value = {**own, **inner, **({} if isinstance(value, str) and not value else text)}
+    return name, value
+
+
+def sheets_of(root: ElementTree.Element) -> Sheets:
+    """Return the cells of a workbook of Excel 2003; the place of some is stated because others before are empty."""
+    sheets: Sheets = []
+    for sheet in root.iter(f"{_SHEETS}Worksheet"):
+        rows: list[list[str]] = []
+        for row in sheet.iter(f"{_SHEETS}Row"):
+            rows += [[] for _ in range(_omitted(row, rows))]
+            cells: list[str] = []
+            for cell in row.iter(f"{_SHEETS}Cell"):
+                data = cell.find(f"{_SHEETS}Data")
+                cells += [""] * _omitted(cell, cells)
+                cells.append("" if data is None else "".join(data.itertext()).strip())
+            rows.append(cells)
+        sheets.append((sheet.get(f"{_SHEETS}Name", ""), rows))
+    return sheets
+
+
+def _omitted(element: ElementTree.Element, before: list[Any]) -> int:
+    return min(max(int(float(element.get(f"{_SHEETS}Index", 0))) - len(before) - 1, 0), MOST_COLUMNS)
 
 
 def _local(name: str) -> str:
