@@ -10,7 +10,7 @@ from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import check_unpacked, refuse_twice, refusing_damage, texts_in, value_of
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, MOST_STRUCTS, hdf5_tables
-from mrdamper.rig_files.readers.nested import DEEPEST, nested_tables
+from mrdamper.rig_files.readers.nested import nested_tables
 
 _NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 _OBJECTS = ("object", "opaque", "function", "unknown")
@@ -45,37 +45,26 @@ class Matlab(Reader):
             check_unpacked(source, 8 * sum(int(np.prod(shape, dtype=object)) for _, shape, _ in variables))
             wanted = [name for name, _, kind in variables if kind in (*_NUMERIC, "struct", "char", "cell")]
             source.file.seek(0)
-            values = loadmat(
-                source.file, variable_names=wanted, struct_as_record=True, verify_compressed_data_integrity=True
-            )
+            values = loadmat(source.file, variable_names=wanted, simplify_cells=True)
         others = [name for name, _, kind in variables if kind in _OBJECTS]
         tree = {name: _tree(values[name]) for name in wanted if name in values}
         objects = {name: np.empty(2, dtype=object) for name in others}  # refused if one is asked for
         return nested_tables(source, {**tree, **objects}, self.title)
 
 
-def _tree(value: Any, depth: int = 0) -> Any:
+def _tree(value: Any) -> Any:
     """Return a variable as a nested structure: mappings for structs, lists for arrays of them and for cells."""
+    if isinstance(value, dict):
+        return {name: _tree(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_tree(item) for item in value[:MOST_STRUCTS]]
     array = np.asarray(value)
-    kind, size = array.dtype.kind, array.size
-    if array.dtype.names:
-        names = array.dtype.names
-        items = array.reshape(-1)[:MOST_STRUCTS] if depth < DEEPEST else []
-        members = [{name: _tree(item[name], depth + 1) for name in names} for item in items]
-        return members[0] if len(members) == 1 else members
     if words := texts_in(array):
         return words
-    if kind == "O" and size and depth < DEEPEST:
-        cells = [np.asarray(cell) for cell in array.flat]
-        if size == 1:
-            return _tree(cells[0], depth + 1)
-        if all(cell.dtype.names for cell in cells) or all(cell.dtype.kind in "iuf" and cell.size > 1 for cell in cells):
-            trees = [_tree(cell, depth + 1) for cell in cells[:MOST_STRUCTS]]
-            if cells[0].dtype.names or array.ndim != 2 or min(array.shape) < 2 or size > MOST_STRUCTS:
-                return trees
-            return [trees[i : i + array.shape[1]] for i in range(0, size, array.shape[1])]
-        return array
-    return value_of(array) if size else ""
+    if array.dtype.kind == "O" and 0 < array.size <= MOST_STRUCTS and array.ndim:
+        cells = [_tree(cell) for cell in array]
+        return array if any(isinstance(cell, (str, float)) for cell in cells) else cells
+    return value_of(array) if array.size else ""
 
 
 def _is_version_4(head: bytes) -> bool:
