@@ -376,10 +376,5 @@ def _units(table: RawTable, words: Words, column: list[int]) -> list[str] | None
     if not column or table.words is None:
         return [""] * len(words.labels)
     stated = table.words(column[0])
-    units = []
-    for code in range(len(words.labels)):
-        codes = np.unique(stated.codes[words.codes == code])
-        if codes.size != 1:
-            return None
-        units.append(stated.labels[codes[0]].strip("[]() "))
-    return units
+    pairs = np.unique(np.column_stack([words.codes, stated.codes]), axis=0)
+    return [stated.labels[unit].strip("[]() ") for _, unit in pairs] if len(pairs) == len(words.labels) else None

@@ -304,7 +304,5 @@ def damaged(source: Source, title: str, why: str) -> RigFileError:
 
 def _seconds(array: np.ndarray) -> Floats:
     """Seconds after the first stamp, by integers: doubles cannot hold the nanoseconds of a date."""
-    missing = np.isnat(array)
-    whole = array.astype("datetime64[ns]" if array.dtype.kind == "M" else "timedelta64[ns]").astype(np.int64)
-    first = whole[~missing][0] if not missing.all() else 0
-    return np.where(missing, np.nan, (whole - first) / 1e9)
+    since = array - array[np.argmin(np.isnat(array))] if array.size else array.astype("timedelta64[ns]")
+    return since.astype("timedelta64[ns]") / np.timedelta64(1, "s")

@@ -157,11 +157,9 @@ def _with_whole_quotes(lines: list[str]) -> list[str]:
     for i, line in enumerate(lines[:_HEADER_LINES]):
         if line.count('"') % 2 == 0 or is_comment(line):
             continue
-        parts = [line]
         for j in range(i + 1, min(i + _BREAKS + 1, len(lines))):
-            parts.append(lines[j])
-            if sum(part.count('"') for part in parts) % 2 == 0:
-                whole = " ".join(parts)
+            whole = " ".join(lines[i : j + 1])
+            if whole.count('"') % 2 == 0:
                 if not any(looks_numeric(cell) for cell in whole.replace('"', "").replace(";", ",").split(",")):
                     lines[i:j] = [""] * (j - i)
                     lines[j] = whole
