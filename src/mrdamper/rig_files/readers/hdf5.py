@@ -114,9 +114,8 @@ class _Walk:
         if not isinstance(value, Stored):
             stated = f"{name} [{unit}]" if isinstance(value, float) and is_unit(unit) else name
             return {stated: value} if value is not None else {}
-        lists = {
-            f"{name} {key}": words for key in list(item.attrs)[:MOST_COLUMNS] if (words := texts_in(item.attrs[key]))
-        }
+        attributes = _attributes(item)
+        lists = {f"{name} {key}": words for key, words in attributes.items() if isinstance(words, list)}
         if item.dtype.names:  # a table of records states its conditions itself
             units = next((w for w in lists.values() if len(w) == len(item.dtype.names) and any(map(is_unit, w))), None)
             fields: dict[str, Any] = {
@@ -124,8 +123,8 @@ class _Walk:
                 for field in item.dtype.names
             }
             fields |= {"units": dict(zip(item.dtype.names, units, strict=True))} if units else {}
-            return {**_attributes(item), **fields} if alone else {name: {**_attributes(item), **fields}}
-        numbers = {key: number for key, number in _attributes(item).items() if isinstance(number, float)}
+            return attributes | fields if alone else {name: attributes | fields}
+        numbers = {key: number for key, number in attributes.items() if isinstance(number, float)}
         packed = item.dtype.kind in "iu" and counts_of(item.attrs) is None
         says = {f"{name}_{key}": number for key, number in numbers.items()} if packed else {}
         clock = {} if timed or stated_clock(numbers) is None else numbers
