@@ -54,7 +54,9 @@ class _Node:
 
     def add(self, key: str, array: Array) -> None:
         """Add the columns of an array."""
-        self.columns += [_Column(*column) for column in columns_of(key, array, self.lists)]
+        unit = self.units.get(key, "")
+        columns = columns_of(key, array, self.lists)
+        self.columns += [_Column(name, own or (unit if parse_unit(unit) else ""), part) for name, own, part in columns]
 
 
 def nested_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[RawTable]:
@@ -86,12 +88,10 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     texts = [value for value in tree.values() if isinstance(value, _JsonText)]
     lists = {f"{key} ": own.pop(key) for own in texts for key in list(own) if isinstance(own[key], list)}
     tree |= {key: own for key, own in lists.items() if all(isinstance(item, str) for item in own)}
-    keys = {"name", "unit", "data"}
-    channels = {key: value for key, value in tree.items() if isinstance(value, Mapping) and {*value} == keys}
-    data = {key: channel["data"] for key, channel in channels.items()}
-    apart = with_tests_apart({**tree, **data})
-    tree = _with_own_axes({k: channels[k] if k in data and v is data[k] else v for k, v in apart.items()})
-    node.units = {**node.units, **_stated_units(tree), **_units({key: of["unit"] for key, of in channels.items()})}
+    keys = {"name", "unit", "data"}  # of an array with its unit
+    channels = {k: of for k, of in tree.items() if isinstance(of, Mapping) and {*of} == keys and of["name"] == k}
+    tree = _with_own_axes(with_tests_apart({**tree, **{key: channel["data"] for key, channel in channels.items()}}))
+    node.units = {**node.units, **_stated_units(tree), **{key: str(of["unit"]) for key, of in channels.items()}}
     sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= FEWEST_SAMPLES}
     texts = [_LISTING.sub("", value) for value in tree.values() if isinstance(value, str)]
     node.lists += [re.split(r"\s*[,;]\s*", text.strip()) for text in texts if len(text) < MOST_TEXT]
@@ -240,10 +240,8 @@ def _paired(tree: Mapping[str, Any], units: Mapping[str, str]) -> Mapping[str, A
         if key in pairs:
             partners[key] = {**tree[pairs[key]], "data": value}
         elif isinstance(value, Array) and key in clocks and isinstance(tree[clocks[key]], Array):
-            own = {"name": key, "unit": units.get(key, ""), "data": value, "time": tree[clocks[key]]}
-            partners[key] = {**own, "timeunit": "s"} if seconds else own
-        elif isinstance(value, Array) and key in units:
-            partners[key] = {"name": key, "unit": units[key], "data": value}
+            clock = {"time": tree[clocks[key]], "timeunit": units.get(clocks[key], "s" if seconds else "")}
+            partners[key] = {"name": key, "unit": units.get(key, ""), "data": value, **clock}
         elif key not in used:
             partners[key] = value
     return partners
