@@ -69,24 +69,9 @@ def as_it_is(path: Path) -> Iterator[Source]:
 
 def is_plain_zip(source: Source) -> bool:
     """Tell if the content is a zip that is not itself a document or a NumPy file."""
-    if not source.head().startswith((b"PK\x03\x04", b"PK\x05\x06")):
-        return False
-    if source.suffix in (".xlsx", ".xlsm", ".xlsb", ".ods", ".npz"):
-        return False
-    names = zipped_names(source)
-    return names is None or not (is_workbook(names) or is_arrays(names))
-
-
-def zipped_names(source: Source) -> list[str] | None:
-    """Names of the members of a zip; None if it cannot be read."""
-    source.file.seek(0)
-    try:
-        with zipfile.ZipFile(source.file) as archive:
-            return archive.namelist()
-    except UNREADABLE_ZIP:
-        return None
-    finally:
-        source.file.seek(0)
+    kinds = ((is_workbook, (".xlsx", ".xlsm", ".xlsb", ".ods")), (is_arrays, (".npz",)))
+    is_zip = source.head().startswith((b"PK\x03\x04", b"PK\x05\x06"))
+    return is_zip and not any(is_zip_of(source, *kind) for kind in kinds)
 
 
 def is_workbook(names: list[str]) -> bool:
@@ -104,8 +89,13 @@ def is_zip_of(source: Source, holds: Callable[[list[str]], bool], suffixes: Sequ
     """Tell if the content is a zip of such members, or a damaged zip of such a name."""
     if source.head(2) != b"PK":
         return False
-    names = zipped_names(source)
-    return source.suffix in suffixes if names is None else holds(names)
+    try:
+        with zipfile.ZipFile(source.file) as archive:
+            return holds(archive.namelist())
+    except UNREADABLE_ZIP:
+        return source.suffix in suffixes
+    finally:
+        source.file.seek(0)
 
 
 @contextlib.contextmanager
