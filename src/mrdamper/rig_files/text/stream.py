@@ -35,6 +35,7 @@ _MULTIBYTE = ("cp932", "gb18030", "cp949", "big5", "shift_jis", "euc_jp", "gbk",
 _NAMES = 16 * 1024  # bytes in which the names of columns stand
 _TEXT = bytes(b for b in range(256) if b >= 32 or b in b"\t\n\r\f\v")
 _CTRL_Z = b"\x1a"
+_BLANK = b" \t\r\n\xef\xbb\xbf\xff\xfe" + _CTRL_Z  # and marks of the order of bytes
 _SEGMENT = re.compile(r"(?:Channels|Samples|Date|Time|Y_Unit_Label|X_Dimension|X0|Delta_X|\*{3}End_of_Header)\b")
 _STATED = re.compile(
     rb"(?m)^[ \t]*(?:[#%\"A-Za-z]|//)[^\n]*[0-9] ?(?:m?A|amp)[^\n]*"
@@ -128,7 +129,7 @@ def line_feeds(block: bytes) -> int:
 def open_text(source: Source, form: FileForm) -> TextStream:
     """Find the encoding, and give the text as UTF-8 or as it is."""
     head = source.head(_HEAD)
-    if not head.strip(b" \t\r\n"):
+    if not head.strip(_BLANK):
         raise source.refuse("E_EMPTY", "the file is empty", "export it again")
     encoding, mark = _encoding(source, head, form)
     file, size, start = source.file, source.size, mark
@@ -138,10 +139,7 @@ def open_text(source: Source, form: FileForm) -> TextStream:
         start, inner = 0, "utf-8"
     else:
         inner = encoding
-    stop = _without_end_mark(file, size)
-    if stop <= start:
-        raise source.refuse("E_EMPTY", "the file is empty", "export it again")
-    return TextStream(source, file, inner, start, stop, encoding)
+    return TextStream(source, file, inner, start, _without_end_mark(file, size), encoding)
 
 
 def too_long(source: Source, line: int | None) -> RigFileError:
