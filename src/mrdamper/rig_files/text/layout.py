@@ -201,7 +201,7 @@ def _with_levels(names: tuple[str, ...], levels: list[tuple[str, ...]]) -> tuple
 def _without_units(lines: Sequence[str]) -> Sequence[str]:
     """Return the lines without the units behind their numbers, where no line is a row of plain numbers."""
     last = list(islice((line for line in reversed(lines) if line.strip()), _SAMPLE))
-    if any(_is_row(cells_of(line, mark)) for line in last for mark in _SEPARATORS):
+    if any(is_row(cells_of(line, mark)) for line in last for mark in _SEPARATORS):
         return lines
     return [next(filter(None, (_bare_row(line, mark) for mark in _SEPARATORS[:-1])), line) for line in lines]
 
@@ -334,7 +334,8 @@ def _evenness(lines: Sequence[str], separator: str) -> float:
     return agreeing / len(lines) * sum(values) / max(1, sum(filled))
 
 
-def _is_row(cells: Sequence[str]) -> bool:
+def is_row(cells: Sequence[str]) -> bool:
+    """Tell if the cells of a line are those of a row of numbers, some of which may be missing."""
     filled = [cell for cell in cells if cell]
     numeric = sum(looks_numeric(cell) and cell.lower() not in ("-", "--") for cell in filled)
     return numeric >= 1 and (numeric >= 2 or len(filled) <= 2) and 3 * numeric >= len(filled)
@@ -345,11 +346,11 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
     start = bisect_left(content, above, key=lambda entry: entry[0])
     before, content = content[:start], content[start:]
     sample = [cells_of(line, separator) for _, line in content[-_SAMPLE:]]
-    rows = [cells for cells in sample if _is_row(cells)]
+    rows = [cells for cells in sample if is_row(cells)]
     prose = all(sum(_WORD.match(cell) is not None for cell in cells) >= 2 for cells in rows)
     if separator == SPACES and len(content) < _FEWEST_LINES and prose:
         raise NoTableError("E_NO_DATA", "text with numbers in it, but no rows of numbers", file=source.name)
-    few = not rows or (len(rows) == 1 and len(content) > 1 and not _is_row(sample[-1]))
+    few = not rows or (len(rows) == 1 and len(content) > 1 and not is_row(sample[-1]))
     named = few and any(_names_columns(line, mark) for _, line in content[-_SAMPLE:] for mark in _SEPARATORS[:-1])
     if not rows or named:
         what = "names of columns, but no row of numbers below them" if named else "no row of numbers"
@@ -376,11 +377,11 @@ def _first_of(
     worded: tuple[int, list[str]] | None = None
     first: tuple[int, list[str]] | None = None
     rows = [cells_of(line, separator) for _, line in content] if labelled else []
-    keys = Counter(cells[0].strip('"').casefold() for cells in rows if len(cells) == width and _is_row(cells))
+    keys = Counter(cells[0].strip('"').casefold() for cells in rows if len(cells) == width and is_row(cells))
     label = next((key for key, count in keys.most_common(1) if count > 1), "-")  # of most rows; - if each has its own
     for i, line in content:
         cells = cells_of(line, separator)
-        if not _is_row(cells):
+        if not is_row(cells):
             first, worded = None, worded or (i, cells)
         elif len(cells) == width and not _is_key(cells[0].strip('"')):
             return first or (i, cells)

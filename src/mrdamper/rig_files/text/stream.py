@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import csv
 import io
 import re
 from collections.abc import Iterable, Iterator
@@ -16,8 +15,7 @@ from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.conditions import stated_by_lines, stated_in_titles
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RigFileError, Source, scratch
-from mrdamper.rig_files.text.layout import SPACES, Layout, is_comment, is_footer, split, units_in
-from mrdamper.rig_files.text.tokens import looks_numeric
+from mrdamper.rig_files.text.layout import SPACES, Layout, cells_of, is_comment, is_footer, is_row, units_in
 
 LONGEST_LINE = 64 * 1024
 CHUNK = 4 * 2**20
@@ -351,11 +349,6 @@ def _is_data(text: str, layout: Layout) -> bool:
     """Tell if a line is a row, even a damaged one: those must not pass for remarks."""
     if not text.strip() or is_comment(text) or _SEGMENT.match(text) or is_footer(text, layout):
         return False
-    try:
-        cells = split(text, layout.separator)
-    except csv.Error:
-        return True
-    if layout.separator == SPACES and len(cells) != layout.width and _WORD.match(cells[0]):  # MR DAMPER TEST 1  PAGE 2
-        return False
-    values = [cell for cell in cells if cell and looks_numeric(cell)]
-    return len(values) >= 2 or (len(values) == 1 and len(cells) == 1)
+    cells = cells_of(text, layout.separator)
+    heading = layout.separator == SPACES and len(cells) != layout.width and _WORD.match(cells[0])
+    return not heading and is_row(cells)  # MR DAMPER TEST 1  PAGE 2
