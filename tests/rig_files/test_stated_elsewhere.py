@@ -192,6 +192,38 @@ def test_two_currents_are_named_where_either_may_be_that_of_the_coil(tmp_path):
     assert import_files([tmp_path], stated).records[0].current[0] == 0.5
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "Comment: current raised by 0.4 A every 8 cycles", "coil current checked at 1 A, then switched off",
+        "coil current step 0.5 A", "Spulenstrom um 0,4 A erhöht", "Coil current (zero-check): 0.00 A",
+        "Courant augmenté de 0,5 A", "steps of 0.5 A", "Coil current verified: 0.5 A",
+    ],
+)  # fmt: skip
+def test_a_line_about_a_change_or_a_check_of_the_current_states_none(line, tmp_path):
+    table(tmp_path / "a.csv", [line, "Time [s],Displacement [mm],Force [N]"], T, X, force(0.5))
+    (refusal,) = import_files([tmp_path]).refusals
+    assert refusal.error.code == "E_CURRENT_MISSING"
+
+
+def test_a_line_counts_only_where_a_column_in_amperes_that_is_not_taken_has_its_current(tmp_path):
+    names = "Time [s],Displacement [mm],Force [N],q1 [A],q2 [A]"
+    for at, codes in ((0.5, []), (1.0, ["E_CURRENT_CONTRADICTS"])):
+        table(tmp_path / "a.csv", ["Current: 0.5 A", names], T, X, force(0.5), at + 0 * T, np.sin(T))
+        result = import_files([tmp_path])
+        assert [refusal.error.code for refusal in result.refusals] == codes
+    assert 'column = "q1 [A]"' in result.refusals[0].error.remedy
+    (record,) = import_files([tmp_path], parse_profile('[current.values]\n"a" = 0.5')).records
+    assert record.current[0] == 0.5
+
+
+@pytest.mark.parametrize("name", ["iCoil_FL", "i_coil_rear", "iDmprCoil_2", "I_Spule_VL"])
+def test_a_name_with_the_letter_of_a_current_and_the_coil_is_its_current(name, tmp_path):
+    names = f"Time [s],Displacement [mm],Force [N],{name} [A],I_drive [A]"
+    table(tmp_path / "a.csv", [names], T, X, force(0.5), 0.5 + 0 * T, 5 + 0 * T)
+    expect(tmp_path, 0.5)
+
+
 def test_channels_that_are_logged_in_turn_are_asked_for_with_one_clock(tmp_path):
     rows = [f"{t:.5f},{x:.4f},\n{t + 1e-3:.5f},,{f:.4f}" for t, x, f in zip(T, X, force(0.5), strict=True)]
     (tmp_path / "a_0.5A.csv").write_text("Time [s],Displacement [mm],Force [N]\n" + "\n".join(rows))

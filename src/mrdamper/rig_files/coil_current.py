@@ -15,6 +15,7 @@ from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import chunks
 from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.column_names import COIL, RATING, holds, names_condition, split_name
+from mrdamper.rig_files.columns import coil_currents
 from mrdamper.rig_files.conditions import (
     LARGEST_STATED,
     Statement,
@@ -66,6 +67,8 @@ def current_of(
         lines = [line for line in table.remarks if line not in table.titles]
         statements = _set_points(table, rows) or stated_in_titles(lines) or _folders(table, path)
     stated = _agreed(statements, where)
+    if stated is not None and channel is None and source is None and all(s.of_line for s in statements):
+        _refuse_contradicted_line(table, stated, rows, where)
     mean = None if channel is None or stated is None else contradicted(channel, stated.amperes)
     if stated is not None and mean is not None:
         problem = printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A")
@@ -74,6 +77,25 @@ def current_of(
     if stated is None or (channel is not None and (source is None or source.pattern is None)):
         return None, {}
     return stated.amperes, {"current_from": as_data(stated.whence)}
+
+
+def _refuse_contradicted_line(table: RawTable, stated: Statement, rows: slice, where: str) -> None:
+    """Refuse what a line states where columns in A are not taken for the coil's current, and none of them has it."""
+    read = {i: own[i][rows] for i in coil_currents(table) if (own := table.try_read(i)) is not None}
+    values = {i: table.headers[i].factor * of[np.isfinite(of)] for i, of in read.items()}
+    values = {i: of for i, of in values.items() if of.size >= 3 and np.max(np.abs(of)) <= LARGEST_STATED}
+    held = {i: held_current(of) for i, of in values.items()}
+    if not held or any(not change and not contradicts(mean, stated.amperes) for mean, change in held.values()):
+        return
+    first = min(held)
+    name, low, high = table.names[first], np.min(values[first]), np.max(values[first])
+    line = f"[channels.current] column = {json.dumps(name, ensure_ascii=False)}"
+    raise ColumnError(
+        printable(f"{stated.whence} gives {stated.amperes:g} A, the column {name!r} {low:.3g} to {high:.3g} A"),
+        where=where,
+        remedy=f"if it is the coil's current, correct the line and set {line} in a profile; else set [current.values]",
+        code="E_CURRENT_CONTRADICTS",
+    )
 
 
 def _agreed(statements: list[Statement], where: str) -> Statement | None:

@@ -255,9 +255,9 @@ def role_of(name: str) -> str | None:
         return _SYMBOLS[words[0]]
     if len(words) == 1 and words[0].rstrip("0123456789") in _SYMBOLS:  # t1, x1, F1
         return _SYMBOLS[words[0].rstrip("0123456789")]
-    if len(words) == 2 and _SYMBOLS.get(words[0]) == "current" and lower[1] in COIL:  # I_coil
-        return "current"
     roles = [role for role in map(_role_of_word, lower) if role is not None]
+    if not roles and words and _SYMBOLS.get(words[0]) == "current" and COIL & {*lower[1:]}:  # I_coil, iDmprCoil_FL
+        return "current"
     # "load displacement" is a displacement: the last word is the noun in the languages at hand.
     return roles[-1] if roles else None
 

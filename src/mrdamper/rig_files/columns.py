@@ -15,6 +15,7 @@ from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, p
 from mrdamper.rig_files.column_names import (
     COIL,
     DIMENSION,
+    RATING,
     TABLES,
     WORDS,
     Header,
@@ -164,10 +165,17 @@ def left_out(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]
             problem = _unit_problem(table, role, column, table.headers[column].unit)
             if problem is not None:
                 reasons[role] = problem.found
-    several = [table.names[i] for i in table.columns("current", "current") if i not in taken]
+    several = [table.names[i] for i in coil_currents(table) if i not in taken]
     if len(several) > 1 and not {"current"} & {*assigned, *reasons}:
         reasons["current"] = f"{several[0]!r} and {several[1]!r} may both be it"
     return reasons
+
+
+def coil_currents(table: RawTable) -> list[int]:
+    """Return the columns in A that may be measured currents of the coil: no commands, computed ones, other devices."""
+    columns = [i for i in table.columns(dimension="current") if not RATING.search(table.names[i])]
+    names = {i: table.headers[i].name for i in columns}
+    return [i for i, name in names.items() if role_of(name) == "current" or says_nothing(name)]
 
 
 def measured_beside_others(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]) -> list[str]:

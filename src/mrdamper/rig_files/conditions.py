@@ -122,6 +122,11 @@ class Statement:
     amperes: float
     whence: str
 
+    @property
+    def of_line(self) -> bool:
+        """A line of text, which may mean something else than the test."""
+        return self.whence.startswith("the line ")
+
 
 def currents_in(text: str) -> tuple[float, ...]:
     """Coil currents [A] in a title, a sheet's or a file's name: every distinct one.
@@ -366,8 +371,9 @@ def _quantities(line: str, decimal: str | None) -> Iterator[Quantity]:
             continue
         if decimal != "," and "," in match["key"] and "," in match["number"]:  # two cells: gain, offset
             continue
-        key, unit = split_name(match["key"].strip().strip('"'))
-        unit = match["unit"] or unit
+        whole = match["key"].strip().strip('"')
+        key, unit = split_name(whole)
+        key, unit = whole if RATING.search(whole) else key, match["unit"] or unit
         unit_of = parse_unit(unit)
         value = _value(match["number"], decimal)
         if unit_of is not None and value is not None:
