@@ -25,6 +25,7 @@ from mrdamper.rig_files.mapping.companions import (
     contradictions,
     currents_beside,
     currents_listed,
+    discarded_tests,
     holds_channels,
     is_list,
     joined_files,
@@ -280,7 +281,7 @@ class _Intake:
         for path in [path for path in unused if self._found or path.stat().st_size <= _LARGEST_LIST]:
             stated = currents_beside(path, self._results(path), self.tests())
             if stated:
-                self._refuse_contradicted(stated)
+                self._refuse_contradicted(stated, discarded_tests(path, self._results(path), self.tests()))
             elif path in others and path not in self._given and (is_list(path) or is_description(path)):
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
             else:
@@ -298,9 +299,8 @@ class _Intake:
         self._found = tests
         return used
 
-    def _refuse_contradicted(self, stated: Sequence[tuple[float, str]]) -> None:
-        """Refuse accepted tests whose current another file contradicts."""
-        refused: dict[int, InputError] = {}
+    def _refuse_contradicted(self, stated: Sequence[tuple[float, str]], refused: dict[int, InputError]) -> None:
+        """Refuse accepted tests whose current another file contradicts, and those that are refused for a remark."""
         for i, ((file, record), (current, whence)) in enumerate(zip(self.tests(), stated, strict=True)):
             try:
                 with_stated_current(record, current, whence, file.name)
@@ -363,9 +363,12 @@ class _Intake:
         if len({tuple(current for current, _ in stated) for *_, stated in candidates}) != 1:
             return set()
         path, results, tests, stated = candidates[0]
+        refused = discarded_tests(path, results, tests)
+        self.refusals += [Refusal(str(tests[i][0]), error, tests[i][1].id) for i, error in refused.items()]
         self._pending = [
             (file, with_stated_current(record, *own, file.name, f"its current is the {own[0]:g} A of {own[1]}"))
-            for (file, record), own in zip(within_times(tests, results), stated, strict=True)
+            for i, ((file, record), own) in enumerate(zip(within_times(tests, results), stated, strict=True))
+            if i not in refused
         ]
         self.notes = [note for note in self.notes if Path(note.file) != path]
         self._drop_refusals({path})

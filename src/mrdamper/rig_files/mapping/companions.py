@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -13,9 +14,9 @@ import numpy as np
 
 from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import rescale, take
-from mrdamper.errors import InputError, QualityError
+from mrdamper.errors import InputError, QualityError, printable
 from mrdamper.rig_files.coil_current import as_data, current_of, with_stated_current, with_value_of_name
-from mrdamper.rig_files.column_names import RATING, SI, role_of, split_name, words_of
+from mrdamper.rig_files.column_names import RATING, SI, role_of, split_name, words, words_of
 from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.conditions import amperes, series_in
 from mrdamper.rig_files.file_records import digest_of, records_of_file
@@ -36,6 +37,7 @@ _FEWEST_ROWS = 50  # of a record
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")  # short ones
 _LEGEND = re.compile(r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")  # I1 = 0.3 A
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
+_DISCARDED, _DISCARDED_FLAG = (re.compile("(?i)" + "|".join(words(of))) for of in ("discarded", "discarded_flag"))
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
 _ALIKE = 0.1  # relative difference of frequency and amplitude within which two motions are one
 _ALIKE_A = 0.03  # difference of the current within which two tests have the same [A]
@@ -225,6 +227,28 @@ def currents_beside(
     if any(len(of_test) != 1 for of_test in own):
         return None
     return [(codes[code], f"{path.name}, {code.upper()}") for (code,) in own]
+
+
+def discarded_tests(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> dict[int, InputError]:
+    """Return the refusal of each test that a remark in a plan calls invalid, aborted, repeated or a warm-up."""
+    rows = [[*zip(results.keys, cells, strict=True)] for cells in results.cells] if results else []
+    remarks = [
+        next((cell for key, cell in row if _DISCARDED.search(cell) or _DISCARDED_FLAG.search(f"{key}: {cell}")), "")
+        for row in rows
+    ]
+    if results is None or results.of_supply or not any(remarks):
+        return {}
+    numbered = replace(results, current=tuple(float(i) if remark else 0.0 for i, remark in enumerate(remarks, 1)))
+    refused: dict[int, InputError] = {}
+    files = [file for file, _ in tests]
+    for i, (row, _) in enumerate(currents_beside(path, numbered, tests) or ()):
+        file, record = tests[i]
+        name = json.dumps(file.name if files.count(file) == 1 else record.id, ensure_ascii=False)
+        if row:
+            problem = f"{path.name} has the remark {remarks[int(row) - 1][:80]!r} on this test"
+            remedy = f"set [file] leave_out = [{name}] in a profile, or correct the remark if the test is valid"
+            refused[i] = QualityError(printable(problem), where=file.name, remedy=remedy, code="E_DISCARDED")
+    return refused
 
 
 def currents_listed(path: Path, tests: Sequence[tuple[Path, Record]]) -> list[tuple[float, str]] | None:
