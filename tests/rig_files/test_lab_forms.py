@@ -319,6 +319,17 @@ def test_a_session_is_cut_at_rests_at_steps_of_the_current_and_where_the_logger_
     assert currents(read_runs(path)) == [0.0, 0.0, 0.5, 0.5]
 
 
+def test_rows_of_a_cell_array_below_their_names_are_tests(tmp_path):
+    from scipy.io import savemat
+
+    cells = np.empty((3, 4), dtype=object)
+    cells[0] = ["Current (A)", "Time (s)", "Displacement (mm)", "Force (N)"]
+    for row, amperes in ((1, 0.0), (2, 0.6)):
+        cells[row] = [[amperes, T, X, force(amperes)][i] for i in range(4)]
+    savemat(tmp_path / "results.mat", {"results": cells})
+    assert currents(read_runs(tmp_path / "results.mat")) == [0.0, 0.6]
+
+
 @pytest.mark.parametrize("kind", ["h5", "mat"])
 @pytest.mark.parametrize(
     "places",

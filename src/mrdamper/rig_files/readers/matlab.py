@@ -61,6 +61,8 @@ def _tree(value: Any) -> Any:
     array = np.asarray(value)
     if words := texts_in(array):
         return words
+    if array.dtype.kind == "O" and array.ndim == 2 and (names := texts_in(array[0])):  # a table, names above its rows
+        return [dict(zip(names, map(_tree, row), strict=True)) for row in array[1 : MOST_STRUCTS + 1]]
     if array.dtype.kind == "O" and 0 < array.size <= MOST_STRUCTS and array.ndim:
         cells = [_tree(cell) for cell in array]
         return array if any(isinstance(cell, (str, float)) for cell in cells) else cells
