@@ -193,15 +193,14 @@ def unpacked(says: Mapping[str, Any], values: np.ndarray) -> np.ndarray:
     if values.dtype.kind not in "iuf":
         return values
     formula = _formula_of(says) or counts_of(says) if values.dtype.kind in "iu" else None
-    if formula is not None:
-        return formula[0] * values.astype(np.float64) + formula[1]
-    if not any(name in says for name in _PACKING):
+    if formula is None and not any(name in says for name in _PACKING):
         return values
     numbers = values.astype(np.float64)
     for name in ("_FillValue", "missing_value"):
         if name in says:
             numbers[np.isin(values, np.asarray(says[name]))] = np.nan
-    factor, offset = (float(np.reshape(says.get(n, d), -1)[0]) for n, d in (("scale_factor", 1), ("add_offset", 0)))
+    usual = (float(np.reshape(says.get(n, d), -1)[0]) for n, d in (("scale_factor", 1), ("add_offset", 0)))
+    factor, offset = formula or usual
     return factor * numbers + offset
 
 
@@ -218,17 +217,13 @@ def counts_of(says: Mapping[str, Any]) -> tuple[float, float] | None:
 
 def _formula_of(says: Mapping[str, Any]) -> tuple[float, float] | None:
     """Factor and offset of whole numbers whose conversion a text states: physical = raw * gain + offset."""
-    texts = [
-        text_of(np.reshape(value, -1)[0])
-        for value in says.values()
-        if np.asarray(value).dtype.kind in "SUO" and np.size(value) == 1
-    ]
+    lower = {name.casefold(): np.reshape(value, -1) for name, value in says.items()}
+    texts = (text_of(value) for value in lower.values() if value.dtype.kind in "SUO" and value.size == 1)
     match = next(filter(None, map(_FORMULA.search, texts)), None)
-    lower = {name.casefold(): value for name, value in says.items()}
     names = [name.casefold() for name in match.groups() if name] if match else []
     if not names or any(name not in lower for name in names):
         return None
-    factor, offset = (float(np.reshape(lower[name], -1)[0]) for name in (*names, names[0])[:2])
+    factor, offset = (float(lower[name][0]) for name in (*names, names[0])[:2])
     return factor, offset if len(names) > 1 else 0.0
 
 
