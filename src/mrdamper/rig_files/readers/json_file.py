@@ -13,7 +13,7 @@ import numpy as np
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import damaged, refuse_twice, whole
 from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, Source
-from mrdamper.rig_files.readers.nested import document_tables, seconds_of
+from mrdamper.rig_files.readers.nested import nested_tables, seconds_of
 from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES
 
 _SAVED_MODEL = "mrdamper-model"
@@ -40,7 +40,8 @@ class Json(Reader):
         if isinstance(tree, Mapping) and _SAVED_MODEL in map(str, tree.values()):
             remedy = "give it to mrdamper predict, validate or export; tests are what import reads"
             raise NoTableError("E_FORMAT", "a saved model", file=source.name, remedy=remedy)
-        return document_tables(source, tree if isinstance(tree, Mapping) else {"": tree}, self.title)
+        tree = tree if isinstance(tree, Mapping) else {"": tree}
+        return nested_tables(source, tree, self.title, may_be_notes=True)
 
 
 def _parsed(source: Source, content: bytes) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import refusing_damage, whole
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, Reader, Source
-from mrdamper.rig_files.readers.nested import document_tables
+from mrdamper.rig_files.readers.nested import nested_tables
 from mrdamper.rig_files.readers.workbook import as_text, tables_of_sheets
 from mrdamper.rig_files.text.elements import Sheets, numbers_in, root_of, sheets_of, tree_of
 
@@ -40,7 +40,9 @@ class Markup(Reader):
         with refusing_damage(source, self.title):
             root = root_of(content)
             sheets, tree = sheets_of(root), tree_of(root)
-        return _of_cells(source, sheets, form) if sheets else document_tables(source, tree, self.title)
+        if sheets:
+            return _of_cells(source, sheets, form)
+        return nested_tables(source, tree, self.title, may_be_notes=True)
 
 
 def _plain(head: bytes) -> bytes:

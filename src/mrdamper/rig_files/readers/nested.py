@@ -59,28 +59,20 @@ class _Node:
         self.columns += [_Column(name, own or (unit if parse_unit(unit) else ""), part) for name, own, part in columns]
 
 
-def nested_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[RawTable]:
-    """Return the tables of a nested structure, in the order they appear; E_NO_DATA or E_UNSAFE if it holds no array."""
+def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, may_be_notes: bool = False) -> list[RawTable]:
+    """Return the tables of a nested structure, in the order they appear; E_NO_DATA or E_UNSAFE if it holds no array.
+
+    Of a document that may be notes it is a `NoTableError`, E_FORMAT, if none has two columns.
+    """
     nodes = [node for node in _walk(tree, _Node("")) if node.columns]
+    if may_be_notes and not any(len(node.columns) > 1 for node in nodes):
+        remedy = "export it as CSV, or the samples of every channel as a list"
+        raise NoTableError("E_FORMAT", f"{title} without lists of numbers", file=source.name, remedy=remedy)
     objects = [column.name for node in nodes for column in node.columns if column.array.dtype == object]
     if not any(column.array.dtype != object for node in nodes for column in node.columns):
         code, what = ("E_UNSAFE", f"only objects ({objects[0]})") if objects else ("E_NO_DATA", "no array of numbers")
         raise source.refuse(code, what, "save the channels as arrays of numbers")
     return [_table(source, node, title) for node in nodes]
-
-
-def document_tables(source: Source, tree: Mapping[str, Any], title: str) -> list[RawTable]:
-    """Return tables as `nested_tables`; `NoTableError`, E_FORMAT, if none has two columns: it may be notes."""
-    try:
-        tables = nested_tables(source, tree, title)
-    except RigFileError as error:
-        if error.code != "E_NO_DATA":
-            raise
-        tables = []
-    if not any(len(table.names) > 1 for table in tables):
-        remedy = "export it as CSV, or the samples of every channel as a list"
-        raise NoTableError("E_FORMAT", f"{title} without lists of numbers", file=source.name, remedy=remedy)
-    return tables
 
 
 def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Node]:
