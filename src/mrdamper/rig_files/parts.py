@@ -217,8 +217,6 @@ def _members(table: RawTable) -> dict[str, dict[str, int]]:
         if len(columns) == len(moved) and len(set(keys)) == 1:  # of one name: told apart by their order
             columns = [(i, f"{n}") for n, (i, _) in enumerate(columns, 1)]
         elif len(set(keys)) < len(keys):
-            if role in ("displacement", "force"):
-                return {}
             continue
         for i, key in columns:
             members.setdefault(key, {})[role] = i
@@ -260,7 +258,7 @@ def stretches_of_time(time: np.ndarray) -> list[slice]:
     stamps = time[finite]
     steps = np.diff(stamps)
     back = np.flatnonzero(steps < 0)
-    if not back.size or back.size > MOST_RUNS:
+    if back.size > MOST_RUNS:
         return whole
     step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     bounds = np.concatenate([[0], back + 1, [stamps.size]])

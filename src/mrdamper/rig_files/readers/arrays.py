@@ -92,17 +92,11 @@ def array_table(
 
     def words(column: int) -> Words:
         with refusing_damage(source, title):
-            array = np.asarray(load(column))
-        return words_of([text_of(item) for item in array.reshape(-1).tolist()])
+            cells = list(map(text_of, np.asarray(load(column)).reshape(-1).tolist()))
+        codes = {cell: code for code, cell in enumerate(dict.fromkeys(cells))}
+        return Words(np.array([codes[cell] for cell in cells], dtype=np.int32), tuple(codes))
 
     return RawTable(source, tuple(names), tuple(units), read, words=words)
-
-
-def words_of(cells: Sequence[str]) -> Words:
-    """Return a column of words from its cells."""
-    indices: dict[str, int] = {}
-    codes = np.fromiter((indices.setdefault(cell, len(indices)) for cell in cells), dtype=np.int32, count=len(cells))
-    return Words(codes, tuple(indices))
 
 
 def text_of(item: object) -> str:
