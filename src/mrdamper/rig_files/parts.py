@@ -103,14 +103,17 @@ def _rows_of(codes: np.ndarray, code: int) -> slice | np.ndarray:
 
 def _remembered(table: RawTable) -> Callable[[tuple[int, ...]], Content]:
     """Keep the table's columns while its tests are taken out one by one; of a small file all are read in one pass."""
-    read = lru_cache(maxsize=3)(lambda columns: table.read(columns))
-    every = tuple(i for i, header in enumerate(table.headers) if header.role is not None or header.dimension)
+    read = lru_cache(maxsize=2)(table.read)
+
+    @cache
+    def every() -> Content | None:
+        with suppress(InputError):  # one of them cannot be read, which matters only if it is asked for
+            return table.read([i for i, h in enumerate(table.headers) if h.role is not None or h.dimension])
+        return None
 
     def remembered(columns: tuple[int, ...]) -> Content:
-        if table.source.size <= _SMALL and {*columns} <= {*every}:
-            with suppress(InputError):  # one of them cannot be read, which matters only if it is asked for
-                return read(every)
-        return read(columns)
+        whole = every() if table.source.size <= _SMALL else None
+        return whole if whole is not None and {*columns} <= {*whole.values} else read(columns)
 
     return remembered
 
