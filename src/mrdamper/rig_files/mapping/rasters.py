@@ -143,8 +143,8 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
     def columns_of(columns: Sequence[int]) -> Content:
         return Content({i: on_clock(kept[i]) for i in columns})
 
-    apart = {other: _apart(table, clock, other) for other in {*owner.values()} - {clock}}
-    apart = {other: gap for other, gap in apart.items() if gap > _SAME}
+    gaps = _apart(table, clock, [*{*owner.values()} - {clock}])
+    apart = {other: gap for other, gap in gaps.items() if gap > _SAME}
     names = sorted({table.headers[i].name for i in kept if owner.get(i) in apart and table.headers[i].channel})
     own, text = "on clocks of their own", f"interpolated onto the force's: {', '.join(names[:6])}"
     if max(apart.values(), default=np.inf) < np.inf:
@@ -153,17 +153,20 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
     return resampled_table.noted(Finding("W_RASTER", f"{own}, {text}")) if names else resampled_table
 
 
-def _apart(table: RawTable, clock: int, other: int) -> float:
-    """Largest difference of the stamps of a row between two clocks [s]; infinite where they have no common rows."""
-    values = table.try_read(clock, other)
-    first, second = (_filled(values[i]) * table.headers[i].factor if values else np.empty(0) for i in (clock, other))
-    return float(np.nanmax(np.abs(second - first))) if second.size == first.size > 0 else np.inf
+def _apart(table: RawTable, clock: int, others: Sequence[int]) -> dict[int, float]:
+    """Largest difference of the stamps of a row from those of other clocks [s]; infinite without common rows."""
+    every, gaps = table.try_read(clock, *others), {}
+    for other in others:
+        values = every or table.try_read(clock, other)  # those of several lengths cannot be read together
+        one, two = (_filled(values[i]) * table.headers[i].factor if values else np.empty(0) for i in (clock, other))
+        gaps[other] = float(np.nanmax(np.abs(two - one))) if two.size == one.size > 0 else np.inf
+    return gaps
 
 
 def _with_clocks_compared(table: RawTable) -> RawTable:
     """Note a second clock of a table that starts a little earlier or later than the one that all channels follow."""
     clocks = table.columns("time", "time")
-    apart = _apart(table, *clocks) if len(clocks) == 2 else 0.0
+    apart = max(_apart(table, clocks[0], clocks[1:]).values()) if len(clocks) == 2 else 0.0
     if not _SAME < apart < _TWO_STARTS:
         return table
     one, two = (table.headers[i].name for i in clocks)
