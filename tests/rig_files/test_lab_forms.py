@@ -352,6 +352,16 @@ def test_channels_of_several_groups_follow_the_only_time(places, kind, tmp_path)
     np.testing.assert_allclose((record.time, 1e3 * record.displacement, record.force), (T, X, force(0.5)), atol=1e-9)
 
 
+def test_a_list_of_forces_beside_a_motion_is_no_channel_of_it(tmp_path):
+    from scipy.io import savemat
+
+    limits = {"rating": T[:3], "F_N": np.array([0.0, 500.0, 1000.0])}
+    savemat(tmp_path / "run_0.5A.mat", {"rig": {"time_s": T, "x_mm": X, "ch3": X}, "cell": limits})
+    with pytest.raises(InputError) as refusal:
+        read_run(tmp_path / "run_0.5A.mat")
+    assert "no column is known to be force" in str(refusal.value)
+
+
 def test_channels_of_other_lengths_in_one_group_are_no_table_of_results(tmp_path):
     import h5py
 

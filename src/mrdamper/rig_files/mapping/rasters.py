@@ -43,7 +43,7 @@ def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
 
     Beside each other in one group lie a table of each channel, or of each sampling rate. They are joined
     where none of them is a whole test, or where the one that is has no current and another holds it. Where no more
-    than one has a time, all follow it.
+    than one has a time, all of its length follow it.
     """
     groups: dict[str, list[RawTable]] = {}
     for table in tables:
@@ -61,9 +61,17 @@ def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
         lacks = not whole or ("current" in every and "current" not in roles[whole[0]] and len(timed) > 1)
         if len(parts) < 2 or len(whole) > 1 or not needed or not lacks or not joined.keys().isdisjoint(map(id, parts)):
             continue
+        if len(timed) < 2 and len(set(map(_rows, parts))) > 1:  # a list of something else
+            continue
         joined[id(parts[0])] = _joined(label, parts)
         dropped |= {id(table) for table in parts[1:]}
     return [joined.get(id(table), table) for table in tables if id(table) not in dropped]
+
+
+def _rows(table: RawTable) -> int:
+    column = next((i for i, header in enumerate(table.headers) if header.channel), 0)
+    values = table.try_read(column)
+    return values[column].size if values else 0
 
 
 def _named(table: RawTable) -> RawTable:
