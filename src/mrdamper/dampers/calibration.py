@@ -61,7 +61,7 @@ class PredictedRun:
     distance: Distance = AT_TESTS  # from the runs that the model was identified from
 
     @classmethod
-    def of(cls, run: Run, predicted: Floats, velocity: Floats, distance: Distance = AT_TESTS) -> PredictedRun:
+    def of(cls, run: Run, predicted: Floats, velocity: Floats) -> PredictedRun:
         """From the prediction (N,) [N] along the whole run; raises E_CLOCK as `session_of`."""
         at, loops = np.flatnonzero(run.in_window), _loops(run)
         powers = np.array(
@@ -78,7 +78,6 @@ class PredictedRun:
             run.force[at[::step]],
             _peaks(run) / np.maximum([_peak(predicted[loop], cycles) for loop, cycles in loops], 1e-300),
             np.divide(powers[0], powers[1], out=np.full(len(loops), np.inf), where=powers[1] != 0),
-            distance,
         )
 
     @classmethod
@@ -92,7 +91,6 @@ class PredictedRun:
             np.concatenate([part.measured[thin] for part in parts]),
             np.concatenate([part.peak for part in parts]),
             np.concatenate([part.energy for part in parts]),
-            parts[0].distance,
         )
 
     @property

@@ -387,7 +387,7 @@ class Linearisation:
 def project_out(slopes: Floats, columns: Floats) -> Floats:
     """Project slopes (N, D) onto the orthogonal complement of some columns."""
     gram = columns.T @ columns
-    scale = np.sqrt(np.diag(gram))
+    scale = np.sqrt(gram.diagonal())
     scale = np.where(scale > 0, scale, 1.0)
     normal = gram / scale / scale[:, None] + _RIDGE * np.eye(scale.size)
     taken = (np.linalg.solve(normal, columns.T @ slopes / scale[:, None]) / scale[:, None]).T @ columns.T

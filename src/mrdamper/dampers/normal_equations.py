@@ -52,6 +52,17 @@ _PASSES = 2  # over all coordinates in the choice of forms
 _RANK_LIMIT = 1e-10  # singular value over the largest below which a coefficient is not determined
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
+# Weights of the values at both ends of an interval and of the second derivatives there, for a cubic spline and its
+# slope in the interval: a row for each power of the share of the interval.
+_SPLINE = np.array(
+    [
+        [1, 0, 0, 0, -1, 1, -1 / 3, -1 / 6],
+        [-1, 1, -1 / 3, -1 / 6, 0, 0, 1, 0],
+        [0, 0, 1 / 2, 0, 0, 0, -1 / 2, 1 / 2],
+        [0, 0, -1 / 6, 1 / 6, 0, 0, 0, 0],
+    ]
+)
+
 _Trial: TypeAlias = "tuple[JointFunctionFit, dict[str, Floats]]"  # and its errors by kind of fold
 
 
@@ -96,22 +107,24 @@ class Condensed:
 
         Both (R, L+1, L+1).
         """
+        begin, rung, last = self._rungs
+        u = np.minimum(np.maximum((np.log(shape_values) - begin) / rung, 0), last)
+        first = np.minimum(u.astype(int), last - 1)
+        weights = ((u - first)[:, None] ** np.arange(4) @ _SPLINE).reshape(-1, 2, 4)
+        both = (weights @ self._cells[np.arange(u.size), first]).reshape(u.size, 2, *self.gram.shape[2:])
+        return both[:, 0], both[:, 1] / rung
+
+    @cached_property
+    def _rungs(self) -> tuple[float, float, int]:
+        """First value of the ladder and distance of the next, in the logarithm, and the number of the last."""
         logs = np.log(self.ladder)
-        u = np.clip((np.log(shape_values) - logs[0]) / (logs[1] - logs[0]), 0, logs.size - 1)
-        first = np.minimum(np.floor(u).astype(int), logs.size - 2)
-        after = u - first
-        before, one = 1 - after, np.ones_like(u)
-        weights = np.array(
-            [
-                [before, after, (before**3 - before) / 6, (after**3 - after) / 6],
-                [-one, one, (1 - 3 * before**2) / 6, (3 * after**2 - 1) / 6],
-            ]
-        ).transpose(2, 0, 1)  # (R, 2, 4)
-        weights[:, 1] /= logs[1] - logs[0]
-        rows, pair = np.arange(len(shape_values))[:, None], first[:, None] + np.arange(2)
-        nodes = np.concatenate([self.gram[rows, pair], self.bend[rows, pair]], axis=1)  # (R, 4, L+1, L+1)
-        both = (weights @ nodes.reshape(u.size, 4, -1)).reshape(u.size, 2, *nodes.shape[2:])
-        return both[:, 0], both[:, 1]
+        return float(logs[0]), float(logs[1] - logs[0]), logs.size - 1
+
+    @cached_property
+    def _cells(self) -> Floats:
+        """(R, K-1, 4, (L+1)²) matrices and derivatives at both ends of every interval of the ladder."""
+        both = (values.reshape(*values.shape[:2], -1) for values in (self.gram, self.bend))
+        return np.stack([end for values in both for end in (values[:, :-1], values[:, 1:])], axis=2)
 
 
 @on_one_blas_thread
@@ -341,15 +354,16 @@ class _Design:
             self.matrix[:, row, at : at + block.shape[1]] = block / data.scale[:, None]
             at += block.shape[1]
         self.matrix[:, -1, -1] = 1.0
+        self.ridge = _RIDGE * np.eye(len(blocks) + 1)
+        self.upper = np.triu(np.ones_like(self.ridge)) - np.eye(len(blocks) + 1) / 2
 
     def table(self, gram: Floats) -> tuple[Floats, Floats]:
         """Rows that represent a run's samples, and the factors of their Gram matrices.
 
         (R, L+1, P+1), by coefficient and, last, the measured force; (R, L+1, L+1).
         """
-        size = np.sqrt(np.maximum(np.einsum("rii->ri", gram), 1e-300))
-        scaled = gram / size[:, :, None] / size[:, None, :]
-        factor = _factor(scaled + _RIDGE * np.eye(gram.shape[1])) * size[:, None, :]
+        size = np.sqrt(np.maximum(gram.diagonal(0, 1, 2), 1e-300))
+        factor = _factor(gram / (size[:, :, None] * size[:, None, :]) + self.ridge) * size[:, None, :]
         return factor @ self.matrix, factor
 
 
@@ -364,6 +378,7 @@ class _ShapeSearch:
         self.columns = columns / self.scale
         self._tables: tuple[bytes, Floats, Floats, Floats] = b"", columns, columns, columns
         self._solved: _Solution | None = None
+        self.ends: tuple[float, float] = np.log(data.ladder[[0, -1]]).tolist()
 
     def weighted(self, weights: Floats) -> _ShapeSearch:
         """Return the same with other weights, which do not change the cached tables."""
@@ -373,8 +388,7 @@ class _ShapeSearch:
 
     def shape_values(self, u: Floats) -> Floats:
         """(R,) values of the shape coordinate."""
-        ladder = self.design.data.ladder
-        return np.exp(np.clip(self.columns @ u, np.log(ladder[0]), np.log(ladder[-1])))
+        return np.exp(np.minimum(np.maximum(self.columns @ u, self.ends[0]), self.ends[1]))
 
     def solution(self, u: Floats) -> _Solution:
         """Return the other functions' coefficients at a point."""
@@ -388,11 +402,9 @@ class _ShapeSearch:
         slope, factor, table, solution = self._at(u)
         inverse = np.linalg.inv(factor)
         # A triangle whose square moves by `slope` moves by the upper half of this, times itself.
-        moved = np.triu(inverse.transpose(0, 2, 1) @ slope @ inverse)
-        moved[:, *np.diag_indices(moved.shape[1])] /= 2
-        ladder, s = self.design.data.ladder, self.columns @ u
-        inside = (s > np.log(ladder[0])) & (s < np.log(ladder[-1]))
-        by_shape = np.einsum("rij,rj->ri", moved, solution.error) * (self.weights * inside)[:, None]
+        moved = (inverse.transpose(0, 2, 1) @ slope @ inverse) * self.design.upper
+        s, (low, high) = self.columns @ u, self.ends
+        by_shape = (moved @ solution.error[:, :, None])[:, :, 0] * (self.weights * ((s > low) & (s < high)))[:, None]
         jacobian = (by_shape[:, :, None] * self.columns[:, None, :]).reshape(-1, u.size)
         weighted = (self.weights[:, None, None] * table[:, :, :-1]).reshape(jacobian.shape[0], -1)
         return project_out_columns(weighted, jacobian)

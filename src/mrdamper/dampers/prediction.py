@@ -60,21 +60,8 @@ class Prediction(Displayable):
         return replace(self, force=gain * self.force + offset)
 
     def distance(self, damper: DamperLike) -> Distance:
-        """Distance from the tests of the damper that the prediction is of.
-
-        A motion outside the tested ones counts by how much faster it is than the nearest of them, and by how much of
-        its peak force exceeds that of the nearest: what is unknown of the law of the force over the velocity grows
-        with the force that the law adds.
-        """
-        away = damper.envelope.distance(self.condition, self.motion.current)
-        if away.motion < _NO_DISTANCE:
-            return away
-        here, there = self.condition, damper.envelope.nearest(self.condition)
-        faster = np.log(here.peak_velocity / there.peak_velocity)
-        tested, peak = (peak_force(damper.force_along(sine(at, _CYCLES, _SAMPLES), at)) for at in (there, here))
-        rise = 1 - tested / peak if peak > 0 else 0.0
-        parts = [_OF_HULL * away.motion, max(_OF_VELOCITY * faster, 0.0), max(rise, 0.0)]
-        return replace(away, motion=float(np.linalg.norm(parts)))
+        """Distance from the tests of the damper that the prediction is of."""
+        return distance_from_tests(damper, self.condition, self.motion.current)
 
     @property
     def is_sine(self) -> bool:
@@ -99,3 +86,21 @@ class Prediction(Displayable):
             "current_A": motion.current,
             "force_N": self.force,
         }
+
+
+def distance_from_tests(damper: DamperLike, condition: Condition, current: Floats) -> Distance:
+    """Distance from the tests of a damper to a condition and the currents (N,) [A] along its motion.
+
+    A motion outside the tested ones counts by how much faster it is than the nearest of them, and by how much of
+    its peak force exceeds that of the nearest: what is unknown of the law of the force over the velocity grows
+    with the force that the law adds.
+    """
+    away = damper.envelope.distance(condition, current)
+    if away.motion < _NO_DISTANCE:
+        return away
+    here, there = condition, damper.envelope.nearest(condition)
+    faster = np.log(here.peak_velocity / there.peak_velocity)
+    tested, peak = (peak_force(damper.force_along(sine(at, _CYCLES, _SAMPLES), at)) for at in (there, here))
+    rise = 1 - tested / peak if peak > 0 else 0.0
+    parts = [_OF_HULL * away.motion, max(_OF_VELOCITY * faster, 0.0), max(rise, 0.0)]
+    return replace(away, motion=float(np.linalg.norm(parts)))

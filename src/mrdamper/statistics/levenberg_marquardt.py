@@ -74,7 +74,7 @@ def least_squares(
         if curved and before is not None:
             extra = _learnt_curvature(extra, point - before[0], gradient - before[1], normal)
         held = ((point <= lower) & (gradient > 0)) | ((point >= upper) & (gradient < 0))
-        free = ~held & (np.diag(normal) > 0)  # a coordinate without an effect has no step
+        free = ~held & (normal.diagonal() > 0)  # a coordinate without an effect has no step
         if not free.any():
             ending = StopReason.AT_BOUNDS
             break
@@ -184,10 +184,11 @@ def _damped_step(
     normal: Floats, extra: Floats | None, gradient: Floats, free: NDArray[np.bool_], damping: float
 ) -> tuple[Floats, float]:
     """Step of the free coordinates, and its predicted gain."""
-    normal = normal[free][:, free]
-    stiff = np.diag(damping * np.maximum(np.diag(normal), 1e-300))
+    if not free.all():
+        normal, extra = normal[free][:, free], None if extra is None else extra[free][:, free]
+    stiff = np.eye(len(normal)) * (damping * np.maximum(normal.diagonal(), 1e-300))
     if extra is not None:
-        whole = normal + extra[free][:, free]
+        whole = normal + extra
         normal = whole if _is_positive(whole + stiff) else normal
     moved = -np.linalg.solve(normal + stiff, gradient[free])
     step = np.zeros(gradient.size)

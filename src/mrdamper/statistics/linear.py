@@ -34,9 +34,9 @@ def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None
     scale = np.sqrt(gram.diagonal())
     scale[~(scale > 0)] = 1.0
     normal = gram / scale / scale[:, None]
-    if _pivots(normal).min(initial=1.0) > _WELL_APART:
+    if (inverse := _inverse(normal)) is not None:
         # Normal equations with one refinement: as accurate as a factorisation of N rows.
-        inverse = np.linalg.inv(normal) / scale / scale[:, None]
+        inverse = inverse / scale / scale[:, None]
         solution = inverse @ (right @ columns)
         return solution + inverse @ ((right - columns @ solution) @ columns)
     return np.asarray(np.linalg.lstsq(columns / scale, right, rcond=rank_limit)[0], dtype=float) / scale
@@ -50,10 +50,10 @@ def solve_weighted(columns: Floats, right: Floats, weights: Floats, rank_limit: 
     scale: Floats = np.sqrt(np.diagonal(gram, 0, 1, 2))
     scale[~(scale > 0)] = 1.0
     normal = gram / scale[:, :, None] / scale[:, None, :]
-    if _pivots(normal).min(initial=1.0) <= _WELL_APART:
+    if (inverse := _inverse(normal)) is None:
         each = [solve_linear(columns * own[:, None], right * own, rank_limit) for own in weights]
         return np.array(each).reshape(-1, width)
-    inverse: Floats = np.linalg.inv(normal) / scale[:, :, None] / scale[:, None, :]
+    inverse = inverse / scale[:, :, None] / scale[:, None, :]
     solution: Floats = np.zeros(scale.shape)
     for _ in range(2):  # the second time for the remainder, as in `solve_linear`
         left: Floats = (squares * (right - solution @ columns.T)) @ columns
@@ -65,7 +65,7 @@ def project_out_columns(columns: Floats, right: Floats) -> Floats:
     """Subtract from (N,) or (N, D) right sides the part the columns explain; arguments as `solve_linear`."""
     scale = np.linalg.norm(columns, axis=0)
     basis, triangle = np.linalg.qr(columns / np.where(scale > 0, scale, 1.0))
-    pivots = np.abs(np.diag(triangle))
+    pivots = np.abs(triangle.diagonal())
     if pivots.min(initial=1.0) <= _RANK_LIMIT * pivots.max(initial=1.0):  # one column more is rounding
         turned, sizes, _ = np.linalg.svd(triangle)
         basis = basis @ turned[:, sizes > _RANK_LIMIT * sizes[0]]
@@ -102,11 +102,17 @@ def robust_weights(errors: Floats, best: float) -> Floats:
     return 1.0 / np.sqrt(np.maximum(errors, best))
 
 
-def _pivots(normal: Floats) -> Floats:
+def _inverse(normal: Floats) -> Floats | None:
+    """Inverse of matrices of equilibrated columns; None where one has a pivot at which it would lose digits."""
     try:
-        return np.asarray(np.linalg.cholesky(normal).diagonal(0, -2, -1), dtype=float)
+        inverse = np.linalg.inv(normal)
+        largest = inverse.diagonal(0, -2, -1)  # over the inverse square of every pivot
+        if largest.min(initial=1.0) > 0 and largest.max(initial=1.0) < _WELL_APART**-2:
+            return inverse
+        pivots = np.linalg.cholesky(normal).diagonal(0, -2, -1)
     except np.linalg.LinAlgError:
-        return np.zeros(1)
+        return None
+    return inverse if pivots.min(initial=1.0) > _WELL_APART else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ import numpy as np
 from mrdamper.dampers.bands import band, session_band
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import PredictedRun, measured_peak
-from mrdamper.dampers.prediction import Prediction
+from mrdamper.dampers.distance import Distance
+from mrdamper.dampers.prediction import Prediction, distance_from_tests
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, GainOffset, RecordingTime, SessionCorrection, Sessions
 from mrdamper.data import Condition, Displayable, Run
 from mrdamper.errors import InputError, RunError, UnknownNameError, require, validate_arguments
@@ -34,7 +36,13 @@ class RunScore:
     rest: float | None = None  # RMS error at rest, anywhere in the record, over the peak-to-peak force
     session: str = UNKNOWN  # predicted as it is, or corrected by other runs of its session
     reading: GainOffset | None = None  # of the best fit to the run; no score is corrected by them
-    predicted: PredictedRun | None = None  # samples of the uncorrected prediction and the measured ones
+    compared: PredictedRun | None = None  # samples of the uncorrected prediction and the measured ones
+    away: Callable[[], Distance] = Distance  # distance of the prediction from the tests of the damper
+
+    @cached_property
+    def predicted(self) -> PredictedRun | None:
+        """Samples of the uncorrected prediction, with the distance, which only the model of a report needs."""
+        return replace(self.compared, distance=self.away()) if self.compared else None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -147,8 +155,8 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> Run
     prediction = damper.predict(run)
     inside = run.in_window
     reading = GainOffset.of(run.force[inside], prediction.force[inside])
-    away = prediction.distance(damper)
-    beside = PredictedRun.of(run, prediction.force, prediction.motion.velocity, away)
+    compared = PredictedRun.of(run, prediction.force, prediction.motion.velocity)
+    away = partial(distance_from_tests, damper, prediction.condition, prediction.motion.current)
     expected = sessions.expected(RecordingTime.of(run), without=run.id) if sessions else None
     if expected is not None:
         prediction = prediction.corrected(expected.gain, expected.offset)
@@ -162,7 +170,8 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> Run
         _at_rest(run, prediction),
         UNKNOWN if expected is None else KNOWN,
         reading,
-        beside,
+        compared,
+        away,
     )
 
 
