@@ -98,6 +98,8 @@ def validate_arguments(*but: str) -> Callable[[Function], Function]:
 
     def guard(function: Function) -> Function:
         signature = inspect.signature(function)
+        names = [one.name for one in signature.parameters.values() if one.kind is one.POSITIONAL_OR_KEYWORD]
+        plain = len(names) == len(signature.parameters)
         kinds: dict[str, object] = {}
 
         @wraps(function)
@@ -105,7 +107,10 @@ def validate_arguments(*but: str) -> Callable[[Function], Function]:
             if not kinds:  # names are known once all modules are read
                 kinds.update(get_type_hints(function))
             try:
-                bound = signature.bind(*given, **named).arguments
+                complete = plain and not named and len(given) == len(names)  # binding takes most of the time
+                bound = (
+                    zip(names, given, strict=True) if complete else signature.bind(*given, **named).arguments.items()
+                )
             except TypeError as error:
                 wanted = re.sub(r": '([^']*)'", r": \1", str(signature).replace("(self, ", "(").partition(" -> ")[0])
                 wanted = re.sub(r"<function .*? at 0x\w+>", "...", wanted)
@@ -114,7 +119,7 @@ def validate_arguments(*but: str) -> Callable[[Function], Function]:
                     remedy=f"call {function.__name__}{wanted}; see help({function.__qualname__})",
                     code="E_ARGUMENT",
                 ) from error
-            for name, value in bound.items():
+            for name, value in bound:
                 if name in kinds and name not in but:
                     _require_fit(name, value, kinds[name])
             return function(*given, **named)

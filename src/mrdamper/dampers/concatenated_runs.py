@@ -223,10 +223,10 @@ class JointResiduals:
         self.share = np.concatenate([part.share for part in parts])
         self.unit = np.sqrt(self.share) / np.repeat([part.scale for part in parts], [p.target.size for p in parts])
         self.information = np.sqrt([part.information for part in parts])
-        self.weights, self.bounds = self.information, bounds_of(problem.linear)
+        self.bounds = bounds_of(problem.linear)
+        self._set_weights(self.information)
         self._seen: tuple[Excitation, Excitation] | None = None
         self._columns_at: tuple[Floats, Model, Floats, Floats] | None = None
-        self._solved: tuple[Floats, LinearSolution] | None = None
 
     def only(self, runs: Sequence[int]) -> JointResiduals:
         """Return the samples of some of the runs, in order; the others are evaluated but not used."""
@@ -235,7 +235,8 @@ class JointResiduals:
             setattr(table, name, getattr(self, name)[kept])
         table.owner = np.searchsorted(runs, self.owner[kept])
         table.information = self.information[list(runs)]
-        table.weights, table._seen, table._solved = table.information, None, None
+        table._seen = None
+        table._set_weights(table.information)
         if self._columns_at is not None:
             point, reduced, base, columns = self._columns_at
             table._columns_at = point, reduced, base[kept], columns[kept]
@@ -243,13 +244,12 @@ class JointResiduals:
 
     def weigh(self, errors: Floats) -> None:
         """Robust weights: the sum of the errors counts, not of their squares; long records by their information."""
-        self.weights = self.information * robust_weights(errors, _MIN_ERROR_PP)
-        self._solved = None
+        self._set_weights(self.information * robust_weights(errors, _MIN_ERROR_PP))
 
-    @property
-    def factor(self) -> Floats:
-        """(N,) what residuals [N] are multiplied by."""
-        return self.weights[self.owner] * self.unit
+    def _set_weights(self, weights: Floats) -> None:
+        self.weights = weights
+        self.factor = weights[self.owner] * self.unit  # (N,) what residuals [N] are multiplied by
+        self._solved: tuple[Floats, LinearSolution] | None = None
 
     def _followed(self, model: Model, point: Floats) -> tuple[Excitation, Floats]:
         """Motion and state of a model at the samples."""
@@ -286,7 +286,8 @@ class JointResiduals:
         columns, right = columns * factor[:, None], (self.target - base) * factor
         solution, held = solve_bounded(columns, right, *self.bounds)
         residual = columns @ solution - right
-        errors = np.sqrt(np.bincount(self.owner, residual**2)) / self.weights
+        begins = np.searchsorted(self.owner, np.arange(self.weights.size))
+        errors = np.sqrt(np.add.reduceat(residual**2, begins)) / self.weights
         model = replace(reduced, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
         stopped = tuple(i.name for i, h in zip(linear, held, strict=True) if h)
         free = columns[:, ~held] if stopped else columns
@@ -327,10 +328,10 @@ class JointResiduals:
 
         Exact in one pass where the model gives tangents, else by forward differences.
         """
-        weights = self.weights[self.owner]
         motion = self.concatenated.with_field_current(self.problem.coil_at(point))
         if (slopes := self.problem.force_slopes(point, model, motion, self.picked)) is not None:
-            return slopes * (weights * self.unit)[:, None]
+            return np.multiply(slopes, self.factor[:, None], out=slopes)
+        weights = self.weights[self.owner]
         return forward_differences(lambda u: self.residual(u, model) * weights, point, residual, *self.problem.box())
 
     def residual(self, point: Floats, model: Model) -> Floats:

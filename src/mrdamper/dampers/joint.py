@@ -434,13 +434,14 @@ class JointProblem:
         tangents = force_tangents(moved, motion, names, picked)
         if tangents is None:
             return None
-        slopes = np.zeros((point.size, len(names)))
+        slopes = np.empty((point.size, tangents.shape[1]))
         for i, axis in enumerate(self.axes):
             if i in self._entangled_axes:
-                slopes[i] = self._moved_along(i, point, names)
+                np.matmul(self._moved_along(i, point, names), tangents[1:], out=slopes[i])
             else:
-                slopes[i, names.index(axis.name)] = axis.value(float(point[i])) if axis.log else 1.0
-        return (slopes @ tangents[1:]).T
+                scale = axis.value(float(point[i])) if axis.log else 1.0
+                np.multiply(tangents[1 + names.index(axis.name)], scale, out=slopes[i])
+        return slopes.T
 
     @cached_property
     def _entangled_axes(self) -> frozenset[int]:
