@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -55,15 +54,9 @@ def distance_from(
     some = np.abs(current[:: max(1, current.size // _MAX_SAMPLES)])
     distances = _current_distances(some, levels, changing=swept_A is not None)
     between, beyond = (float(np.sqrt(np.mean(distance**2))) for distance in distances)
-    frequency, amplitude = _nearest(MotionHull.of(tested), at.frequency_Hz, at.amplitude_m)
+    frequency, amplitude = MotionHull.of(tested).nearest(at.frequency_Hz, at.amplitude_m)
     motion = np.hypot(np.log(at.frequency_Hz / frequency), np.log(at.amplitude_m / amplitude))
     return Distance(between, beyond, float(motion))
-
-
-@lru_cache(maxsize=4096)
-def _nearest(hull: MotionHull, frequency: float, amplitude: float) -> tuple[float, float]:
-    """Nearest motion of a hull: dampers of many models are made from the same tests, and score the same runs."""
-    return hull.nearest(frequency, amplitude)
 
 
 def _current_distances(current: Floats, levels: Floats, changing: bool) -> tuple[Floats, Floats]:

@@ -74,6 +74,11 @@ class Condition:
     amplitude_m: float
 
     def __post_init__(self) -> None:
+        current, frequency, amplitude = self.current_A, self.frequency_Hz, self.amplitude_m
+        floats = type(current) is type(frequency) is type(amplitude) is float
+        sized = floats and abs(current) <= _MOST_CURRENT and 0 <= amplitude <= _LONGEST
+        if sized and (not frequency or _SLOWEST <= frequency <= _FASTEST):
+            return  # a study makes thousands of them
         # A traced model is evaluated at symbols, which have no size.
         given = (("current", self.current_A, -math.inf), ("frequency", self.frequency_Hz, 0.0))
         for name, value, least in (*given, ("amplitude", self.amplitude_m, 0.0)):

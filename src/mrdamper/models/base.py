@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -211,9 +211,9 @@ class Model(ABC):
     def nearest(cls, values: Mapping[str, float]) -> Self:
         """Make the model as `build` does, with every parameter limited to its bounds."""
         bounds = {info.name: info.bounds for info in cls.parameters()}
-        inside = {name: plain(np.clip(value, *bounds[name])) for name, value in values.items() if name in bounds}
+        inside = {name: _limited(value, *bounds[name]) for name, value in values.items() if name in bounds}
         model = cls.resolved({**values, **inside})
-        return cls(**{n: plain(np.clip(value, *bounds[n])) if n in bounds else value for n, value in model.items()})
+        return cls(**{n: _limited(value, *bounds[n]) if n in bounds else value for n, value in model.items()})
 
     @classmethod
     def map_forms(cls) -> Mapping[str, tuple[str, ...]]:
@@ -228,6 +228,10 @@ class Model(ABC):
     def values(self) -> dict[str, float]:
         """Parameter values by name."""
         return {info.name: getattr(self, info.name) for info in self.parameters()}
+
+
+def _limited(value: Any, low: float, high: float) -> Any:
+    return min(max(float(value), low), high) if isinstance(value, float) else plain(np.clip(value, low, high))
 
 
 def require_positive(where: str, **values: float) -> None:

@@ -166,8 +166,10 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None, *, com
     prediction = damper.predict(run)
     inside = run.in_window
     reading = GainOffset.of(run.force[inside], prediction.force[inside])
-    samples = PredictedRun.of(run, prediction.force, prediction.motion.velocity) if compared else None
-    away = partial(distance_from_tests, damper, prediction.condition, prediction.motion.current)
+    samples: tuple[Any, ...] = ()
+    if compared:
+        away = partial(distance_from_tests, damper, prediction.condition, prediction.motion.current)
+        samples = PredictedRun.of(run, prediction.force, prediction.motion.velocity), away
     expected = sessions.expected(RecordingTime.of(run), without=run.id) if sessions else None
     if expected is not None:
         prediction = prediction.corrected(expected.gain, expected.offset)
@@ -181,8 +183,7 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None, *, com
         _at_rest(run, prediction),
         UNKNOWN if expected is None else KNOWN,
         reading,
-        samples,
-        away,
+        *samples,
     )
 
 

@@ -39,31 +39,40 @@ class MotionHull:
 
     def nearest(self, frequency: Any, amplitude: Any) -> tuple[Any, Any]:
         """Frequency [Hz] and amplitude [m] of the nearest motion of the hull; for arrays and traced numbers."""
-        if len(self.corners) == 1:
-            return self.corners[0]
-        u, w = (np.log(np.maximum(value, _ZERO_IN_LOGARITHM)) for value in (frequency, amplitude))
-        corners = np.log(self.corners)
-        inside: Any = None
-        nearest: tuple[Any, Any, Any] | None = None
-        count = len(corners)
-        for i in range(count if count > 2 else 1):
-            (u0, w0), (u1, w1) = corners[i].tolist(), corners[(i + 1) % count].tolist()
-            du, dw = u1 - u0, w1 - w0
-            left = du * (w - w0) - dw * (u - u0) >= 0
-            inside = left if inside is None else inside & left
-            share = np.clip(((u - u0) * du + (w - w0) * dw) / (du**2 + dw**2), 0.0, 1.0)
-            at, up = u0 + share * du, w0 + share * dw
-            distance = (u - at) * (u - at) + (w - up) * (w - up)
-            if nearest is None:
-                nearest = distance, at, up
-                continue
-            closer = distance < nearest[0]
-            nearest = tuple(np.where(closer, a, b) for a, b in zip((distance, at, up), nearest, strict=True))  # type: ignore[assignment]
-        assert nearest is not None
-        f, A = np.exp(nearest[1]), np.exp(nearest[2])
-        if count == 2:
-            return f, A
-        return _where(inside, frequency, f), _where(inside, amplitude, A)
+        numbers = isinstance(frequency, float) and isinstance(amplitude, float)
+        return (_nearest_of_numbers if numbers else _nearest)(self, frequency, amplitude)
+
+
+def _nearest(hull: MotionHull, frequency: Any, amplitude: Any) -> tuple[Any, Any]:
+    if len(hull.corners) == 1:
+        return hull.corners[0]
+    u, w = (np.log(np.maximum(value, _ZERO_IN_LOGARITHM)) for value in (frequency, amplitude))
+    corners = np.log(hull.corners)
+    inside: Any = None
+    nearest: tuple[Any, Any, Any] | None = None
+    count = len(corners)
+    for i in range(count if count > 2 else 1):
+        (u0, w0), (u1, w1) = corners[i].tolist(), corners[(i + 1) % count].tolist()
+        du, dw = u1 - u0, w1 - w0
+        left = du * (w - w0) - dw * (u - u0) >= 0
+        inside = left if inside is None else inside & left
+        share = np.clip(((u - u0) * du + (w - w0) * dw) / (du**2 + dw**2), 0.0, 1.0)
+        at, up = u0 + share * du, w0 + share * dw
+        distance = (u - at) * (u - at) + (w - up) * (w - up)
+        if nearest is None:
+            nearest = distance, at, up
+            continue
+        closer = distance < nearest[0]
+        nearest = tuple(np.where(closer, a, b) for a, b in zip((distance, at, up), nearest, strict=True))  # type: ignore[assignment]
+    assert nearest is not None
+    f, A = np.exp(nearest[1]), np.exp(nearest[2])
+    if count == 2:
+        return f, A
+    return _where(inside, frequency, f), _where(inside, amplitude, A)
+
+
+# Dampers of many models are made from the same tests, and predict the same runs.
+_nearest_of_numbers = lru_cache(maxsize=4096)(_nearest)
 
 
 @lru_cache(maxsize=256)
