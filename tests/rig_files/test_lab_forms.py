@@ -239,12 +239,22 @@ def test_a_profile_integrates_a_velocity(tmp_path):
     assert np.ptp(read_run(tmp_path / "lvt.csv", profile).displacement) == pytest.approx(0.020, rel=2e-3)
 
 
-def test_a_heading_that_states_another_amplitude_is_reported(tmp_path):
-    head = "Amplitude: 10 mm\nCurrent: 0.5 A\nTime (s),Displacement (mm),Force (N)\n"
-    (tmp_path / "a.csv").write_text(head + rows(T, X / 25.4, force(0.5)))
-    assert "W_NAME" in [finding.code for finding in read_run(tmp_path / "a.csv").findings]
-    (tmp_path / "b.csv").write_text(head + rows(T, X, force(0.5)))
-    assert "W_NAME" not in [finding.code for finding in read_run(tmp_path / "b.csv").findings]
+@pytest.mark.parametrize(
+    ("heading", "factor", "code"),
+    [
+        ("Amplitude: 10 mm", 1 / 5, "W_NAME"), ("Amplitude: 10 mm", 1.0, ""), ("Stroke: 20 mm", 1.0, ""),
+        ("Amplitude: 10 mm", 1 / 25.4, "E_MOTION_CONTRADICTS"), ("Stroke: 20 mm", 25.4, "E_MOTION_CONTRADICTS"),
+        ("Amplitude: 10 mm", 1 / 10, "E_MOTION_CONTRADICTS"),
+    ],
+)  # fmt: skip
+def test_a_heading_of_another_amplitude_is_reported_and_refused_at_the_factor_of_a_unit(
+    tmp_path, heading, factor, code
+):
+    head = f"{heading}\nCurrent: 0.5 A\nTime (s),Displacement (mm),Force (N)\n"
+    (tmp_path / "a.csv").write_text(head + rows(T, factor * X, force(0.5)))
+    result = import_files([tmp_path])
+    codes = [r.error.code for r in result.refusals] or [f.code for r in result.records for f in r.findings]
+    assert [c for c in codes if c in ("W_NAME", "E_MOTION_CONTRADICTS")] == [code] * bool(code)
 
 
 @pytest.mark.parametrize("stated", [10, 20])

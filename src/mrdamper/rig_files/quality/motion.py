@@ -33,6 +33,8 @@ FEWEST_LEVELS, _MANY = 16, 8  # values of a channel, and samples for each
 _SAME_FREQUENCY = 0.2  # relative difference of what is measured
 # Measured amplitude over the one stated, which may be the stroke peak to peak: a machine falls short of its command.
 _AMPLITUDES = (0.25, 1.6)
+_UNITS = np.array([2.54, 10, 25.4, 39.37, 100, 1000])  # factors between units of length
+_SAME_FACTOR = 0.015  # relative difference from it: 2.5 and 25 are none
 
 
 def moves(view: View) -> None:
@@ -221,7 +223,8 @@ def stated_motion(record: Record, unit: str) -> float | None:
 def agrees_with_its_name(view: View) -> Iterator[Finding]:
     """Report a motion of another frequency or amplitude than a name or heading states.
 
-    One of both is refused, and one of another frequency where time is nothing but a sampling rate that is stated.
+    One of both is refused, one of another frequency where time is nothing but a sampling rate that is stated, and one
+    of an amplitude that differs by the factor of a unit.
     """
     motion = view.motion
     if motion is None:
@@ -236,6 +239,8 @@ def agrees_with_its_name(view: View) -> Iterator[Finding]:
         contradictions.append((f"{amplitude:g} mm", f"an amplitude of {size:.3g} mm", "displacement"))
     if not contradictions:
         return
+    factors = np.array([size, 2 * size]) / amplitude if amplitude else np.empty(0)
+    factors = np.maximum(factors, 1 / factors)[:, None] / _UNITS
     stated, has, channels = (" and ".join(words) for words in zip(*contradictions, strict=True))
     states, rate = f"the name or heading states {stated}", view.record.provenance.get("time_from", "")
     if len(contradictions) > 1:
@@ -244,5 +249,10 @@ def agrees_with_its_name(view: View) -> Iterator[Finding]:
     if rate and channels == "time":
         problem = f"{states}, and by the sampling rate ({rate}) the motion has {has}"
         remedy = "set [file] sample_rate_Hz = ... in a profile, or correct the name"
+        raise view.refused("E_MOTION_CONTRADICTS", problem, remedy)
+    if channels == "displacement" and np.any(alike := np.abs(factors - 1) <= _SAME_FACTOR):
+        factor = _UNITS[np.any(alike, axis=0)][0]
+        problem = f"{states}, and the record has {has}: they differ by {factor:g}, as units of length do"
+        remedy = 'correct the name or heading, or set [channels.displacement] unit = "..." in a profile'
         raise view.refused("E_MOTION_CONTRADICTS", problem, remedy)
     yield Finding("W_NAME", f"{states} and the record has {has}: check the unit of {channels}, or the name")
