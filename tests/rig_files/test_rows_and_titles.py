@@ -5,6 +5,7 @@ import json
 import h5py
 import numpy as np
 import pytest
+from openpyxl import Workbook
 
 from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.conditions import currents_in, stated_by_lines, stated_quantities, stated_rate, without_currents
@@ -186,3 +187,28 @@ def test_titles_over_every_column_agree_within_a_test_and_are_no_ranges(tmp_path
     assert [float(np.mean(record.current)) for record in result.records] == currents
     assert [record.id for record in result.records] == [f"a_{current:g}_A" for current in currents]
     assert {refusal.error.code for refusal in result.refusals} <= {"E_CURRENT_MISSING"}
+
+
+@pytest.mark.parametrize("clock", ["x_Run{}", "x{}", "q_Run{}"])
+def test_columns_in_a_unit_of_time_are_the_times_of_tests_beside_each_other(tmp_path, clock):
+    names = ";".join(f"{clock.format(i)} [s];stroke_Run{i} [mm];load_Run{i} [N]" for i in (1, 2))
+    text = f"# 0.5 A;0.5 A;0.5 A;1 A;1 A;1 A\n{names.replace('_Run', '') if clock == 'x{}' else names}\n"
+    (tmp_path / "a.csv").write_text(text + rows(T, X, force(0.5), T, 1.1 * X, force(1.0)))
+    records = import_files([tmp_path / "a.csv"]).records
+    assert [float(np.mean(record.current)) for record in records] == [0.5, 1.0]
+    assert all(np.allclose(record.time, T) for record in records)
+
+
+def test_the_name_of_a_sheet_states_the_current_of_each_of_its_tables(tmp_path):
+    book = Workbook()
+    for name, current in (("0 A", 0.0), ("0.5 A", 0.5)):
+        sheet = book.create_sheet(name)
+        for factor in (1.0, 1.5):
+            sheet.append(["Time [s]", "Travel [mm]", "Force [N]"])
+            for row in zip(T, factor * X, factor * force(current), strict=True):
+                sheet.append([round(float(value), 4) for value in row])
+            sheet.append([])
+    del book["Sheet"]
+    book.save(tmp_path / "a.xlsx")
+    result = import_files([tmp_path / "a.xlsx"])
+    assert [float(np.mean(record.current)) for record in result.records] == [0.0, 0.0, 0.5, 0.5]

@@ -230,6 +230,20 @@ def test_invalid_samples_of_a_measuring_system_are_missing(tmp_path):
     assert np.flatnonzero(np.isnan(record.force)).tolist() == [40, 90]
 
 
+def test_the_comment_of_a_group_of_channels_states_the_current_of_its_test(tmp_path):
+    from asammdf import MDF, Signal
+
+    file = MDF(version="4.10")
+    for i, current in enumerate((0.0, 0.5)):
+        loads = (1 + current) * F
+        signals = [Signal(X, T, unit="mm", name="disp"), Signal(loads, T, unit="N", name="force")]
+        file.append(signals, comment=f"T{i + 1:02d} coil current {current:.1f} A")
+    file.save(tmp_path / "session.mf4")
+    file.close()
+    records = import_files([tmp_path]).records
+    assert [record.current[0] for record in records] == [0.0, 0.5]
+
+
 def test_clean_records_show_no_leaps_and_no_spikes():
     for seed in range(40):
         record = clean_record(seed, sensor=5e-6 * (seed % 3))

@@ -87,6 +87,18 @@ EXPORTS = {
     "sections with a clock without colons": "[header]\ntime\nLoad N\n\n[channel units]\nN\nmm\n\n"
     + "[column names]\ntime load stroke\n\n[data]\n"
     + lines(lambda i, t, x, f: f"{clock(t):%H%M%S.%f} {f:+.9E} {x:+.9E}"),
+    "sections with the channels of a vehicle before those with units": "[header]\nsatellites\ntime\nvelocity kmh\n"
+    + "load\nstroke\n\n[channel units]\nN\nmm\n\n[comments]\nrig 7\n\n"
+    + "[column names]\nsats time velocity load stroke\n\n[data]\n"
+    + lines(lambda i, t, x, f: f"009 {clock(t):%H%M%S.%f} 000.012 {f:+.9E} {x:+.9E}"),
+    "a rate in samples by seconds written out": "TEST ID,211\nSAMPLE RATE,200 samples/sec\n\nStroke (mm),Load (N)\n"
+    + lines(lambda i, t, x, f: f"{x:.6f},{f:.4f}"),
+    "the step of an abscissa": "Values: 1001\nAbscissa: Time / s, start 0, delta 0.005\nChannel 1: Displacement / mm\n"
+    + "Channel 2: Force / N\n\n"
+    + lines(lambda i, t, x, f: f"{x:.9E}\t{f:.9E}"),
+    "a head in YAML": "#---\n#name: a\n#coil:\n#  current: 0.5\n#  unit: A\n#fields:\n#- name: t\n#  unit: s\n"
+    + "#- name: stroke\n#  unit: mm\n#- name: force\n#  unit: N\n#---\nt,stroke,force\n"
+    + lines(lambda i, t, x, f: f"{t:.3f},{x:.6f},{f:.4f}"),
     "numbers of rows without a name": "t.s,stroke.mm,load.N\n"
     + lines(lambda i, t, x, f: f'"{i + 1}",{t:.3f},{x:.6f},{f:.4f}'),
     "a step for all channels, and a separator behind every line": '"Name","stroke","load",\n"VUnit","mm","N",\n'
@@ -104,10 +116,11 @@ EXPORTS = {
 
 @pytest.mark.parametrize("export", EXPORTS)
 def test_an_export_gives_the_samples_it_was_made_of(tmp_path, export):
-    (tmp_path / "run_0.5A.csv").write_text(EXPORTS[export])
+    (tmp_path / f"run{'_0.5A' * ('YAML' not in export)}.csv").write_text(EXPORTS[export])
     result = import_files([tmp_path])
     assert not [str(refusal.error) for refusal in result.refusals]
     (record,) = result.records
+    assert record.current[0] == 0.5
     size = record.time.size
     assert size >= T.size - 1  # a last row without a line end is left out
     np.testing.assert_allclose(record.time - record.time[0], T[:size], rtol=0, atol=1e-9)

@@ -47,7 +47,7 @@ _NEGATIVE = re.compile(r"[=:]\s*[-−]$")  # a dash elsewhere may stand between 
 _NUMERIC_CELL = re.compile(r"[,;]\s*\"?[+-]?[0-9.]+\"?\s*(?:[,;]|$)")
 _LINE = re.compile(
     r"^[\s#%/\"]*(?P<key>[^:=;\t]{1,60}?)[\s\"]*(?:[:=;\t]|(?<![0-9]),|,(?![0-9]+(?![0-9.])))[\s:=;,\t\"]*(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)"
-    r"[\s;,\t\"]*[\[(]?(?P<unit>(?:1/)?(?:[^\W\d_]|/){0,9}(?:-1)?)[\])]?[\s;,\t\"]*$"
+    r"[\s;,\t\"]*[\[(]?(?P<unit>(?:1/)?(?:[^\W\d_]|/){0,11}(?:-1)?)[\])]?[\s;,\t\"]*$"
 )
 CELL = re.compile(r"\s*([+-]?[0-9]+(?:[.,][0-9]+)?)\s*((?:[^\W\d_]|°){0,8})\s*")  # a number, and a unit behind it
 LONGEST_LINE, _MOST_PARTS = 300, 20
@@ -102,7 +102,7 @@ _RATE_IN_NAME = re.compile(
     r"|(?P<b>[0-9]+(?:[.,][0-9]+)?)[ _]?(?P<kb>k?)Hz[_ ]?fs(?![A-Za-z]))"
 )
 _SPACED = re.compile(
-    r"^[\s#%/\"]*(?P<key>[^\d:=;,\t]{1,60}?)\s+(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)\s*(?P<unit>(?:1/)?(?:[^\W\d_]|/){1,9}(?:-1)?)\s*$"
+    r"^[\s#%/\"]*(?P<key>[^\d:=;,\t]{1,60}?)\s+(?P<number>[+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]{1,2})?)\s*(?P<unit>(?:1/)?(?:[^\W\d_]|/){1,11}(?:-1)?)\s*$"
 )
 BARE_RATE = re.compile(r"(?i)f_?s|(?:sampl(?:e|ing)|scan|abtast)[ _]?(?:rate|freq(?:uency)?)")
 _BARE_STEP = re.compile(

@@ -48,6 +48,10 @@ _CLOCKS, _WEIGHTS = meanings("clocks") | {"time since start": ""}, meanings("wei
 _TIME_UNIT = re.compile(
     r"(?i)^[\s\"#%]*(?:horizontal|x[ -]?|h|time[ _-]?)\s*units?\"?\s*[:=,;\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s,;]*$"
 )
+_ABSCISSA = re.compile(  # Abscissa: Time / s, start 0, delta 0.001
+    r"(?i)^[\s#%\"]*(?:abscissa|abszisse|(?:x|time)[ _-]?axis|zeitachse)\b.{0,40}?[/\[( ](?P<unit>[mµu]?s)\b.{0,40}?"
+    r"\b(?:delta|step|increment|schritt(?:weite)?|d[xt])\b\W{1,4}(?P<step>[0-9]+(?:\.[0-9]+)?(?:e[+-]?[0-9]+)?)(?=[\s,;]|$)"
+)
 _KEY = re.compile(r"[\s#%;\"]*([^=:]{1,60}?)\s*[=:]\s*(\S+)\s*")  # CoilCurrent=0.5, CoilCurrentUnit=A
 _UNIT_KEY = re.compile(rf"(?i)(?:{'|'.join(words('unit'))})$")  # HUnit, X-Einheit
 _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.IGNORECASE)
@@ -60,6 +64,7 @@ _ALL_VOLTS = re.compile(
 )
 _EXCEPT = re.compile(r"(?i)\b(?:except|but|not|no|non|außer|nicht|kein\w*|sauf|salvo|excepto|tranne)\b")
 _AT = re.compile(r"\s(?:at|for|bei|mit|à|pour|con|com|en|vs\.?)\s")  # of a condition: force (N) at coil current
+_SYMBOL = re.compile(r"^[A-Za-z](?=[ _.0-9])")  # before the number of a test
 _LABVIEW = ("Delta_X", "X_Dimension")
 _BEHIND_NAME = re.compile(r"\s*[:=|,]\s*|\s[-–—]\s|$")  # in front of what a name means: t - time
 _OTHER_FORCE = re.compile("(?i)" + "|".join(words("other_force")))  # than the damper's
@@ -157,6 +162,7 @@ def _with_values_for_all(table: RawTable) -> RawTable:
     numbers = {key: cell for key, cell in plain.items() if looks_numeric(cell)}
     for end in ("Unit", "_unit", " unit"):
         lines += [f"{key}: {cell} {plain[key + end]}" for key, cell in numbers.items() if key + end in plain]
+    lines += [f"DELTA_T: {m['step']} {m['unit']}" for m in map(_ABSCISSA.match, table.remarks) if m]
     lines += [f"DELTA_T: {line[8:].strip()} s" for line in table.remarks if line.startswith("DELTA_T=")]
     return replace(table, remarks=(*table.remarks, *lines)) if lines else table
 
@@ -379,6 +385,9 @@ def _with_si_units(table: RawTable) -> RawTable:
 def _with_clocks_and_weights(table: RawTable) -> RawTable:
     """Names of clocks of microcontrollers as times, and loads that a scale shows in kg or g as forces."""
     headings, notes = {}, []
+    clocks = table.columns(dimension="time")
+    if not table.columns("time") and len(clocks) == len(table.columns("displacement", "length")) > 1:  # x_Run1 in s
+        headings = {i: (_SYMBOL.sub("time", table.names[i]), table.units[i]) for i in clocks}
     for i, header in enumerate(table.headers):
         key = re.sub(r"[\s_()]+", " ", header.name.strip().casefold()).strip()
         if not header.unit and key in _CLOCKS:

@@ -181,6 +181,7 @@ def with_description(table: RawTable, path: Path, profile: Profile) -> RawTable:
     named = [p for p in beside if p != path and p.is_file() and not profile.leaves_out(p.name)]
     named = [p for p in (*named, *([other] if other else ())) if p.suffix.lower() in _NAMED or is_description(p)]
     lines = short_lines(named[0]) if named else packaged_lines(path)
+    lines = [*lines, *_head_in_yaml(table.remarks)]
     return replace(table, remarks=(*table.remarks, *lines))
 
 
@@ -316,6 +317,15 @@ def packaged_lines(path: Path) -> list[str]:
             return [*lines, *(f"description: {entry['description']}" for entry in entries if "description" in entry)]
         except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
             continue  # none, or no data package
+    return []
+
+
+def _head_in_yaml(lines: Iterable[str]) -> list[str]:
+    """Return what lines between two of three dashes state, commented out or not: the head of a CSVY file."""
+    bare = [line.lstrip().removeprefix("#") for line in lines]
+    marks = [i for i, line in enumerate(bare) if line.strip() == "---"]
+    with suppress(ValueError, RecursionError):
+        return list(_stated(_tree_of_yaml("\n".join(bare[marks[0] + 1 : marks[1]])), "")) if len(marks) == 2 else []
     return []
 
 

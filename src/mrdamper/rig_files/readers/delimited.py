@@ -47,7 +47,7 @@ class DelimitedText(Reader):
 
     name = "text"
     title = "delimited text"
-    suffixes = (".csv", ".txt", ".dat", ".tsv", ".asc", ".prn", ".log", ".tab", ".lvm", ".tra")
+    suffixes = (".csv", ".txt", ".dat", ".tsv", ".asc", ".prn", ".log", ".tab", ".lvm", ".tra", ".vbo")
     binary = False
 
     def recognises(self, source: Source) -> bool:

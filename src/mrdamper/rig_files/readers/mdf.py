@@ -36,7 +36,12 @@ class Mdf(Reader):
         check_unpacked(
             source, max((8 * channels[0]["data"].size for channels in groups.values() if channels), default=0)
         )
-        tree = {name: {"channels": channels} for name, channels in groups.items() if len(channels) > 1}
+        notes = [getattr(group.channel_group, "comment", "") for group in file.groups]
+        tree = {
+            name: {"channels": channels, **({"comment": str(note)} if note else {})}
+            for (name, channels), note in zip(groups.items(), notes, strict=True)
+            if len(channels) > 1
+        }
         return nested_tables(source, tree, self.title)
 
 

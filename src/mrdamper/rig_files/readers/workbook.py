@@ -57,7 +57,12 @@ def tables_of_sheets(source: Source, sheets: Sequence[tuple[str, Source]], form:
         except InputError as error:
             first = first or error
             tables = []
-        tables = [replace(t, label=t.label or name, form={"sheet": name}) for t in tables if len(t.names) >= _FEWEST]
+        titles = (name,) if len(tables) > 1 else ()  # of each of its tables
+        tables = [
+            replace(t, label=t.label or name, remarks=(*titles, *t.remarks), form={"sheet": name})
+            for t in tables
+            if len(t.names) >= _FEWEST
+        ]
         named = [header.channel for table in tables for header in table.headers]
         noted = sheet.size <= _NOTES and all(any(table.odd[:1]) for table in tables) and not any(named)  # quantities
         beside += sheet.head(_NOTES).decode("utf-8", "replace").splitlines() if noted or not tables else ()

@@ -81,12 +81,15 @@ def _sections(text: str) -> Iterator[str]:
     }
     names, units = says.get("column names", "").split(), says.get("channel units", "").splitlines()
     rows = [line.split() for line in says.get("data", "").splitlines() if line.strip()]
-    if len(names) <= len(units) or names[0] != "time" or any(not re.fullmatch(_CLOCK, row[0]) for row in rows):
+    at, first = names.index("time") if "time" in names else -1, len(names) - len(units)
+    if at < 0 or at >= first or any(len(row) <= at or not re.fullmatch(_CLOCK, row[at]) for row in rows):
         return
-    yield "\t".join(names)
-    yield "\t".join(["s", *[""] * (len(names) - 1 - len(units)), *units])  # those of the last columns
-    for clock, *cells in rows:
-        yield "\t".join([f"{clock[:2]}:{clock[2:4]}:{clock[4:]}", *cells])
+    first = first if units else at + 1
+    yield from (f"# {line}" for name in ("comments", "session data") for line in says.get(name, "").splitlines())
+    yield "\t".join(["time", *names[first:]])
+    yield "\t".join(["s", *units])  # those of the last columns: the others are of the vehicle
+    for row in rows:
+        yield "\t".join([f"{row[at][:2]}:{row[at][2:4]}:{row[at][4:]}", *row[first:]])
 
 
 _WAYS = {
