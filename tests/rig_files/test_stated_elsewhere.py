@@ -317,7 +317,8 @@ def test_tests_of_different_lengths_in_one_array_are_cut_where_they_end(tmp_path
     assert [r.time.size for r in import_files([tmp_path]).records] == [T.size, T.size - 250, T.size - 500]
 
 
-def test_an_attribute_has_the_unit_that_another_attribute_states(tmp_path):
+@pytest.mark.parametrize("key", ["units", "Unidade", "birim", "単位", "единица", "Einheit"])
+def test_an_attribute_has_the_unit_that_another_attribute_states(tmp_path, key):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for i, (current, unit) in enumerate([(500, "mA"), (1.0, "A")]):
             group = file.create_group(f"tests/T{i}")
@@ -327,7 +328,7 @@ def test_an_attribute_has_the_unit_that_another_attribute_states(tmp_path):
                 ("displacement", "mm", X),
                 ("force", "N", force(0.5 + 0.5 * i)),
             ):
-                group.create_dataset(name, data=values).attrs["units"] = unit_of
+                group.create_dataset(name, data=values).attrs[key] = unit_of
     expect(tmp_path, 0.5, 1.0)
 
 

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 TABLES: Mapping[str, Any] = tomllib.loads(files("mrdamper.rig_files").joinpath("words.toml").read_text("utf-8"))
 KEYS: Mapping[str, Sequence[str]] = TABLES["keys"]
+UNIT_KEYS = frozenset(KEYS["unit"])
 _LETTERS = str.maketrans("łøıđß", "loids")
 _FEWEST_LETTERS = 4  # of a word that is known without its accents: cas is another word than čas
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from mrdamper.data.arrays import odd_steps
 from mrdamper.errors import InputError
-from mrdamper.rig_files.column_names import DIMENSION, RATING, is_unit, role_of, split_name, words, words_of
+from mrdamper.rig_files.column_names import DIMENSION, RATING, UNIT_KEYS, is_unit, role_of, split_name, words, words_of
 from mrdamper.rig_files.columns import column_called
 from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.profile import FileForm
@@ -25,7 +25,7 @@ _FEWEST_ROWS = 5  # of a test, on average
 _MOST_LEVELS = 200  # currents of a column of texts that are looked at
 _SMALL = 32 * 2**20  # bytes of a file whose columns are kept together
 _RUN_WORDS = words("run")
-_VALUE, _CHANNEL, _UNIT, _NUMBER = words("value"), words("channel"), words("unit"), words("run_number")
+_VALUE, _CHANNEL, _UNIT, _NUMBER = words("value"), words("channel"), UNIT_KEYS, words("run_number")
 _MOST_CHANNELS = 60
 _FEWEST_SAMPLES = 50  # of channels whose names say nothing
 

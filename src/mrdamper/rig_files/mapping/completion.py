@@ -13,6 +13,7 @@ from mrdamper.rig_files.column_names import (
     DIMENSION,
     RATING,
     SI,
+    UNIT_KEYS,
     WEIGHT,
     Header,
     holds,
@@ -53,10 +54,10 @@ _ABSCISSA = re.compile(  # Abscissa: Time / s, start 0, delta 0.001
     r"\b(?:delta|step|increment|schritt(?:weite)?|d[xt])\b\W{1,4}(?P<step>[0-9]+(?:\.[0-9]+)?(?:e[+-]?[0-9]+)?)(?=[\s,;]|$)"
 )
 _KEY = re.compile(r"[\s#%;\"]*([^=:]{1,60}?)\s*[=:]\s*(\S+)\s*")  # CoilCurrent=0.5, CoilCurrentUnit=A
-_UNIT_KEY = re.compile(rf"(?i)(?:{'|'.join(words('unit'))})$")  # HUnit, X-Einheit
+_UNIT_KEY = re.compile(rf"(?i)(?:{'|'.join(UNIT_KEYS)})$")  # HUnit, X-Einheit
 _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.IGNORECASE)
 _TITLES = words("label") | words("notes")
-_UNITS_IN = rf"(?i:{'|'.join(words('unit'))}|unités|unidades|units)"
+_UNITS_IN = rf"(?i:{'|'.join(sorted(UNIT_KEYS, key=len, reverse=True))}|unités|unidades|units)"
 _SI_UNITS = re.compile(rf"\bSI[- ](?:base[- ])?{_UNITS_IN}|{_UNITS_IN}\W*(?:(?:in|du|del|do)\W+)?SI\b")
 _ALL_VOLTS = re.compile(
     r"(?i)\b(?:all|alle|todos|tous|tutti)\b(?: \w+)? (?:channels|signals|columns|kanäle|signale|canales|canaux|canali)"

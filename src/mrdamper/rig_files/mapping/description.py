@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.column_names import DIMENSION, is_unit, parse_unit, split_name, words, words_of
+from mrdamper.rig_files.column_names import DIMENSION, UNIT_KEYS, is_unit, parse_unit, split_name, words, words_of
 from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines
 from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, states_si, states_volts
 from mrdamper.rig_files.mapping.results import numbered_tests
@@ -85,7 +85,7 @@ _RULE = re.compile(r"[\s|:+=-]*")  # below the names of columns of a table in Ma
 _DEEPEST, _FEWEST_TESTS = 6, 2
 _MOST_LEVELS = 50  # of a text in YAML
 _MOST_LISTED = 200  # quantities or channels
-_VALUE, _SCALE, _UNIT = words("value"), words("scale"), words("unit")
+_VALUE, _SCALE, _UNIT = words("value"), words("scale"), UNIT_KEYS
 _EU = re.compile(r"(?i)\b(?:EU|units?)\b")  # engineering units, those of the row
 _PER = re.compile(rf"{_EU.pattern} ?(?:/|per) ?m?V\b|\bm?V ?(?:/|per) ?{_EU.pattern[4:]}")
 _SHIFT = re.compile(r"(?i)offset|zero")

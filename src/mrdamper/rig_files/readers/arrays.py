@@ -17,7 +17,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import InputError, MissingExtraError
-from mrdamper.rig_files.column_names import KEYS, is_unit, split_name
+from mrdamper.rig_files.column_names import KEYS, UNIT_KEYS, is_unit, split_name
 from mrdamper.rig_files.readers.base import (
     MOST_COLUMNS,
     MOST_RATIO,
@@ -201,7 +201,7 @@ def unpacked(says: Mapping[str, Any], values: np.ndarray) -> np.ndarray:
 def counts_of(says: Mapping[str, Any]) -> tuple[float, float] | None:
     """Scale and offset of counts of a converter, where both and the unit that they lead to are stated together."""
     lower = {name.casefold(): np.reshape(value, -1) for name, value in says.items()}
-    if not {"scale", "offset"} <= set(lower) or not {"unit", "units"} & set(lower):
+    if not {"scale", "offset"} <= set(lower) or not UNIT_KEYS & set(lower):
         return None
     both = [lower[name] for name in ("scale", "offset")]
     if any(value.dtype.kind not in "iuf" or value.size != 1 for value in both) or both[0][0] in (0, 1):

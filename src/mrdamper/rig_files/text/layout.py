@@ -16,7 +16,7 @@ from itertools import accumulate, islice
 from string import ascii_uppercase
 from typing import Literal
 
-from mrdamper.rig_files.column_names import holds, is_unit, parse_unit, split_name, words
+from mrdamper.rig_files.column_names import UNIT_KEYS, holds, is_unit, parse_unit, split_name, words
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RigFileError, Source
 from mrdamper.rig_files.text.tokens import FORTRAN, MISSING, looks_numeric, stamp, with_notes_beside
@@ -33,7 +33,7 @@ _MARKS, _DIGITS = frozenset("#%/"), frozenset("0123456789+-.")
 _FEWEST_LINES = 20  # of a text: fewer, with words among the numbers, are notes
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
-_UNIT_KEYS, _NOTES, _SCALES = words("unit"), words("notes"), words("scale") | {"offset"}
+_UNIT_KEYS, _NOTES, _SCALES = UNIT_KEYS, words("notes"), words("scale") | {"offset"}
 _MOST_LEVELS = 4  # lines of headings
 _TELLING = 2  # columns whose names tell what they are
 _LONGEST_HEADING = 6  # words
