@@ -38,6 +38,19 @@ def require_the_tests(folder) -> None:
         np.testing.assert_allclose(record.force, force(amperes), rtol=0, atol=1e-2)
 
 
+@pytest.mark.parametrize("folder", ["", "data"])
+def test_a_list_of_variables_names_columns_called_by_number_also_from_the_folder_above(tmp_path, folder):
+    (tmp_path / folder).mkdir(exist_ok=True)
+    write(tmp_path / folder, "v01,v02,v03\n")
+    (tmp_path / "list.csv").write_text(
+        "degisken;aciklama;birim\nv01;zaman (time);s\nv02;yer degistirme (displacement);mm\nv03;kuvvet (force);N\n"
+        "v04;unused;-\n"
+    )
+    tests = "".join(f"{name};{amperes}\n" for name, amperes in CURRENTS.items())
+    (tmp_path / "deneyler.csv").write_text(f"deney;akim_A\n{tests}")
+    require_the_tests(tmp_path)
+
+
 @pytest.mark.parametrize(
     ("item", "last"),
     [

@@ -150,6 +150,7 @@ _LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
 # Time  1 - default sample rate
 _RATE_GROUP = re.compile(r"\s+\d*\s*-\s*(?:default|fast|slow) sample rate", re.IGNORECASE)
 _DEVICE = re.compile(r"\\[\w.-]{1,30}:[0-9]{1,3}$")  # F_rod\ES650:1
+_NUMBER = re.compile("(?<![0-9])(?:0|[1-9][0-9]*)$")
 _FUSED = re.compile(r"[ _.:-]+")
 _SMALL = MappingProxyType({"a": "current", "n": "force"})  # units of one letter in names in small letters
 _BY_UNIT = MappingProxyType({"length": "displacement", "force": "force", "current": "current"})
@@ -254,8 +255,8 @@ def role_of(name: str) -> str | None:
         return None
     if len(words) == 1 and words[0] in _SYMBOLS:
         return _SYMBOLS[words[0]]
-    if len(words) == 1 and words[0].rstrip("0123456789") in _SYMBOLS:  # t1, x1, F1
-        return _SYMBOLS[words[0].rstrip("0123456789")]
+    if len(words) == 1 and (symbol := _NUMBER.sub("", words[0])) in _SYMBOLS:  # t1, x1, F1; v01 is the first variable
+        return _SYMBOLS[symbol]
     roles = [role for role in map(_role_of_word, lower) if role is not None]
     if not roles and words and _SYMBOLS.get(words[0]) == "current" and COIL & {*lower[1:]}:  # I_coil, iDmprCoil_FL
         return "current"

@@ -97,7 +97,8 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Add what short texts beside the file state of signs, and of names, units and scales where they lack."""
     lacking = bool(scaled_columns(table)) or _lacks_names_or_units(table)
     readme, structures, listing = _texts_in(path.parent, path.parent.stat().st_mtime_ns)
-    texts = readme or _texts_in(path.parent.parent, path.parent.parent.stat().st_mtime_ns)[0]
+    above = _texts_in(path.parent.parent, path.parent.parent.stat().st_mtime_ns)
+    texts, listing = (readme, listing) if readme else (above[0], [*listing, *above[2]])
     texts = texts + (structures if lacking or len(structures) <= _FEW_FILES else [])
     texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(p.name)]

@@ -306,7 +306,8 @@ def _signs(stems: Mapping[int, tuple[str, ...]], clause: str) -> list[int]:
 
 def heads_senses(cell: str) -> bool:
     """Tell if the cells below a heading say in which sense channels count positive: positive, positive direction."""
-    return len(cell.split()) <= _SHORT and bool(_signs(_POLARITIES, cell)) and not _signs(_SENSES, cell)
+    named = len(cell.split()) <= _SHORT and any(map(str.isalpha, cell))  # a dash stands for nothing
+    return named and bool(_signs(_POLARITIES, cell)) and not _signs(_SENSES, cell)
 
 
 def senses_in(clause: str) -> set[int]:
