@@ -90,6 +90,42 @@ def test_files_of_other_kinds_and_notes_are_named_and_left_out(tmp_path):
     assert sorted(found.left_out) == ["README.txt", "photo.jpg"]
 
 
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("codebook.csv", "variable;what;unit\nv01;time;s\nv02;stroke;mm\n"),
+        ("specimen.csv", 'specimen,label,oil\n4,"A, long","X9"\n5,"B","X9"\n'),
+        ("wiring.txt", "scope 7, channels as below\nC1 = clip gauge, blue\nC2 = load pin, red\n"),
+        ("logbook.csv", "Time,Test,Current / A,Remark\n14:05,sine,0.4,\n14:09,sine,0.8,\n14:13,sine,0.8,\n"),
+    ],
+)
+def test_helper_tables_beside_tests_do_not_block_them_and_their_reason_is_told(tmp_path, name, content):
+    for number in (1, 2):
+        (tmp_path / f"run{number}.csv").write_text(text(0.4 * number))
+    (tmp_path / name).write_text(content)
+    found = import_files([tmp_path])
+    assert (len(found.records), [str(r.error) for r in found.refusals]) == (2, [])
+    assert found.left_out == (name,)
+    assert found.reasons[name]
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("run3.csv", "one;two;three\nfour;five;six\n"),
+        ("last.csv", f"{HEAD}\n"),
+        ("last.csv", "Zeit;Weg;Kraft\ns;mm;N\n"),
+        ("last.csv", "1,2\n"),
+    ],
+    ids=["called as a test", "its columns", "columns of channels", "numbers only"],
+)
+def test_a_damaged_test_beside_others_is_refused(tmp_path, name, content):
+    for number in (1, 2):
+        (tmp_path / f"run{number}.csv").write_text(text(0.4 * number))
+    (tmp_path / name).write_text(content)
+    assert [r.file.rpartition("/")[2] for r in import_files([tmp_path]).refusals][:1] == [name]
+
+
 def test_a_text_without_a_table_is_refused_if_it_is_all_there_is(tmp_path):
     (tmp_path / "README.txt").write_text("Damper 7, tested in March.\n")
     assert [refusal.error.code for refusal in import_files([tmp_path]).refusals] == ["E_NO_DATA"]

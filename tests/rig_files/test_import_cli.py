@@ -202,6 +202,14 @@ def test_tests_without_a_current_are_named_within_their_archive_and_a_table_take
     assert run(tmp_path / "rig.zip", "--out", tmp_path / "out", "--tests", tmp_path / "tests.csv").exit_code == 0
 
 
+def test_the_profile_of_a_folder_is_that_of_its_first_test_where_a_table_beside_it_is_damaged(tmp_path):
+    write(tmp_path, "a1.csv", text(rows(), ("Time,Stroke,Load",)))
+    write(tmp_path, "a0.csv", "Time,Stroke,Load\n")
+    done = run(tmp_path, "--write-profile", "-")
+    assert done.exit_code == 0
+    assert '[channels.force]\ncolumn = "Load"' in done.output
+
+
 def test_a_key_that_stands_twice_in_a_profile_is_named(tmp_path):
     profile = write(tmp_path, "rig.toml", '[file]\nnames = ["a"]\nnames = ["time [s]"]\n')
     done = run(write(tmp_path, "a.csv", text()), "--profile", profile)

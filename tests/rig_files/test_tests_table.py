@@ -70,6 +70,20 @@ def test_a_template_is_written_completed_and_used(rig, tmp_path):
     }
 
 
+def test_a_template_has_the_currents_that_a_plan_states_and_a_number_may_begin_with_its_point(rig, lab, tmp_path):
+    (rig / "tests.csv").unlink()
+    rows = [f"{n},{test.current}" for n, test in enumerate(lab.tests, 1)]
+    (rig / "plan.csv").write_text("\n".join(["Test,Current (A)", *rows]) + "\n")
+    table = tmp_path / "table.csv"
+    done = run("import", rig, "--write-tests", table)
+    assert "plan.csv" not in done.output
+    assert pl.read_csv(table)["current_A"].to_list() == [test.current for test in lab.tests]
+    table.write_text(table.read_text().replace(",0.6,", ",.6,"))
+    done = run("import", rig, "--tests", table, "--out", tmp_path / "ds")
+    assert done.exit_code == 0, done.output
+    assert {item.current_A for item in load_dataset(tmp_path / "ds")} == {0.0, 0.6, 1.2}
+
+
 @pytest.mark.parametrize(
     ("table", "found"),
     {

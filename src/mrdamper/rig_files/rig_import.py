@@ -6,7 +6,7 @@ import contextlib
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import chain
 from pathlib import Path
@@ -27,6 +27,7 @@ from mrdamper.rig_files.mapping.companions import (
     currents_listed,
     discarded_tests,
     holds_channels,
+    is_helper,
     is_list,
     joined_files,
     number_of,
@@ -64,6 +65,7 @@ class ImportResult(Displayable):
     records: tuple[Record, ...]  # accepted, with their findings, in the order of the files
     refusals: tuple[Refusal, ...] = ()
     left_out: tuple[str, ...] = ()  # files of the folders that are no rig's: of other kinds, or texts without a table
+    reasons: Mapping[str, str] = field(default_factory=dict)  # by those of them that were read, why they are no tests
 
     @property
     def headline(self) -> str:
@@ -115,7 +117,7 @@ def file_for_profile(paths: Sequence[str | Path], profile: Profile) -> Iterator[
     with unpacked(paths) as given:
         files = [file for file in files_in(given)[0] if not is_readme(file)] or files_in(given)[0]
         result = import_files(given, profile) if len(files) > 1 else ImportResult(())
-        refused = {refusal.file.removesuffix(f": {refusal.run}") for refusal in result.refusals}
+        refused = {r.file.removesuffix(f": {r.run}") for r in result.refusals if r.error.code != "E_NO_DATA"}
         first = (file for file in files if without_temporary_folder(str(file)) in refused)
         tests = (file for file in files if file.name not in result.left_out)
         yield next(chain(first, tests), files[0])
@@ -186,7 +188,8 @@ def import_files(
         left_out += [] if refusals is intake.notes else [Path(note.file) for note in intake.notes]
         left_out += intake.copies
         names = tuple(path.name for path in left_out)
-        return ImportResult(with_unique_ids(_with_folders(intake.tests())), named, names)
+        reasons = {Path(note.file).name: intake.reason(note) for note in intake.notes}
+        return ImportResult(with_unique_ids(_with_folders(intake.tests())), named, names, reasons)
 
 
 class _Intake:
@@ -198,6 +201,7 @@ class _Intake:
         self._parts: list[tuple[Path, list[Record]]] = []  # the last file and those that it continues, with their tests
         self._pending: list[tuple[Path, Record]] = []
         self._found: list[tuple[Path, Record]] = []
+        self.unchecked: list[tuple[Path, Record]] = []  # every test, also those refused
         self.refusals: list[Refusal] = []
         self.notes: list[Refusal] = []  # texts of a folder that hold no table
         self.copies: list[Path] = []  # files of tests that hold the samples of another
@@ -253,6 +257,7 @@ class _Intake:
                 self._check(path, record, problems, several=len(records) > 1)
 
     def _check(self, path: Path, record: Record, problems: list[InputError], *, several: bool) -> None:
+        self.unchecked.append((path, record))
         checked = record
         for step in (partial(require_current, path=path), check_long_record):
             try:
@@ -282,7 +287,7 @@ class _Intake:
             stated = currents_beside(path, self._results(path), self.tests())
             if stated:
                 self._refuse_contradicted(stated, discarded_tests(path, self._results(path), self.tests()))
-            elif path in others and path not in self._given and (is_list(path) or is_description(path)):
+            elif path in others and path not in self._given and self._is_beside_tests(path):
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
             else:
                 continue
@@ -298,6 +303,19 @@ class _Intake:
             tests[i] = path, replace(record, findings=(*record.findings, finding))
         self._found = tests
         return used
+
+    def reason(self, note: Refusal) -> str:
+        """Tell why a file of the folder is no test and, where it lists currents, why they were not used."""
+        results = self._results(Path(note.file))
+        if results is None:
+            return note.error.found
+        keys = ", ".join(filter(None, results.keys))
+        missing = any(refusal.error.code == "E_CURRENT_MISSING" for refusal in self.refusals)
+        why = f": no column beside it names every test ({keys or 'none'})" if missing else ""
+        return f"currents under {results.title!r}, not used{why}"
+
+    def _is_beside_tests(self, path: Path) -> bool:
+        return is_list(path) or is_description(path) or is_helper(path, self._order)
 
     def _refuse_contradicted(self, stated: Sequence[tuple[float, str]], refused: dict[int, InputError]) -> None:
         """Refuse accepted tests whose current another file contradicts, and those that are refused for a remark."""
@@ -332,6 +350,7 @@ class _Intake:
             self._drop_refusals(paths)
             self._pending = [(path, record) for path, record in self._pending if path not in paths]
             self._found = [(path, record) for path, record in self._found if path not in paths]
+            self.unchecked = [(path, record) for path, record in self.unchecked if path not in paths]
             if isinstance(records, InputError):
                 self.refusals.append(Refusal(str(group[0].path), records))
             else:
@@ -398,7 +417,11 @@ class _Intake:
 
     def tests(self) -> list[tuple[Path, Record]]:
         """The accepted tests with their files, in the order of these."""
-        return sorted(self._found, key=lambda entry: self._order[entry[0]])
+        return self.in_order(self._found)
+
+    def in_order(self, tests: Sequence[tuple[Path, Record]]) -> list[tuple[Path, Record]]:
+        """Return tests in the order of their files."""
+        return sorted(tests, key=lambda entry: self._order[entry[0]])
 
     def _refuse(self, errors: Mapping[int, InputError]) -> None:
         """Refuse accepted tests, each by its place among them."""
@@ -420,15 +443,19 @@ def _unchecked(path: Path, profile: Profile) -> tuple[list[Record], list[Refusal
 def found_tests(
     paths: Iterable[str | Path], profile: Profile | str | Path | None = None
 ) -> tuple[tuple[Record, ...], tuple[Refusal, ...]]:
-    """Every test that files hold, unchecked, and the files that cannot be read: for a table of tests."""
-    records: list[tuple[Path, Record]] = []
-    refusals: list[Refusal] = []
+    """Every test that files hold, with the currents that other files state, and the files that cannot be read.
+
+    The tests are not yet checked: they are those of a table that is to be completed.
+    """
     with unpacked(paths) as given:
-        for path in files_in(given)[0]:
-            of_file, problems = _unchecked(path, profile_of(profile))
-            records += [(path, record) for record in of_file]
-            refusals += [p for p in problems if path in given or not isinstance(p.error, NoTableError)]
-    return tuple(_with_folders(records)), tuple(refusals)
+        files, others = files_in(given)
+        intake = _Intake(profile_of(profile), None)
+        for path in [path for path in files if not profile_of(profile).leaves_out(path.name)]:
+            intake.read(path, given=path in given)
+        intake.join([path for path in others if path.suffix.lower() in TEXTS])
+        refusals = [refusal for refusal in intake.refusals if not refusal.run]
+        tests = intake.in_order(intake.unchecked)
+    return tuple(_with_folders(tests)), tuple(refusals)
 
 
 def _with_folders(tests: Sequence[tuple[Path, Record]]) -> list[Record]:

@@ -303,7 +303,8 @@ def _print(result: ImportResult, out: Path | None, total: int, new: int, *, dry:
     for some, most in ((lines, 7), (findings, 4), (_refused_lines(result.refusals), 4)):
         print("".join(f"{line}\n" for line in shortened(some, most, verbose)), end="")
     if result.left_out:
-        print(f"not imported as tests: {listed(result.left_out, 5)}")
+        whys = {name: f" ({reason})" for name, reason in result.reasons.items()}
+        print(f"not imported as tests: {listed([name + whys.get(name, '') for name in result.left_out], 5)}")
     if result.refusals and all(refusal.error.remedy.startswith("write the currents") for refusal in result.refusals):
         print(
             "a table takes the current of each test: mrdamper import FILES --write-tests tests.csv, "

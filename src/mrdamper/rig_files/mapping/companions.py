@@ -16,11 +16,11 @@ from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import rescale, take
 from mrdamper.errors import InputError, QualityError, printable
 from mrdamper.rig_files.coil_current import as_data, current_of, with_stated_current, with_value_of_name
-from mrdamper.rig_files.column_names import RATING, SI, role_of, split_name, words, words_of
+from mrdamper.rig_files.column_names import RATING, SI, is_unit, role_of, split_name, words, words_of
 from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.conditions import amperes, series_in
 from mrdamper.rig_files.file_records import digest_of, records_of_file
-from mrdamper.rig_files.mapping.completion import completed
+from mrdamper.rig_files.mapping.completion import completed, item_of
 from mrdamper.rig_files.mapping.description import short_lines, with_notes
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
 from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
@@ -30,7 +30,7 @@ from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.arrays import array_table
 from mrdamper.rig_files.readers.base import RawTable, Source
-from mrdamper.rig_files.record import Finding, Record, part_of_record
+from mrdamper.rig_files.record import REQUIRED, Finding, Record, part_of_record
 from mrdamper.rig_files.rig_record import records_of
 
 _FEWEST_ROWS = 50  # of a record
@@ -330,6 +330,27 @@ def is_list(path: Path) -> bool:
         return any(table.names) and rows < _FEWEST_ROWS and not record
 
     return ask_tables(path, lambda tables: all(map(short, tables)), False)
+
+
+def is_helper(path: Path, files: Collection[Path]) -> bool:
+    """Tell if a short text is no damaged test: no other file is called alike, or has its first line.
+
+    Nor does a line of it head two of the columns that a record has.
+    """
+    others = [other for other in files if other != path]
+    called = {re.sub("[0-9]+", "0", other.stem) for other in others}
+    lines = short_lines(path) if path.suffix.lower() in TEXTS else []
+    cells = [[cell.strip() for cell in re.split(r"[,;\t|]", line)] for line in lines]
+    roles = [{item_of(cell).role for cell in of if not is_unit(cell)} for of in cells]
+    if not others or re.sub("[0-9]+", "0", path.stem) in called or any(len(of & {*REQUIRED}) > 1 for of in roles):
+        return False
+    words = 0 < len(lines) < _FEWEST_ROWS and re.search(r"[^\W\d_]", lines[0]) is not None
+    return words and _first_line(path) not in map(_first_line, others)
+
+
+def _first_line(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.readline(4096).strip()
 
 
 def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:

@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.rig_files.column_names import COIL, holds, names_condition, split_name, words, words_of
+from mrdamper.rig_files.column_names import COIL, headers_of, holds, names_condition, split_name, words, words_of
 from mrdamper.rig_files.conditions import contradicts, currents_in, names_only_currents, quantity_in_cell
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of, is_units
 
 _SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
-_NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")
-_QUANTITY = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)\s*(m?A)")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]+)?|[.,][0-9]+)")
+_QUANTITY = re.compile(rf"({_NUMBER.pattern})\s*(m?A)")
 _SUPPLY = re.compile(r"(?i)\b(?:power[ _-]?)?suppl(?:y|ied)\b|\bpsu\b")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
@@ -222,7 +222,7 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
     split = [
         re.split(r" {2,}", t.strip()) if wide else cells_of(t, separator) for t in (x[:_LONGEST_LINE] for x in lines)
     ]
-    rows = [[cell.strip('"').strip() for cell in cells] for cells in split]
+    rows = [_headings([cell.strip('"').strip() for cell in cells]) for cells in split]
     for at, row in enumerate(rows):
         if sum(map(bool, row)) < 2:  # most lines are one cell where another character separates them
             continue
@@ -261,6 +261,13 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
             ("", *(row[i] for i in others)),
             bool(supply),
         )
+
+
+def _headings(row: list[str]) -> list[str]:
+    """Return a row of names whose units in small letters are written as such: coil_current_a."""
+    headers = headers_of(row, [""] * len(row))
+    units = [header.unit if header != split_name(cell) else "" for cell, header in zip(row, headers, strict=True)]
+    return [f"{cell[:-2]} [{unit}]" if unit else cell for cell, unit in zip(row, units, strict=True)]
 
 
 def _is_current(cell: str) -> bool:
