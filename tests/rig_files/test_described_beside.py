@@ -38,6 +38,66 @@ def require_the_tests(folder) -> None:
         np.testing.assert_allclose(record.force, force(amperes), rtol=0, atol=1e-2)
 
 
+UNITS = "time [s],displacement [mm],force [N]\n"
+
+
+@pytest.mark.parametrize(
+    ("tables", "names"),
+    [
+        ({"level.csv": "level_id,coil_current_a,by\n1,0.2,TTi\n2,0.9,TTi\n3,0,TTi\n4,1.5,TTi\n",
+          "test.csv": "test,damper_id,level_id\nm07,5,1\nm08,5,2\nm09,5,3\n"}, {}),
+        ({"design.csv": "StdOrder,Mount,Current (A)\n9,7,0.2\n7,8,0.9\n8,9,0\n"}, {}),
+        ({"plan.csv": "Oil,Piston,Current (A)\n1,1,0.2\n1,2,0.9\n2,1,0\n2,2,1.2\n"},
+         {"m07": "O1_P1", "m08": "O1_P2", "m09": "O2_P1"}),
+        ({"plan.csv": "Versuch;Sollstrom (A);Iststrom (A)\nm07;0,2;0,2\nm08;2,0;0,9\nm09;0;0\n"}, {}),
+        ({"plan.csv": "test,I (A)\nm07,.2\nm08,.9\nm09,0\n"}, {}),
+    ],
+    ids=["by an id of another table", "by the word before the number", "by two numbers", "measured beside set", ".2"],
+)  # fmt: skip
+def test_currents_of_a_table_that_names_the_tests_by_keys(tmp_path, tables, names):
+    write(tmp_path, UNITS)
+    for name, called in names.items():
+        (tmp_path / f"{name}.csv").rename(tmp_path / f"{called}.csv")
+    for name, content in tables.items():
+        (tmp_path / name).write_text(content)
+    require_the_tests(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"level.csv": "level,Current (A)\n1,0.2\n1,0.9\n", "test.csv": "test,level\nm07,1\nm08,1\nm09,1\n"},
+        {"design.csv": "Mount,Mass,Current (A)\n9,7,0.2\n7,8,0.9\n8,9,0\n"},
+        {"plan.csv": "test;Sollstrom (A);Sollstrom 2 (A)\nm07;0,2;0,2\nm08;2,0;0,9\nm09;0;0\n"},
+    ],
+    ids=["a key of two rows", "two headings of one letter", "two set currents"],
+)
+def test_currents_of_a_table_whose_keys_are_not_unique_are_asked(tmp_path, tables):
+    write(tmp_path, UNITS)
+    for name, content in tables.items():
+        (tmp_path / name).write_text(content)
+    result = import_files([tmp_path])
+    assert {refusal.error.code for refusal in result.refusals} == {"E_CURRENT_MISSING"}
+    assert all(reason for reason in result.reasons.values())
+
+
+@pytest.mark.parametrize("pause", ["hold;", "hold;ramp"])
+def test_steps_of_a_record_that_a_plan_gives_no_current_are_no_tests(tmp_path, pause):
+    rows, start = ["t (s);x (mm);F (N);Step"], 0.0
+    for step, amperes in enumerate((None, 0.2, None, 0.9), 1):
+        still = T[:60] if amperes is None else T
+        x, f = (0 * still, 0 * still) if amperes is None else (X, force(amperes))
+        rows += [f"{start + t:.3f};{a:.5f};{b:.4f};{step}" for t, a, b in zip(still, x, f, strict=True)]
+        start += still[-1] + 0.005
+    (tmp_path / "record.csv").write_text("\n".join(rows) + "\n")
+    plan = f"1;{pause};\n2;sine;1;0.2\n3;{pause};\n4;sine;1;0.9\n"
+    (tmp_path / "plan.csv").write_text(f"Step;kind;f (Hz);coil current (A)\n{plan}")
+    result = import_files([tmp_path])
+    assert not [str(refusal.error) for refusal in result.refusals]
+    assert [float(np.mean(record.current)) for record in result.records] == pytest.approx([0.2, 0.9])
+    assert [record.time.size for record in result.records] == [T.size, T.size]
+
+
 @pytest.mark.parametrize("folder", ["", "data"])
 def test_a_list_of_variables_names_columns_called_by_number_also_from_the_folder_above(tmp_path, folder):
     (tmp_path / folder).mkdir(exist_ok=True)

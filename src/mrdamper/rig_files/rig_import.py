@@ -38,7 +38,7 @@ from mrdamper.rig_files.mapping.companions import (
     tests_by,
     within_times,
 )
-from mrdamper.rig_files.mapping.description import is_description, is_readme
+from mrdamper.rig_files.mapping.description import is_description, is_readme, short_lines
 from mrdamper.rig_files.mapping.proposals import is_integrated
 from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.profile import Profile, profile_of
@@ -370,8 +370,9 @@ class _Intake:
         states others.
         """
         candidates: list[tuple[Path, Results | None, list[tuple[Path, Record]], list[tuple[float, str]]]] = []
-        for path in paths:
-            results = self._results(path)
+        results_by = [(path, self._results(path)) for path in paths]
+        linked = [(p, r.joined(short_lines(other))) for p, r in results_by if r for other in paths if other != p]
+        for path, results in (*results_by, *((path, results) for path, results in linked if results)):
             tests = self._numbered(results) if results else self._pending
             stated = currents_beside(path, results, tests)
             if stated and not (results and results.of_supply):

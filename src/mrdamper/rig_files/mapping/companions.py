@@ -315,7 +315,8 @@ def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:
         if column is None:
             return []
         form = profile.file.model_copy(update={"run_column": column})
-        return records_of_file(path, profile.model_copy(update={"file": form}))[0]
+        records, _ = records_of_file(path, profile.model_copy(update={"file": form}))
+        return [r for r in records if not results.is_pause(r.id.removeprefix(path.stem).lstrip("_"))]
     except InputError:
         return []
 

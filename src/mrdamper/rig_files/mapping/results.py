@@ -26,6 +26,8 @@ _LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: .
     r"[\s#%*\"-]*(?P<name>[^\W\d_][^\d:=]{0,30}?)[\s_.#-]*(?P<number>[0-9]{1,6})"
     r"(?:\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até)\b)\s*(?:[^\W\d_]{1,30}[\s_.#]*)?(?P<last>[0-9]{1,6}))?\s*[:=;,\t)]"
 )
+_LABELLED = re.compile(r"(?<![^\W\d_])([^\W\d_]+)[ _.-]?([0-9]+)")
+_MEASURED = tuple(words("measured"))
 _STARTS, _ENDS = words("start"), words("end")
 _COUNTED = words("run") | words("run_number") | words("table_file")  # what the number in a test's name may be
 _NUMBERED = _COUNTED | {"step", "schritt", "#"}
@@ -44,6 +46,7 @@ class Results:
     keys: tuple[str, ...] = ()  # headings of the columns of `cells`; empty for the number of the row
     of_supply: bool = False  # the coil's only if force grows with it
     counts_tests: bool = True  # so that a number in a test's name may be meant; Day 1: 0.5 A counts something else
+    pauses: tuple[tuple[str, ...], ...] = ()  # cells of the rows that state no current and no other number
 
     def by_test(self, tests: Sequence[Iterable[str]], *, by_number: bool = True) -> dict[int, float]:
         """Return the current [A] of each test by its number, where one column of the table tells all of them apart.
@@ -58,9 +61,48 @@ class Results:
             columns = columns if self._counts_tests(columns, len(tests)) else columns[1:]
             matches = [match for column in columns if (match := _match(column, names, exact))]
             currents = [{i: self.current[row] for i, row in match.items()} for match in matches]
+            if currents and all(other == currents[0] for other in currents):
+                return currents[0]
             if currents:
-                return currents[0] if all(other == currents[0] for other in currents) else {}
-        return {}
+                break
+        return self._by_labels(tests) if self.counts_tests else {}
+
+    def _by_labels(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
+        """Return the current [A] of each test by the numbers in its name behind the beginnings of headings: S1_T02.
+
+        Empty unless every test has one row, no row two tests, and no such beginning is that of two headings.
+        """
+        heads = [split_name(key).name.casefold() for key in self.keys]
+        rows: dict[int, int] = {}
+        for test, texts in enumerate(tests):
+            fitting = {*range(len(self.cells))}
+            for label, number in {(label.casefold(), n) for text in texts for label, n in _LABELLED.findall(text)}:
+                columns = [i for i, head in enumerate(heads) if head.startswith(label)]
+                if len(columns) > 1:
+                    return {}
+                fitting = {row for row in fitting if all(_key(self.cells[row][i]) == _key(number) for i in columns)}
+            if len(fitting) != 1:
+                return {}
+            rows[test] = fitting.pop()
+        return {i: self.current[row] for i, row in rows.items()} if len({*rows.values()}) == len(rows) else {}
+
+    def joined(self, lines: Sequence[str]) -> Results | None:
+        """Return the rows of another table, each with the current of the row of this one whose key it states.
+
+        The column of the key is called alike in both tables; None unless it is the only one by which all rows fit.
+        """
+        tables = []
+        for separator in _SEPARATORS[:3]:
+            heads, *rows = [[cell.strip('" ') for cell in cells_of(line, separator)] for line in lines] or [[]]
+            rows = [row for row in rows if len(row) == len(heads)]
+            for key in {*map(_key, heads)} & {_key(key) for key in self.keys if key} if len(rows) > 1 else ():
+                own = [_key(cells[[*map(_key, self.keys)].index(key)]) for cells in self.cells]
+                theirs = [_key(row[[*map(_key, heads)].index(key)]) for row in rows]
+                if len({*own}) == len(own) and {*theirs} <= {*own}:
+                    current = tuple(self.current[own.index(cell)] for cell in theirs)
+                    cells = tuple((str(n), *row) for n, row in enumerate(rows, 1))
+                    tables.append(replace(self, current=current, cells=cells, keys=("", *heads), pauses=()))
+        return tables[0] if len(tables) == 1 else None
 
     def by_folder(self, folders: Sequence[str], tests: Sequence[Iterable[str]]) -> dict[int, float]:
         """Return the current [A] of each test by its number, where one column names its folder and another itself."""
@@ -115,9 +157,13 @@ class Results:
             if len(at) != 1 or table.words is None:
                 continue
             numbers = {_key(label) for label in table.words(i).labels} - {""}
-            if len(numbers) > 1 and numbers <= {_key(cells[at[0]]) for cells in self.cells}:
+            if len(numbers) > 1 and numbers <= {_key(cells[at[0]]) for cells in (*self.cells, *self.pauses)}:
                 return name
         return None
+
+    def is_pause(self, number: str) -> bool:
+        """Tell if a row without a current or any other number has this one: a test holds still there."""
+        return any(_key(number) in map(_key, cells) for cells in self.pauses)
 
 
 def results_in(lines: Sequence[str]) -> Results | None:
@@ -238,13 +284,19 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
         if below < len(rows) and is_units(rows[below]) and not any(map(_NUMBER.fullmatch, rows[below])):
             unit = rows[below][columns[0]].strip("[]()") if columns[0] < len(rows[below]) else ""
             below += 1
-        body = []
+        body, pauses = [], []
         for cells in rows[below:]:
             cell = cells[columns[0]] if len(cells) > columns[0] else ""
+            cells = [*cells, *[""] * (len(row) - len(cells))][: len(row)]
+            if not cell and any(cells) and not any(map(_NUMBER.fullmatch, cells[1:])):
+                pauses.append(cells)
+                continue
             if not _QUANTITY.fullmatch(cell) and not _NUMBER.fullmatch(cell):
                 break
-            body.append([*cells, *[""] * (len(row) - len(cells))][: len(row)])
-        every = [[_amperes(cells[i], unit or split_name(row[i]).unit) for cells in body] for i in columns]
+            body.append(cells)
+        measured = [i for i in columns if row[i].casefold().startswith(_MEASURED) or holds(row[i], {*_MEASURED})]
+        chosen = measured if len(measured) == 1 else columns  # Iststrom beside Sollstrom
+        every = [[_amperes(cells[i], unit or split_name(row[i]).unit) for cells in body] for i in chosen]
         currents = every[0]
         if len(body) < _FEWEST_ROWS or any(value is None for value in currents):
             continue
@@ -257,9 +309,10 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
         yield Results(
             tuple(value for value in currents if value is not None),
             tuple((str(n), *(cells[i] for i in others)) for n, cells in enumerate(body, 1)),
-            row[columns[0]],
+            row[chosen[0]],
             ("", *(row[i] for i in others)),
             bool(supply),
+            pauses=tuple(("", *(cells[i] for i in others)) for cells in pauses),
         )
 
 
