@@ -317,6 +317,69 @@ def test_tests_of_different_lengths_in_one_array_are_cut_where_they_end(tmp_path
     assert [r.time.size for r in import_files([tmp_path]).records] == [T.size, T.size - 250, T.size - 500]
 
 
+def cells_with_headings(path, rows):
+    """Store a cell array as MATLAB 7.3 does: references, its dimensions the other way round."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        store = file.create_group("#refs#")
+        cells = np.empty((len(rows[0]), len(rows)), dtype=h5py.ref_dtype)
+        for (r, c), cell in ((at, rows[at[0]][at[1]]) for at in np.ndindex(len(rows), len(rows[0]))):
+            text = isinstance(cell, str)
+            value = [[ord(letter)] for letter in cell] if text else np.reshape(cell, (1, -1))
+            item = store.create_dataset(f"{r}_{c}", data=value)
+            item.attrs["MATLAB_class"] = np.bytes_("char" if text else "double")
+            cells[c, r] = item.ref
+        file.create_dataset("results", data=cells).attrs["MATLAB_class"] = np.bytes_("cell")
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+    path.write_bytes(head.ljust(512, b"\0") + path.read_bytes()[512:])
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+@pytest.mark.parametrize("form", ["a test a row", "a sample a row"])
+def test_a_cell_array_below_a_row_of_headings_is_a_table(tmp_path, version, form):
+    if form == "a test a row":
+        heads = ["Test", "Coil current (A)", "Time (s)", "Stroke (mm)", "Load (N)"]
+        rows = [heads, *([float(n), i, T, X, force(i)] for n, i in enumerate((0.0, 0.5, 1.0), 1))]
+    else:
+        samples = zip(T[::3], X[::3], force(0.5)[::3], strict=True)
+        rows = [["Time (s)", "Stroke (mm)", "Load (N)"], *(list(map(float, row)) for row in samples)]
+    if version == "5":
+        cells = np.empty((len(rows), len(rows[0])), dtype=object)
+        for at in np.ndindex(cells.shape):
+            cells[at] = rows[at[0]][at[1]]
+        savemat(tmp_path / "mr_0.5A.mat" if form == "a sample a row" else tmp_path / "mr.mat", {"results": cells})
+    else:
+        cells_with_headings(tmp_path / ("mr_0.5A.mat" if form == "a sample a row" else "mr.mat"), rows)
+    expect(tmp_path, *((0.0, 0.5, 1.0) if form == "a test a row" else (0.5,)))
+
+
+README = """{0}1{1}time (s)
+{0}2{1}rod position (mm), encoder
+{0}3{1}load cell amplifier output (V), sensitivity 200 N/V, tension positive
+{0}4{1}coil current (A)
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "behind"),
+    [("  row ", "  "), ("data[", "] "), ("- data(:,", "): "), ("data(", ",:) = "), ("ligne ", " - ")],
+)
+def test_channels_of_a_matrix_that_a_readme_describes_by_their_numbers(tmp_path, before, behind):
+    for n, i in enumerate((0.0, 0.5)):
+        savemat(tmp_path / f"r{n}.mat", {"data": np.array([T, X, force(i) / 200, np.full(T.size, i)])})
+    (tmp_path / "README.txt").write_text(README.format(before, behind))
+    expect(tmp_path, 0.0, 0.5)
+
+
+def test_columns_are_called_by_the_names_that_the_message_lists(tmp_path):
+    savemat(tmp_path / "r.mat", {"data": np.array([T, X, force(0.5), 0.1 * X, 0.3 * X])})
+    assert "data[1], data[2]" in str(import_files([tmp_path]).refusals[0].error)
+    named = zip(("time", "displacement", "force"), ("s", "mm", "N"), (1, 2, 3), strict=True)
+    text = "".join(f'[channels.{role}]\ncolumn = "data[{n}]"\nunit = "{unit}"\n' for role, unit, n in named)
+    (record,) = import_files([tmp_path], parse_profile(f"{text}[current]\nvalue = 0.5\n")).records
+    np.testing.assert_allclose(record.force, force(0.5))
+    assert not [finding.text for finding in record.findings if "further tests" in finding.text]
+
+
 @pytest.mark.parametrize("key", ["units", "Unidade", "birim", "単位", "единица", "Einheit"])
 def test_an_attribute_has_the_unit_that_another_attribute_states(tmp_path, key):
     with h5py.File(tmp_path / "a.h5", "w") as file:

@@ -410,7 +410,9 @@ def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> Non
 
 def _refuse_two_values(table: RawTable, role: str, column: int, profile: Profile) -> None:
     """Columns of one name must hold one thing, in whatever units."""
-    if role not in REQUIRED or role in table.chosen or isinstance(profile.channel(role).column, int):
+    stated = profile.channel(role).column
+    exact = isinstance(stated, int) or table.names.count(stated or "") == 1  # Force [2] beside Force [1]
+    if role not in REQUIRED or role in table.chosen or exact:
         return
     if same := _differing(table, column):
         problem = f"{len(same)} columns are called {table.headers[column].name!r} and differ"
@@ -420,7 +422,8 @@ def _refuse_two_values(table: RawTable, role: str, column: int, profile: Profile
 
 def _differing(table: RawTable, column: int) -> list[int]:
     """Return the columns of one name, which is that of a column, where they hold different things; else none."""
-    keys = [(header.name.casefold(), header.role, header.dimension) for header in table.headers]  # t is no T
+    headers = zip(table.headers, table.names, strict=True)  # t is no T, and data[1] no data[2]
+    keys = [((h.name if h.role else name).casefold(), h.role, h.dimension) for h, name in headers]
     same = [i for i, key in enumerate(keys) if keys[column][0] and key == keys[column]]
     return same if len(same) > 1 and not _are_alike(table, same) else []
 

@@ -84,7 +84,9 @@ _NUMBERS = (
 )
 NUMBERED = re.compile(rf"(?i)(?:{_NUMBERS}?[ ._]?|[a-z]\w*\[)([0-9]{{1,3}})\]?")
 _CHANNEL_IS = re.compile(
-    rf"(?i)(?<!\w){_NUMBERS}" + r"[ ._]?(?P<number>[0-9]{1,3})\s*[:=]\s*(?P<what>(?:(?!, )[^;|\t]){2,60})"
+    rf"(?i)(?<!\w)(?:{_NUMBERS}[ ._]?|[a-z]\w*[\[(](?::, ?)?)"
+    r"(?P<number>[0-9]{1,3})(?:(?:, ?:)?[\])])?(?:\s*[:=]\s*|\s+[-–]\s+|\s{2,}|(?<=[\])])\s)"
+    r"(?P<what>(?:(?!, )[^;|\t]){2,60})"
 )
 _FULL_SCALE = re.compile(  # sections of a header: Name=Stroke, FullScale=75, Unit=mm
     r"(?im)^name *= *(?P<name>[^=\n]{1,60})\n(?:[^=\n]*=[^\n]*\n){0,4}?full[ _]?scale *= *(?P<full>[0-9.]{1,12})\n"

@@ -124,6 +124,13 @@ def texts_in(values: Any) -> list[str]:
     return [] if any(cell.dtype.kind not in "SU" or cell.size > 1 for cell in cells) else list(map(text_of, cells))
 
 
+def with_headings(rows: Sequence[Sequence[Any]]) -> list[dict[str, Any]]:
+    """Return the rows of cells below one of different texts as mappings; empty if the first is no such row."""
+    heads = rows[0] if rows and all(isinstance(cell, str) and cell for cell in rows[0]) else []
+    told_apart = len({*heads}) == len(heads) > 1
+    return [dict(zip(heads, row, strict=True)) for row in rows[1:]] if told_apart else []
+
+
 def value_of(array: np.ndarray) -> Any:
     """Return the number or the text of an array of one item, a list for one of words, any other array as it is."""
     if array.dtype.kind in "US" and array.size <= MOST_COLUMNS:

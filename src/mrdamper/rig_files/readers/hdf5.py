@@ -21,6 +21,7 @@ from mrdamper.rig_files.readers.arrays import (
     texts_in,
     unit_in,
     unpacked,
+    with_headings,
 )
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import DEEPEST, MOST_TEXT, nested_tables
@@ -105,7 +106,8 @@ class _Walk:
         if h5py.check_ref_dtype(item.dtype) is h5py.Reference:
             references = np.reshape(item[()], -1) if _is_matlab(item) else []
             cells = [self._at(item.file, r, depth) for r in references] if len(references) <= MOST_STRUCTS else []
-            return {name: cells or np.empty(2, dtype=object)}
+            rows = [cells[row :: item.shape[-1]] for row in range(item.shape[-1] if cells and item.ndim == 2 else 0)]
+            return {name: with_headings(rows) or cells or np.empty(2, dtype=object)}
         unit = unit_in(item.attrs)
         kind = getattr(h5py.check_vlen_dtype(item.dtype), "kind", "")  # of vectors of samples
         if kind and kind in "iuf" and len(item.shape) == 1 and len(item) <= MOST_STRUCTS:

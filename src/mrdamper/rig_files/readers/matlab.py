@@ -7,7 +7,14 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.arrays import check_unpacked, refuse_twice, refusing_damage, texts_in, value_of
+from mrdamper.rig_files.readers.arrays import (
+    check_unpacked,
+    refuse_twice,
+    refusing_damage,
+    texts_in,
+    value_of,
+    with_headings,
+)
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, MOST_STRUCTS, hdf5_tables
 from mrdamper.rig_files.readers.nested import nested_tables
@@ -64,6 +71,8 @@ def _tree(value: Any) -> Any:
     if array.dtype.kind == "O" and array.ndim == 2 and (names := texts_in(array[0])):  # a table, names above its rows
         return [dict(zip(names, map(_tree, row), strict=True)) for row in array[1 : MOST_STRUCTS + 1]]
     if array.dtype.kind == "O" and 0 < array.size <= MOST_STRUCTS and array.ndim:
+        if rows := with_headings(array.tolist() if array.ndim == 2 else []):
+            return [_tree(row) for row in rows]
         cells = [_tree(cell) for cell in array]
         return array if any(isinstance(cell, (str, float)) for cell in cells) else cells
     return value_of(array) if array.size else ""
