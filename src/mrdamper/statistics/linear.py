@@ -105,7 +105,7 @@ def robust_weights(errors: Floats, best: float) -> Floats:
 def _inverse(normal: Floats) -> Floats | None:
     """Inverse of matrices of equilibrated columns; None where one has a pivot at which it would lose digits."""
     try:
-        inverse = np.linalg.inv(normal)
+        inverse: Floats = np.asarray(np.linalg.inv(normal), dtype=float)
         largest = inverse.diagonal(0, -2, -1)  # over the inverse square of every pivot
         if largest.min(initial=1.0) > 0 and largest.max(initial=1.0) < _WELL_APART**-2:
             return inverse
