@@ -949,7 +949,8 @@ def test_a_plan_of_tests_states_their_currents_by_the_day_that_is_their_folder_a
     ("heading", "cell"),
     [
         ("Remark", "INVALID - plug came off, repeated as run 3"), ("Bemerkung", "abgebrochen"), ("note", "warm-up"),
-        ("valid", "no"), ("备注", "无效"),
+        ("valid", "no"), ("备注", "无效"), ("Status", "cancelled, oil leak"), ("Discard", "yes"), ("Include", "no"),
+        ("Bemerkung", "ungueltig, Stecker lose"), ("remarks", "not valid, plug loose"), ("Notes", "run-in"),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("files", [["run_1", "run_2", "run_3"], ["a_0A", "b_0.5A", "c_0.5A"]])
@@ -958,12 +959,12 @@ def test_a_test_that_a_plan_calls_invalid_or_a_warm_up_is_asked_about(tmp_path, 
         (tmp_path / f"{name}.csv").write_text("Time [s],disp [mm],force [N]\n" + rows(T, X, force(i / 4, i)))
     remarks = [
         f"{file},{0.5 * bool(i)},{of}"
-        for i, (file, of) in enumerate(zip(files, ("yes", f'"{cell}"', "repeat of run 2"), strict=True))
+        for i, (file, of) in enumerate(zip(files, ("", f'"{cell}"', "repeat of run 2"), strict=True))
     ]
     (tmp_path / "plan.csv").write_text("\n".join([f"Run,Coil current [A],{heading}", *remarks, ""]))
     (refusal,) = import_files([tmp_path]).refusals
     assert (refusal.error.code, refusal.run) == ("E_DISCARDED", files[1])
-    assert repr(cell) in refusal.error.found
+    assert repr(f"{heading}: {cell}") in refusal.error.found
     remedy = parse_profile(refusal.error.remedy.split(" in a profile")[0].replace("set [file] ", "[file]\n"))
     result = import_files([tmp_path], remedy)
     assert not result.refusals

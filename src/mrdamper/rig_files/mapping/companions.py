@@ -38,6 +38,7 @@ TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml"
 _LEGEND = re.compile(r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")  # I1 = 0.3 A
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
 _DISCARDED, _DISCARDED_FLAG = (re.compile("(?i)" + "|".join(words(of))) for of in ("discarded", "discarded_flag"))
+_REMARKS = frozenset((*words("notes"), *words("remarks")))
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
 _ALIKE = 0.1  # relative difference of frequency and amplitude within which two motions are one
 _ALIKE_A = 0.03  # difference of the current within which two tests have the same [A]
@@ -232,11 +233,9 @@ def currents_beside(
 def discarded_tests(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> dict[int, InputError]:
     """Return the refusal of each test that a remark in a plan calls invalid, aborted, repeated or a warm-up."""
     rows = [[*zip(results.keys, cells, strict=True)] for cells in results.cells] if results else []
-    remarks = [
-        next((cell for key, cell in row if _DISCARDED.search(cell) or _DISCARDED_FLAG.search(f"{key}: {cell}")), "")
-        for row in rows
-    ]
-    if results is None or results.of_supply or not any(remarks):
+    texts = [[f"{key}: {cell}" for key, cell in row if _discards(key, cell)] for row in rows]
+    remarks = [next(iter(of), "") for of in texts]
+    if results is None or results.of_supply or not any(remarks) or all(remarks):  # of all tests it is of none
         return {}
     numbered = replace(results, current=tuple(float(i) if remark else 0.0 for i, remark in enumerate(remarks, 1)))
     refused: dict[int, InputError] = {}
@@ -249,6 +248,11 @@ def discarded_tests(path: Path, results: Results | None, tests: Sequence[tuple[P
             remedy = f"set [file] leave_out = [{name}] in a profile, or correct the remark if the test is valid"
             refused[i] = QualityError(printable(problem), where=file.name, remedy=remedy, code="E_DISCARDED")
     return refused
+
+
+def _discards(heading: str, cell: str) -> bool:
+    of_remarks = not _REMARKS.isdisjoint(words_of(heading.casefold()))
+    return bool(_DISCARDED_FLAG.search(f"{heading}: {cell}") or (of_remarks and _DISCARDED.search(cell)))
 
 
 def currents_listed(path: Path, tests: Sequence[tuple[Path, Record]]) -> list[tuple[float, str]] | None:
