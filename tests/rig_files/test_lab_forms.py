@@ -8,6 +8,7 @@ import pytest
 from mrdamper.errors import InputError
 from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import parse_profile
+from mrdamper.rig_files.readers.arrays import unit_in
 from mrdamper.rig_files.rig_import import import_files, read_run, read_runs
 
 T = np.arange(0.0, 4.0, 0.005)
@@ -360,6 +361,50 @@ def test_channels_of_several_groups_follow_the_only_time(places, kind, tmp_path)
     savemat(tmp_path / "run_0.5A.mat", tree)
     record = read_run(tmp_path / f"run_0.5A.{kind}")
     np.testing.assert_allclose((record.time, 1e3 * record.displacement, record.force), (T, X, force(0.5)), atol=1e-9)
+
+
+@pytest.mark.parametrize(("cut", "amperes"), [(1, (0.5, 0.5)), (0, (0.0, 1.0))])
+def test_groups_of_other_length_or_of_another_current_are_not_joined(cut, amperes, tmp_path):
+    import h5py
+
+    with h5py.File(tmp_path / "tests.h5", "w") as file:
+        file["run_01/time [s]"], file["run_01/displacement [mm]"] = T, X
+        file["run_02/force [N]"] = force(1.0)[: T.size - cut]
+        for name, current in zip(("run_01", "run_02"), amperes, strict=True):
+            file[name].attrs["current_A"] = current
+    assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_COLUMN"]
+
+
+def test_structs_of_tests_by_current_and_frequency_are_tests(tmp_path):
+    from scipy.io import savemat
+
+    tests = np.empty((3, 2), object)
+    for i, k in np.ndindex(3, 2):
+        time = T / (1 + k)
+        tests[i, k] = {"time_s": time, "displacement_mm": X, "force_N": (1 + k) * force(i / 2), "current_A": i / 2}
+    savemat(tmp_path / "tests.mat", {"tests": tests})
+    assert sorted(currents(import_files([tmp_path]).records)) == [0.0, 0.0, 0.5, 0.5, 1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("attributes", "unit"),
+    [
+        ({"units": "N", "unit": "Damper 7"}, "N"), ({"Unit": "UUT-3", "units": "kN"}, "kN"),
+        ({"unit": "V", "units": "N"}, ""), ({"unit": "N", "Einheit": "N"}, "N"),
+    ],
+)  # fmt: skip
+def test_an_attribute_that_is_no_unit_or_contradicts_another_gives_none(attributes, unit):
+    assert unit_in(attributes) == unit
+
+
+@pytest.mark.parametrize("line", ["2;Sinus", ";2", "2;;", "Nr. 2"])
+def test_a_number_above_the_names_of_a_further_test_is_no_row_of_the_test_before(line, tmp_path):
+    blocks = [
+        f"Spulenstrom [A];{i / 2}\n{line}\nZeit [s];Weg [mm];Kraft [N]\n" + rows(T, X, force(i / 2), separator=";")
+        for i in range(3)
+    ]
+    (tmp_path / "versuche.csv").write_text("".join(blocks))
+    assert currents(import_files([tmp_path]).records) == [0.0, 0.5, 1.0]
 
 
 def test_a_list_of_forces_beside_a_motion_is_no_channel_of_it(tmp_path):

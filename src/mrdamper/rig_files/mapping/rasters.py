@@ -61,11 +61,15 @@ def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
         lacks = not whole or ("current" in every and "current" not in roles[whole[0]] and len(timed) > 1)
         if len(parts) < 2 or len(whole) > 1 or not needed or not lacks or not joined.keys().isdisjoint(map(id, parts)):
             continue
-        if len(timed) < 2 and len(set(map(_rows, parts))) > 1:  # a list of something else
-            continue
+        if len(timed) < 2 and (len(set(map(_rows, parts))) > 1 or len(_currents(parts)) > 1):
+            continue  # a list of something else, or of another test
         joined[id(parts[0])] = _joined(label, parts)
         dropped |= {id(table) for table in parts[1:]}
     return [joined.get(id(table), table) for table in tables if id(table) not in dropped]
+
+
+def _currents(tables: Sequence[RawTable]) -> set[float]:
+    return {v for table in tables for name, v in table.constants.items() if split_name(name).role == "current"}
 
 
 def _rows(table: RawTable) -> int:

@@ -17,7 +17,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import InputError, MissingExtraError
-from mrdamper.rig_files.column_names import KEYS, UNIT_KEYS, is_unit, split_name
+from mrdamper.rig_files.column_names import KEYS, UNIT_KEYS, is_unit, parse_unit, split_name
 from mrdamper.rig_files.readers.base import (
     MOST_COLUMNS,
     MOST_RATIO,
@@ -109,10 +109,15 @@ def text_of(item: object) -> str:
 
 
 def unit_in(says: Mapping[str, Any], of: str = "") -> str:
-    """Return the unit that attributes or properties state, of all or of one of them; of a time without its date."""
+    """Return the unit that attributes or properties state, of all or of one of them; of a time without its date.
+
+    A text that is no unit counts if there is none; none counts where two contradict each other.
+    """
     names = {name.casefold(): name for name in says}
-    stated = (text_of(says[names[key]]) for key in (f"{of.casefold()}{unit}" for unit in KEYS["unit"]) if key in names)
-    return next(filter(None, stated), "").partition(" since ")[0]
+    keys = [key for key in (f"{of.casefold()}{unit}" for unit in KEYS["unit"]) if key in names]
+    stated = [text.partition(" since ")[0] for key in keys if (text := text_of(says[names[key]]))]
+    units = {parse_unit(text): text for text in reversed(stated) if is_unit(text)}
+    return next(iter(units.values() if units else stated), "") if len(units) < 2 else ""
 
 
 def texts_in(values: Any) -> list[str]:

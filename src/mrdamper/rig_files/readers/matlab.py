@@ -61,11 +61,15 @@ class Matlab(Reader):
 
 def _tree(value: Any) -> Any:
     """Return a variable as a nested structure: mappings for structs, lists for arrays of them and for cells."""
+    if hasattr(value, "_fieldnames"):  # in arrays of several dimensions
+        value = vars(value)
     if isinstance(value, dict):
-        return {name: _tree(item) for name, item in value.items()}
+        return {name: _tree(item) for name, item in value.items() if not name.startswith("_")}
     if isinstance(value, list):
         return [_tree(item) for item in value[:MOST_STRUCTS]]
     array = np.asarray(value)
+    if array.dtype.kind == "O" and array.ndim > 1 and all(hasattr(item, "_fieldnames") for item in array.flat):
+        array = array.reshape(-1)  # structs of tests by current and frequency
     if words := texts_in(array):
         return words
     if array.dtype.kind == "O" and array.ndim == 2 and (names := texts_in(array[0])):  # a table, names above its rows

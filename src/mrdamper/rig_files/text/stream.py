@@ -16,6 +16,7 @@ from mrdamper.rig_files.conditions import stated_by_lines, stated_in_titles
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RigFileError, Source, scratch
 from mrdamper.rig_files.text.layout import SPACES, Layout, cells_of, is_comment, is_footer, is_row, units_in
+from mrdamper.rig_files.text.tokens import looks_numeric
 
 LONGEST_LINE = 64 * 1024
 CHUNK = 4 * 2**20
@@ -351,4 +352,5 @@ def _is_data(text: str, layout: Layout) -> bool:
         return False
     cells = cells_of(text, layout.separator)
     heading = layout.separator == SPACES and len(cells) != layout.width and _WORD.match(cells[0])
-    return not heading and is_row(cells)  # MR DAMPER TEST 1  PAGE 2
+    one = sum(map(looks_numeric, filter(None, cells))) == 1 < len(cells)  # a number and what it is of: 2;Sinus
+    return not heading and not one and is_row(cells)  # MR DAMPER TEST 1  PAGE 2
