@@ -35,6 +35,7 @@ _FEWEST_SLOW = 5  # samples of a current that is recorded more rarely than the f
 NO_CHANNEL = "the current channel is "  # beginning of the finding on a column of no current
 CURRENT_TOO = "and give the current of each test"  # within the remedy of a refusal of units or columns
 _CALIBRATION = 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
+_PROFILE = "profile"  # where a current stands
 _OF_ANOTHER = re.compile("(?i)shunt|bridge|brücke")  # resistance or voltage
 _FOLDERS = 3  # above a file, whose names may state its current
 
@@ -51,10 +52,10 @@ def current_of(
     """
     where, source = printable(table.source.name), profile.current
     statements = _statements(table, path, profile, force)
+    stated_by_profile = source is not None and not source.values
     if source is not None and source.value is not None:
-        _refuse_contradiction(source.value, channel, statements, where)
-        return source.value, {"current_from": "profile"}
-    if source is not None and source.pattern is not None:
+        statements.insert(0, Statement(source.value, _PROFILE))
+    elif source is not None and source.pattern is not None:
         places = [path.name, table.label, f"{path.name}/{table.label}", f"{path.as_posix()}/{table.label}".rstrip("/")]
         current = next((v for place in places if place and (v := current_in_name(place, profile)) is not None), None)
         if current is None and channel is None:
@@ -66,15 +67,10 @@ def current_of(
     elif not statements and channel is None:
         lines = [line for line in table.remarks if line not in table.titles]
         statements = _set_points(table, rows) or stated_in_titles(lines) or _folders(table, path)
-    stated = _agreed(statements, where)
+    stated = _agreed(statements, channel, where)
     if stated is not None and channel is None and source is None and all(s.of_line for s in statements):
         _refuse_contradicted_line(table, stated, rows, where)
-    mean = None if channel is None or stated is None else contradicted(channel, stated.amperes)
-    if stated is not None and mean is not None:
-        problem = printable(f"{stated.whence} gives {stated.amperes:g} A, the current channel {mean:g} A")
-        remedy = "if the channel is right, rename; else leave the channel out of the export"
-        raise ColumnError(problem, where=where, remedy=remedy, code="E_CURRENT_CONTRADICTS")
-    if stated is None or (channel is not None and (source is None or source.pattern is None)):
+    if stated is None or (channel is not None and not stated_by_profile):
         return None, {}
     return stated.amperes, {"current_from": as_data(stated.whence)}
 
@@ -98,18 +94,30 @@ def _refuse_contradicted_line(table: RawTable, stated: Statement, rows: slice, w
     )
 
 
-def _agreed(statements: list[Statement], where: str) -> Statement | None:
-    """Return the first of statements that agree; None if there is none."""
+def _agreed(statements: list[Statement], channel: Floats | None, where: str) -> Statement | None:
+    """Return the first of statements that agree, also with the channel; None if there is none."""
+    if not statements:
+        return None
+    current, whence, others = statements[0].amperes, statements[0].whence, statements[1:]
+    finite = np.empty(0) if channel is None else channel[np.isfinite(channel)]
+    mean, change = held_current(finite) if finite.size >= 3 else (current, "")
+    against = [f"{other.whence} gives {other.amperes:g} A" for other in others if contradicts(other.amperes, current)]
+    measured = [f"the current channel gives {mean:g} A"] if not change and contradicts(mean, current) else []
     over = [statement for statement in statements if abs(statement.amperes) > LARGEST_STATED]
-    others = [statement for statement in statements[1:] if contradicts(statement.amperes, statements[0].amperes)]
-    if over:
-        code, problem = "E_RANGE", f"{over[0].whence} gives {over[0].amperes:g} A, which is no coil current of a damper"
-    elif others:
-        first, other = statements[0], others[0]
-        code, problem = "E_AMBIGUOUS", f"{first.whence} gives {first.amperes:g} A, {other.whence} {other.amperes:g} A"
+    if whence == _PROFILE:
+        varies = [f"the current channel goes from {finite.min():.3g} to {finite.max():.3g} A"] if change else []
+        code, against = "E_CURRENT_CONTRADICTS", [*varies, *measured, *against]
+        remedy = "leave [current] out of the profile; if the file is wrong, correct it, or rename it"
+    elif over or against:
+        code, remedy = "E_RANGE" if over else "E_AMBIGUOUS", "correct the name or the line that is wrong"
+        if over:
+            current, whence, against = over[0].amperes, over[0].whence, ["which is no coil current of a damper"]
     else:
-        return statements[0] if statements else None
-    remedy = "correct the name or the line that is wrong"
+        code, against = "E_CURRENT_CONTRADICTS", measured
+        remedy = "if the channel is right, rename; else leave the channel out of the export"
+    if not against:
+        return statements[0]
+    problem = f"{whence} gives {current:g} A, {against[0]}"
     raise ColumnError(printable(problem), where=where, remedy=remedy, code=code)
 
 
@@ -232,19 +240,6 @@ def with_stated_current(record: Record, current: float, whence: str, where: str,
     findings += (Finding("W_CHOSEN", printable(note)),) if note else ()
     provenance = {**record.provenance, "current_from": as_data(whence)}
     return replace(record, current=constant(current, record.time), findings=findings, provenance=provenance)
-
-
-def _refuse_contradiction(value: float, channel: Floats | None, statements: list[Statement], where: str) -> None:
-    """Refuse a profile's current that a channel, a name, a heading or a result of the file contradicts."""
-    finite = np.empty(0) if channel is None else channel[np.isfinite(channel)]
-    mean, change = held_current(finite) if finite.size >= 3 else (value, "")
-    others = [f"the current channel goes from {np.min(finite):.3g} to {np.max(finite):.3g} A"] if change else []
-    others += [f"the current channel gives {mean:g} A"] if not change and contradicts(mean, value) else []
-    others += [f"{s.whence} gives {s.amperes:g} A" for s in statements if contradicts(s.amperes, value)]
-    if others:
-        problem = printable(f"the profile says {value:g} A, {others[0]}")
-        remedy = "leave [current] out of the profile; if the file is wrong, correct it, or rename it"
-        raise ColumnError(problem, where=where, remedy=remedy, code="E_CURRENT_CONTRADICTS")
 
 
 def _statements(table: RawTable, path: Path, profile: Profile, force: int | None) -> list[Statement]:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,11 +31,9 @@ from mrdamper.rig_files.column_names import (
     words_of,
 )
 from mrdamper.rig_files.conditions import currents_in, named_after_currents, rate_in_name, stated_rate
+from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
-from mrdamper.rig_files.record import OPTIONAL, REQUIRED, SIGNED
-
-if TYPE_CHECKING:
-    from mrdamper.rig_files.profile import Profile
+from mrdamper.rig_files.record import OPTIONAL, REQUIRED, SIGNED, Finding
 
 ROLES = (*REQUIRED, *OPTIONAL)
 _DERIVED = ("velocity", "acceleration")  # of the displacement
@@ -67,43 +64,44 @@ def assign(table: RawTable, profile: Profile) -> dict[str, Assigned]:
     Raises `ColumnError` if a channel is not there or two may be it, `UnitError`, its code E_UNITS_MISSING or
     E_UNITS_DIMENSION, and `RigFileError`, E_DUPLICATE_COLUMN, if columns of one name differ.
     """
-    columns: dict[str, int] = {}
-    problems: list[InputError] = []
-    for role in ROLES:
-        column = profile.channel(role).column
-        if column is not None:
-            try:
-                columns[role] = column_called(table, column, role)
-            except ColumnError as error:
-                if role in REQUIRED:
-                    problems.append(error)
-    for role in ROLES:
-        if role in columns or (role == "time" and profile.file.sample_rate_Hz):
-            continue
-        try:
-            choice = _choose(table, role, columns.values())
-        except InputError as error:
-            problems.append(error)
-            continue
-        if choice is not None:
-            columns[role] = choice
+    columns, problems = _columns(table, profile)
     if not problems:
         problems += _missing(table, columns, profile)
     assigned: dict[str, Assigned] = {}
     stated = profile.current or currents_in(table.source.name)
     for role, column in columns.items():
-        try:
+        with _noted(problems):
             _refuse_two_values(table, role, column, profile)
             entry = _convert(table, role, column, profile, asks_current=bool(problems) and not stated)
-        except InputError as error:
-            problems.append(error)
-            continue
-        if entry is not None:
-            assigned[role] = entry
+            assigned |= {} if entry is None else {role: entry}
     if not problems and "time" in assigned and "time" not in profile.channels:
         problems += _second_clock(table, assigned["time"])
     CombinedError.raise_from(problems)
     return assigned
+
+
+def _columns(table: RawTable, profile: Profile) -> tuple[dict[str, int], list[InputError]]:
+    """Return the column of every channel, by the profile, else by name and unit, and why some cannot be known."""
+    columns: dict[str, int] = {}
+    problems: list[InputError] = []
+    for role in ROLES:
+        stated = profile.channel(role).column
+        with _noted(problems if role in REQUIRED else []):
+            columns |= {} if stated is None else {role: column_called(table, stated, role)}
+    for role in ROLES:
+        if role not in columns and not (role == "time" and profile.file.sample_rate_Hz):
+            with _noted(problems):
+                choice = _choose(table, role, columns.values())
+                columns |= {} if choice is None else {role: choice}
+    return columns, problems
+
+
+@contextlib.contextmanager
+def _noted(problems: list[InputError]) -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        problems.append(error)
 
 
 def partly_assigned(table: RawTable, profile: Profile, needed: Collection[str] = ()) -> dict[str, Assigned]:
@@ -146,18 +144,44 @@ def index_of_samples(table: RawTable) -> int | None:
     return columns[0] if len(columns) == 1 else None
 
 
-def left_out(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]) -> dict[str, str]:
+def noted_columns(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]) -> Iterator[Finding]:
+    """Yield what is to be told of columns: taken beside others like them, or not taken though they may be needed."""
+    columns = {role: entry.column for role, entry in assigned.items()}
+    for role, own in columns.items():
+        alike = table.columns(role, table.headers[own].dimension)
+        measured = [i for i in alike if holds(table.headers[i].name, _MEASURED)]
+        open_role = profile.channel(role).column is None and role not in table.chosen
+        if open_role and len(alike) > 1 and measured == [own]:
+            other = next(table.names[i] for i in alike if i != own)
+            text = f"{table.names[own]!r} is taken as the {role}, not {other!r}: its name says it was measured"
+            yield Finding("W_CHOSEN", text)
+    named = named_after_currents(table.names)
+    others = [table.names[i] for i in named if i != columns["force"]]
+    if columns["force"] in named and others:
+        text = f"the tests of {len(others)} columns named after other currents are not taken: {', '.join(others)}; "
+        yield Finding("W_COLUMN", f"{text}to take each, leave [channels.force] column out of the profile")
+    for role in [role for role in SIGNED if role in assigned]:
+        same = _differing(table, columns[role])
+        numbers = ", ".join(str(i + 1) for i in same if i != columns[role])
+        name = table.headers[columns[role]].name
+        text = f"of {len(same)} columns called {name!r} one is taken as the {role}, not {numbers}; "
+        if same:
+            yield Finding("W_COLUMN", f"{text}if these are further tests, write the condition of each into its name")
+    for role, reason in _left_out(table, profile, columns).items():
+        yield Finding("W_COLUMN", f"the {role} channel is not used: {reason}")
+
+
+def _left_out(table: RawTable, profile: Profile, columns: Mapping[str, int]) -> dict[str, str]:
     """Return optional channels that a column is named after but that its unit forbids to use, and why.
 
     A column without a unit is only told of if it may be the coil current, which no test can do without.
     """
-    taken = {entry.column for entry in assigned.values()}
     reasons = {}
     for role in OPTIONAL:
-        if role in assigned or (role == "current" and profile.current and not profile.current.values):
+        if role in columns or (role == "current" and profile.current and not profile.current.values):
             continue
         try:
-            column = _stated_or_chosen(table, role, profile, taken)
+            column = _stated_or_chosen(table, role, profile, columns.values())
         except ColumnError as error:
             reasons[role] = error.found
             continue
@@ -165,8 +189,8 @@ def left_out(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]
             problem = _unit_problem(table, role, column, table.headers[column].unit)
             if problem is not None:
                 reasons[role] = problem.found
-    several = [table.names[i] for i in coil_currents(table) if i not in taken]
-    if len(several) > 1 and not {"current"} & {*assigned, *reasons}:
+    several = [table.names[i] for i in coil_currents(table) if i not in columns.values()]
+    if len(several) > 1 and not {"current"} & {*columns, *reasons}:
         reasons["current"] = f"{several[0]!r} and {several[1]!r} may both be it"
     return reasons
 
@@ -178,44 +202,11 @@ def coil_currents(table: RawTable) -> list[int]:
     return [i for i, name in names.items() if role_of(name) == "current" or says_nothing(name)]
 
 
-def measured_beside_others(table: RawTable, profile: Profile, assigned: Mapping[str, Assigned]) -> list[str]:
-    """Return which columns were taken because they are called measured, beside others of the same channel."""
-    taken = []
-    for role in [role for role in assigned if profile.channel(role).column is None and role not in table.chosen]:
-        own = assigned[role].column
-        alike = table.columns(role, table.headers[own].dimension)
-        if len(alike) > 1 and [own] == [i for i in alike if holds(table.headers[i].name, _MEASURED)]:
-            other = next(table.names[i] for i in alike if i != own)
-            taken.append(f"{table.names[own]!r} is taken as the {role}, not {other!r}: its name says it was measured")
-    return taken
-
-
-def tests_not_taken(table: RawTable, assigned: Mapping[str, Assigned]) -> list[str]:
-    """Return which columns are not taken that may be further tests: named after currents, or as the one that is."""
-    named = named_after_currents(table.names)
-    others = [table.names[i] for i in named if i != assigned["force"].column]
-    taken = assigned["force"].column in named
-    text = f"the tests of {len(others)} columns named after other currents are not taken: {', '.join(others)}; "
-    texts = [f"{text}to take each, leave [channels.force] column out of the profile"] if taken and others else []
-    for role in [role for role in SIGNED if role in assigned]:
-        own = assigned[role].column
-        same = _differing(table, own)
-        others = ", ".join(str(i + 1) for i in same if i != own)
-        text = f"of {len(same)} columns called {table.headers[own].name!r} one is taken as the {role}, not {others}; "
-        texts += [f"{text}if these are further tests, write the condition of each into its name"] if same else []
-    return texts
-
-
 def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
     """Column and unit of every channel as far as the file says them, for a profile to be completed."""
-    proposed: dict[str, tuple[int | None, str]] = {role: (None, "") for role in REQUIRED}
-    for role in ROLES:
-        with contextlib.suppress(InputError):
-            choice = _choose(table, role, [column for column, _ in proposed.values() if column is not None])
-            if choice is not None:
-                header = table.headers[choice]
-                proposed[role] = choice, header.unit if header.dimension == DIMENSION[role] else ""
-    return proposed
+    headers = {role: (i, table.headers[i]) for role, i in _columns(table, Profile())[0].items()}
+    proposed = {role: (i, h.unit if h.dimension == DIMENSION[role] else "") for role, (i, h) in headers.items()}
+    return {**dict.fromkeys(REQUIRED, (None, "")), **proposed}
 
 
 def candidates_of(table: RawTable, role: str) -> list[int]:

@@ -24,15 +24,7 @@ from mrdamper.rig_files.coil_current import (
     without_gaps,
 )
 from mrdamper.rig_files.column_names import Unit, role_of, words
-from mrdamper.rig_files.columns import (
-    Assigned,
-    assign,
-    index_of_samples,
-    left_out,
-    measured_beside_others,
-    rate_of,
-    tests_not_taken,
-)
+from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, noted_columns, rate_of
 from mrdamper.rig_files.conditions import stated_motion, stated_quantities
 from mrdamper.rig_files.mapping.clocks import past_midnight, refuse_two_rates
 from mrdamper.rig_files.mapping.proposals import integral
@@ -109,10 +101,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     if len(stretches) == 1:
         remarks["motion_stated"] = stated_motion(stated_quantities(table.remarks, decimal=table.decimal))
     remarks = {key: text for key, text in remarks.items() if text}
-    findings += [Finding("W_CHOSEN", text) for text in measured_beside_others(table, profile, assigned)]
-    findings += [Finding("W_COLUMN", text) for text in tests_not_taken(table, assigned)]
-    left_out_channels = left_out(table, profile, assigned).items()
-    findings += [Finding("W_COLUMN", f"the {name} channel is not used: {why}") for name, why in left_out_channels]
+    findings += noted_columns(table, profile, assigned)
     records = []
     for number, stretch in enumerate(stretches, 1):
         part = {name: values[stretch] for name, values in channels.items()}

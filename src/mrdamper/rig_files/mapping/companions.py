@@ -477,10 +477,9 @@ def _point(record: Record) -> _Point | None:
     """Frequency [Hz], amplitude [m], current [A] and peak-to-peak force [N] of a record; None without a period."""
     if record.current is None:
         return None
-    channels = (record.time, record.displacement, record.force, record.current)
-    channels = [_sampled(channel, record.time.size) for channel in channels]
-    there = np.all([np.isfinite(c) for c in channels], axis=0)
-    time, x, force, current = (c[there] for c in channels)
+    there = np.flatnonzero(record.present)
+    there = there[:: max(1, there.size // _MOST_SAMPLES)]
+    time, x, force, current = (take(c, there) for c in (record.time, record.displacement, record.force, record.current))
     if time.size < 20:
         return None
     strokes = find_strokes(time, x)

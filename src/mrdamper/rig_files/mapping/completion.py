@@ -214,17 +214,15 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
 
 def _with_listed_names(table: RawTable) -> RawTable:
     """Names, units and scales of columns without any that numbered lines state: 1=Time;min, or UNITS.CHAN_1=mm."""
-    listed = [match for line in table.lines if (match := LISTED.match(line))]
     texts: dict[str, dict[int, str]] = {"name": {}, "unit": {}, "scal": {}}
-    for match in listed if all(is_unit(match["unit"].strip()) for match in listed) else ():
-        texts["name"][int(match["number"])] = match["name"].strip()
-        texts["unit"][int(match["number"])] = match["unit"].strip()
-    width = range(1, len(table.names) + 1)
-    if {*texts["name"]} != {*width}:
-        texts = {"name": {}, "unit": {}, "scal": {}}
-        for match in filter(None, map(_INDEXED.match, table.lines)):
+    for line in table.lines:
+        if match := LISTED.match(line):
+            texts["name"][int(match["number"])] = match["name"].strip()
+            texts["unit"][int(match["number"])] = match["unit"].strip()
+        elif match := _INDEXED.match(line):
             what = (match["what"] or match["after"]).casefold()[:4].replace("desc", "name").replace("labe", "name")
             texts[what][int(match["number"])] = match["value"]
+    width = range(1, len(table.names) + 1)
     if any(i not in texts["name"] or not is_unit(texts["unit"].get(i, "")) for i in width):
         rows = {row for line in table.lines if (row := _row_of_names(line, len(width)))}
         return table.named(dict(enumerate(rows.pop()))) if len(rows) == 1 else table

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,14 +22,7 @@ DRIFT = 0.1  # of the amplitude over the record, for a short one
 DRIFT_A_CYCLE = 0.015  # of the amplitude a cycle: less does not open a loop
 DRIFT_AT_MOST = 0.3  # of the amplitude over the record, however long
 _MOST = 1_000_000  # samples looked at
-LONGEST_STROKE = 3.0  # [m] peak to peak; the longest test rigs have about 1.5 m
-LARGEST_FORCE = 2e7  # [N]; the largest seismic test machines
-SMALLEST_FORCE = 0.5  # [N] peak to peak; a load cell of a damper rig resolves about 1 N
-LARGEST_CURRENT = 200.0  # [A]
-FASTEST = 30.0  # [m/s]
-SHORT_STROKE, LONG_STROKE = 0.15e-3, 0.9  # [m] peak to peak: beyond, a slip of the unit is likelier than a test
-SMALL_FORCE, LARGE_FORCE = 8.0, 1.5e6  # [N] peak to peak
-SLOW = 300.0  # [s] of a cycle
+_ANY = (0.0, np.inf)
 FEWEST_LEVELS, _MANY = 16, 8  # values of a channel, and samples for each
 _SAME_FREQUENCY = 0.2  # relative difference of what is measured
 # Measured amplitude over the one stated, which may be the stroke peak to peak: a machine falls short of its command.
@@ -157,48 +151,53 @@ def current_in(record: Record, window: tuple[float, float] | None) -> Floats:
     return current[there]
 
 
-def exchanged_or_out_of_range(view: View) -> None:
-    """Refuse channels whose size says that a unit is wrong or that columns are exchanged."""
+class Size(NamedTuple):
+    """A figure of a record beside the lowest and highest that a test can have, and that most tests have."""
+
+    text: str
+    value: float
+    possible: tuple[float, float]
+    usual: tuple[float, float]  # beyond, a slip of the unit is likelier than a test
+    remedy: str
+
+
+def _sizes(view: View) -> tuple[Size, ...]:
     record, strokes = view.record, view.strokes
-    stroke, force = _peak_to_peak(record.displacement), _peak_to_peak(record.force)
+    stroke, force = (float(np.nanmax(values) - np.nanmin(values)) for values in (record.displacement, record.force))
     largest, current = (
         0.0 if values is None else max(float(np.nanmax(values)), -float(np.nanmin(values)))
         for values in (record.force, record.current)
     )
     speed = float(np.median(strokes.lengths / strokes.durations)) if strokes.durations.size else 0.0
     unit = "set its unit in a profile: [channels.{}] unit{}"
-    if stroke > LONGEST_STROKE:
-        problem, remedy = f"displacement moves {stroke:.4g} m peak to peak", unit.format("displacement", ' = "mm"?')
-        if force < LONGEST_STROKE:
-            problem += f", force {force:.4g} N"
-            remedy = "displacement and force look exchanged: name the columns the other way round"
-    elif largest > LARGEST_FORCE:
-        problem, remedy = f"force reaches {largest:.4g} N", unit.format("force", "")
-    elif force < SMALLEST_FORCE:
-        problem = f"force changes by {force:.3g} N in the whole record"
-        remedy = "check the load cell, the unit of force (kN?), or whether columns are exchanged"
-    elif current > LARGEST_CURRENT:
-        problem, remedy = f"current reaches {current:.4g} A", unit.format("current", ' = "mA"?')
-    elif speed > FASTEST:
-        problem = f"the mean speed of the strokes is {speed:.4g} m/s"
-        remedy = "check the units of time and displacement"
-    else:
-        return
-    raise view.refused("E_RANGE", problem, remedy)
+    length, remedy = f"displacement moves {1e3 * stroke:.4g} mm peak to peak", unit.format("displacement", ' = "mm"?')
+    if force < 3.0 < stroke:
+        length += f", force {force:.4g} N"
+        remedy = "displacement and force look exchanged: name the columns the other way round"
+    check = "check the load cell, the unit of force (kN?), or whether columns are exchanged"
+    return (  # [m] of test rigs, [N] of seismic test machines, [N] that load cells resolve, [A], [m/s] and [s]
+        Size(length, stroke, (0.0, 3.0), (0.15e-3, 0.9), remedy),
+        Size(f"force reaches {largest:.4g} N", largest, (0.0, 2e7), _ANY, unit.format("force", "")),
+        Size(f"force changes by {force:.3g} N in the whole record", force, (0.5, np.inf), (8.0, 1.5e6), check),
+        Size(f"current reaches {current:.4g} A", current, (0.0, 200.0), _ANY, unit.format("current", ' = "mA"?')),
+        Size(f"the mean speed of the strokes is {speed:.4g} m/s", speed, (0.0, 30.0), _ANY,
+             "check the units of time and displacement"),
+        Size(f"a cycle takes {strokes.period or 0:.3g} s", strokes.period or 0.0, _ANY, (0.0, 300.0), ""),
+    )  # fmt: skip
+
+
+def exchanged_or_out_of_range(view: View) -> None:
+    """Refuse channels whose size says that a unit is wrong or that columns are exchanged."""
+    for size in _sizes(view):
+        if not size.possible[0] <= size.value <= size.possible[1]:
+            raise view.refused("E_RANGE", size.text, size.remedy)
 
 
 def unusual(view: View) -> Iterator[Finding]:
     """Report values that hardly occur in a damper test: sizes of a slipped unit, and channels of a few levels."""
-    record, period = view.record, view.strokes.period
-    stroke, force = _peak_to_peak(record.displacement), _peak_to_peak(record.force)
-    sizes = (
-        (stroke < SHORT_STROKE or stroke > LONG_STROKE, f"displacement moves {1e3 * stroke:.3g} mm peak to peak"),
-        (force < SMALL_FORCE or force > LARGE_FORCE, f"force changes by {force:.3g} N in all"),
-        (period is not None and period > SLOW, f"a cycle takes {period or 0:.3g} s"),
-    )
-    for odd, text in sizes:
-        if odd:
-            yield Finding("W_RANGE", f"{text}: is its unit right?")
+    for size in _sizes(view):
+        if not size.usual[0] <= size.value <= size.usual[1]:
+            yield Finding("W_RANGE", f"{size.text}: is its unit right?")
     for name in ("displacement", "force"):
         values = getattr(view.run, name)
         levels = np.unique(values[: _MANY * FEWEST_LEVELS]).size
@@ -207,10 +206,6 @@ def unusual(view: View) -> Iterator[Finding]:
             yield Finding(
                 "W_COARSE", f"{name} has {levels} different values only: a sensor of so few steps hides the loop"
             )
-
-
-def _peak_to_peak(values: np.ndarray) -> float:
-    return float(np.nanmax(values) - np.nanmin(values))
 
 
 def stated_motion(record: Record, unit: str) -> float | None:
