@@ -224,13 +224,12 @@ class _Intake:
         no_table |= not records and not given and is_readme(path) and not holds_channels(path, profile.file)
         (self.notes if no_table else self.refusals).extend(refusals)
         split = profile.file.blocks == "split" or (self._table and self._table.of_file(path))
-        if refusals or split or not goes_on(records):
-            self._take_parts()
-            self._take(path, records)
-            return
-        if not (self._parts and follows(*self._parts[-1], path, records)):
+        whole = refusals or split or not goes_on(records)
+        if whole or not (self._parts and follows(*self._parts[-1], path, records)):
             self._take_parts()
         self._parts.append((path, records))
+        if whole:
+            self._take_parts()
 
     def _take_parts(self) -> None:
         """Take the tests of the last file, or those of the files that are parts of one record."""

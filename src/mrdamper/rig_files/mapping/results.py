@@ -206,41 +206,32 @@ def form_of_tests(table: RawTable, form: FileForm) -> FileForm:
 
 def with_results(tables: list[RawTable]) -> list[RawTable]:
     """Tables of a file's tests with the currents that its table of results states."""
-    lines = list(dict.fromkeys(line for table in tables for line in table.remarks))
-    results = results_in(lines) if len(lines) >= _FEWEST_ROWS else None
-    others = tables
-    if results is not None and results.of_supply:
-        return others
-    if results is None:
-        stated = [(table, r) for table in tables if _may_be_results(table) and (r := results_in(lines_of(table)))]
-        stated = [(table, results) for table, results in stated if not results.of_supply]
-        beside = [table for table, _ in stated]
-        tables = [t for t in tables if t not in beside and (not any(t.names) or _names_channels(t))]
-        stated = [r for _, r in stated if len(stated) == 1 or len(r.current) == len(tables)]  # no means over them
-        if len(stated) != 1:
-            return others
-        results = stated[0]
-    shared = set(tables[0].remarks).intersection(*(table.remarks for table in tables[1:])) if len(tables) > 1 else set()
-    tests = [[table.label, *(_last_lines(table, shared))] for table in tables]
-    currents = results.by_test(tests)
-    if len(currents) < len(tables) or not tables:
-        return others
-    note = f"table of results, {results.title}"
-    with_current: list[RawTable] = []
-    for i, table in enumerate(tables):
+    results = results_in(list(dict.fromkeys(line for table in tables for line in table.remarks)))
+    results, tests = (results, tables) if results is not None else _results_apart(tables)
+    if results is None or results.of_supply or not tests:
+        return tables
+    shared = set(tests[0].remarks).intersection(*(table.remarks for table in tests[1:])) if len(tests) > 1 else set()
+    currents = results.by_test([[table.label, *_last_lines(table, shared)] for table in tests])
+    note, with_current = f"table of results, {results.title}", list[RawTable]()
+    for i, table in enumerate(tests if len(currents) == len(tests) else ()):
         rest = {key: v for key, v in table.constants.items() if not names_condition(split_name(key).name, "current")}
         with_current.append(replace(table, constants={**rest, "current [A]": currents[i]}, stated_in=note))
-    return with_current
+    return with_current or tables
 
 
-def _names_channels(table: RawTable) -> bool:
-    """Tell if two columns or more of a table name channels: others of a workbook list parameters."""
-    return len({header.role or header.dimension for header in table.headers} - {None}) >= _TELLING
-
-
-def _may_be_results(table: RawTable) -> bool:
-    """Tell if a table names a current, or nothing, and is no record of a test."""
-    return (any(map(_is_current, table.names)) or not any(table.names)) and not table.columns("time")
+def _results_apart(tables: Sequence[RawTable]) -> tuple[Results | None, list[RawTable]]:
+    """Return the one table of results among tables, and those of tests: others of a workbook list parameters."""
+    stated, tests = list[Results](), list[RawTable]()
+    for table in tables:
+        may_be = (any(map(_is_current, table.names)) or not any(table.names)) and not table.columns("time")
+        results = results_in(lines_of(table)) if may_be else None
+        channels = {header.role or header.dimension for header in table.headers} - {None}
+        if results is not None and not results.of_supply:
+            stated.append(results)
+        elif not any(table.names) or len(channels) >= _TELLING:
+            tests.append(table)
+    stated = [results for results in stated if len(stated) == 1 or len(results.current) == len(tests)]  # no means
+    return stated[0] if len(stated) == 1 else None, tests
 
 
 def lines_of(table: RawTable) -> list[str]:

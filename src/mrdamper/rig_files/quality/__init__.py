@@ -28,7 +28,6 @@ _AT_ONCE = 2  # parts: their checks are sums and sorts of long arrays, which nee
 _MAY_REST = ("E_NO_EXCITATION",)  # a long test may pause; it may not be one long pause
 _OF_THE_WHOLE = ("W_SHORT", "W_DRIFT")
 _ONCE = ("W_CURRENT_VARIES",)  # checked over the whole record: parts may each hold another current
-_Verdict = tuple[tuple[Finding, ...], tuple[tuple[int, int], ...], InputError | None]
 CHECKS: tuple[Check, ...] = (
     samples.long_enough,
     samples.finite,
@@ -114,34 +113,36 @@ def check_long_record(record: Record) -> Record:
     by_code: dict[str, list[Finding]] = {}
     segments: list[tuple[int, int]] = []
     resting: list[InputError | None] = []
-    for start, (noticed, inside, error) in _checked_parts(record):
+    for start, part, error in _checked_parts(record):
         resting.append(error)
-        for finding in noticed:
+        for finding in part.findings:
             by_code.setdefault(finding.code, []).append(finding)
-        _extend(segments, inside, start)
+        for begin, end in part.segments or ((0, part.time.size),):
+            goes_on = segments and segments[-1][1] == start + begin + 1
+            first = segments.pop()[0] if goes_on else start + begin
+            segments.append((first, start + end))
     if all(resting) and resting[0] is not None:
         raise resting[0]
     findings = (*record.findings, *_summed(by_code, len(resting), resting.count(None)), *motion.change_of(record, None))
     return replace(record, findings=findings, segments=tuple(segments))
 
 
-def _checked_parts(record: Record) -> Iterator[tuple[int, _Verdict]]:
-    """Start of every part and what came of it, in order, two checked at once."""
+def _checked_parts(record: Record) -> Iterator[tuple[int, Record, InputError | None]]:
+    """Start of every part, the part and why it rests, if it does, in order, two checked at once."""
 
-    def one(part: Record) -> _Verdict:
+    def one(place: tuple[int, Record]) -> tuple[int, Record, InputError | None]:
         try:
             with np.errstate(all="ignore"):  # each thread has its own
-                part = check_record(part)
-            return part.findings, part.segments, None
+                return place[0], check_record(place[1]), None
         except InputError as error:
             if error.code not in _MAY_REST:
                 raise
-            return (), ((0, part.time.size),), error
+            return *place, error
 
     parts = _parts(record)
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         while together := list(islice(parts, _AT_ONCE)):
-            yield from zip((at for at, _ in together), pool.map(one, (part for _, part in together)), strict=True)
+            yield from pool.map(one, together)
 
 
 def _parts(record: Record) -> Iterator[tuple[int, Record]]:
@@ -152,14 +153,6 @@ def _parts(record: Record) -> Iterator[tuple[int, Record]]:
         for values in record.channels.values():
             drop_pages(values)
         yield at, replace(part, findings=(), segments=(), **channels)
-
-
-def _extend(segments: list[tuple[int, int]], new: tuple[tuple[int, int], ...], start: int) -> None:
-    for a, b in new:
-        if segments and segments[-1][1] == start + a + 1:
-            segments[-1] = segments[-1][0], start + b
-        else:
-            segments.append((start + a, start + b))
 
 
 def _summed(by_code: dict[str, list[Finding]], parts: int, moving: int) -> Iterator[Finding]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +17,7 @@ _YIELD = np.geomspace(0.004, 1.0, 14)  # yield displacements tried, of half the 
 
 @dataclass(frozen=True, eq=False)
 class CycleChannel:
-    """One channel of K steady cycles: each is offset + (1 + gain) (loop − its mean), `late` of a period."""
+    """One channel of K cycles: each is offset + (1 + gain) (loop − its mean), `late` of a period."""
 
     values: Floats  # (K, P), at P equal phases of every cycle
     loop: Floats  # (P,), mean over the cycles
@@ -36,7 +35,7 @@ class CycleChannel:
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """Displacement and force of the K steady cycles, by phase."""
+    """Displacement and force of K cycles, by phase."""
 
     starts: Floats  # (K,) [s]
     period: float  # [s]
@@ -49,17 +48,8 @@ class Cycles:
         return np.interp(place, np.arange(POINTS + 1), np.append(loop, loop[0]))
 
 
-class Folded(NamedTuple):
-    """K cycles of a record, each at P equal phases."""
-
-    starts: Floats  # (K,) [s]
-    period: float  # [s]
-    displacement: Floats  # (K, P) [m]
-    force: Floats  # (K, P) [N]
-
-
 @once_per_run
-def every_cycle(view: View) -> Folded | None:
+def every_cycle(view: View) -> Cycles | None:
     """Fold the cycles of a record without a gap, up to its end; None under one cycle of a periodic motion."""
     motion, count = view.motion, view.whole_cycles
     if motion is None or not count:
@@ -71,7 +61,7 @@ def every_cycle(view: View) -> Folded | None:
     if not kept.any():
         return None
     channels = (np.interp(grid, run.time, v).reshape(count, POINTS)[kept] for v in (run.displacement, run.force))
-    return Folded(starts[kept], period, *channels)
+    return Cycles(starts[kept], period, *map(_channel, channels))
 
 
 @once_per_run
@@ -81,18 +71,18 @@ def steady_cycles(view: View) -> Cycles | None:
     The first of three or more is omitted: it may contain the start from rest. A cycle with a gap is, too, and one
     before the window of a run that states one.
     """
-    folded = every_cycle(view)
-    if folded is None:
+    every = every_cycle(view)
+    if every is None:
         return None
-    count = round((float(view.steady.time[-1]) - folded.starts[0]) / folded.period)
+    count = round((float(view.steady.time[-1]) - every.starts[0]) / every.period)
     first = int(count > 2 and count == view.whole_cycles)
     if view.record.window is not None:
-        before = folded.starts < view.record.window[0] - _EARLY * folded.period
+        before = every.starts < view.record.window[0] - _EARLY * every.period
         first = max(first, int(np.count_nonzero(before)))
-    if first == folded.starts.size:
+    if first == every.starts.size:
         return None
-    channels = (_channel(values[first:]) for values in (folded.displacement, folded.force))
-    return Cycles(folded.starts[first:], folded.period, *channels)
+    channels = (_channel(channel.values[first:]) for channel in (every.displacement, every.force))
+    return Cycles(every.starts[first:], every.period, *channels)
 
 
 def _channel(values: Floats) -> CycleChannel:

@@ -158,10 +158,6 @@ class ForceLag:
     noise: float  # of the mean cycle, over the force's RMS
     cycle: Floats  # (P,) force without the best of them [N]
 
-    def misfit(self, lag: Lag) -> float:
-        """Misfit of a lag, less the noise."""
-        return _beyond(self.tried[lag], self.noise)
-
     @property
     def best(self) -> Lag:
         """The simplest of those that explain the force nearly as well as any: a delay, a filter, or both."""
@@ -181,7 +177,7 @@ class ForceLag:
     @property
     def is_clear(self) -> bool:
         """True where the lag explains more than any rate dependence may."""
-        return _is_clear(self.best, self.misfit(Lag()), self.misfit(self.best))
+        return _is_clear(self.best, *(_beyond(self.tried[lag], self.noise) for lag in (Lag(), self.best)))
 
 
 def _beyond(misfit: float, noise: float) -> float:

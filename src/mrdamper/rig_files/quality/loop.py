@@ -102,7 +102,7 @@ def keeps_its_sign(view: View) -> None:
     cycles = every_cycle(view)
     if cycles is None or len(cycles.starts) < 2 or cycles.period < _FEWEST * view.step or view.noticed("W_FROZEN"):
         return  # a force that stands still opposes its own other half cycle
-    starts, force = cycles.starts, cycles.force
+    starts, force = cycles.starts, cycles.force.values
     ends = np.searchsorted(view.run.time, [starts, starts + cycles.period])
     shares = np.array([_damping_share(view, start, stop) for start, stop in ends.T])
     flipped = np.flatnonzero(shares < -_CLEARLY)
