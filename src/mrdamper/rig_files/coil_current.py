@@ -106,7 +106,7 @@ def _agreed(statements: list[Statement], channel: Floats | None, where: str) -> 
     over = [statement for statement in statements if abs(statement.amperes) > LARGEST_STATED]
     if whence == _PROFILE:
         varies = [f"the current channel goes from {finite.min():.3g} to {finite.max():.3g} A"] if change else []
-        code, against = "E_CURRENT_CONTRADICTS", [*varies, *measured, *against]
+        code, whence, against = "E_CURRENT_CONTRADICTS", "the profile", [*varies, *measured, *against]
         remedy = "leave [current] out of the profile; if the file is wrong, correct it, or rename it"
     elif over or against:
         code, remedy = "E_RANGE" if over else "E_AMBIGUOUS", "correct the name or the line that is wrong"

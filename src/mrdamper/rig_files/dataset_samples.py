@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -65,10 +64,9 @@ def _of_parquet(table: RawTable, path: Path) -> dict[str, Channels]:
     assert table.words is not None
     ids = table.words(names.index("run_id"))
     channels: Channels = {}
-    for name in _in_order(names):
-        at = names.index(name)
-        if name not in (*REQUIRED, *OPTIONAL) and table.units[at]:
-            continue  # dates
+    for at, name in enumerate(names):
+        if name == "run_id" or (name not in (*REQUIRED, *OPTIONAL) and table.units[at]):
+            continue  # the last are dates
         try:
             channels[name] = table.read([at]).values[at]
         except RigFileError as error:
@@ -98,8 +96,8 @@ def _of_text(source: Source, path: Path) -> dict[str, Channels]:
     ids = words_in(table["run_id"])
     channels = {
         name: table[name].cast(pl.Float64).fill_null(float("nan")).to_numpy()
-        for name in _in_order(table.columns)
-        if table.schema[name].is_numeric() or refuse_text(name, path)
+        for name in table.columns
+        if name != "run_id" and (table.schema[name].is_numeric() or refuse_text(name, path))
     }
     return _by_run(ids.codes, ids.labels, channels)
 
@@ -108,11 +106,6 @@ def _require(names: list[str], path: Path) -> None:
     for column in ("run_id", *REQUIRED):
         if column not in names:
             raise missing_column(column, names, path)
-
-
-def _in_order(names: Iterable[str]) -> list[str]:
-    channels = [name for name in (*REQUIRED, *OPTIONAL) if name in names]
-    return channels + [name for name in names if name not in (*channels, "run_id")]
 
 
 def refuse_text(name: str, path: Path) -> bool:

@@ -84,22 +84,12 @@ class Channel(Table):
     integrate: bool = False
     """The displacement's column holds the velocity, of which the displacement is the integral, from zero on."""
 
-    @field_validator("file")
-    @classmethod
-    def _file_names_the_test(cls, file: str | None) -> str | None:
-        if file is not None and (file.count("{run}") != 1 or file.count("*") > 3):
-            raise ValueError("file needs {run} once, and at most three *")
-        return file
-
-    @field_validator("scale")
-    @classmethod
-    def _scale_is_not_zero(cls, scale: float | None) -> float | None:
-        if scale == 0:
-            raise ValueError("a scale of zero leaves nothing")
-        return scale
-
     @model_validator(mode="after")
-    def _calibration_is_whole(self) -> Channel:
+    def _keys_fit_together(self) -> Channel:
+        if self.file is not None and (self.file.count("{run}") != 1 or self.file.count("*") > 3):
+            raise ValueError("file needs {run} once, and at most three *")
+        if self.scale == 0:
+            raise ValueError("a scale of zero leaves nothing")
         if self.scale is not None and self.unit is None:
             raise ValueError("scale needs the unit it leads to")
         if self.offset and self.scale is None:

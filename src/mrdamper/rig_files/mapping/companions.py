@@ -7,7 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import chain, combinations
 from pathlib import Path
 
 import numpy as np
@@ -63,11 +63,8 @@ class Part:
 
 def holds_channels(path: Path, form: FileForm) -> bool:
     """Tell if a table of a file has columns of a displacement and a force."""
-
-    def both(tables: list[RawTable]) -> bool:
-        return any({"displacement", "force"} <= {header.channel for header in table.headers} for table in tables)
-
-    return ask_tables(path, both, False, form)
+    channels = ask_tables(path, lambda tables: [{header.channel for header in t.headers} for t in tables], [], form)
+    return any({"displacement", "force"} <= of_table for of_table in channels)
 
 
 def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
@@ -370,12 +367,12 @@ def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:
         notes = records[i].provenance
         owner = " ".join((records[i].rig, notes.get("specimen", ""), notes.get("session", "")))
         groups[owner, round(point[2] / _ALIKE_A / 2)].append(i)
-    for members in groups.values():
-        for i in members:
-            for j in members:
-                if i < j and _contradict(points[i], points[j]):
-                    refused.setdefault(i, _refusal(records[i], points[i], records[j], points[j]))
-                    refused.setdefault(j, _refusal(records[j], points[j], records[i], points[i]))
+    for i, j in chain.from_iterable(combinations(members, 2) for members in groups.values()):
+        (*_, current, force), (*_, other_current, other_force) = points[i], points[j]
+        near = abs(current - other_current) <= _ALIKE_A and _are_near(points[i], points[j])
+        if near and max(force, other_force) > _SEVERAL * min(force, other_force):
+            refused.setdefault(i, _refusal(records[i], points[i], records[j], points[j]))
+            refused.setdefault(j, _refusal(records[j], points[j], records[i], points[i]))
     return refused
 
 
@@ -449,11 +446,6 @@ def _same(one: Record, other: Record, with_current: bool) -> bool:
 
 def _sampled(channel: Floats, size: int) -> Floats:
     return take(channel, np.arange(0, size, max(1, size // _MOST_SAMPLES)))
-
-
-def _contradict(one: _Point, other: _Point) -> bool:
-    near = abs(one[2] - other[2]) <= _ALIKE_A and _are_near(one, other)
-    return near and max(one[3], other[3]) > _SEVERAL * min(one[3], other[3])
 
 
 def _are_near(one: _Point, other: _Point) -> bool:

@@ -170,7 +170,8 @@ def _sizes(view: View) -> tuple[Size, ...]:
     )
     speed = float(np.median(strokes.lengths / strokes.durations)) if strokes.durations.size else 0.0
     unit = "set its unit in a profile: [channels.{}] unit{}"
-    length, remedy = f"displacement moves {1e3 * stroke:.4g} mm peak to peak", unit.format("displacement", ' = "mm"?')
+    length = f"displacement moves {f'{stroke:.4g} m' if stroke > 0.9 else f'{1e3 * stroke:.3g} mm'} peak to peak"
+    remedy = unit.format("displacement", ' = "mm"?')
     if force < 3.0 < stroke:
         length += f", force {force:.4g} N"
         remedy = "displacement and force look exchanged: name the columns the other way round"
