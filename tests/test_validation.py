@@ -8,7 +8,6 @@ import pytest
 from support.dampers import joint_damper
 from support.synthetic import synthetic_run
 
-from mrdamper.dampers.distance import AT_TESTS
 from mrdamper.data import Condition, Run, same_condition
 from mrdamper.errors import InputError
 from mrdamper.physics.motion import analyse_motion, sine
@@ -32,9 +31,6 @@ class Said:
     motion: object
     condition: Condition
     extrapolation: tuple = ()
-
-    def distance(self, tested):
-        return AT_TESTS
 
     def corrected(self, gain, offset):
         return replace(self, force=gain * self.force + offset)
@@ -127,7 +123,7 @@ def test_standing_still_has_an_error_of_its_own_and_the_best_gain_and_offset_are
         def predict(self, run):
             said = super().predict(run)
             velocity = np.where(still, 0.0, said.motion.velocity)
-            return replace(said, motion=SimpleNamespace(velocity=velocity, resting=still))
+            return replace(said, motion=SimpleNamespace(velocity=velocity, current=still, resting=still))
 
     score = score_run(Resting(), replace(run, force=wrong))
     miss = wrong - 0.8 * (run.force - 4.0)

@@ -10,7 +10,7 @@ from scipy.special import stdtrit
 from mrdamper.dampers import bands
 from mrdamper.dampers.bands import band, no_band, portable_band, scope, session_band
 from mrdamper.dampers.calibration import LEVELS, Calibration, Growth
-from mrdamper.dampers.distance import AT_TESTS, Distance
+from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.joint import JointDamper
 from mrdamper.dampers.prediction import Prediction
 from mrdamper.dampers.sessions import RecordingTime, RunScatter, SessionCorrection, Sessions
@@ -241,7 +241,7 @@ def test_a_portable_band_is_that_of_loops_at_three_currents(monkeypatch):
     monkeypatch.setattr(JointDamper, "predict", predict)
     monkeypatch.setattr(bands, "band", found)
     away = {1.5: AWAY}
-    monkeypatch.setattr(Prediction, "distance", lambda asked, damper: away.get(asked.condition.current_A, AT_TESTS))
+    monkeypatch.setattr(Prediction, "distance", lambda asked, damper: away.get(asked.condition.current_A, Distance()))
     tested = SimpleNamespace(tested=True, middle=CONDITION, current_A=(0.0, 2.0), peak_velocity_m_s=(0.0, 0.9),
         farthest=[CONDITION, replace(CONDITION, current_A=1.5)])  # fmt: skip
     portable = portable_band(replace(made, envelope=tested), 0.8)

@@ -1,6 +1,7 @@
 """Calibrated intervals: closed forms, equivariance, exchange of labels, coverage of a known truth."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -48,6 +49,10 @@ def test_a_run_is_compared_inside_its_window_with_what_it_takes_out_of_the_motio
     record = Run("r", TIME, np.sin(2 * np.pi * TIME), 1.2 * force + 3, 0.0, window=(0.0, 0.75), notes={"session": "a"})
     found = PredictedRun.of(record, force, velocity)
     assert (found.run_id, found.session) == ("r", "a")
+    asked = []
+    far = PredictedRun.of(record, force, velocity, lambda: asked.append("far") or Distance(motion=0.5))
+    assert not asked  # a study asks for the distances of the selected damper alone
+    assert (far.distance, far.distance, asked) == (Distance(motion=0.5), Distance(motion=0.5), ["far"])
     assert found.peak == pytest.approx(1.2)
     inside = TIME <= 0.75
     power = [np.trapezoid(f[inside] * velocity[inside], TIME[inside]) for f in (1.2 * force + 3, force)]
@@ -329,7 +334,7 @@ def test_errors_grow_with_the_distance_from_the_tests_as_they_were_made(gain, of
             1 + np.sqrt(gain**2 + own**2 + g @ way.squares) for own, g in ((0.01, PEAK**2), (0.03, ENERGY**2))
         )
         error = np.sqrt(moved + 0.02**2 + FORCE**2 @ way.squares) * np.ptp(SWING) / 2
-        runs.append(replace(run("r", error, peak=peak, energy=energy), distance=way))
+        runs.append(replace(run("r", error, peak=peak, energy=energy), away=lambda way=way: way))
     found = Growth.of(runs, at_tests)
     assert found.force == pytest.approx(beside_typical(FORCE))
     assert found.peak == pytest.approx(beside_typical(PEAK))
@@ -341,12 +346,16 @@ def test_errors_grow_with_the_distance_from_the_tests_as_they_were_made(gain, of
     one = Growth.of(runs[:2], at_tests)
     assert one.peak == pytest.approx((beside_typical(PEAK)[0], *TYPICAL[1:]))
     assert one.dof == (2.0, 1.0, 1.0)
-    far = Growth.of([replace(run("r", peak=1e4), distance=ways[2])], at_tests)  # beyond ten it is no longer told apart
+    far = Growth.of(
+        [replace(run("r", peak=1e4), away=lambda: ways[2])], at_tests
+    )  # beyond ten it is no longer told apart
     assert far.peak[1] == pytest.approx(np.sqrt((10.0**2 + TYPICAL[1] ** 2) / 2))
     # An energy that cannot be compared is wrong by all of it.
-    lost, twice = (Growth.of([replace(run("r", energy=e), distance=ways[1])], at_tests) for e in (np.inf, 2.0))
+    lost, twice = (Growth.of([replace(run("r", energy=e), away=lambda: ways[1])], at_tests) for e in (np.inf, 2.0))
     assert lost == twice
-    none = Growth.of([replace(run("r"), distance=way) for way in ways], at_tests)  # better than at the tests
+    none = Growth.of(
+        [replace(run("r"), away=lambda way=way: way) for way in ways], at_tests
+    )  # better than at the tests
     assert none.force == none.energy == pytest.approx(beside_typical(0.0))
 
 
@@ -363,7 +372,9 @@ def test_the_scatter_at_the_tests_is_no_growth():
     at_tests = ModelError(force=0.02, peak=0.02, energy=0.02, gain=0.0, offset=0.0)
     errors = 0.02 * np.sqrt(2) * np.array([1.0, 0.0, 1.0, 0.0])
     way = Distance(0.0, 0.0, 0.5)
-    runs = [replace(run("r", e * np.ptp(SWING) / 2, peak=1 + e, energy=1 - e), distance=way) for e in errors]
+    runs = [
+        replace(run("r", e * np.ptp(SWING) / 2, peak=1 + e, energy=1 - e), away=lambda way=way: way) for e in errors
+    ]
     found = Growth.of(runs, at_tests)
     for quantity in ("force", "peak", "energy"):
         assert getattr(found, quantity) == pytest.approx((*TYPICAL[:2], TYPICAL[2] / np.sqrt(2)))
@@ -374,7 +385,9 @@ TYPICAL = np.array([0.25, 0.25, 0.25])
 
 def test_the_error_that_the_parameters_account_for_is_no_growth():
     way, error = Distance(0.0, 0.0, 0.5), 0.3
-    runs = [replace(run("r", error * np.ptp(SWING) / 2, peak=1 + error, energy=1 - error), distance=way)] * 4
+    runs = [
+        replace(run("r", error * np.ptp(SWING) / 2, peak=1 + error, energy=1 - error), away=lambda way=way: way)
+    ] * 4
     nothing = ModelError(force=0.0, peak=0.0, energy=0.0, gain=0.0, offset=0.0)
     for share in (0.0, 0.75, 1.0):
         found = Growth.of(runs, nothing, {"r": np.full(3, share * error**2)})
@@ -386,7 +399,7 @@ def test_the_error_that_the_parameters_account_for_is_no_growth():
 def test_the_curvature_over_the_velocity_counts_as_much_as_the_folds():
     """Of the typical growth, that of the folds and that by curvature the squares have their mean."""
     nothing = ModelError(force=0.0, peak=0.0, energy=0.0, gain=0.0, offset=0.0)
-    fold = [replace(run("r", 0.1 * np.ptp(SWING) / 2, peak=1.1, energy=0.9), distance=Distance(0.0, 0.0, 0.5))]
+    fold = [replace(run("r", 0.1 * np.ptp(SWING) / 2, peak=1.1, energy=0.9), away=partial(Distance, 0.0, 0.0, 0.5))]
     curvature = np.array([0.3, 0.4, 0.5])
     for runs, shown in ((fold, [0.2]), ([], [])):
         found = Growth.of(runs, nothing, curvature=curvature)

@@ -1,6 +1,7 @@
 """The covariance of a damper: closed forms of one parameter, scales, order, what bounds hold and what nothing shows."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -333,7 +334,7 @@ def test_other_sessions_show_the_scatter_of_sessions_and_far_runs_the_growth():
     runs = runs_of(sessions=3, session=0.2)
     damper = fitted(runs)
     seen = [PredictedRun.of(r, damper.predict(r).force, damper.predict(r).motion.velocity) for r in runs]
-    far = [replace(p, predicted=1.5 * p.predicted, distance=Distance(0.0, 0.5, 0.0)) for p in seen]
+    far = [replace(p, predicted=1.5 * p.predicted, away=partial(Distance, 0.0, 0.5, 0.0)) for p in seen]
     plain = estimate_uncertainty(damper, runs, seen).uncertainty
     for factor in (1.4, 1.01):  # two of three parts of it are the session's own
         others = [replace(p, measured=p.predicted * factor) for p in seen]
@@ -435,7 +436,7 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
         shifted = run.force * (1 + 0.08 * rng.standard_normal()) + 40 * rng.standard_normal()
         seen.append(PredictedRun.of(run, shifted, damper.predict(run).motion.velocity))
     seen[1] = replace(seen[1], peak=1.3 * seen[1].peak, energy=0.7 * seen[1].energy)
-    seen[3] = replace(seen[3], distance=Distance(0.05, 0.2, 0.3))
+    seen[3] = replace(seen[3], away=partial(Distance, 0.05, 0.2, 0.3))
     seen[6] = replace(seen[6], run_id="recorded later")  # the parameters move it as they move the median run
     known = estimate_uncertainty(damper, runs, seen).uncertainty
     assert known.of_sessions

@@ -10,7 +10,6 @@ from support.dampers import joint_damper
 from support.synthetic import synthetic_run
 
 from mrdamper.dampers.calibration import PredictedRun
-from mrdamper.dampers.distance import AT_TESTS
 from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
@@ -41,9 +40,6 @@ class Said:
     motion: object
     condition: Condition
     extrapolation: tuple = ()
-
-    def distance(self, tested):
-        return AT_TESTS
 
 
 class Memory:
@@ -362,7 +358,7 @@ def test_stretches_are_scored_as_the_record_they_were_cut_from():
     predictions = [PredictedRun(f"long {n}", "day", f, -f, f[:1], f[1:2]) for n, f in enumerate(forces)]
     assert joined.predicted is None
     (beside,) = cross_validation._whole_again(
-        Validation("x", tuple(replace(s, compared=p) for s, p in zip(scores[:2], predictions, strict=True))), pieces
+        Validation("x", tuple(replace(s, predicted=p) for s, p in zip(scores[:2], predictions, strict=True))), pieces
     ).runs
     assert (beside.predicted.run_id, beside.predicted.session) == ("long", "day")
     assert beside.predicted.predicted.tolist() == [0, 2, 4, 6, 10, 12, 14]  # every second of each of two

@@ -11,14 +11,15 @@ Residuals of cross-validation replace those of a calibration set [Barber, Candè
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mrdamper.dampers.distance import AT_TESTS, Distance
+from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.sessions import GainOffset
 from mrdamper.data.arrays import Floats, index_at
 from mrdamper.data.runs import Run, once_per_run
@@ -58,10 +59,10 @@ class PredictedRun:
     measured: Floats  # (N,) [N]
     peak: Floats  # (L,) measured over predicted peak-to-peak force of each loop (`_loops`)
     energy: Floats  # (L,) the same of the dissipated energy
-    distance: Distance = AT_TESTS  # from the runs that the model was identified from
+    away: Callable[[], Distance] = Distance  # calculates the distance from the runs the model was identified from
 
     @classmethod
-    def of(cls, run: Run, predicted: Floats, velocity: Floats) -> PredictedRun:
+    def of(cls, run: Run, predicted: Floats, velocity: Floats, away: Callable[[], Distance] = Distance) -> PredictedRun:
         """From the prediction (N,) [N] along the whole run; raises E_CLOCK as `session_of`."""
         at, loops = np.flatnonzero(run.in_window), _loops(run)
         powers = np.array(
@@ -78,6 +79,7 @@ class PredictedRun:
             run.force[at[::step]],
             _peaks(run) / np.maximum([_peak(predicted[loop], cycles) for loop, cycles in loops], 1e-300),
             np.divide(powers[0], powers[1], out=np.full(len(loops), np.inf), where=powers[1] != 0),
+            away,
         )
 
     @classmethod
@@ -91,7 +93,13 @@ class PredictedRun:
             np.concatenate([part.measured[thin] for part in parts]),
             np.concatenate([part.peak for part in parts]),
             np.concatenate([part.energy for part in parts]),
+            parts[0].away,
         )
+
+    @cached_property
+    def distance(self) -> Distance:
+        """Distance from the runs that the model was identified from; intervals of a selected damper alone take it."""
+        return self.away()
 
     @property
     def half(self) -> float:

@@ -39,9 +39,6 @@ class Distance:
         return np.square([self.between, self.beyond, self.motion])
 
 
-AT_TESTS = Distance()
-
-
 def distance_from(
     tested: Sequence[Condition], at: Condition, current: Floats, *, swept_A: tuple[float, float] | None = None
 ) -> Distance:

@@ -52,15 +52,10 @@ _PASSES = 2  # over all coordinates in the choice of forms
 _RANK_LIMIT = 1e-10  # singular value over the largest below which a coefficient is not determined
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
-# Weights of the values at both ends of an interval and of the second derivatives there, for a cubic spline and its
-# slope in the interval: a row for each power of the share of the interval.
+# Six times the weights of the values at both ends of an interval and of the second derivatives there, for a cubic
+# spline and its slope in the interval: a row for each power of the share of the interval
 _SPLINE = np.array(
-    [
-        [1, 0, 0, 0, -1, 1, -1 / 3, -1 / 6],
-        [-1, 1, -1 / 3, -1 / 6, 0, 0, 1, 0],
-        [0, 0, 1 / 2, 0, 0, 0, -1 / 2, 1 / 2],
-        [0, 0, -1 / 6, 1 / 6, 0, 0, 0, 0],
-    ]
+    [[6, 0, 0, 0, -6, 6, -2, -1], [-6, 6, -2, -1, 0, 0, 6, 0], [0, 0, 3, 0, 0, 0, -3, 3], [0, 0, -1, 1, 0, 0, 0, 0]]
 )
 
 _Trial: TypeAlias = "tuple[JointFunctionFit, dict[str, Floats]]"  # and its errors by kind of fold
@@ -107,18 +102,12 @@ class Condensed:
 
         Both (R, L+1, L+1).
         """
-        begin, rung, last = self._rungs
-        u = np.minimum(np.maximum((np.log(shape_values) - begin) / rung, 0), last)
-        first = np.minimum(u.astype(int), last - 1)
-        weights = ((u - first)[:, None] ** np.arange(4) @ _SPLINE).reshape(-1, 2, 4)
-        both = (weights @ self._cells[np.arange(u.size), first]).reshape(u.size, 2, *self.gram.shape[2:])
-        return both[:, 0], both[:, 1] / rung
-
-    @cached_property
-    def _rungs(self) -> tuple[float, float, int]:
-        """First value of the ladder and distance of the next, in the logarithm, and the number of the last."""
         logs = np.log(self.ladder)
-        return float(logs[0]), float(logs[1] - logs[0]), logs.size - 1
+        u = np.minimum(np.maximum((np.log(shape_values) - logs[0]) / (logs[1] - logs[0]), 0), logs.size - 1)
+        first = np.minimum(u.astype(int), logs.size - 2)
+        weights = ((u - first)[:, None] ** np.arange(4) @ _SPLINE).reshape(-1, 2, 4) / 6
+        both = (weights @ self._cells[np.arange(u.size), first]).reshape(u.size, 2, *self.gram.shape[2:])
+        return both[:, 0], both[:, 1] / (logs[1] - logs[0])
 
     @cached_property
     def _cells(self) -> Floats:
@@ -469,8 +458,11 @@ def choose_forms(
     parameters for the tests are skipped. `shape_values` (R,): the shape coordinate of individual fits, as start.
     `dissipating`: units of the coordinates that must not be negative; forms that break a law of physics are refused.
     """
-    start = tuple(shape_values.tolist())
-    options = {name: _supported(laws, data.conditions) for name, laws in candidates.items()}
+    start, units = tuple(shape_values.tolist()), dissipating or {}
+    options = {
+        name: [law for law in laws if supported(_form(law), data.conditions)] or [laws[0]]
+        for name, laws in candidates.items()
+    }
     forms: dict[str, str | Law] = {name: laws[0] for name, laws in options.items()}
     fit, errors = _tried(data, forms, start)
     refused: dict[str, str] = {}
@@ -486,8 +478,9 @@ def choose_forms(
                     continue  # the tests do not separate the terms of this form
                 larger = _size(law) >= _size(forms[name])
                 better = not smaller_wins(errors, other) if larger else smaller_wins(other, errors)
-                better = _risen(fit, trial, name, data.conditions, dissipating or {}, better)
-                reason = _broken(trial, name, data.conditions, dissipating or {}) if better else ""
+                better = _risen(fit, trial, name, data.conditions, units, better)
+                checked = trial.parameters.functions.get(name) if better and name in units else None
+                reason = broken_law(checked, data.conditions, units[name]) if checked else ""
                 if reason:
                     refused[f"{name}: {law_of(law)[0]}"] = reason
                 elif better:
@@ -495,11 +488,6 @@ def choose_forms(
         if forms == before:
             break
     return FormChoice(forms, fit_jointly(data, forms, fit.parameters.functions.get(data.shape)), refused)
-
-
-def _supported(laws: Sequence[str | Law], conditions: Sequence[Condition]) -> list[str | Law]:
-    kept = [law for law in laws if supported(_form(law), conditions)]
-    return kept or [laws[0]]
 
 
 def _risen(
@@ -517,12 +505,6 @@ def _risen(
     if rises(other, one, dissipating[name], conditions):
         return False
     return better or rises(one, other, dissipating[name], conditions)
-
-
-def _broken(fit: JointFunctionFit, name: str, conditions: Sequence[Condition], dissipating: Mapping[str, str]) -> str:
-    """Return the law of physics that the function of a coordinate breaks, if any."""
-    function = fit.parameters.functions.get(name)
-    return broken_law(function, conditions, dissipating[name]) if function and name in dissipating else ""
 
 
 def _tried(data: Condensed, forms: Mapping[str, str | Law], shape_values: tuple[float, ...]) -> _Trial:

@@ -25,6 +25,7 @@ _LATEX = str.maketrans(
 )
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "!\"#$%&'()*+,-./:;<=>?@[\\]^_`{|}~"})
 _FORMULA = re.compile(r"'*\s*[=+\-@\t\r]")  # characters that begin a formula in a spreadsheet
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # reserved by Windows
 _MAX_NAME_PART = 48  # characters; of four bytes each, with prefix, suffix and hash, below 255
 
@@ -61,7 +62,7 @@ def csv_cell(text: str) -> str:
 
     An apostrophe precedes =, +, -, @ and tab, as in spreadsheets; numbers are unchanged.
     """
-    return f"'{text}" if _FORMULA.match(text) and not _is_number(text) else text
+    return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
 
 
 def csv_value(cell: str) -> str:
@@ -116,7 +117,3 @@ def _one_line(text: str) -> str:
     """Remove line breaks, control characters, and marks that change the direction of writing."""
     plain = re.sub(r"\s+", " ", text)
     return "".join("?" if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Co", "Cn") else c for c in plain)
-
-
-def _is_number(text: str) -> bool:
-    return re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", text) is not None

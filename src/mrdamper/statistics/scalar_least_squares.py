@@ -22,10 +22,7 @@ Evaluation = tuple[Floats, Floats]  # residual, its derivative
 
 
 def least_squares_in_one(
-    evaluate: Callable[[float], Evaluation | None],
-    start: float,
-    lower: float,
-    upper: float,
+    evaluate: Callable[[float], Evaluation | None], start: float, lower: float, upper: float
 ) -> Minimum | None:
     """Minimise |residual(u)|² between two bounds, until the predicted gain of a step is negligible.
 

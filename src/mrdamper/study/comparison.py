@@ -138,9 +138,7 @@ def _usable(rig: Dataset) -> UsableRuns:
     runs = UsableRuns.of(rig)
     if len(runs.train) < 3 and len(runs.everything) == len(runs.train):
         raise IdentificationError(
-            "fewer than three identification runs with a steady sine",
-            where=rig.name,
-            remedy="check the split column",
+            "fewer than three identification runs with a steady sine", where=rig.name, remedy="check the split column"
         )
     return runs
 

@@ -161,8 +161,6 @@ def _joined(name: str, scores: Sequence[RunScore]) -> RunScore:
     flags = tuple(dict.fromkeys(flag for score in scores for flag in score.extrapolation))
     rests = [score.rest for score in scores if score.rest is not None]
     rest = float(np.sqrt(np.mean(np.square(rests)))) if rests else None
-    predictions = [score.compared for score in scores if score.compared is not None]
-    compared = PredictedRun.joined(name, predictions) if predictions else None
-    return replace(
-        scores[0], run_id=name, scores=whole, extrapolation=flags, rest=rest, reading=None, compared=compared
-    )
+    predictions = [score.predicted for score in scores if score.predicted is not None]
+    beside = PredictedRun.joined(name, predictions) if predictions else None
+    return replace(scores[0], run_id=name, scores=whole, extrapolation=flags, rest=rest, reading=None, predicted=beside)

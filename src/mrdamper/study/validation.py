@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,9 @@ import numpy as np
 from mrdamper.dampers.bands import band, session_band
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import PredictedRun, measured_peak
-from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.prediction import Prediction, distance_from_tests
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, GainOffset, RecordingTime, SessionCorrection, Sessions
-from mrdamper.data import Condition, Displayable, Run, session_of
+from mrdamper.data import Condition, Displayable, Run
 from mrdamper.errors import InputError, RunError, UnknownNameError, require, validate_arguments
 from mrdamper.statistics.metrics import Scores, dissipated_power, score
 
@@ -36,15 +35,7 @@ class RunScore:
     rest: float | None = None  # RMS error at rest, anywhere in the record, over the peak-to-peak force
     session: str = UNKNOWN  # predicted as it is, or corrected by other runs of its session
     reading: GainOffset | None = None  # of the best fit to the run; no score is corrected by them
-    # samples of the uncorrected prediction and the measured ones, and the distance from the tests of the damper, which
-    # only the intervals of the selected damper take
-    compared: PredictedRun | None = None
-    away: Callable[[], Distance] = Distance
-
-    @cached_property
-    def predicted(self) -> PredictedRun | None:
-        """Samples of the uncorrected prediction with their distance from the tests."""
-        return replace(self.compared, distance=self.away()) if self.compared else None
+    predicted: PredictedRun | None = None  # samples of the uncorrected prediction and the measured ones
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -135,41 +126,30 @@ def validate(
     """
     if not hasattr(damper, "predict"):
         require(damper, Damper, "a damper", "load_model(file) gives one")
-    return score_runs(damper, runs, title or damper.title, sessions)
-
-
-def score_runs(
-    damper: Damper, runs: Iterable[Run], title: str, sessions: Sessions | None = None, *, compared: bool = False
-) -> Validation:
-    """Predict and score runs; arguments as `validate` and `score_run`."""
     scored, refused = list[RunScore](), dict[str, str]()
     for run in runs:
         require(run, Run, "a run")
         try:
-            scored.append(score_run(damper, run, sessions, compared=compared))
+            scored.append(score_run(damper, run, sessions))
         except InputError as error:
             refused[run.id] = str(error)
-    return Validation(title, tuple(scored), refused)
+    return Validation(title or damper.title, tuple(scored), refused)
 
 
-def score_run(damper: Damper, run: Run, sessions: Sessions | None = None, *, compared: bool = False) -> RunScore:
+def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> RunScore:
     """Predict and score one run, corrected where its session is known.
 
-    `compared`: keep samples for prediction intervals, of a run that the damper was not fitted to. Raises `InputError`
-    if the run does not move, its force is constant or not that of a damper, or its clock is no date.
+    Raises `InputError` if the run does not move, or its force is constant or not that of a damper.
     """
     swing = float(np.ptp(run.force[run.in_window]))
     if not _MIN_SWING_N < swing < 1 / _MIN_SWING_N:
         text = f"the force changes by {swing:.3g} N" if swing else "the force does not change"
         raise RunError(text, where=f"run {run.id}", remedy="check the channel")
-    session_of(run)  # refuses a clock that is no date
     prediction = damper.predict(run)
     inside = run.in_window
     reading = GainOffset.of(run.force[inside], prediction.force[inside])
-    samples: tuple[Any, ...] = ()
-    if compared:
-        away = partial(distance_from_tests, damper, prediction.condition, prediction.motion.current)
-        samples = PredictedRun.of(run, prediction.force, prediction.motion.velocity), away
+    away = partial(distance_from_tests, damper, prediction.condition, prediction.motion.current)
+    beside = PredictedRun.of(run, prediction.force, prediction.motion.velocity, away)
     expected = sessions.expected(RecordingTime.of(run), without=run.id) if sessions else None
     if expected is not None:
         prediction = prediction.corrected(expected.gain, expected.offset)
@@ -183,7 +163,7 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None, *, com
         _at_rest(run, prediction),
         UNKNOWN if expected is None else KNOWN,
         reading,
-        *samples,
+        beside,
     )
 
 
@@ -228,7 +208,7 @@ def leave_out(
         rest = [i for i in range(len(runs)) if i not in set(fold)]
         if rest:
             damper = fit(rest)
-            scored |= {i: score_run(damper, runs[i], compared=True) for i in fold}
+            scored |= {i: score_run(damper, runs[i]) for i in fold}
     return Validation(title, tuple(scored[i] for i in sorted(scored)))
 
 

@@ -47,7 +47,7 @@ from mrdamper.study.recipe import (
     whole_damper,
 )
 from mrdamper.study.usable_runs import UsableRuns
-from mrdamper.study.validation import RunScore, Validation, score_runs
+from mrdamper.study.validation import RunScore, Validation, validate
 
 CONDITION = "condition"  # kind of fold: the runs of one condition, a stretch of another record
 AWAY = ("current", "fastest motions")  # kinds that determine the growth of errors away from the tests
@@ -363,8 +363,7 @@ def _with_sessions(chosen: RecipeResult, dataset: Dataset) -> tuple[RecipeResult
 def with_unused_runs(candidate: RecipeResult, everything: Sequence[Run]) -> RecipeResult:
     """Add scores of the identification runs that the recipe could not use to its cross-validated ones."""
     scored = {score.run_id for score in (*candidate.train.runs, *candidate.cross_validated.runs)}
-    unused = [run for run in everything if run.id not in scored]
-    others = score_runs(candidate.damper, unused, candidate.damper.title, compared=True)
+    others = validate(candidate.damper, [run for run in everything if run.id not in scored])
     if not others.runs:
         return candidate
     left_out = candidate.cross_validated

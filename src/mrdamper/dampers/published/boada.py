@@ -139,10 +139,7 @@ def _train(inputs: Floats, targets: Floats) -> Floats:
         hidden = np.tanh(sums)
         moved = (np.tanh(sums + _WEIGHT_STEP * given[:, None]) - hidden) / _WEIGHT_STEP  # (runs, hidden, inputs + 1)
         units = np.column_stack([hidden[:, :, 0], np.ones(runs)])
-        by_layer = (
-            np.einsum("oh,rhi->rohi", second[:, :-1], moved),
-            np.einsum("ok,rh->rokh", np.eye(outputs), units),
-        )
+        by_layer = (np.einsum("oh,rhi->rohi", second[:, :-1], moved), np.einsum("ok,rh->rokh", np.eye(outputs), units))
         by_weight = np.hstack([part.reshape(runs * outputs, -1) for part in by_layer])
         return np.vstack([by_weight, _DECAY * np.eye(count)])
 

@@ -167,14 +167,7 @@ def require_determined(form: str, conditions: Sequence[Condition]) -> None:
         raise _undetermined(chosen, f"{len(conditions)} conditions do not tell its terms apart", I, f, A)
 
 
-def _best_rates(
-    form: Form,
-    I: Floats,
-    f: Floats,
-    A: Floats,
-    target: Floats,
-    weight: Floats,
-) -> tuple[float, ...]:
+def _best_rates(form: Form, I: Floats, f: Floats, A: Floats, target: Floats, weight: Floats) -> tuple[float, ...]:
     """Search the rates in their logarithm: a grid, then refinement from its three best points."""
     if not form.rate_bounds:
         return ()

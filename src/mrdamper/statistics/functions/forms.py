@@ -150,11 +150,7 @@ FORMS: Mapping[str, Form] = MappingProxyType(
                 (_I2, _I, Term(frequency=-2), _ONE),
                 source="Qian et al. 2024, Eq. 28–31, with the law harmonic balance implies",
             ),
-            Form(
-                "plane",
-                (_I2, _I, Term(frequency=1), Term(amplitude=1), _ONE),
-                source="Qian et al. 2024, Eq. 33–36",
-            ),
+            Form("plane", (_I2, _I, Term(frequency=1), Term(amplitude=1), _ONE), source="Qian et al. 2024, Eq. 33–36"),
             Form(
                 "current-decay-frequency",
                 (Term(decay_I=0, decay_f=1), Term(decay_I=0), _ONE),

@@ -101,17 +101,11 @@ def _offset(run: Run, e: Trial) -> tuple[str, str]:
 def _current(run: Run, e: Trial) -> tuple[str, str]:
     tested = abs(run.mean_current)
     if e.unit == "mA":
-        return (
-            f"its current of {_amperes(tested)} looks like {1e3 * e.value:.4g} mA",
-            corrected_unit(run, e.value),
-        )
+        return (f"its current of {_amperes(tested)} looks like {1e3 * e.value:.4g} mA", corrected_unit(run, e.value))
     why = "an open coil, or no supply" if e.value == 0 else "a partly open coil, or another current than written down"
     if e.value > tested:
         why = "another current than written down"
-    return (
-        f"its force is that of {_amperes(e.value)}, not of {_amperes(tested)}: {why}",
-        _repeated(run, e.value),
-    )
+    return (f"its force is that of {_amperes(e.value)}, not of {_amperes(tested)}: {why}", _repeated(run, e.value))
 
 
 def _time(run: Run, e: Trial) -> tuple[str, str]:
@@ -140,7 +134,8 @@ def _shifted(run: Run, e: Trial) -> tuple[str, str]:
 
 
 def _own_profile(run: Run, line: str) -> str:
-    return f"import {_file(run)} on its own with {line} in the profile, then add it with import --add"
+    file = run.notes.get("file", "") or run.id
+    return f"import {file} on its own with {line} in the profile, then add it with import --add"
 
 
 def _corrected(run: Run, channel: str, factor: float, unit: str = "", *, read: str = "") -> str:
@@ -202,10 +197,6 @@ def _repeated(run: Run, current: float) -> str:
 def _is_stated(run: Run) -> bool:
     """Tell if the current is a stated number: a measured one varies."""
     return float(np.ptp(run.current)) == 0
-
-
-def _file(run: Run) -> str:
-    return run.notes.get("file", "") or run.id
 
 
 def _amperes(current: float) -> str:

@@ -56,7 +56,8 @@ def compare_runs(runs: Sequence[Run], keep: Collection[str] = ()) -> RunComparis
     motions and sessions do not explain.
     """
     copies = find_copies(runs)
-    described = [describe_copy(copy, _split(runs, copy.run_id) == "validate") for copy in copies]
+    validated = {run.id for run in runs if run.split == "validate"}
+    described = [describe_copy(copy, copy.run_id in validated) for copy in copies]
     contradictions = {one.run_id: one for one in described if one.run_id not in keep}
     tracks = [t for t in tracks_of([run for run in runs if run.id not in contradictions])]
     tracks, milliamperes = _in_amperes(tracks, keep)
@@ -139,10 +140,6 @@ def _in_amperes(tracks: Sequence[Track], keep: Collection[str]) -> tuple[list[Tr
         kept.append(replace(track, current=track.current / 1e3))
         contradictions[run.id] = Contradiction(run.id, "current", size / 1e3, float("inf"), text, remedy)
     return kept, contradictions
-
-
-def _split(runs: Sequence[Run], name: str) -> str:
-    return next(run.split for run in runs if run.id == name)
 
 
 def _parted(train: Sequence[Track], gains: Mapping[int, float]) -> list[dict[str, float]]:
