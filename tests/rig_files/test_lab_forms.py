@@ -36,6 +36,32 @@ def test_codes_in_names_are_read_by_a_legend_beside_the_files(tmp_path):
     assert currents(import_files([tmp_path]).records) == [0.0, 0.6]
 
 
+DUTIES = "| duty | current |\n|---|---|\n| 0 % | 0 A |\n| 50 % | 1.1 A |"
+
+
+@pytest.mark.parametrize(
+    ("names", "text", "stated"),
+    [
+        (["K7_I00", "K7_I05", "K7_I15"], "I05 = 0.5 A, I15 = 1.5 A (tenths of ampere)\nF10 = 1.0 Hz", [0.0, 0.5, 1.5]),
+        (["K7_I05", "K7_I10", "K7_I15"], "I05 = 0.5 A, I15 = 1.5 A", []),
+        (["G3_cur0.0", "G3_cur0.8"], "G3 is the damper.\ncur0.8 = coil current 0.8 A, f2 = 2 Hz.", [0.0, 0.8]),
+        (["G3_cur0.0", "G3_cur0.8"], "cur0.8 = supply 0.8 A", []),
+        (["m_A5_I0,00", "m_A5_I1,20"], "Dateinamen: m_A<Amplitude in mm>_I<Spulenstrom in A>.csv", [0.0, 1.2]),
+        (["m_000", "m_500"], "names: m_<coil current [mA]>", [0.0, 0.5]),
+        (["m_0", "m_2"], "names: m_<current>", []),
+        (["m_d00", "m_d50"], f"Names: m_d<duty %>.csv.\n\n{DUTIES}", [0.0, 1.1]),
+        (["m_d00", "m_d75"], f"Names: m_d<duty %>.csv.\n\n{DUTIES}", []),
+    ],
+)  # fmt: skip
+def test_a_readme_gives_the_codes_and_the_scheme_of_names(tmp_path, names, text, stated):
+    for i, name in enumerate(names):
+        (tmp_path / f"{name}.csv").write_text("Time [s],disp [mm],force [N]\n" + rows(T, X, force(i / 2, i)))
+    (tmp_path / "README.md").write_text(text + "\n")
+    result = import_files([tmp_path])
+    assert currents(result.records) == stated
+    assert len(result.refusals) == (0 if stated else len(names))
+
+
 def test_without_a_legend_codes_state_no_current(tmp_path):
     (tmp_path / "MRD_I2_F1.csv").write_text("time (s),disp (mm),force (N)\n" + rows(T, X, force(0.6)))
     assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_CURRENT_MISSING"]

@@ -16,7 +16,16 @@ from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import rescale, take
 from mrdamper.errors import InputError, QualityError, printable
 from mrdamper.rig_files.coil_current import as_data, current_of, with_stated_current, with_value_of_name
-from mrdamper.rig_files.column_names import RATING, SI, is_unit, role_of, split_name, words, words_of
+from mrdamper.rig_files.column_names import (
+    RATING,
+    SI,
+    is_unit,
+    names_condition,
+    role_of,
+    split_name,
+    words,
+    words_of,
+)
 from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.conditions import amperes, series_in
 from mrdamper.rig_files.file_records import digest_of, records_of_file
@@ -35,7 +44,13 @@ from mrdamper.rig_files.rig_record import records_of
 
 _FEWEST_ROWS = 50  # of a record
 TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")  # short ones
-_LEGEND = re.compile(r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)\s*$")  # I1 = 0.3 A
+_LEGEND = re.compile(  # I1 = 0.3 A, cur0.8 = coil current 0.8 A (as set)
+    r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([^\W\d_][^\d=:]{0,30}\s)?([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)"
+    r"\s*(?:\([^()]*\))?\s*$"
+)
+_DECIMAL_CODE = re.compile(r"(?<![a-z])[a-z]{1,6}[0-9]+\.[0-9]+(?![0-9])")
+_SCHEME = re.compile(r"[\w.,+=-]*(?:<[^<>]{1,60}>[\w.,+=-]*)+")  # MRD_A<amplitude in mm>_I<coil current in A>.csv
+_SCHEME_NUMBER = re.compile(r"[0-9]+(?:[.,xp][0-9]+)?")
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
 _DISCARDED, _DISCARDED_FLAG = (re.compile("(?i)" + "|".join(words(of))) for of in ("discarded", "discarded_flag"))
 _REMARKS = frozenset((*words("notes"), *words("remarks")))
@@ -210,17 +225,19 @@ def currents_beside(
     stated, ratings = set(), False
     for line in lines:
         parts = re.split(r"\s*[;|]\s*|,\s+|[.:]\s+(?=\w+ ?=)", line)
-        legends = [(name, amperes(m[2], m[3])) for m in map(_LEGEND.match, parts) if m for name in _meant(m[1], called)]
+        matches = [m for m in map(_LEGEND.match, parts) if m and (not m[2] or role_of(m[2]) == "current")]
+        legends = [(name, amperes(m[3], m[4])) for m in matches for name in _meant(m[1], called)]
         rating = RATING.search(line) is not None
         stated |= {*legends} if not (rating or ratings) else set()
         if line.strip() and not legends:  # a heading: Fuses
             ratings = rating
-    codes = dict(stated)
+    if by_scheme := _by_scheme(lines, results, [file for file, _ in tests]):
+        return [(current, f"{path.name}, the names of files") for current in by_scheme]
+    stems = [re.sub(r"(?<=[A-Za-z])0+(?=[0-9])", "", file.stem.casefold()) for file, _ in tests]
+    words = [[*re.split(r"[^0-9A-Za-z]+", s), *_DECIMAL_CODE.findall(s.replace(",", "."))] for s in stems]
+    codes = _with_scale(dict(stated), {word for own in words for word in own})
     if len(codes) < 2 or len(codes) < len(stated):
         return None
-    words = [
-        re.split(r"[^0-9A-Za-z]+", re.sub(r"(?<=[A-Za-z])0+(?=[0-9])", "", file.stem.casefold())) for file, _ in tests
-    ]
     own = [[code for code in codes if code in {*parts} | names] for parts, names in zip(words, files, strict=True)]
     if any(len(of_test) != 1 for of_test in own):
         return None
@@ -285,9 +302,48 @@ def _grow(stated: Sequence[tuple[Record, float]], repeated: float | None = None)
     return len(rising) == len(points) and enough and all(one[3] < other[3] for one, other in alike)
 
 
+def _with_scale(codes: dict[str, float], words: Collection[str]) -> dict[str, float]:
+    """Add the codes of zero, and of decimals in amperes, by others of one scale: I00 by I05 = 0.5 A and I15 = 1.5 A."""
+    parted = {code: m for code in {*codes, *words} if (m := re.fullmatch(r"([a-z]+)([0-9]+(?:\.[0-9]+)?)", code))}
+    scales: dict[str, list[float]] = defaultdict(list)
+    for code, current in codes.items():
+        if code in parted and float(parted[code][2]):
+            scales[parted[code][1]].append(round(current / float(parted[code][2]), 9))
+    more = {}
+    for code, match in parted.items():
+        number, scale = float(match[2]), scales[match[1]]
+        if len({*scale}) == 1 and ((number == 0 and len(scale) > 1) or ("." in code and scale[0] == 1)):
+            more[code] = number * scale[0]
+    return {**more, **codes}
+
+
+def _by_scheme(lines: Sequence[str], results: Results | None, files: Sequence[Path]) -> list[float]:
+    """Return the current [A] of each file by a scheme of their names, or by the number in it and a table of results.
+
+    Thus <coil current in A>, or <duty %> with a table of the current by the duty; empty unless all files have one.
+    """
+    stated: set[tuple[float, ...]] = set()
+    for parts in (re.split("<([^<>]*)>", m[0].rstrip(".,")) for line in lines for m in _SCHEME.finditer(line)):
+        pattern = "".join("([^_]+?)" if i % 2 else re.escape(part) for i, part in enumerate(parts))
+        names = [re.fullmatch(pattern, file.stem) or re.fullmatch(pattern, file.name) for file in files]
+        for place, texts in zip(parts[1::2], zip(*(m.groups() for m in names if m), strict=True), strict=False):
+            header = split_name(place)
+            numbers = [amperes(text, "") for text in texts if _SCHEME_NUMBER.fullmatch(text)]
+            at = [i for i, key in enumerate(results.keys if results else ()) if header.name and key == header.name]
+            rows = zip(results.cells, results.current, strict=True) if results and len(at) == 1 else ()
+            by_number = {amperes(m[0], ""): of for cells, of in rows if (m := _SCHEME_NUMBER.match(cells[at[0]]))}
+            if header.dimension == "current" and names_condition(header.name, "current"):
+                by_number = {number: header.factor * number for number in numbers}
+            if len(numbers) == len(files) and {*numbers} <= {*by_number}:
+                stated.add(tuple(by_number[number] for number in numbers))
+    return [*stated.pop()] if len(stated) == 1 else []
+
+
 def _meant(key: str, files: Collection[str]) -> list[str]:
     """Return the codes that the key of a legend names, or the file: I1, test01-test04, a.dat."""
     code = _CODE.fullmatch(key)
+    if code is None and _DECIMAL_CODE.fullmatch(key.casefold().replace(",", ".")):
+        return [key.casefold().replace(",", ".")]
     if code is None:
         return [key.casefold()] if key.casefold() in files else []
     return [f"{code[1].casefold()}{number}" for number in range(int(code[2]), int(code[3] or code[2]) + 1)]
