@@ -199,6 +199,16 @@ def test_columns_in_a_unit_of_time_are_the_times_of_tests_beside_each_other(tmp_
     assert all(np.allclose(record.time, T) for record in records)
 
 
+def test_whole_numbers_of_a_sheet_beside_texts_with_decimal_commas_have_no_point(tmp_path):
+    book = Workbook()
+    book.active.append(["No", "Time [s]", "Travel [mm]", "Force [N]"])
+    for row in zip(T, X, force(0.5), strict=True):
+        book.active.append([1, *(f"{value:.4f}".replace(".", ",") for value in row)])
+    book.save(tmp_path / "a_0.5A.xlsx")
+    (record,) = import_files([tmp_path / "a_0.5A.xlsx"]).records
+    assert np.allclose(record.force, force(0.5), atol=1e-3)
+
+
 def test_the_name_of_a_sheet_states_the_current_of_each_of_its_tables(tmp_path):
     book = Workbook()
     for name, current in (("0 A", 0.0), ("0.5 A", 0.5)):

@@ -13,7 +13,7 @@ from mrdamper.errors import InputError
 from mrdamper.rig_files.conditions import currents_in
 from mrdamper.rig_files.mapping.results import results_in
 from mrdamper.rig_files.preview import guess_profile
-from mrdamper.rig_files.profile import Channel, Profile
+from mrdamper.rig_files.profile import Channel, Profile, parse_profile
 from mrdamper.rig_files.rig_import import import_files, read_run
 from mrdamper.rig_files.rig_record import thousands_in
 
@@ -51,6 +51,17 @@ def test_marks_of_thousands_beside_a_decimal_mark_are_read(written, separator, t
     columns = {**NAMES, "force [N]": [written(v) for v in BIG]}
     record = read_run(write(tmp_path, "a_0.5A.csv", table(columns, separator)))
     np.testing.assert_allclose(record.force, np.round(BIG, 1), atol=1e-9)
+
+
+@pytest.mark.parametrize(("mark", "other"), [".,", ",."])
+def test_marks_of_thousands_alone_are_read_where_a_profile_states_the_decimal_mark(mark, other, tmp_path):
+    columns = {name: [f"{v:.4f}".replace(".", mark) for v in values] for name, values in NAMES.items()}
+    columns["force [N]"] = [f"{v:,.0f}".replace(",", other) for v in BIG]
+    path = write(tmp_path, "a_0.5A.csv", table(columns, ";"))
+    with pytest.raises(InputError, match="decimal"):
+        read_run(path)
+    record = read_run(path, parse_profile(f'[file]\ndecimal = "{mark}"'))
+    np.testing.assert_allclose(record.force, np.round(BIG))
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from mrdamper.rig_files.readers.delimited import DelimitedText
 
 _COMPOUND = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"  # Excel up to 2003
 _FEWEST = 2  # columns of a test: a displacement and a force
+_LARGEST_WHOLE = 1e15  # below, every whole number is a double
 _NOTES = 4096  # bytes of a sheet without a test in which conditions of the others may stand
 _FLAT = str.maketrans({"\t": " ", "\n": " ", "\r": " ", '"': "''", "\0": " "})
 
@@ -122,7 +123,8 @@ def _shown(cell: object) -> str:
     if isinstance(cell, bool):
         return str(cell).upper()
     if isinstance(cell, float):
-        return repr(cell) if math.isfinite(cell) else "inf"
+        whole = cell.is_integer() and abs(cell) < _LARGEST_WHOLE
+        return str(int(cell)) if whole else repr(cell) if math.isfinite(cell) else "inf"
     if isinstance(cell, (datetime.datetime, datetime.time)):
         return cell.isoformat()
     if isinstance(cell, datetime.timedelta):

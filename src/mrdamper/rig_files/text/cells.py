@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -19,7 +20,7 @@ from mrdamper.rig_files.column_names import parse_unit
 from mrdamper.rig_files.readers.base import RigFileError, scratch
 from mrdamper.rig_files.text.layout import QUANTITY, SPACES, Layout, is_comment, is_footer, split
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, too_long
-from mrdamper.rig_files.text.tokens import MISSING, NUMBER, looks_numeric, number, stamp
+from mrdamper.rig_files.text.tokens import MISSING, NUMBER, THOUSANDS, looks_numeric, number, stamp
 
 _MARKS = "#%/"
 _MOST_SHOWN = 10  # wrong cells and rows of a file
@@ -147,6 +148,8 @@ def _numbers(cells: Sequence[str], column: int, lines: Sequence[int], form: RowF
     values = np.empty(len(cells))
     for i, cell in enumerate(cells):
         value = float(cell.replace(",", ".") if comma else cell) if matches(cell) else number(cell, mark)
+        if value is None and form.layout.groups and THOUSANDS.fullmatch(cell):
+            value = float(re.sub("[.,]", "", cell))
         if value is None:
             form.note(_no_number(cell, column, lines[i], form))
         elif math.isinf(value):

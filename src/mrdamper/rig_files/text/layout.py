@@ -70,6 +70,7 @@ class Layout:
     over: tuple[str, ...] = ()  # where the line above the names holds titles of groups of columns
     writes: tuple[tuple[str, str], ...] = ()  # signs used throughout and their meaning: D for E, a typographic minus
     behind: tuple[str, ...] = ()  # where its numbers have a unit behind them: 12.3 mm
+    groups: bool = False  # the other mark thousands, as a profile states the decimal one: 1,000
 
     @property
     def width(self) -> int:
@@ -139,6 +140,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         titles or _titles(above, separator, width),
         _writes(rows),
         behind,
+        form.decimal is not None,
     )
 
 
@@ -415,7 +417,7 @@ def _decimal(rows: Sequence[Sequence[str]], source: Source, first: int) -> str:
         return "."  # the strict reader refuses the few others, with their place
     if len(dots) > few:
         problem = f"{dots[0]!r} beside {commas[0]!r}: point or comma for decimals?"
-        remedy = "write one decimal mark throughout, without separators of thousands"
+        remedy = 'write one decimal mark throughout, or set [file] decimal = "." or decimal = "," in a profile'
         raise source.refuse("E_AMBIGUOUS", problem, remedy, line=first + 1)
     if all(_GROUPED.fullmatch(c) for c in commas):
         remedy = 'say decimal = "," or decimal = "." under [file] of a profile'

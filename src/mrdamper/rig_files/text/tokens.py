@@ -3,7 +3,7 @@
 Strict on purpose: what only some programs take for a number (1_000.5, 0x1F, other
 scripts' digits) is refused, so that no two programs read different values from one file.
 Points and commas as marks of thousands are read only in numbers that have a decimal mark, too:
-1.017,56; apostrophes and spaces always: 1'017.
+1.017,56, or where a profile states the decimal mark; apostrophes and spaces always: 1'017.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ _GROUPED = {
     )
     for mark, other in (".,", ",.")
 }
+THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+|[+-]?[1-9][0-9]{0,2}(?:\.[0-9]{3})+")
 _LONGEST = 40  # characters of a number
 _CELLS_APART = re.compile(r"\S\s{2,}\S|[0-9]\s[+-]")  # what another separator would split
 _SIGN_APART = re.compile(r"([+-]) +(?=[0-9.,])")  # - 0.328
