@@ -227,6 +227,22 @@ def test_counts_are_scaled_by_the_formula_that_a_text_states_and_refused_without
     assert [r.error.code for r in import_files([tmp_path / "open.h5"]).refusals] == ["E_AMBIGUOUS"]
 
 
+@pytest.mark.parametrize("names", [("2D_force", "VBOX_pos"), ("logger1_F", "logger2_x")])
+def test_channels_of_two_loggers_of_other_form_are_joined(tmp_path, names):
+    for i in (1, 2):
+        head = f"# coil {i / 2} A\nTIME[s];LOADCELL[N]\n"
+        (tmp_path / f"T{i:02d}_{names[0]}.csv").write_text(head + rows(T, force(i / 2, i), separator=";"))
+        (tmp_path / f"T{i:02d}_{names[1]}.csv").write_text("Time (s),Position (mm)\n" + rows(T[::2], X[::2]))
+    channels = {"displacement": ("Position (mm)", names[1], "mm"), "force": ("LOADCELL[N]", names[0], "N")}
+    lines = ['[file]\nseparator = ";"\ndecimal = "."', '[channels.time]\ncolumn = "TIME[s]"\nunit = "s"']
+    for role, (column, name, unit) in channels.items():
+        lines += [f'[channels.{role}]\ncolumn = "{column}"\nunit = "{unit}"\nfile = "T{{run}}_{name}.csv"']
+    for profile in [None] * ("2D" in names[0]) + [parse_profile("\n".join(lines))]:
+        result = import_files([tmp_path], profile)
+        assert not result.refusals
+        assert currents(result.records) == [0.5, 1.0]
+
+
 def test_rows_of_a_netcdf_table_are_tests(tmp_path):
     netcdf_file = pytest.importorskip("scipy.io").netcdf_file
     with netcdf_file(tmp_path / "t.nc", "w") as file:

@@ -90,6 +90,9 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
 
     Raises `InputError` if the file of a `run` lacks a channel that the profile says is in it, or a time.
     """
+    form = profile.file.model_copy(update={"separator": None, "decimal": None})  # it may be that of another file
+    others = {role: channel for role, channel in profile.channels.items() if role != "time"}
+    other_logger = profile.model_copy(update={"file": form, "channels": others})
     try:
         with raw_tables(path, profile.file) as tables:
             if len(tables) != 1:
@@ -101,6 +104,8 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
             channels = {role: rescale(raw.values[e.column], e.factor, e.offset) for role, e in assigned.items()}
             current = None if alone else current_of(table, profile, path, channels.get("current"), slice(None))[0]
     except InputError:
+        if run and other_logger != profile:
+            return part_of(path, other_logger, run)
         if run:
             raise
         return None
@@ -110,7 +115,7 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
     time = channels.get("time", np.empty(0))
     timed = len(channels) > 1 and time.size > 1 and bool(np.all(np.diff(time) > 0))
     if not channels or not (alone or timed):
-        return None
+        return part_of(path, other_logger, run) if run and other_logger != profile else None
     words = [word for word in words_of(split_name(path.stem).name) if role_of(word) not in assigned]
     test = (
         path.parent / "_".join(words) if alone and words else path.parent if alone else path.with_name(run or path.name)
@@ -131,7 +136,7 @@ def _table_of(source: Source, channels: Mapping[str, Floats], remarks: Sequence[
 
 def number_of(path: Path) -> tuple[str, ...]:
     """Return the numbers in a file's name, by which files of one test belong together: not those of its channel."""
-    stem = re.sub(r"(?i)(?<![a-z])ch[ _]?[0-9]$|^c[0-9](?=--)", "", path.stem)
+    stem = re.sub(r"(?i)(?<![a-z])ch[ _]?[0-9]$|^c[0-9](?=--)|(?<![0-9a-z])[23]d(?![0-9a-z])", "", path.stem)
     return str(path.parent), *(str(int(number)) for number in re.findall(r"[0-9]+", stem))
 
 
