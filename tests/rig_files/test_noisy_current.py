@@ -9,7 +9,7 @@ from support.noise import CHANGES, KINDS, changing_current, constant_current
 from support.rig_records import clean_record, codes_of
 
 from mrdamper import identify
-from mrdamper.data import Run
+from mrdamper.data import Run, held_current
 from mrdamper.errors import RunError
 from mrdamper.physics.motion import measured_motion
 from mrdamper.rig_files.quality.sentinel import COARSEST, code_in
@@ -36,6 +36,15 @@ def test_noise_of_any_kind_leaves_a_current_constant(kind):
 def test_a_current_that_changes_by_a_tenth_of_an_ampere_is_no_constant(kind):
     runs = [channel(seed, changing_current, kind=kind) for seed in range(COUNT // 3)]
     assert sum(not run.current_changes for run in runs) <= len(runs) // 100
+
+
+@pytest.mark.parametrize(("level", "constant"), [(0.3, True), (0.8, True), (0.1, False)])
+def test_a_ripple_from_sample_to_sample_is_averaged_where_the_current_keeps_its_sign(level, constant):
+    time = np.arange(7000) / 1000
+    ripple = 0.15 * np.sign(np.sin(2 * np.pi * 187.3 * time))
+    mean, change = held_current(level + ripple)
+    assert (not change) == constant
+    assert mean == pytest.approx(level, abs=2e-3)
 
 
 @pytest.mark.parametrize("level", [-0.3, 0.0, 0.4])

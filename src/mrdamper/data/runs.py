@@ -320,6 +320,7 @@ _LEVEL_STEP = 5e-3  # step of currents in a test plan [A]
 _LEVEL_TOLERANCE_A, _LEVEL_TOLERANCE = 5e-4, 2e-3
 _MAX_RESOLUTION_A = 0.1  # [A]: a channel of such resolution varies by half a step
 _WHITE_NOISE_FACTOR = 4  # factor of the limit for uncorrelated samples, which no coil current has
+_MAX_RELATIVE_RIPPLE = 0.6  # RMS of a chopper's ripple from sample to sample, of the mean, about which it averages
 _VON_NEUMANN_RATIO = 1.0  # von Neumann's ratio: two for white noise, near zero for a current that keeps its levels
 
 
@@ -364,6 +365,7 @@ def held_current(current: Floats) -> tuple[float, str]:
     total = float(np.std(current))
     white = float(np.mean(np.diff(current) ** 2)) > _VON_NEUMANN_RATIO * total**2
     noise = (_MAX_RMS_A + _MAX_RELATIVE_RMS * abs(mean)) * (_WHITE_NOISE_FACTOR if white else 1)
+    noise = max(noise, _MAX_RELATIVE_RIPPLE * abs(mean)) if white else noise
     allowed = noise + 0.5 * _resolution(current)
     steady = (
         trend <= _MAX_TREND_A + _MAX_RELATIVE_TREND * abs(mean) + 4 * float(np.sqrt(6 * within / size))
