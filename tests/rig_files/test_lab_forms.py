@@ -1032,6 +1032,16 @@ def test_a_plan_of_tests_states_their_currents_by_the_day_that_is_their_folder_a
     assert {r.error.code for r in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
 
 
+def test_a_plan_that_lacks_tests_is_named_with_them(tmp_path):
+    for i in (1, 2, 3):
+        (tmp_path / f"run0{i}.csv").write_text("Time [s],disp [mm],force [N]\n" + rows(T, X, force(i / 2, i)))
+    (tmp_path / "plan.csv").write_text("run,current (A)\nrun01,0.5\nrun02,1\n")
+    errors = [refusal.error for refusal in import_files([tmp_path]).refusals]
+    assert len(errors) == 3
+    assert all("plan.csv names 2 of 3 tests and may lack run03" in error.found for error in errors)
+    assert all(error.remedy.startswith("if so, add what it lacks; else write the currents") for error in errors)
+
+
 @pytest.mark.parametrize(
     ("heading", "cell"),
     [

@@ -26,6 +26,7 @@ from mrdamper.rig_files.mapping.companions import (
     currents_beside,
     currents_listed,
     discarded_tests,
+    gap_of_plan,
     holds_channels,
     is_helper,
     is_list,
@@ -360,7 +361,11 @@ class _Intake:
             self.refusals.append(Refusal(str(path), error))
         notes = [Path(note.file) for note in self.notes]
         paths = [path for path in (*others, *notes, *texts) if self._pending and path not in used]
-        return used | self._join_currents(paths)
+        used |= self._join_currents(paths)
+        open_tests = [test for test in self._pending if test[1].current is None]
+        gaps = tuple(filter(None, (gap_of_plan(path, self._results(path), open_tests) for path in paths)))
+        self._pending = [(path, r.noticed(*gaps) if r.current is None else r) for path, r in self._pending]
+        return used
 
     def _join_currents(self, paths: Sequence[Path]) -> set[Path]:
         """Give the tests without a current those that one of some files states; the file that was used.

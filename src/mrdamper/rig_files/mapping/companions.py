@@ -14,8 +14,8 @@ import numpy as np
 
 from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import rescale, take
-from mrdamper.errors import InputError, QualityError, printable
-from mrdamper.rig_files.coil_current import as_data, current_of, with_stated_current, with_value_of_name
+from mrdamper.errors import InputError, QualityError, listed, printable
+from mrdamper.rig_files.coil_current import NO_CHANNEL, as_data, current_of, with_stated_current, with_value_of_name
 from mrdamper.rig_files.column_names import (
     RATING,
     SI,
@@ -272,6 +272,16 @@ def discarded_tests(path: Path, results: Results | None, tests: Sequence[tuple[P
 def _discards(heading: str, cell: str) -> bool:
     of_remarks = not _REMARKS.isdisjoint(words_of(heading.casefold()))
     return bool(_DISCARDED_FLAG.search(f"{heading}: {cell}") or (of_remarks and _DISCARDED.search(cell)))
+
+
+def gap_of_plan(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> Finding | None:
+    """Return the finding that a plan, which names some of the tests without a current, lacks others."""
+    cells = {cell.casefold() for row in (results.cells if results else ()) for cell in row if not cell.isdigit()}
+    absent = [names[0] for names in _called(tests) if not cells & {name.casefold() for name in names}]
+    if not 0 < len(absent) < len(tests):
+        return None
+    text = f"{path.name} names {len(tests) - len(absent)} of {len(tests)} tests and may lack {listed(absent, 3)}"
+    return Finding("W_COLUMN", printable(f"{NO_CHANNEL}missing: {text}: if so, add what it lacks"))
 
 
 def currents_listed(path: Path, tests: Sequence[tuple[Path, Record]]) -> list[tuple[float, str]] | None:
