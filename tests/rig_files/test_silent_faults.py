@@ -335,6 +335,14 @@ def test_a_filtered_sheet_beside_the_measured_one_is_left_out_and_said(tmp_path)
     assert "W_TABLE" in {finding.code for finding in record.findings}
 
 
+def test_of_two_files_of_the_same_samples_that_of_the_shorter_name_is_the_test(tmp_path):
+    for name in ("run_0.5A - Copy.csv", "run_0.5A.csv"):
+        write(tmp_path, name, table(NAMES, ","))
+    result = import_files([tmp_path])
+    assert [record.id for record in result.records] == ["run_0.5A"]
+    assert result.left_out == ("run_0.5A - Copy.csv",)
+
+
 @pytest.mark.parametrize("name", ["run_0.5A", "run_raw_0.5A"])
 @pytest.mark.parametrize("copy", ["filtered/run_0.5A.csv", "run_filtered_0.5A.csv", "run_0.5A (Peak-Valley).csv"])
 def test_a_filtered_copy_of_a_file_is_no_second_test(name, copy, tmp_path):

@@ -484,8 +484,9 @@ def _copies(records: Sequence[Record], points: Mapping[int, _Point]) -> dict[int
 
 
 def repeated(records: Sequence[Record]) -> set[int]:
-    """Return the tests that hold the samples, the current too, of one before them: by their place."""
-    return {i for members in _of_same_samples(records, with_current=True) for i in members[1:]}
+    """Return the tests that hold the samples, the current too, of one of a shorter name or before them: by place."""
+    groups = _of_same_samples(records, with_current=True)
+    return {i for group in groups for i in sorted(group, key=lambda i: len(records[i].id))[1:]}
 
 
 def _of_same_samples(records: Sequence[Record], *, with_current: bool = False) -> list[list[int]]:
