@@ -206,6 +206,12 @@ def test_a_line_about_a_change_or_a_check_of_the_current_states_none(line, tmp_p
     assert refusal.error.code == "E_CURRENT_MISSING"
 
 
+@pytest.mark.parametrize("line", ["Essai 3, courant de 0,5 A", "Test 3: corriente de 0,5 A", "current stage: 0.5 A"])
+def test_a_line_about_the_current_of_the_test_is_no_change(line, tmp_path):
+    table(tmp_path / "a.csv", [line, "Time [s],Displacement [mm],Force [N]"], T, X, force(0.5))
+    expect(tmp_path, 0.5)
+
+
 def test_a_line_counts_only_where_a_column_in_amperes_that_is_not_taken_has_its_current(tmp_path):
     names = "Time [s],Displacement [mm],Force [N],q1 [A],q2 [A]"
     for at, codes in ((0.5, []), (1.0, ["E_CURRENT_CONTRADICTS"])):
