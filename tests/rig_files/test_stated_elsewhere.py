@@ -376,6 +376,25 @@ def test_channels_of_a_matrix_that_a_readme_describes_by_their_numbers(tmp_path,
     expect(tmp_path, 0.0, 0.5)
 
 
+@pytest.mark.parametrize("list_of_two", [False, True])
+def test_files_of_one_channel_each_are_told_apart_by_a_text_that_describes_their_names(tmp_path, list_of_two):
+    for n, i in enumerate((0.0, 0.5)):
+        for part, values in (("A", X / 4), ("B", force(i) / 200), ("C", np.full(T.size, i))):
+            table(tmp_path / f"{part}_rec{n:03}.csv", ["Time,Ampl"], T, values)
+    lines = [
+        "time in s, Ampl in V",
+        "A = laser sensor, 4 mm/V",
+        "B = load cell, 200 N/V",
+        "C = Hall probe, coil, 1 A/V",
+    ]
+    lines += ["A = wire sensor, 5 mm/V"] if list_of_two else []
+    (tmp_path / "wiring.txt").write_text("\n".join([*lines, ""]))
+    if list_of_two:
+        assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} >= {"E_COLUMN"}
+    else:
+        expect(tmp_path, 0.0, 0.5)
+
+
 def test_columns_are_called_by_the_names_that_the_message_lists(tmp_path):
     savemat(tmp_path / "r.mat", {"data": np.array([T, X, force(0.5), 0.1 * X, 0.3 * X])})
     assert "data[1], data[2]" in str(import_files([tmp_path]).refusals[0].error)

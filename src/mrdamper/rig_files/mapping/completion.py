@@ -88,6 +88,7 @@ _CHANNEL_IS = re.compile(
     r"(?P<number>[0-9]{1,3})(?:(?:, ?:)?[\])])?(?:\s*[:=]\s*|\s+[-–]\s+|\s{2,}|(?<=[\])])\s)"
     r"(?P<what>(?:(?!, )[^;|\t]){2,60})"
 )
+_FILE_IS = re.compile(r"\W*(?P<part>[A-Za-z][0-9A-Za-z]{0,20})\s*[:=]\s*(?P<what>[^\W\d_](?:(?!, )[^;|\t]){2,60})")
 _FULL_SCALE = re.compile(  # sections of a header: Name=Stroke, FullScale=75, Unit=mm
     r"(?im)^name *= *(?P<name>[^=\n]{1,60})\n(?:[^=\n]*=[^\n]*\n){0,4}?full[ _]?scale *= *(?P<full>[0-9.]{1,12})\n"
     r"(?:[^=\n]*=[^\n]*\n){0,4}?unit *= *(?P<unit>\S{1,12})$"
@@ -108,7 +109,7 @@ def completed(table: RawTable) -> RawTable:
         return table
     table = _with_explained_names(table)
     table = _with_titles(_with_heading_of_currents(_with_keyed_lines(table)))
-    table = _with_listed_units(with_axis_as_time(table))
+    table = _with_name_by_file(_with_listed_units(with_axis_as_time(table)))
     table = with_stated_signs(_with_si_units(with_epoch(_with_clocks_and_weights(table))))
     return with_sense(with_scales(with_counts(table)))
 
@@ -262,6 +263,17 @@ def _with_numbered_channels(table: RawTable) -> RawTable:
     return replace(table, names=names)
 
 
+def _with_name_by_file(table: RawTable) -> RawTable:
+    """Name of the only column beside a time, where a line says what files of such a name hold: C2 = load cell."""
+    others = [i for i, header in enumerate(table.headers) if header.role != "time"]
+    if len(others) != 1 or len(table.names) != 2 or table.headers[others[0]].role:
+        return table
+    parts = {*re.split(r"[^0-9a-z]+", table.source.name.casefold())}
+    called = filter(None, map(_FILE_IS.match, table.lines))
+    meant = {match["what"].strip() for match in called if match["part"].casefold() in parts}
+    return table.named({others[0]: (meant.pop(), table.headers[others[0]].unit)}) if len(meant) == 1 else table
+
+
 def _with_explained_names(table: RawTable) -> RawTable:
     """Names of columns that say nothing, with what a line that begins with each says: PT07;Stroke;mm; y0 = load, N."""
     lines = [[cell.strip(' "') for cell in re.split(r"[,;|\t=:]", line.strip(" |"))] for line in table.lines]
@@ -344,7 +356,7 @@ def _with_listed_units(table: RawTable) -> RawTable:
             number = NUMBERED.fullmatch(name) if i is None and role_of(meaning) else None
             i = int(number[1]) - 1 if number else i
             role = (role_of(names[i]) or header.role or "") if i in names else ""
-            fits = role_of(meaning) in (role, None) and header.dimension == DIMENSION.get(role, "")
+            fits = role_of(meaning) in (role, None) and header.dimension == DIMENSION.get(role, "voltage")
             if i is None or not fits or re.search(rf"[0-9]\s*(?:[|;\t]\s*|,)?{re.escape(header.unit)}\W*$", text):
                 continue  # load cell, 25 kN: a value
             headings = " ".join(part.partition(": ")[0] for part in (line, whole))

@@ -194,6 +194,7 @@ def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[s
                 has = any(header.dimension == DIMENSION.get(role) for header in table.headers)
                 if role not in ("", "voltage", "time") and meant and not has:
                     scales.append((role, unit, factor, line))
+        scales = [entry for entry in scales if _names(entry[3], name)] or scales
         if scales:
             return scales[0] if len({entry[:3] for entry in scales}) == 1 else None
     return None

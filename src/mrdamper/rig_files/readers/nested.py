@@ -287,6 +287,7 @@ def _parameters(items: list[Any]) -> dict[str, dict[str, Any]]:
         row = any(isinstance(v, float) and split_name(key).role for key, v in lower.items())
         if len(names) == 1 and value is not None and not row:
             others = [text for text in texts.values() if text != names[0] and RATING.search(text)]
+            value = re.sub(r"^([+-]?)(?=[.,][0-9])", r"\g<1>0", value) if isinstance(value, str) else value  # .5
             parameters[" ".join([names[0], *others])] = {"value": value, "unit": _stated(lower, KEYS["unit"], str)}
     some = any(isinstance(item["value"], float) or CELL.fullmatch(item["value"]) for item in parameters.values())
     return parameters if some and len(parameters) == len(items) else {}
