@@ -395,6 +395,22 @@ def test_files_of_one_channel_each_are_told_apart_by_a_text_that_describes_their
         expect(tmp_path, 0.0, 0.5)
 
 
+@pytest.mark.parametrize("cut", [0, 7])
+def test_channels_of_values_in_rows_are_joined_and_must_have_the_number_of_values_they_state(tmp_path, cut):
+    for n, i in enumerate((0.0, 0.5)):
+        for kind, what, values in (("DT2", "DISPLACEMENT", X / 25.4), ("FT2", "FORCE", force(i) / 1e3)):
+            numbers = [f"{value:15.7E}" for value in values][: T.size - cut if kind == "FT2" and n else None]
+            rows = ["".join(numbers[k : k + 5]) for k in range(0, len(numbers), 5)]
+            unit = "IN" if kind == "DT2" else "KN"
+            head = [f"TEST {n}, COIL CURRENT {i:.2f} A", f"{what} TIME SERIES IN UNITS OF {unit}"]
+            text = "\n".join([*head, f"NPTS= {T.size}, DT=   .0020 SEC", *rows, ""])
+            (tmp_path / f"RUN{n}.{kind}").write_text(text)
+    if cut:
+        assert "E_TRUNCATED" in {refusal.error.code for refusal in import_files([tmp_path]).refusals}
+    else:
+        expect(tmp_path, 0.0, 0.5)
+
+
 def test_columns_are_called_by_the_names_that_the_message_lists(tmp_path):
     savemat(tmp_path / "r.mat", {"data": np.array([T, X, force(0.5), 0.1 * X, 0.3 * X])})
     assert "data[1], data[2]" in str(import_files([tmp_path]).refusals[0].error)
