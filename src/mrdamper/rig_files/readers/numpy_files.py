@@ -28,8 +28,7 @@ class Npy(Reader):
         with refusing_damage(source, self.title):
             source.file.seek(0)
             shape, dtype = stated_array(source, source.file, "the array", source.size)
-        check_unpacked(source, math.prod(shape) * dtype.itemsize)
-        with refusing_damage(source, self.title):
+            check_unpacked(source, math.prod(shape) * dtype.itemsize)
             source.file.seek(0)
             array = np.lib.format.read_array(source.file, allow_pickle=False)
         if dtype.names:
