@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -17,7 +16,7 @@ from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.cells import LINES, RowFormat, Spool, field_count, read_bulk, read_cells, split_rows
-from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split
+from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split_strictly
 from mrdamper.rig_files.text.programs import as_plain_table, turned_table
 from mrdamper.rig_files.text.stream import LONGEST_LINE, Block, TextStream, find_blocks, line_feeds, open_text, too_long
 from mrdamper.rig_files.text.tokens import looks_numeric
@@ -241,12 +240,7 @@ def _without_cut_row(form: RowFormat, block: Block) -> tuple[Block, tuple[Findin
     if len(last) > LONGEST_LINE:
         raise too_long(stream.source, line)
     width = form.layout.width
-    try:
-        cells = split(text, form.layout.separator)
-    except csv.Error as error:
-        raise stream.source.refuse(
-            "E_QUOTE", "a quote is not closed", "copy or export the file again", line=line
-        ) from error
+    cells = split_strictly(text, form.layout.separator, stream.source, line, "copy or export the file again")
     before = stream.decode(tail[: len(tail) - len(last)].rstrip(b"\r\n").rpartition(b"\n")[2])
     ends_empty = len(cells) == width and before.rstrip().endswith(form.layout.separator)  # as the row above does
     cut = len(cells) < width or (len(cells) == width and not cells[-1] and not ends_empty)

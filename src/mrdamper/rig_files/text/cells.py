@@ -4,7 +4,6 @@ that grow, in memory while small, in unnamed temporary files once they are large
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Sequence
@@ -18,11 +17,10 @@ from mrdamper.data import Floats
 from mrdamper.errors import CombinedError
 from mrdamper.rig_files.column_names import parse_unit
 from mrdamper.rig_files.readers.base import RigFileError, scratch
-from mrdamper.rig_files.text.layout import QUANTITY, SPACES, Layout, is_comment, is_footer, split
+from mrdamper.rig_files.text.layout import QUANTITY, SPACES, Layout, is_comment, is_footer, split, split_strictly
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, too_long
 from mrdamper.rig_files.text.tokens import MISSING, NUMBER, THOUSANDS, looks_numeric, number, stamp
 
-_MARKS = "#%/"
 _MOST_SHOWN = 10  # wrong cells and rows of a file
 _MOST_STRAY = 0.05  # above this share, reading the whole block cell by cell is no slower
 _ALLOWED = bytes(range(256))
@@ -101,15 +99,10 @@ def split_rows(texts: Sequence[str], line: int, form: RowFormat, final: bool) ->
     last = 0
     for at, text in enumerate(texts, line):
         stripped = text.strip(" \t\r")
-        if not stripped or (stripped[0] in _MARKS and is_comment(stripped)):
+        if not stripped or is_comment(stripped):
             continue
         last = at
-        try:
-            cells = split(text.rstrip("\r"), separator)
-        except csv.Error as error:
-            raise form.stream.source.refuse(
-                "E_QUOTE", "a quote is not closed, or text follows it", "close it or remove it", line=at
-            ) from error
+        cells = split_strictly(text.rstrip("\r"), separator, form.stream.source, at)
         if len(cells) != width and (len(cells) != form.layout.width):
             wrong.append((at, len(cells), text))
         elif any(cells):

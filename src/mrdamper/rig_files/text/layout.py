@@ -102,10 +102,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         lines = [*_with_name_of_numbers(lines[:first], separator, width), *lines[first:]]
     header, unit_row = _header_lines(lines, first, separator, width, source, form)
     if header is not None and not is_comment(lines[header]):
-        try:
-            split(lines[header], separator)
-        except csv.Error as error:
-            raise source.refuse("E_QUOTE", "a quote is not closed", "close or remove it", line=header + 1) from error
+        split_strictly(lines[header], separator, source, header + 1)
     names, titles = form.names or ("",) * width, ()
     below = [] if header is None else [lines[i] for i in range(header + 1, min(first, len(lines))) if i != unit_row]
     if header is not None and not form.names:
@@ -283,6 +280,16 @@ def split(line: str, separator: str) -> list[str]:
     else:
         cells = line.split(separator)
     return [cell.strip(" \t") for cell in cells]
+
+
+def split_strictly(
+    text: str, separator: str, source: Source, line: int, remedy: str = "close it or remove it"
+) -> list[str]:
+    """Return the cells of a line of a file; E_QUOTE if a quote is not closed."""
+    try:
+        return split(text, separator)
+    except csv.Error as error:
+        raise source.refuse("E_QUOTE", "a quote is not closed, or text follows it", remedy, line=line) from error
 
 
 def units_in(line: str, layout: Layout) -> tuple[str, ...]:
