@@ -126,6 +126,14 @@ def test_a_damaged_test_beside_others_is_refused(tmp_path, name, content):
     assert [r.file.rpartition("/")[2] for r in import_files([tmp_path]).refusals][:1] == [name]
 
 
+def test_a_table_of_results_of_as_many_columns_stands_above_the_record(tmp_path):
+    (tmp_path / "a.csv").write_text(text())
+    (tmp_path / "b.csv").write_text("Specimen,Max force,Energy,Mean\n1,850,12,0\n2,900,13,0\n\n" + text())
+    record, below = (read_run(tmp_path / name) for name in ("a.csv", "b.csv"))
+    assert record.channels.keys() == below.channels.keys()
+    np.testing.assert_array_equal(list(record.channels.values()), list(below.channels.values()))
+
+
 def test_a_text_without_a_table_is_refused_if_it_is_all_there_is(tmp_path):
     (tmp_path / "README.txt").write_text("Damper 7, tested in March.\n")
     assert [refusal.error.code for refusal in import_files([tmp_path]).refusals] == ["E_NO_DATA"]
