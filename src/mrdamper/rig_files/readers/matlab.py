@@ -72,8 +72,6 @@ def _tree(value: Any) -> Any:
         array = array.reshape(-1)  # structs of tests by current and frequency
     if words := texts_in(array):
         return words
-    if array.dtype.kind == "O" and array.ndim == 2 and (names := texts_in(array[0])):  # a table, names above its rows
-        return [dict(zip(names, map(_tree, row), strict=True)) for row in array[1 : MOST_STRUCTS + 1]]
     if array.dtype.kind == "O" and 0 < array.size <= MOST_STRUCTS and array.ndim:
         if rows := with_headings(array.tolist() if array.ndim == 2 else []):
             return [_tree(row) for row in rows]
