@@ -50,9 +50,14 @@ UNITS = "time [s],displacement [mm],force [N]\n"
         ({"plan.csv": "Oil,Piston,Current (A)\n1,1,0.2\n1,2,0.9\n2,1,0\n2,2,1.2\n"},
          {"m07": "O1_P1", "m08": "O1_P2", "m09": "O2_P1"}),
         ({"plan.csv": "Versuch;Sollstrom (A);Iststrom (A)\nm07;0,2;0,2\nm08;2,0;0,9\nm09;0;0\n"}, {}),
+        ({"log.csv": "Uhrzeit;Art;Strom (A)\n14:05;Sinus;0,2\n14:11;Sinus;0,9\n14:12;Sinus;0\n14:18;Ende;\n"},
+         {"m07": "R_20230603_140512", "m08": "R_20230603_141130", "m09": "R_20230603_141259"}),
         ({"plan.csv": "test,I (A)\nm07,.2\nm08,.9\nm09,0\n"}, {}),
     ],
-    ids=["by an id of another table", "by the word before the number", "by two numbers", "measured beside set", ".2"],
+    ids=[
+        "by an id of another table", "by the word before the number", "by two numbers", "measured beside set",
+        "time of day", ".2",
+    ],
 )  # fmt: skip
 def test_currents_of_a_table_that_names_the_tests_by_keys(tmp_path, tables, names):
     write(tmp_path, UNITS)
@@ -79,6 +84,19 @@ def test_currents_of_a_table_whose_keys_are_not_unique_are_asked(tmp_path, table
     result = import_files([tmp_path])
     assert {refusal.error.code for refusal in result.refusals} == {"E_CURRENT_MISSING"}
     assert all(reason for reason in result.reasons.values())
+
+
+@pytest.mark.parametrize("unit", ["A", "V"])
+def test_levels_of_a_structure_give_the_currents_of_the_tests_that_a_column_calls_so(tmp_path, unit):
+    rows = ["run,time [s],displacement [mm],force [N]"]
+    for code, amperes in (("L1", 0.2), ("L2", 0.9)):
+        rows += [f"{code},{t:.3f},{x:.5f},{f:.4f}" for t, x, f in zip(T, X, force(amperes), strict=True)]
+    (tmp_path / "all.csv").write_text("\n".join(rows) + "\n")
+    levels = {"L1": {"current": 0.2, "unit": unit}, "L2": {"current": 0.9, "unit": unit}}
+    (tmp_path / "metadata.json").write_text(json.dumps({"levels": levels}))
+    result = import_files([tmp_path])
+    currents = [float(np.mean(record.current)) for record in result.records]
+    assert currents == ([] if unit == "V" else pytest.approx([0.2, 0.9]))
 
 
 @pytest.mark.parametrize("pause", ["hold;", "hold;ramp"])

@@ -107,6 +107,19 @@ def test_counts_without_a_scale_are_refused_until_a_profile_states_it(tmp_path):
     assert np.ptp(import_files([tmp_path], stated).records[0].displacement) == pytest.approx(0.02, rel=1e-3)
 
 
+def test_channels_of_whole_numbers_beside_scales_are_asked_in_one_round(tmp_path):
+    with h5py.File(tmp_path / "a_0.5A.h5", "w") as file:
+        for name, values, unit in (
+            ("time", T, "s"),
+            ("stroke", np.round(100 * X), "mm"),
+            ("load", force(0.5) // 1, "N"),
+        ):
+            file[name] = values if name == "time" else values.astype("<i2")
+            file[name].attrs.update({"units": unit} | ({} if name == "time" else {f"{name}_scale": 0.5}))
+    asked = {refusal.error.remedy.partition("]")[0] for refusal in import_files([tmp_path]).refusals}
+    assert asked == {"set [channels.displacement", "set [channels.force"}
+
+
 def test_letters_over_the_columns_of_a_sheet_are_no_units_and_names_with_units_answer(tmp_path):
     table(tmp_path / "test_0.5A.csv", ["A,B,C"], T, X, force(0.5))
     assert {r.error.code for r in import_files([tmp_path]).refusals} == {"E_COLUMN"}

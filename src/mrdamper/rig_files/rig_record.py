@@ -12,7 +12,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.arrays import chunks, rescale
-from mrdamper.errors import ColumnError, InputError, listed, printable
+from mrdamper.errors import ColumnError, CombinedError, InputError, listed, printable
 from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import (
     NO_CHANNEL,
@@ -159,6 +159,7 @@ def _read(table: RawTable, assigned: dict[str, Assigned], profile: Profile):
 
 def _refuse_unscaled(table: RawTable, assigned: dict[str, Assigned], raw: dict[int, Floats], profile: Profile) -> None:
     """Refuse whole numbers beside which their scale stands: nobody says whether they were multiplied by it."""
+    problems: dict[str, InputError] = {}
     for key, value in (*table.constants.items(), *_numbers_in_lines(table)):
         words = [word for word in re.split(r"[^A-Za-z]+", key.casefold()) if word]
         rest = " ".join(word for word in words if word not in _SCALES)
@@ -170,7 +171,8 @@ def _refuse_unscaled(table: RawTable, assigned: dict[str, Assigned], raw: dict[i
         if profile.channel(role).scale is None and some.size and np.array_equal(some, np.round(some), equal_nan=True):
             problem = f"{role} is whole numbers, and {printable(key)} is {value:g}, which may be applied or not"
             remedy = f"set [channels.{role}] unit and scale in a profile, scale = 1 if it is applied"
-            raise table.source.refuse("E_AMBIGUOUS", problem, remedy)
+            problems.setdefault(role, table.source.refuse("E_AMBIGUOUS", problem, remedy))
+    CombinedError.raise_from([*problems.values()])
 
 
 def _numbers_in_lines(table: RawTable) -> Iterator[tuple[str, float]]:

@@ -133,7 +133,8 @@ def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
         try:
             read_runs(first, guess)
         except InputError as error:
-            typer.echo(f"the profile does not suffice yet: {error}", err=True)
+            problems = dict.fromkeys(str(problem) for problem in getattr(error, "errors", (error,)))
+            warn(f"the profile does not suffice yet: {problem}" for problem in problems)
     put_text(text, target)
 
 

@@ -54,6 +54,10 @@ _SCHEME_NUMBER = re.compile(r"[0-9]+(?:[.,xp][0-9]+)?")
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
 _DISCARDED, _DISCARDED_FLAG = (re.compile("(?i)" + "|".join(words(of))) for of in ("discarded", "discarded_flag"))
 _REMARKS = frozenset((*words("notes"), *words("remarks")))
+_STAMP = re.compile(  # 20190603_140512, 2019-06-03T14:05:12
+    r"(?<![0-9])20[0-9]{2}-?[01][0-9]-?[0-3][0-9][T_ -](?P<hour>[0-2][0-9])[:-]?(?P<minute>[0-5][0-9])"
+    r"[:-]?(?P<second>[0-5][0-9])(?![0-9])"
+)
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
 _ALIKE = 0.1  # relative difference of frequency and amplitude within which two motions are one
 _ALIKE_A = 0.03  # difference of the current within which two tests have the same [A]
@@ -238,7 +242,8 @@ def currents_beside(
             ratings = rating
     if by_scheme := _by_scheme(lines, results, [file for file, _ in tests]):
         return [(current, f"{path.name}, the names of files") for current in by_scheme]
-    stems = [re.sub(r"(?<=[A-Za-z])0+(?=[0-9])", "", file.stem.casefold()) for file, _ in tests]
+    names_of = [f"{file.stem} {record.id}".casefold() for file, record in tests]
+    stems = [re.sub(r"(?<=[A-Za-z])0+(?=[0-9])", "", name) for name in names_of]
     words = [[*re.split(r"[^0-9A-Za-z]+", s), *_DECIMAL_CODE.findall(s.replace(",", "."))] for s in stems]
     codes = _with_scale(dict(stated), {word for own in words for word in own})
     if len(codes) < 2 or len(codes) < len(stated):
@@ -371,12 +376,18 @@ def within_times(tests: Sequence[tuple[Path, Record]], results: Results | None) 
 
 
 def _called(tests: Sequence[tuple[Path, Record]]) -> list[tuple[str, ...]]:
-    """Names of each test: its own, that of its file, and its own without that of its file."""
+    """Names of each test: its own, that of its file, its own without that of its file, and when it was recorded."""
     stems = [re.sub(r"[^\w.+=-]+", "_", file.stem) for file, _ in tests]
     return [
-        (record.id, file.name, file.stem, record.id.removeprefix(stem).lstrip("_"))
+        (record.id, file.name, file.stem, record.id.removeprefix(stem).lstrip("_"), *_clocks(record, file))
         for (file, record), stem in zip(tests, stems, strict=True)
     ]
+
+
+def _clocks(record: Record, file: Path) -> set[str]:
+    """Return the hour and minute, and with seconds, at which a test was recorded, by its lines or its file's name."""
+    stated = map(_STAMP.search, (record.provenance.get("recorded_at", ""), file.stem))
+    return {f"{m['hour']}:{m['minute']}{more}" for m in stated if m for more in ("", f":{m['second']}")}
 
 
 def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:

@@ -18,7 +18,16 @@ from typing import Any
 import numpy as np
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.column_names import DIMENSION, UNIT_KEYS, is_unit, parse_unit, split_name, words, words_of
+from mrdamper.rig_files.column_names import (
+    DIMENSION,
+    UNIT_KEYS,
+    is_unit,
+    names_condition,
+    parse_unit,
+    split_name,
+    words,
+    words_of,
+)
 from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines
 from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, states_si, states_volts
 from mrdamper.rig_files.mapping.results import numbered_tests
@@ -347,8 +356,10 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
         return
     lower = {str(name).casefold(): value for name, value in node.items()}
     unit = next((lower[name] for name in ("unit", "units") if isinstance(lower.get(name), str)), "")
-    if unit and isinstance(lower.get("value"), (int, float)):
-        yield f"{key}: {lower['value']:g} {unit}"
+    numbers = {name: value for name, value in lower.items() if isinstance(value, (int, float))}
+    one = [value for name, value in numbers.items() if names_condition(name, split_name("", unit).dimension or "")]
+    if unit and ("value" in numbers or len(numbers) == len(one) == 1):  # L1: {current: 0.5, unit: A}
+        yield f"{key}: {numbers.get('value', one[0] if one else 0.0):g} {unit}"
     elif unit:
         words = [key, *(str(value) for value in lower.values() if isinstance(value, (str, int, float)))]
         yield "; ".join(dict.fromkeys(words))

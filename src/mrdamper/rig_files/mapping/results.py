@@ -27,6 +27,7 @@ _LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: .
     r"(?:\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até)\b)\s*(?:[^\W\d_]{1,30}[\s_.#]*)?(?P<last>[0-9]{1,6}))?\s*[:=;,\t)]"
 )
 _LABELLED = re.compile(r"(?<![^\W\d_])([^\W\d_]+)[ _.-]?([0-9]+)")
+_CLOCK = re.compile(r"[0-2][0-9]:[0-5][0-9](?::[0-5][0-9])?")
 _MEASURED = tuple(words("measured"))
 _STARTS, _ENDS = words("start"), words("end")
 _COUNTED = words("run") | words("run_number") | words("table_file")  # what the number in a test's name may be
@@ -337,6 +338,9 @@ def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:
     numbers: set[str] = set()
     for text in texts:
         bare = text.strip().strip('"').strip()
+        if _CLOCK.fullmatch(bare):
+            whole.add(bare)
+            continue
         for part in (bare, *re.split(r"[:=;,\t/]", bare)):
             part = part.strip().strip('"').strip()
             whole |= {_key(part), _key(_SPECIMEN.sub("", part))} - {""}
