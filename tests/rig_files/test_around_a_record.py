@@ -123,7 +123,9 @@ def test_a_damaged_test_beside_others_is_refused(tmp_path, name, content):
     for number in (1, 2):
         (tmp_path / f"run{number}.csv").write_text(text(0.4 * number))
     (tmp_path / name).write_text(content)
-    assert [r.file.rpartition("/")[2] for r in import_files([tmp_path]).refusals][:1] == [name]
+    refusals = import_files([tmp_path]).refusals
+    assert [r.file.rpartition("/")[2] for r in refusals][:1] == [name]
+    assert "set [file] leave_out" in refusals[0].error.remedy or content == "1,2\n"
 
 
 def test_a_table_of_results_of_as_many_columns_stands_above_the_record(tmp_path):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from mrdamper.cli.output import finding_lines
 from mrdamper.rig_files.mapping.proposals import displacement_of
 from mrdamper.rig_files.preview import question_of
 from mrdamper.rig_files.profile import parse_profile
@@ -96,6 +97,20 @@ def test_counts_have_the_scale_that_a_line_gives_one_of_them(tmp_path):
     head = ["# encoder: 1 count = 5 um", "# load cell: 200 N/V", "time_s,encoder_counts,loadcell_V"]
     table(tmp_path / "test_0.5A.csv", head, T, 200 * X, force(0.5) / 200)
     expect(tmp_path, 0.5)
+
+
+@pytest.mark.parametrize(
+    "line", ["+/-10 V = +/-50 mm (stroke), +/-10 V = +/-2 kN (load)", "±5 V = ±25 mm; ±5 V = ±1 kN"]
+)
+def test_full_scales_on_both_sides_of_zero_scale_the_channels_and_each_is_told(tmp_path, line):
+    table(tmp_path / "run_0.5A.csv", ["time [s],stroke [V],load [V]"], T, X / 5, force(0.5) / 200)
+    (tmp_path / "README.txt").write_text(f"Outputs of the controller.\nFull scale: {line}\n")
+    expect(tmp_path, 0.5)
+    (record,) = import_files([tmp_path]).records
+    lines = finding_lines(((record.id, finding) for finding in record.findings), verbose=False)
+    assert sum("is scaled" in text for text in lines) == 2
+    (tmp_path / "README.txt").write_text("Full scale: +/-10 V = 0 to 50 mm (stroke), +/-10 V = +/-2 kN (load)\n")
+    assert import_files([tmp_path]).refusals
 
 
 def test_counts_without_a_scale_are_refused_until_a_profile_states_it(tmp_path):
@@ -426,7 +441,9 @@ def test_channels_of_values_in_rows_are_joined_and_must_have_the_number_of_value
 
 def test_columns_are_called_by_the_names_that_the_message_lists(tmp_path):
     savemat(tmp_path / "r.mat", {"data": np.array([T, X, force(0.5), 0.1 * X, 0.3 * X])})
-    assert "data[1], data[2]" in str(import_files([tmp_path]).refusals[0].error)
+    refusals = import_files([tmp_path]).refusals
+    assert "data[1], data[2]" in str(refusals[0].error)
+    assert "give the current of each test" in str(refusals[-1].error)
     named = zip(("time", "displacement", "force"), ("s", "mm", "N"), (1, 2, 3), strict=True)
     text = "".join(f'[channels.{role}]\ncolumn = "data[{n}]"\nunit = "{unit}"\n' for role, unit, n in named)
     (record,) = import_files([tmp_path], parse_profile(f"{text}[current]\nvalue = 0.5\n")).records

@@ -88,7 +88,8 @@ def finding_lines(findings: Iterable[tuple[str, Finding]], verbose: bool) -> lis
     """List the findings of tests, those of one code once with the number of its tests unless all are asked for."""
     alike: dict[str, list[tuple[str, Finding]]] = {}
     for name, finding in findings:
-        alike.setdefault(f"{name}: {finding}" if verbose else finding.code, []).append((name, finding))
+        told_apart = f"{finding}" if finding.code == "W_SCALE" else finding.code  # of every column
+        alike.setdefault(f"{name}: {finding}" if verbose else told_apart, []).append((name, finding))
     counts = [len({name for name, _ in group}) for group in alike.values()]
     return [
         f"{group[0][0]}: {group[0][1]}" + (f", in {count} tests" if count > 1 else "")

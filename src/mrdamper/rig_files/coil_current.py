@@ -175,11 +175,15 @@ def ask_current_too(error: InputError, table: RawTable, profile: Profile, path: 
     """Add to a refusal of units or columns that the file states no current either: one answer gives both."""
     last = getattr(error, "errors", (error,))[-1]
     channel = table.columns("current") or table.columns(dimension="current")
-    if channel or profile.current or not last.code.startswith(("E_UNITS", "E_AMBIGUOUS", "E_DUPLICATE_COLUMN")):
+    if (
+        channel
+        or profile.current
+        or not last.code.startswith(("E_UNITS", "E_AMBIGUOUS", "E_DUPLICATE_COLUMN", "E_COLUMN"))
+    ):
         return
     with contextlib.suppress(InputError):
         if current_of(table, profile, path, None, slice(None))[0] is None:
-            last.remedy += f"; {CURRENT_TOO}, set [current.values], where no other file has them"
+            last.remedy += f"; {CURRENT_TOO}, set [current.values], where no other column or file has them"
 
 
 def current_by_resistance(table: RawTable, record_id: str) -> tuple[Finding, ...]:

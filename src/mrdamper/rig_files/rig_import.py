@@ -357,7 +357,10 @@ class _Intake:
                 self._take(group[0].path, records)
         for path in [path for path in self._shares if path not in used]:
             problem = f"no other file of test {self._shares[path][0]!r} has the rest of its channels on the same clock"
-            error = ColumnError(problem, where=path.name, remedy="correct file = ... of the channels in the profile")
+            remedy = (
+                'set file = "...{run}..." for each of displacement and force that has a file of its own, or correct it'
+            )
+            error = ColumnError(problem, where=path.name, remedy=remedy)
             self.refusals.append(Refusal(str(path), error))
         notes = [Path(note.file) for note in self.notes]
         paths = [path for path in (*others, *notes, *texts) if self._pending and path not in used]

@@ -28,10 +28,11 @@ from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED, Finding
 
 _MONITOR = words("monitor")
+_AROUND = r"(?:\+ ?/? ?[-−–]|±) ?"  # zero
 SCALE = re.compile(
-    r"(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{1,6}|%)"
+    rf"(?P<around>{_AROUND})?(?<![\w.,])(?P<one>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>[A-Za-zµ]{{1,6}}|%)"
     r"(?:\s*(?:PWM|duty(?: cycle)?|drive|output))?\s*(?:/|=|per|pro|entspricht|->)\s*"
-    r"(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{1,6}|%)(?![A-Za-z0-9/])"
+    rf"(?(around)(?:{_AROUND})?)(?P<other>[0-9]+(?:[.,][0-9]+)?)?\s*(?P<volt>[A-Za-zµ]{{1,6}}|%)(?![A-Za-z0-9/])"
 )
 _PER_COUNT = re.compile(
     r"(?P<number>[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]+)?)\s*(?P<unit>[A-Za-zµ/]{1,6}?)(?:\s*(?:/|per)\s*"

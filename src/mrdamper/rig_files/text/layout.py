@@ -364,7 +364,8 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
     if not rows or named:
         what = "names of columns, but no row of numbers below them" if named else "no row of numbers"
         kind = RigFileError if named else NoTableError
-        raise kind("E_NO_DATA", what, file=source.name, remedy="export the file again, with its data")
+        aside = f", or, if it is no test, set [file] leave_out = [{source.name!r}] in a profile" if named else ""
+        raise kind("E_NO_DATA", what, file=source.name, remedy=f"export the file again, with its data{aside}")
     width = Counter(len(cells) for cells in rows).most_common(1)[0][0]
     labelled = 2 * sum(not cells[0] or _is_key(cells[0].strip('"')) for cells in rows) > len(rows)  # or notes beside
     first, cells = _first_of(content, width, separator, labelled=labelled)
