@@ -86,6 +86,19 @@ def test_currents_of_a_table_whose_keys_are_not_unique_are_asked(tmp_path, table
     assert all(reason for reason in result.reasons.values())
 
 
+@pytest.mark.parametrize("more", ["", "plan.csv : intensite en mA\n"])
+def test_notes_give_the_units_of_the_columns_and_of_a_plan_unless_they_differ(tmp_path, more):
+    write(tmp_path, "t,x,F\n")
+    tests = "".join(f'"{name}";{amperes};1\n' for name, amperes in CURRENTS.items())
+    (tmp_path / "plan.csv").write_text(f'"";"intensite";"frequence"\n{tests}')
+    notes = "mesures : t en s, x en mm (course), F en N (effort)\nplan.csv : intensite en A, rien de plus\n"
+    (tmp_path / "LISEZMOI.txt").write_text(notes + more)
+    if more:
+        assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
+    else:
+        require_the_tests(tmp_path)
+
+
 @pytest.mark.parametrize("unit", ["A", "V"])
 def test_levels_of_a_structure_give_the_currents_of_the_tests_that_a_column_calls_so(tmp_path, unit):
     rows = ["run,time [s],displacement [mm],force [N]"]

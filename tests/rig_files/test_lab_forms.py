@@ -224,7 +224,7 @@ def test_counts_are_scaled_by_the_formula_that_a_text_states_and_refused_without
                 counts = file.create_dataset(channel, data=np.round((values - 0.5) / gain).astype("<i4"))
                 counts.attrs.update({"unit": unit, "gain": gain, "offset": 0.5, "conversion": says})
     assert np.ptp(read_run(tmp_path / "stated.h5").displacement) == pytest.approx(0.020, rel=1e-3)
-    assert [r.error.code for r in import_files([tmp_path / "open.h5"]).refusals] == ["E_AMBIGUOUS"]
+    assert [r.error.code for r in import_files([tmp_path / "open.h5"]).refusals] == ["E_AMBIGUOUS"] * 2
 
 
 @pytest.mark.parametrize("names", [("2D_force", "VBOX_pos"), ("logger1_F", "logger2_x")])

@@ -144,7 +144,7 @@ _INNER = re.compile(
     r"^(?P<name>[^\[({<]+?)\s*[\[({<](?P<unit>[^\[\](){}<>]{1,20})[\])}>]\s*(?:[-–:,;@|/]|(?:at|for|bei|mit|à|con|com)\b).*$",
     re.DOTALL,
 )
-_SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+in\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
+_SLASHED = re.compile(r"^(?P<name>.*\S)\s*(?:\s/\s*|,\s*|\s+(?:in|en|em)\s+|\s*;\s*)(?P<unit>\S{1,20})$", re.DOTALL)
 _EAST_ASIAN = re.compile("[\u3040-\u30ff\u4e00-\u9fff\uac00-\ud7af]")
 _LONGEST_NAME = 200  # beyond, it is no name, and matching it could take long
 # Time  1 - default sample rate

@@ -30,7 +30,7 @@ from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.conditions import amperes, series_in
 from mrdamper.rig_files.file_records import digest_of, records_of_file
 from mrdamper.rig_files.mapping.completion import completed, item_of
-from mrdamper.rig_files.mapping.description import short_lines, with_notes
+from mrdamper.rig_files.mapping.description import short_lines, with_notes, with_units_of_notes
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
 from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
 from mrdamper.rig_files.profile import Channel, FileForm, Profile
@@ -201,7 +201,8 @@ def _arrays(table: RawTable) -> list[Floats]:
 def results_of(path: Path) -> Results | None:
     """Return the table of results that a file holds; None if it holds none."""
     if path.suffix.lower() in TEXTS:
-        return results_in(short_lines(path))
+        lines = short_lines(path)
+        return results_in(lines) or results_in([with_units_of_notes(line, path) for line in lines[:1]] + lines[1:])
     tables_of_results = ask_tables(path, lambda tables: [r for t in tables[:20] if (r := results_in(lines_of(t)))], [])
     return tables_of_results[0] if len(tables_of_results) == 1 else None
 
