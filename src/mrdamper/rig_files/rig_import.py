@@ -377,9 +377,12 @@ class _Intake:
         states others.
         """
         candidates: list[tuple[Path, Results | None, list[tuple[Path, Record]], list[tuple[float, str]]]] = []
-        results_by = [(path, self._results(path)) for path in paths]
-        linked = [(p, r.joined(short_lines(other))) for p, r in results_by if r for other in paths if other != p]
-        for path, results in (*results_by, *((path, results) for path, results in linked if results)):
+        own = ((path, self._results(path)) for path in paths)
+        linked = (
+            (path, joined) for path in paths if (results := self._results(path)) for other in paths
+            if other != path and (joined := results.joined(short_lines(other)))
+        )  # fmt: skip
+        for path, results in chain(own, linked):
             tests = self._numbered(results) if results else self._pending
             stated = currents_beside(path, results, tests)
             if stated and not (results and results.of_supply):
