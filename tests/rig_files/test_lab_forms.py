@@ -286,8 +286,8 @@ def test_a_profile_integrates_a_velocity(tmp_path):
     ("heading", "factor", "code"),
     [
         ("Amplitude: 10 mm", 1 / 5, "W_NAME"), ("Amplitude: 10 mm", 1.0, ""), ("Stroke: 20 mm", 1.0, ""),
-        ("Amplitude: 10 mm", 1 / 25.4, "E_MOTION_CONTRADICTS"), ("Stroke: 20 mm", 25.4, "E_MOTION_CONTRADICTS"),
-        ("Amplitude: 10 mm", 1 / 10, "E_MOTION_CONTRADICTS"),
+        ("Amplitude: 10 mm", 10, "E_MOTION_CONTRADICTS"), ("Stroke: 20 mm", 25.4, "E_MOTION_CONTRADICTS"),
+        ("Stroke: 100 mm", 1.0, "W_NAME"), ("Length 254 mm", 1.0, ""),
     ],
 )  # fmt: skip
 def test_a_heading_of_another_amplitude_is_reported_and_refused_at_the_factor_of_a_unit(

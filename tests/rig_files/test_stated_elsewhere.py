@@ -225,13 +225,22 @@ def test_two_currents_are_named_where_either_may_be_that_of_the_coil(tmp_path):
     [
         "Comment: current raised by 0.4 A every 8 cycles", "coil current checked at 1 A, then switched off",
         "coil current step 0.5 A", "Spulenstrom um 0,4 A erhöht", "Coil current (zero-check): 0.00 A",
-        "Courant augmenté de 0,5 A", "steps of 0.5 A", "Coil current verified: 0.5 A",
+        "Courant augmenté de 0,5 A", "steps of 0.5 A",
     ],
 )  # fmt: skip
 def test_a_line_about_a_change_or_a_check_of_the_current_states_none(line, tmp_path):
     table(tmp_path / "a.csv", [line, "Time [s],Displacement [mm],Force [N]"], T, X, force(0.5))
     (refusal,) = import_files([tmp_path]).refusals
     assert refusal.error.code == "E_CURRENT_MISSING"
+
+
+@pytest.mark.parametrize("key", ["verified", "(verified)", "reduced to", "geprüft"])
+def test_a_current_that_was_checked_or_changed_to_is_that_of_the_test(key, tmp_path):
+    head = [f"Coil current {key}: 0.5 A", "Time [s],Displacement [mm],Force [N]"]
+    table(tmp_path / "a.csv", head, T, X, force(0.5))
+    assert [r.current[0] for r in import_files([tmp_path]).records] == [0.5]
+    table(tmp_path / "a_1.0A.csv", head, T, X, force(0.5))
+    assert [r.error.code for r in import_files([tmp_path / "a_1.0A.csv"]).refusals] == ["E_AMBIGUOUS"]
 
 
 @pytest.mark.parametrize("line", ["Essai 3, courant de 0,5 A", "Test 3: corriente de 0,5 A", "current stage: 0.5 A"])

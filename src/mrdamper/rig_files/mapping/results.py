@@ -32,6 +32,7 @@ _MEASURED = tuple(words("measured"))
 _STARTS, _ENDS = words("start"), words("end")
 _COUNTED = words("run") | words("run_number") | words("table_file")  # what the number in a test's name may be
 _NUMBERED = _COUNTED | {"step", "schritt", "#"}
+_OWN_KEYS = {"id", "nr", "nr.", "no", "no.", "#", "key", "index", "pk"}  # each table has its own
 _SPECIMEN = re.compile(
     r"(?i)^(?:specimen|probe|prüfkörper|test|versuch|run|sample|essai|éprouvette|ensayo|no|nr)\b[\s.:#]*"
 )
@@ -73,7 +74,7 @@ class Results:
 
         Empty unless every test has one row, no row two tests, and no such beginning is that of two headings.
         """
-        heads = [split_name(key).name.casefold() for key in self.keys]
+        heads = ["" if split_name(key).unit else split_name(key).name.casefold() for key in self.keys]
         rows: dict[int, int] = {}
         for test, texts in enumerate(tests):
             fitting = {*range(len(self.cells))}
@@ -90,13 +91,15 @@ class Results:
     def joined(self, lines: Sequence[str]) -> Results | None:
         """Return the rows of another table, each with the current of the row of this one whose key it states.
 
-        The column of the key is called alike in both tables; None unless it is the only one by which all rows fit.
+        The column of the key is called alike in both tables, and not as the key of any table; None unless it is the
+        only one by which all rows fit.
         """
         tables = []
         for separator in _SEPARATORS[:3]:
             heads, *rows = [[cell.strip('" ') for cell in cells_of(line, separator)] for line in lines] or [[]]
             rows = [row for row in rows if len(row) == len(heads)]
-            for key in {*map(_key, heads)} & {_key(key) for key in self.keys if key} if len(rows) > 1 else ():
+            common = {*map(_key, heads)} & {_key(key) for key in self.keys if key} - _OWN_KEYS
+            for key in common if len(rows) > 1 else ():
                 own = [_key(cells[[*map(_key, self.keys)].index(key)]) for cells in self.cells]
                 theirs = [_key(row[[*map(_key, heads)].index(key)]) for row in rows]
                 if len({*own}) == len(own) and {*theirs} <= {*own}:

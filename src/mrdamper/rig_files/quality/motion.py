@@ -235,8 +235,8 @@ def agrees_with_its_name(view: View) -> Iterator[Finding]:
         contradictions.append((f"{amplitude:g} mm", f"an amplitude of {size:.3g} mm", "displacement"))
     if not contradictions:
         return
-    factors = np.array([size, 2 * size]) / amplitude if amplitude else np.empty(0)
-    factors = np.maximum(factors, 1 / factors)[:, None] / _UNITS
+    # A length that is larger than the motion may be that of the damper.
+    factors = np.array([size, 2 * size])[:, None] / (amplitude * _UNITS) if amplitude else np.empty(0)
     stated, has, channels = (" and ".join(words) for words in zip(*contradictions, strict=True))
     states, rate = f"the name or heading states {stated}", view.record.provenance.get("time_from", "")
     if len(contradictions) > 1:
