@@ -18,7 +18,6 @@ _NINES = (9.99, 9.999, 9.9999, 9.99999, 9.999999, 9.9925, 9.91)
 _ENDS = (3.2767, 3.2768, 6.5535, 8.388607, 8.388608, 2.147483647, 2.147483648, 4.294967295)
 _DIGITS = np.sort([*_NINES, *_ENDS])
 _LEAP = 0.25  # of the channel's range: a code stands that far from the samples around it
-_FAR = 2.0  # times as far as all but a hundredth of the channel's own leaps
 _PULSES = 9  # times as far, a value that no logger writes for missing ones is no pulse of a supply
 COARSEST = {"current": 0.1, "voltage": 1.0}  # leaps below are a supply's own [A, V]: ripple and a chopper's pulses
 _CLOCK = 3.0  # times the mean step: larger ones are none of an even clock
@@ -28,10 +27,10 @@ _CHUNK, _MOST_LEAPS = 1_000_000, 10_000  # samples, and leaps to and fro, that a
 _SOME = 10_000  # samples that show a channel's levels
 _BLOCK = 2**16  # samples compared at a time: a cache holds them
 _LONG = 20  # a value held longer than this on average is a plateau, no code
-_OFTEN, _MORE = 2, 4  # times, and times more for each that a level beside it comes again
-_AROUND, _APART = 20, 0.4  # levels on either side, share that leaps
+_OFTEN, _SEVERAL = 2, 3  # times that a code comes, and that another value does
+_MOST_TRIED = 200  # values
+_OWN = 0.4  # of the coarsest leaps: a supply's own turns
 _TURNS, _ONE_TURN, _SLOPES = 2.5, 8.0, 2.0  # times as far as the channel's own turns and slopes: twice, or once
-_ENOUGH = 50  # of a channel's own samples, below which its leaps say nothing
 _OF_RANGE = {"displacement": 0.3, "force": 0.5}  # of the channel's range: a leap that stays
 OFF_BY = {"displacement": 0.3, "force": 0.3}  # of the range without it: a sample that stands alone
 _FAR_STEPS = 10.0  # times as far as the channel moves by itself between two samples
@@ -78,22 +77,12 @@ def code_in(values: Floats, coarsest: float) -> float | None:
         away = max(low - value, value - high)
         if away > scale and (_known(value) or (varies and counts[value] > 1 and away > scale + _PULSES * coarsest)):
             return value
-    codes = _codes_among(values[:_CHUNK]) if coarsest == 0.0 or varies else set()
-    for value in codes if coarsest == 0.0 and levels.size > 1 else ():
-        if _drops_to(values[:_CHUNK], value, float(np.min(np.diff(levels)))):
-            return value
-    if not varies:
-        return None  # a channel that flickers between a few levels leaps there and back all the time
+    if levels.size < 2 or (coarsest > 0.0 and not varies):
+        return None  # a supply that flickers between a few levels leaps there and back all the time
+    some, step = values[:_CHUNK], max(float(np.min(np.diff(levels))), _OWN * coarsest)
     leap = max(_LEAP * (high - low), coarsest)
-    for value, count in _repeated_leaps(values, leap):
-        usual = _known(value) or value == 0.0
-        if count < (1 if _known(value) else 2 if usual else 3):
-            continue
-        off, share = _scattered(values, value, leap)
-        scattered = share >= 0.5 or off >= 2 if usual else share >= 0.8
-        if scattered and _stands_out(values, value, leap):
-            return value
-    return next((code for code in codes - extremes | codes & {0.0} if _too_often(values[:_CHUNK], code)), None)
+    candidates = _codes_among(some) | (_repeated_leaps(some, leap) if varies else set())
+    return next((value for value in sorted(candidates, key=abs) if _drops_to(some, value, step)), None)
 
 
 def _runs_evenly(values: Floats) -> bool:
@@ -135,27 +124,6 @@ def _near(values: Floats, value: float) -> np.ndarray:
     return same[:-2] | same[1:-1] | same[2:]
 
 
-def _bends(values: Floats) -> Floats:
-    """(N−2,) distances of the inner samples from the middle of their neighbours."""
-    return np.abs(values[1:-1] - 0.5 * (values[:-2] + values[2:]))
-
-
-def _too_often(values: Floats, value: float) -> bool:
-    """Check for a value that a fine channel holds far more often than the levels around it, standing off there.
-
-    Among samples of its own size a code does not stand off; but a channel passes each of its
-    levels about as often, and its samples are smooth.
-    """
-    if np.count_nonzero(values == value) < _OFTEN:
-        return False
-    often, around = _levels_around(values[np.isfinite(values)], value)
-    if often < _OFTEN + _MORE * (int(np.max(around, initial=1)) - 1):
-        return False
-    bends, same = _bends(values), values[1:-1] == value
-    own, apart = (bends[mask & np.isfinite(bends)] for mask in (~same, same))
-    return bool(apart.size and np.mean(apart > 3 * np.quantile(own, 0.9)) > _APART)
-
-
 def _codes_among(values: Floats) -> set[float]:
     """Zero and codes in use that a channel holds more than once."""
     largest = float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
@@ -174,23 +142,12 @@ def _codes_among(values: Floats) -> set[float]:
     return set(repeated[counts >= _OFTEN].tolist())
 
 
-def _levels_around(values: Floats, value: float) -> tuple[int, np.ndarray]:
-    """Count the samples at a value of a channel, and at each of the levels next to it on either side."""
-    width, span = 1e-4, float(np.ptp(values))
-    while True:
-        levels, counts = np.unique(values[np.abs(values - value) <= width * span], return_counts=True)
-        at = int(np.searchsorted(levels, value))
-        if min(at, levels.size - 1 - at) >= _AROUND or width >= 1:
-            return int(counts[at]), np.r_[counts[max(0, at - _AROUND) : at], counts[at + 1 : at + 1 + _AROUND]]
-        width *= 10
-
-
-def _repeated_leaps(values: Floats, leap: float) -> list[tuple[float, int]]:
-    """Values, each with its count, at which a channel leaps there and back: twice, or once to a code in use."""
+def _repeated_leaps(values: Floats, leap: float) -> set[float]:
+    """Values at which a channel leaps there and back: three times, or once to a code in use."""
     steps = np.abs(np.diff(values)) > leap
     sizes, counts = np.unique(values[1:-1][steps[1:] & steps[:-1]][:_MOST_LEAPS], return_counts=True)
-    most = np.argsort(counts)[::-1][:200]
-    return [(float(sizes[i]), int(counts[i])) for i in most if counts[i] > 1 or _known(float(sizes[i]))]
+    most = np.argsort(counts)[::-1][:_MOST_TRIED].tolist()
+    return {float(sizes[i]) for i in most if counts[i] >= _SEVERAL or _known(float(sizes[i]))}
 
 
 def _known(value: float) -> bool:
@@ -200,27 +157,6 @@ def _known(value: float) -> bool:
         return size > 0
     digits = size / 10.0 ** np.floor(np.log10(size))
     return bool(np.min(np.abs(digits / _DIGITS - 1)) < 1e-9)
-
-
-def _scattered(values: Floats, value: float, leap: float) -> tuple[int, float]:
-    """Return number and share of a value's occurrences that stand off from the samples on both sides."""
-    starts, stops = _visits(values, value)
-    off = (np.abs(values[starts - 1] - value) > leap) & (np.abs(values[stops] - value) > leap)
-    return int(np.count_nonzero(off)), float(np.mean(off)) if off.size else 0.0
-
-
-def _stands_out(values: Floats, value: float, leap: float) -> bool:
-    """Check for leaps of a channel to a value from much further than it leaps by itself.
-
-    A leap is how far a sample lies from the middle of its neighbours.
-    """
-    values = values[:_CHUNK]
-    bends = _bends(values)
-    own = bends[~_near(values, value) & np.isfinite(bends)]
-    at = bends[(values[1:-1] == value) & np.isfinite(bends) & (bends > leap)]
-    if own.size < _ENOUGH or not at.size:
-        return False
-    return bool(np.median(at) > _FAR * np.quantile(own, 0.99))
 
 
 def spikes(view: View) -> None:
