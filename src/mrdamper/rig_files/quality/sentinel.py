@@ -98,30 +98,19 @@ def _drops_to(values: Floats, value: float, step: float) -> bool:
 
     A force that changes its sign leaps past zero, and a V turns at its tip: neither counts.
     """
-    starts, stops = _visits(values, value, beside=2)
+    same = values == value
+    starts, stops = runs_of(same)
+    inner = (starts >= 2) & (stops <= values.size - 2)
+    starts, stops = starts[inner], stops[inner]
     before, after = values[starts - 1] - value, values[stops] - value
     slope = np.maximum(np.abs(values[starts - 2] - values[starts - 1]), np.abs(values[stops + 1] - values[stops]))
     away = np.where(before * after > 0, np.minimum(np.abs(before), np.abs(after)) - _SLOPES * slope, 0.0)
-    if not np.any(away > _TURNS * step):
+    if not np.any(away > _TURNS * step) or np.sum(stops - starts) > _LONG * starts.size:
         return False
-    steps = np.diff(values)
+    steps, near = np.diff(values), same[:-2] | same[1:-1] | same[2:]
     turns = np.where(steps[1:] * steps[:-1] < 0, np.minimum(np.abs(steps[1:]), np.abs(steps[:-1])), 0.0)
-    own = max(step, float(np.nanmax(turns, where=~_near(values, value), initial=0.0)))
+    own = max(step, float(np.nanmax(turns, where=~near, initial=0.0)))
     return bool(np.count_nonzero(away > _TURNS * own) >= 2 or np.any(away > _ONE_TURN * own))
-
-
-def _visits(values: Floats, value: float, beside: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Return starts and stops of the runs of a value with samples on either side; none where these are plateaus."""
-    starts, stops = runs_of(values == value)
-    inner = (starts >= beside) & (stops <= values.size - beside)
-    inner &= bool(np.sum((stops - starts)[inner]) <= _LONG * np.count_nonzero(inner))
-    return starts[inner], stops[inner]
-
-
-def _near(values: Floats, value: float) -> np.ndarray:
-    """(N−2,) mask of the inner samples that are a value or stand beside it."""
-    same = values == value
-    return same[:-2] | same[1:-1] | same[2:]
 
 
 def _codes_among(values: Floats) -> set[float]:
