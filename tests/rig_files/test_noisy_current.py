@@ -115,3 +115,11 @@ def test_a_dropout_among_a_channels_own_levels_is_a_code(level):
     assert code_in(flickering, 0.0) is None
     assert code_in(np.abs(np.arange(-200.0, 200.0)), 0.0) is None
     assert code_in(np.sign(np.sin(np.arange(400) / 16 + 0.01)) * 800 + np.arange(400) % 3, 0.0) is None
+
+
+def test_a_level_that_a_channel_passes_is_a_code_where_it_drops_to_it():
+    x = np.round(17 + 20 * np.sin(2 * np.pi * np.arange(400) / 97.3), 1)
+    dropped = x.copy()
+    dropped[[24, 125, 226]] = x[62]  # 1.8, no code of a logger
+    assert code_in(dropped, 0.0) == x[62]
+    assert code_in(x, 0.0) is None

@@ -111,20 +111,12 @@ def damping_share(time: Floats, displacement: Floats, force: Floats) -> float:
     if there.size < 50 or np.any(np.diff(time[there]) <= 0):
         return 0.0
     there = there[:: max(1, there.size // _MOST_SAMPLES)]
-    time, x, force = time[there], displacement[there], force[there] - np.mean(force[there])
-    x = x - np.mean(x)
-    velocity = smooth(time, x)[1]
-    if not np.ptp(x) or not np.std(velocity) or not np.std(force):
+    time, x, force = time[there], displacement[there], force[there]
+    spring = np.column_stack([np.ones_like(x), x, time])
+    velocity, rest = (f - spring @ np.linalg.lstsq(spring, f, rcond=None)[0] for f in (smooth(time, x)[1], force))
+    if not velocity.any() or np.std(rest) <= 0.1 * np.std(force):  # nothing but a spring, or another displacement
         return 0.0
-    if float(np.sum(force * velocity)) <= 0:
-        return 0.0
-    x, velocity = x / np.std(x), velocity / np.std(velocity)
-    spring = np.column_stack([np.ones_like(x), x])
-    damper = np.column_stack([spring, velocity, np.tanh(3 * velocity)])
-    without, rest = (np.sum((force - m @ np.linalg.lstsq(m, force, rcond=None)[0]) ** 2) for m in (spring, damper))
-    if without < 0.01 * np.sum(force**2):  # nothing but a spring, or another displacement
-        return 0.0
-    return float(1 - rest / without)
+    return max(float(np.corrcoef(velocity, rest)[0, 1]), 0.0) ** 2
 
 
 def stated_frequencies(table: RawTable) -> Iterator[float]:
