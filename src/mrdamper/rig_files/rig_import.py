@@ -32,6 +32,7 @@ from mrdamper.rig_files.mapping.companions import (
     is_list,
     joined_files,
     number_of,
+    other_motions,
     part_of,
     repeated,
     results_of,
@@ -285,7 +286,7 @@ class _Intake:
         unused = [path for path in (*others, *texts) if path not in used]
         for path in [path for path in unused if self._found or path.stat().st_size <= _LARGEST_LIST]:
             stated = currents_beside(path, self._results(path), self.tests())
-            if stated:
+            if stated and other_motions(path, self._results(path), self.tests()) is None:
                 self._refuse_contradicted(stated, discarded_tests(path, self._results(path), self.tests()))
             elif path in others and path not in self._given and self._is_beside_tests(path):
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
@@ -393,7 +394,8 @@ class _Intake:
         if len({tuple(current for current, _ in stated) for *_, stated in candidates}) != 1:
             return set()
         path, results, tests, stated = candidates[0]
-        refused = discarded_tests(path, results, tests)
+        other = other_motions(path, results, tests)
+        refused = dict.fromkeys(range(len(tests)), other) if other else discarded_tests(path, results, tests)
         self.refusals += [Refusal(str(tests[i][0]), error, tests[i][1].id) for i, error in refused.items()]
         self._pending = [
             (file, with_stated_current(record, *own, file.name, f"its current is the {own[0]:g} A of {own[1]}"))

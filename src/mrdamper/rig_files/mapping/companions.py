@@ -32,7 +32,7 @@ from mrdamper.rig_files.file_records import digest_of, records_of_file
 from mrdamper.rig_files.mapping.completion import completed, item_of
 from mrdamper.rig_files.mapping.description import short_lines, with_notes, with_units_of_notes
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
-from mrdamper.rig_files.mapping.results import Results, lines_of, results_in
+from mrdamper.rig_files.mapping.results import NUMBER, Results, lines_of, results_in
 from mrdamper.rig_files.profile import Channel, FileForm, Profile
 from mrdamper.rig_files.quality.motion import stated_motion
 from mrdamper.rig_files.quality.view import find_strokes
@@ -53,6 +53,8 @@ _SCHEME = re.compile(r"[\w.,+=-]*(?:<[^<>]{1,60}>[\w.,+=-]*)+")  # MRD_A<amplitu
 _SCHEME_NUMBER = re.compile(r"[0-9]+(?:[.,xp][0-9]+)?")
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
 _DISCARDED, _DISCARDED_FLAG = (re.compile("(?i)" + "|".join(words(of))) for of in ("discarded", "discarded_flag"))
+_FREQUENCY = re.compile(r"(?i)^(?:f\b|freq|frec|fréq|част|频率|周波数|częst)")
+_OTHER_FREQUENCY = 0.15  # relative difference of the frequencies of two tests
 _REMARKS = frozenset((*words("notes"), *words("remarks")))
 _STAMP = re.compile(  # 20190603_140512, 2019-06-03T14:05:12
     r"(?<![0-9])20[0-9]{2}-?[01][0-9]-?[0-3][0-9][T_ -](?P<hour>[0-2][0-9])[:-]?(?P<minute>[0-5][0-9])"
@@ -253,6 +255,30 @@ def currents_beside(
     if any(len(of_test) != 1 for of_test in own):
         return None
     return [(codes[code], f"{path.name}, {code.upper()}") for (code,) in own]
+
+
+def other_motions(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> InputError | None:
+    """Return the refusal of a plan of which a test moves at another frequency than its row states."""
+    headers = [split_name(key) for key in results.keys] if results else []
+    columns = [
+        i for i, header in enumerate(headers) if header.dimension == "frequency" and _FREQUENCY.search(header.name)
+    ]
+    cells = [row[columns[0]].replace(",", ".") for row in results.cells] if results and len(columns) == 1 else []
+    if results is None or not cells or not all(map(NUMBER.fullmatch, cells)):
+        return None
+    rows = currents_beside(path, replace(results, current=tuple(map(float, cells)), of_supply=False), tests) or ()
+    texts: list[str] = []
+    for (stated, _), (_, record) in zip(rows, tests, strict=False):
+        thinned = slice(None, None, max(1, record.time.size // _MOST_SAMPLES))
+        strokes = find_strokes(record.time[thinned], record.displacement[thinned])
+        if strokes.steady and strokes.period and stated and abs(1 / (strokes.period * stated) - 1) > _OTHER_FREQUENCY:
+            moves = f"{record.id}, which moves at {1 / strokes.period:.3g} Hz"
+            texts.append(f"{path.name} states {stated:g} Hz of {moves}")
+    if not texts:
+        return None
+    problem = f"{listed(texts, 2)}: are its rows those of other tests?"
+    remedy = "write the current of each test into tests.csv (--write-tests), or correct the plan"
+    return QualityError(printable(problem), where=path.name, remedy=remedy, code="E_MOTION_CONTRADICTS")
 
 
 def discarded_tests(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> dict[int, InputError]:

@@ -16,8 +16,8 @@ from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of, is_units
 
 _SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]+)?|[.,][0-9]+)")
-_QUANTITY = re.compile(rf"({_NUMBER.pattern})\s*(m?A)")
+NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]+)?|[.,][0-9]+)")
+_QUANTITY = re.compile(rf"({NUMBER.pattern})\s*(m?A)")
 _SUPPLY = re.compile(r"(?i)\b(?:power[ _-]?)?suppl(?:y|ied)\b|\bpsu\b")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
@@ -59,9 +59,9 @@ class Results:
         one_of_several = len(tests) == 1 < len(self.current)  # a number in its name alone may count anything
         by_number = by_number and self.counts_tests and not one_of_several
         for exact in (True,) if not by_number else (True, False):
-            columns = list(zip(*self.cells, strict=True))
-            columns = columns if self._counts_tests(columns, len(tests)) else columns[1:]
-            matches = [match for column in columns if (match := _match(column, names, exact))]
+            matches = [
+                match for column in self._columns_of_names(len(tests)) if (match := _match(column, names, exact))
+            ]
             currents = [{i: self.current[row] for i, row in match.items()} for match in matches]
             if currents and all(other == currents[0] for other in currents):
                 return currents[0]
@@ -122,11 +122,25 @@ class Results:
                 return currents
         return {}
 
-    def _counts_tests(self, columns: Sequence[Sequence[str]], tests: int) -> bool:
-        """Tell if the number of a row may be that of a test: as many rows, and no column that numbers the tests."""
-        keys = [{word.casefold() for word in words_of(split_name(key).name)} for key in self.keys]
-        named = [column for key, column in zip(keys, columns, strict=True) if key & _NUMBERED]
-        return tests == len(self.current) and not any(all(map(_NUMBER.fullmatch, column)) for column in named)
+    def _columns_of_names(self, tests: int) -> list[Sequence[str]]:
+        """Return the columns that may name as many tests: none of a quantity, and no numbers of the rows of a log.
+
+        The number of a row may be that of a test if there are as many rows, and no column that numbers the tests.
+        """
+        headers = [split_name(key) for key in self.keys]
+        first, *columns = list[Sequence[str]](zip(*self.cells, strict=True))
+        numeric = [all(map(NUMBER.fullmatch, column)) for column in columns]
+        keys = [{word.casefold() for word in words_of(header.name)} for header in headers[1:]]
+        numbered = any(key & _NUMBERED for key, numbers in zip(keys, numeric, strict=True) if numbers)
+        times = [
+            np.diff([float(cell.replace(",", ".")) for cell in column])
+            for header, column, numbers in zip(headers[1:], columns, numeric, strict=True)
+            if numbers and header.role == "time"
+        ]
+        if any(steps.size and np.all(steps > 0) for steps in times) and not numbered:  # samples over time
+            return [column for column, numbers in zip(columns, numeric, strict=True) if not numbers]
+        names = [column for header, column in zip(headers[1:], columns, strict=True) if header.dimension is None]
+        return names if numbered or tests != len(self.current) else [first, *names]
 
     def rows_in_time(self, times: Sequence[Floats]) -> dict[int, tuple[int, slice]]:
         """Return the row of each test by its number, and the samples between the start and the end that it states.
@@ -151,7 +165,7 @@ class Results:
         columns = [i for i in columns if headers[i].dimension == "time"]
         cells = [row[columns[0]].replace(",", ".") for row in self.cells] if len(columns) == 1 else []
         unit = headers[columns[0]].known if cells else None
-        return [unit.factor * float(cell) for cell in cells] if unit and all(map(_NUMBER.fullmatch, cells)) else []
+        return [unit.factor * float(cell) for cell in cells] if unit and all(map(NUMBER.fullmatch, cells)) else []
 
     def column_of_tests(self, table: RawTable) -> str | None:
         """Return the column of a record that numbers its tests as a column of this table, of the same name, does."""
@@ -267,7 +281,7 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
     for at, row in enumerate(rows):
         if sum(map(bool, row)) < 2:  # most lines are one cell where another character separates them
             continue
-        columns = [i for i, cell in enumerate(row) if cell and not _NUMBER.fullmatch(cell) and _is_current(cell)]
+        columns = [i for i, cell in enumerate(row) if cell and not NUMBER.fullmatch(cell) and _is_current(cell)]
         supply = [] if columns else [i for i, cell in enumerate(row) if _is_of_supply(cell)]
         columns = (
             columns or supply or [i for i, cell in enumerate(row) if holds(cell, COIL) and cell.isalpha()]
@@ -276,17 +290,17 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
             continue
         below = at + 1
         unit = ""
-        if below < len(rows) and is_units(rows[below]) and not any(map(_NUMBER.fullmatch, rows[below])):
+        if below < len(rows) and is_units(rows[below]) and not any(map(NUMBER.fullmatch, rows[below])):
             unit = rows[below][columns[0]].strip("[]()") if columns[0] < len(rows[below]) else ""
             below += 1
         body, pauses = [], []
         for cells in rows[below:]:
             cell = cells[columns[0]] if len(cells) > columns[0] else ""
             cells = [*cells, *[""] * (len(row) - len(cells))][: len(row)]
-            if not cell and any(cells) and not any(map(_NUMBER.fullmatch, cells[1:])):
+            if not cell and any(cells) and not any(map(NUMBER.fullmatch, cells[1:])):
                 pauses.append(cells)
                 continue
-            if not _QUANTITY.fullmatch(cell) and not _NUMBER.fullmatch(cell):
+            if not _QUANTITY.fullmatch(cell) and not NUMBER.fullmatch(cell):
                 break
             body.append(cells)
         measured = [i for i in columns if row[i].casefold().startswith(_MEASURED) or holds(row[i], {*_MEASURED})]

@@ -38,7 +38,7 @@ MISSING = words("missing")
 _INFINITE = re.compile(r"[+-]?(?:inf(?:inity)?|1\.#inf|∞)", re.IGNORECASE)
 _STAMP = re.compile(
     r"(?:(?:([0-9]{4})([-/])([0-9]{2})\2([0-9]{2})|([0-9]{2})\.([0-9]{2})\.([0-9]{4})"
-    r"|([0-9]{1,2})[- ]([a-zä]{3})[- ]([0-9]{4})|[0-9]{1,2}/[0-9]{1,2}/[0-9]{4})(?:T| +))?"
+    r"|([0-9]{1,2})[- ]([a-zä]{3})[- ]([0-9]{4})|[0-9]{1,2}[-/][0-9]{1,2}[-/][0-9]{4})(?:T| +))?"
     r"(?:([0-9]{1,2}):(?=[0-9]{2}:))?([0-9]{1,2}):([0-9]{2})(?:[.,]([0-9]{1,9})|:([0-9]{3}))?"
     r"(?: ?([AP]M))?(Z|[+-][0-9]{2}:?[0-9]{2})?",
     re.IGNORECASE,
@@ -93,8 +93,8 @@ def _looks_numeric(token: str) -> bool:
 def stamp(token: str) -> tuple[int, bool] | None:
     """Nanoseconds of an ISO-8601 time stamp or a clock time, and whether it states its zone.
 
-    Dates also as 2024/03/31, 31.03.2024 and 31-Mar-2024, which mean one thing everywhere. 03/04/2024 does not: it is
-    not looked at, and a record that passes midnight runs backwards. Minutes and seconds need a fraction.
+    Dates also as 2024/03/31, 31.03.2024 and 31-Mar-2024, which mean one thing everywhere. 03/04/2024 and 03-04-2024
+    do not: they are not looked at, and a record that passes midnight runs backwards. Minutes and seconds need a fraction.
     Integers, as doubles would round the nanoseconds of a date. A zone's offset is taken
     off, so that the change to summer time does not bend a record.
     """
