@@ -1066,3 +1066,50 @@ def test_a_test_that_a_plan_calls_invalid_or_a_warm_up_is_asked_about(tmp_path, 
     result = import_files([tmp_path], remedy)
     assert not result.refusals
     assert currents(result.records) == [0.0, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells"),
+    [
+        ("Procedure", ["3 warm-up cycles, then 6 measured cycles"] * 3), ("Warm-up done", ["yes"] * 3),
+        ("Use cooling", ["no"] * 3), ("Used before [h]", ["0", "3", "3"]), ("Repeated", ["", "yes", ""]),
+        ("Remark", ["", "after warm-up", ""]), ("Bemerkung", ["", "nach 10 Einlaufzyklen", ""]),
+        ("Remark", ["", "thermocouple failed, forces valid", ""]), ("Specimen", ["Void ratio 0.2"] * 3),
+        ("Remark", ["warm-up"] * 3),
+    ],
+)  # fmt: skip
+def test_a_remark_on_something_else_or_on_every_test_discards_none(tmp_path, heading, cells):
+    for i in range(3):
+        (tmp_path / f"run_{i + 1}.csv").write_text("Time [s],disp [mm],force [N]\n" + rows(T, X, force(i / 4)))
+    lines = [f'{i + 1},{i / 4},"{cell}"' for i, cell in enumerate(cells)]
+    (tmp_path / "plan.csv").write_text("\n".join([f"Run,Coil current [A],{heading}", *lines, ""]))
+    assert currents(import_files([tmp_path]).records) == [0.0, 0.25, 0.5]
+
+
+@pytest.mark.parametrize("day", ["08-10-2024", "08/10/2024", "08.10.2024", "2024-10-08"])
+def test_stamps_count_seconds_whatever_the_order_of_day_and_month(day, tmp_path):
+    stamps = [f"{day} 13:05:{12 + t:06.3f}" for t in T]
+    lines = [f"{stamp};{x:.4f};{f:.3f}\n" for stamp, x, f in zip(stamps, X, force(0.5), strict=True)]
+    (tmp_path / "meting_0.5A.csv").write_text("Tijd;Weg [mm];Kracht [N]\n" + "".join(lines))
+    np.testing.assert_allclose(read_run(tmp_path / "meting_0.5A.csv").time, T, atol=1e-9)
+
+
+def test_samples_of_a_current_over_time_are_no_plan(tmp_path):
+    for i in range(3):
+        (tmp_path / f"T{i + 1:02}.csv").write_text("Time [s],disp [mm],force [N]\n" + rows(T, X, force(i / 2)))
+    (tmp_path / "ramp.csv").write_text("Time [s],Current [A]\n" + "".join(f"{k / 10},{k / 100}\n" for k in range(60)))
+    assert not import_files([tmp_path]).records
+
+
+@pytest.mark.parametrize(("frequencies", "refused"), [([1, 2, 1], False), ([1, 1, 1], True), ([2, 1, 1], True)])
+def test_a_plan_whose_rows_state_other_motions_gives_no_currents_until_they_are_answered(
+    frequencies, refused, tmp_path
+):
+    for i, factor in enumerate((1, 2, 1)):
+        (tmp_path / f"run_{i + 1}.csv").write_text("Time [s],disp [mm],force [N]\n" + rows(T / factor, X, force(i / 2)))
+    lines = [f"{i + 1},{i / 2},{f},10\n" for i, f in enumerate(frequencies)]
+    (tmp_path / "plan.csv").write_text("Nr,Current [A],Frequency [Hz],Amplitude [mm]\n" + "".join(lines))
+    found = import_files([tmp_path])
+    assert {r.error.code for r in found.refusals} == ({"E_MOTION_CONTRADICTS"} if refused else set())
+    profile = parse_profile('[current.values]\n"run_1*" = 0\n"run_2*" = 0.5\n"run_3*" = 1.0\n')
+    assert currents(import_files([tmp_path], profile).records) == [0.0, 0.5, 1.0]

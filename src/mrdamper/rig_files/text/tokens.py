@@ -94,8 +94,8 @@ def stamp(token: str) -> tuple[int, bool] | None:
     """Nanoseconds of an ISO-8601 time stamp or a clock time, and whether it states its zone.
 
     Dates also as 2024/03/31, 31.03.2024 and 31-Mar-2024, which mean one thing everywhere. 03/04/2024 and 03-04-2024
-    do not: they are not looked at, and a record that passes midnight runs backwards. Minutes and seconds need a fraction.
-    Integers, as doubles would round the nanoseconds of a date. A zone's offset is taken
+    do not: they are not looked at, and a record that passes midnight runs backwards. Minutes and seconds need a
+    fraction. Integers, as doubles would round the nanoseconds of a date. A zone's offset is taken
     off, so that the change to summer time does not bend a record.
     """
     match = _STAMP.fullmatch(token) if ":" in token else None
