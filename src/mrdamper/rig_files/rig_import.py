@@ -21,26 +21,25 @@ from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown,
 from mrdamper.rig_files.coil_current import as_data, require_current, with_current_behind_label, with_stated_current
 from mrdamper.rig_files.file_records import files_in, records_of_file, unpacked
 from mrdamper.rig_files.mapping.companions import (
-    TEXTS,
-    contradictions,
-    currents_beside,
-    currents_listed,
-    discarded_tests,
-    gap_of_plan,
     holds_channels,
     is_helper,
     is_list,
     joined_files,
     number_of,
-    other_motions,
     part_of,
-    repeated,
+)
+from mrdamper.rig_files.mapping.comparisons import contradictions, repeated, stated_as_amplitudes
+from mrdamper.rig_files.mapping.description import SHORT_TEXTS, is_description, is_readme, short_lines
+from mrdamper.rig_files.mapping.plans import (
+    currents_beside,
+    currents_listed,
+    discarded_tests,
+    gap_of_plan,
+    other_motions,
     results_of,
-    stated_as_amplitudes,
     tests_by,
     within_times,
 )
-from mrdamper.rig_files.mapping.description import is_description, is_readme, short_lines
 from mrdamper.rig_files.mapping.proposals import is_integrated
 from mrdamper.rig_files.mapping.results import Results
 from mrdamper.rig_files.profile import Profile, profile_of
@@ -173,7 +172,7 @@ def import_files(
         tests = next((path for path in beside if path not in lists), None) if tests is None else tests
         table = tests if tests is None or isinstance(tests, TestsTable) else load_tests(tests)
         files, left_out = files_in(given)
-        texts = [*lists, *(path for path in left_out if path.suffix.lower() in TEXTS)]
+        texts = [*lists, *(path for path in left_out if path.suffix.lower() in SHORT_TEXTS)]
         left_out += [*lists, *(path for path in files if profile.leaves_out(path.name))]
         files, texts = ([path for path in of if not profile.leaves_out(path.name)] for of in (files, texts))
         intake = _Intake(profile, table)
@@ -465,7 +464,7 @@ def found_tests(
         intake = _Intake(profile_of(profile), None)
         for path in [path for path in files if not profile_of(profile).leaves_out(path.name)]:
             intake.read(path, given=path in given)
-        intake.join([path for path in others if path.suffix.lower() in TEXTS])
+        intake.join([path for path in others if path.suffix.lower() in SHORT_TEXTS])
         refusals = [refusal for refusal in intake.refusals if not refusal.run]
         tests = intake.in_order(intake.unchecked)
     return tuple(_with_folders(tests)), tuple(refusals)

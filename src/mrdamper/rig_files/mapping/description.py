@@ -46,6 +46,7 @@ from mrdamper.rig_files.record import REQUIRED, Finding
 from mrdamper.rig_files.text.elements import numbers_in, root_of, tree_of
 from mrdamper.rig_files.text.stream import decoded
 
+SHORT_TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")
 _MOST = 200  # lines
 _FEWEST_ROWS = 50  # of a record
 _FEW_FILES = 10  # that describe a folder, not a test each

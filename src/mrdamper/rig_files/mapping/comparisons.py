@@ -1,0 +1,168 @@
+"""Comparison of the tests of several files: contradictions, copies, and forces that grow with currents."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from itertools import chain, combinations
+
+import numpy as np
+
+from mrdamper.data import Floats, held_current
+from mrdamper.data.arrays import take
+from mrdamper.errors import QualityError
+from mrdamper.rig_files.coil_current import with_stated_current
+from mrdamper.rig_files.quality.motion import stated_motion
+from mrdamper.rig_files.quality.view import find_strokes
+from mrdamper.rig_files.record import Finding, Record
+
+_ALIKE = 0.1  # relative difference of frequency and amplitude within which two motions are one
+_ALIKE_A = 0.03  # difference of the current within which two tests have the same [A]
+_FEWEST_AGREEING = 3  # tests of the amplitude that they state, for every one of half of it
+_SEVERAL = 2.0  # ratio of peak-to-peak forces at equal conditions that no repetition explains
+_ROUNDING = 1e-3  # of the largest value: two exports of one test differ by less, two tests by more
+_ROUNDING_A = 5.5e-3  # [A] so much a current of two decimals differs from one of more
+MOST_SAMPLES = 20_000
+_Point = tuple[float, float, float, float]
+
+
+def forces_grow(stated: Sequence[tuple[Record, float]], *, repeated: bool = False) -> bool:
+    """Tell if the forces of tests alike in motion grow as the currents [A] that are stated of them.
+
+    All have to be alike, or where currents may be repeated, two of different currents.
+    """
+    points = [_point(with_stated_current(record, current, "", "")) for record, current in stated]
+    rising = sorted((point for point in points if point), key=lambda point: point[2])
+    pairs = list(combinations(rising, 2))
+    alike = [(one, other) for one, other in pairs if _are_near(one, other) and other[2] - one[2] > repeated * _ALIKE_A]
+    enough = bool(alike) if repeated else len(alike) == len(pairs)
+    return len(rising) == len(points) and enough and all(one[3] < other[3] for one, other in alike)
+
+
+def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:
+    """Return the tests that contradict each other, by their place, and the refusal of each.
+
+    Equal conditions whose forces differ several-fold; and the same samples under several currents.
+    """
+    points = {i: point for i, record in enumerate(records) if (point := _point(record)) is not None}
+    refused = _copies(records, points)
+    groups: dict[tuple[str, int], list[int]] = defaultdict(list)
+    for i, point in points.items():
+        notes = records[i].provenance
+        owner = " ".join((records[i].rig, notes.get("specimen", ""), notes.get("session", "")))
+        groups[owner, round(point[2] / _ALIKE_A / 2)].append(i)
+    for i, j in chain.from_iterable(combinations(members, 2) for members in groups.values()):
+        (*_, current, force), (*_, other_current, other_force) = points[i], points[j]
+        near = abs(current - other_current) <= _ALIKE_A and _are_near(points[i], points[j])
+        if near and max(force, other_force) > _SEVERAL * min(force, other_force):
+            refused.setdefault(i, _refusal(records[i], points[i], records[j], points[j]))
+            refused.setdefault(j, _refusal(records[j], points[j], records[i], points[i]))
+    return refused
+
+
+def stated_as_amplitudes(records: Sequence[Record]) -> dict[int, Finding]:
+    """Return, by their place, tests of half the amplitude that their name states, where names state no strokes."""
+    stated = {i: length for i, record in enumerate(records) if (length := stated_motion(record, "mm")) is not None}
+    points = {i: point for i in stated if (point := _point(records[i])) is not None}
+    halves = {i for i, point in points.items() if abs(2e3 * point[1] / stated[i] - 1) < _ALIKE}
+    agreeing = sum(abs(1e3 * point[1] / stated[i] - 1) < _ALIKE for i, point in points.items())
+    if agreeing < _FEWEST_AGREEING * len(halves):
+        return {}
+    return {
+        i: Finding(
+            "W_NAME",
+            f"the name or heading states {stated[i]:g} mm and the record has an amplitude of {1e3 * points[i][1]:.3g} "
+            f"mm, where {agreeing} other tests have what theirs state: check the unit of displacement, or the name",
+        )
+        for i in halves
+    }
+
+
+def _copies(records: Sequence[Record], points: Mapping[int, _Point]) -> dict[int, QualityError]:
+    """Return the tests that hold the samples of another test and have another current than it."""
+    refused: dict[int, QualityError] = {}
+    for members in _of_same_samples(records):
+        currents = {i: points[i][2] for i in members if i in points}
+        for i, current in currents.items():
+            others = [records[j].id for j, its in currents.items() if abs(its - current) > _ALIKE_A]
+            if not others:
+                continue
+            refused[i] = QualityError(
+                f"has the same samples as {others[0]} and another current: {current:.3g} A",
+                where=records[i].provenance.get("file", records[i].id),
+                remedy="one of them is a copy under a wrong name: leave it out, or export the test again",
+                code="E_CONDITIONS",
+            )
+    return refused
+
+
+def repeated(records: Sequence[Record]) -> set[int]:
+    """Return the tests that hold the samples, the current too, of one of a shorter name or before them: by place."""
+    groups = _of_same_samples(records, with_current=True)
+    return {i for group in groups for i in sorted(group, key=lambda i: len(records[i].id))[1:]}
+
+
+def _of_same_samples(records: Sequence[Record], *, with_current: bool = False) -> list[list[int]]:
+    """Group the tests whose force and displacement, or current too, differ by rounding at most, by their places."""
+    groups: list[list[int]] = []
+    peaks = [float(np.nanmax(np.abs(_sampled(record.force, record.time.size)))) for record in records]
+    for i, record in enumerate(records):
+        near = (group for group in groups if abs(peaks[group[0]] - peaks[i]) <= _ROUNDING * peaks[i])
+        own = next((group for group in near if _same(records[group[0]], record, with_current)), None)
+        if own is None:
+            groups.append([i])
+        else:
+            own.append(i)
+    return groups
+
+
+def _same(one: Record, other: Record, with_current: bool) -> bool:
+    size = min(one.time.size, other.time.size)  # the last row may be cut off
+
+    def alike(a: Floats, b: Floats, limit: float | None = None) -> bool:
+        a, b = _sampled(a, size), _sampled(b, size)
+        return np.allclose(a, b, rtol=0, atol=limit or _ROUNDING * np.nanmax(np.abs(a)), equal_nan=True)
+
+    same = max(one.time.size, other.time.size) <= size + 1
+    same = same and alike(one.force, other.force) and alike(one.displacement, other.displacement)
+    currents = (one.current, other.current) if with_current else ()
+    return same and (not currents or alike(*currents, limit=_ROUNDING_A))  # type: ignore[arg-type]
+
+
+def _sampled(channel: Floats, size: int) -> Floats:
+    return take(channel, np.arange(0, size, max(1, size // MOST_SAMPLES)))
+
+
+def _are_near(one: _Point, other: _Point) -> bool:
+    """Tell if two tests are alike in frequency and amplitude."""
+    return all(abs(a - b) <= _ALIKE * max(a, b) for a, b in zip(one[:2], other[:2], strict=True))
+
+
+def _refusal(record: Record, one: _Point, beside: Record, other: _Point) -> QualityError:
+    whence = record.provenance.get("current_from", "its channel")
+    return QualityError(
+        f"at {one[2]:.3g} A (from {whence}), {one[0]:.3g} Hz and {1e3 * one[1]:.3g} mm its force is {one[3]:.4g} N "
+        f"from peak to peak, that of {beside.id} at the same condition {other[3]:.4g} N",
+        where=record.provenance.get("file", record.id),
+        remedy="one of them has another current or another unit of force: state the current of each in tests.csv "
+        "(where a name or heading states a wrong one, correct that), or leave one out",
+        code="E_CONDITIONS",
+    )
+
+
+def _point(record: Record) -> _Point | None:
+    """Frequency [Hz], amplitude [m], current [A] and peak-to-peak force [N] of a record; None without a period."""
+    if record.current is None:
+        return None
+    there = np.flatnonzero(record.present)
+    there = there[:: max(1, there.size // MOST_SAMPLES)]
+    time, x, force, current = (take(c, there) for c in (record.time, record.displacement, record.force, record.current))
+    if time.size < 20:
+        return None
+    strokes = find_strokes(time, x)
+    mean, change = held_current(current)
+    if strokes.period is None or strokes.steady is None or change:
+        return None
+    inside = slice(*strokes.steady)
+    low, high = np.percentile(force[inside], [2, 98])
+    return 1 / strokes.period, float(np.ptp(x[inside])) / 2, abs(mean), float(high - low)
