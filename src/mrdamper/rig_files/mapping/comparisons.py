@@ -154,8 +154,8 @@ def _point(record: Record) -> _Point | None:
     """Frequency [Hz], amplitude [m], current [A] and peak-to-peak force [N] of a record; None without a period."""
     if record.current is None:
         return None
-    there = np.flatnonzero(record.present)
-    there = there[:: max(1, there.size // MOST_SAMPLES)]
+    there = np.arange(0, record.time.size, max(1, record.time.size // MOST_SAMPLES))
+    there = there[record.present[there]]
     time, x, force, current = (take(c, there) for c in (record.time, record.displacement, record.force, record.current))
     if time.size < 20:
         return None
