@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks import conditions
 from benchmarks.timing import growth, race
-from mrdamper.data import Run
+from mrdamper.data import Floats, Run
 from mrdamper.identification import Problem, identify
 from mrdamper.identification.methods.projection import Projection
 from mrdamper.models.bouc_wen import BoucWen
@@ -98,10 +98,14 @@ def growth_rows(quick: bool) -> list[Growth]:
 
 def loop(samples: int, cycles: int) -> tuple[Path, FixedColumns]:
     """A sine of some cycles, three columns, and a force that they and a state describe in part."""
-    phase = 2 * np.pi * cycles * np.arange(samples) / samples + 0.3
-    x, v = 0.02 * np.sin(phase), 0.02 * np.cos(phase)
+    x, v = motion(samples, cycles), motion(samples, cycles, np.pi / 2)
     force = np.tanh(50 * v) + v + 0.1 * x
     return Path.of(x), FixedColumns.of(np.column_stack([v, x, np.ones(samples)]), force)
+
+
+def motion(samples: int, cycles: int, ahead: float = 0.0) -> Floats:
+    """A sine of 20 mm [m], by some angle ahead [rad]."""
+    return 0.02 * np.sin(2 * np.pi * cycles * np.arange(samples) / samples + 0.3 + ahead)
 
 
 def shapes(count: int) -> Shape:

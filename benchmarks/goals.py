@@ -30,7 +30,7 @@ class Goal:
 
 
 _STUDY = "every fold of every candidate is fitted again, for both rigs"
-_STATE = "NumPy operations that divide the record into strokes, and one tanh per sample; hand-written C takes 2 ns"
+_STATE = "NumPy operations that divide the record into strokes, and one tanh per sample"
 _IN_C = "other exponents than 1 and 2 use tables of degree five, and a step checks its input and computes the velocity"
 _MOTION = "seven harmonics, a smoothed motion and its strokes are computed for every record"
 _STREAM = "a step computes the whole force of the model with variable parameters, not the state alone"
@@ -104,7 +104,18 @@ def _of_peers(results: Any) -> list[Goal]:
             _against(one, "identify()", "solve_ivp"),
         ),
     ]
-    return [Goal(name, limit, measured, at_least=True, why=_STATE) for name, limit, measured in wanted]
+    new = _least(loop, "strokes included")
+    c = {name: _least(loop, "hand-written C", name) for name in ("RK4", "closed form")}
+    return [Goal(name, limit, measured, at_least=True, why=_STATE) for name, limit, measured in wanted] + [
+        Goal(
+            f"a new motion, against hand-written C by {name}",
+            1.5,
+            new / peer if new and peer else None,
+            "×",
+            why=_STATE,
+        )
+        for name, peer in c.items()
+    ]
 
 
 def _against(ratios: dict[str, float], ours: str, peer: str) -> float | None:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -32,7 +36,7 @@ class SimulationRow:
 
 def simulation_rows(quick: bool) -> list[SimulationRow]:
     """Ours first, then the peers by time."""
-    ways = {**_ours(), **_numba_rk4(), **_scipy(), **(_opensees())}
+    ways = {**_ours(), **_hand_written_c(), **_numba_rk4(), **_scipy(), **_jax(), **_opensees()}
     truth = _truth()
     errors = {name: float(np.abs(way() - truth).max()) for name, way in ways.items()}
     times = race(ways, 0.15 if quick else 1.0)
@@ -87,6 +91,120 @@ def _numba_rk4() -> dict[str, Callable[[], np.ndarray]]:
     v = X * OMEGA * np.cos(OMEGA * T + PHASE)
     scale = float(SHAPE.yield_displacement)
     return {"numba RK4 as usually written": lambda: rk4(v, 1e-3, 1.0, BETA, BETA, 2.0) / scale}
+
+
+def _hand_written_c() -> dict[str, Callable[[], np.ndarray]]:
+    """RK4 with numbers of this motion only, and the closed form as a sum of arguments of tanh."""
+    if (compiler := shutil.which("cc")) is None:
+        return {}
+    with tempfile.TemporaryDirectory() as folder:
+        library = f"{folder}/by_hand.so"
+        command = [compiler, "-O3", "-march=native", "-shared", "-fPIC", "-x", "c", "-", "-o", library, "-lm"]
+        subprocess.run(command, input=_C_SOURCE, text=True, check=True)
+        loaded = ctypes.CDLL(library)
+    scale = float(SHAPE.yield_displacement)
+    x, v = X * np.sin(OMEGA * T + PHASE), X * OMEGA * np.cos(OMEGA * T + PHASE)
+    numbers = np.ctypeslib.ndpointer(dtype=float, flags="C")
+
+    def way(function: Callable[..., None], motion: np.ndarray, second: float) -> Callable[[], np.ndarray]:
+        function.argtypes = [numbers, numbers, ctypes.c_int, ctypes.c_double, ctypes.c_double]  # type: ignore[attr-defined]
+
+        def run() -> np.ndarray:
+            z = np.empty(T.size)
+            function(motion, z, T.size, second, scale)
+            return z
+
+        return run
+
+    return {
+        "hand-written C, RK4 at the sample step": way(loaded.rk4, v, 1e-3),
+        "hand-written C, closed form per sample": way(loaded.closed, x, BETA),
+    }
+
+
+_C_SOURCE = """
+#include <math.h>
+static double rate(double z, double v, double b) { return v - b * fabs(v) * fabs(z) * z - b * v * z * z; }
+void rk4(const double *v, double *out, int n, double dt, double scale) {
+    double z = 0, b = 0.5 / (scale * scale);
+    for (int i = 0; i < n; i++) {
+        out[i] = z / scale;
+        if (i + 1 == n) return;
+        double middle = 0.5 * (v[i] + v[i + 1]);
+        double k1 = rate(z, v[i], b), k2 = rate(z + 0.5 * dt * k1, middle, b);
+        double k3 = rate(z + 0.5 * dt * k2, middle, b), k4 = rate(z + dt * k3, v[i + 1], b);
+        z += dt * (k1 + 2 * k2 + 2 * k3 + k4) / 6;
+    }
+}
+void closed(const double *x, double *out, int n, double unused, double scale) {
+    double z = 0, u = 0, step;  /* z = tanh(u) while loading, a straight line while unloading */
+    int loading = 1;
+    out[0] = 0;
+    for (int i = 1; i < n; i++) {
+        step = (x[i] - x[i - 1]) / scale;
+        if (z * step < 0) {
+            z += step, loading = 0;
+            if (z * step > 0) u = z, z = tanh(u), loading = 1;
+        } else {
+            if (!loading) u = atanh(z), loading = 1;
+            u += step, z = tanh(u);
+        }
+        out[i] = z;
+    }
+}
+"""
+
+
+def _jax() -> dict[str, Callable[[], np.ndarray]]:
+    """RK4 as one compiled scan, and the solvers of diffrax, in double precision."""
+    if importlib.util.find_spec("diffrax") is None:
+        return {}
+    import diffrax
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    scale, np_ = float(SHAPE.yield_displacement), jax.numpy
+    v = np_.asarray(X * OMEGA * np.cos(OMEGA * T + PHASE))
+
+    def rate(v: jax.Array, z: jax.Array) -> jax.Array:
+        return v - BETA * abs(v) * abs(z) * z - BETA * v * z**2
+
+    def step(z: jax.Array, ends: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
+        first, last = ends
+        k1 = rate(first, z)
+        k2 = rate((first + last) / 2, z + 5e-4 * k1)
+        k3 = rate((first + last) / 2, z + 5e-4 * k2)
+        k4 = rate(last, z + 1e-3 * k3)
+        return z + 1e-3 * (k1 + 2 * k2 + 2 * k3 + k4) / 6, z
+
+    scan = jax.jit(lambda v: jax.lax.scan(step, np_.float64(0.0), (v, np_.append(v[1:], v[-1])))[1])
+    term = diffrax.ODETerm(lambda t, z, _: rate(X * OMEGA * np_.cos(OMEGA * t + PHASE), z))
+    times = diffrax.SaveAt(ts=np_.asarray(T))
+
+    def solver(rtol: float) -> Callable[[], np.ndarray]:
+        control = diffrax.PIDController(rtol=rtol, atol=rtol * 1e-3 * scale)
+
+        @jax.jit
+        def solve(first: jax.Array) -> jax.Array | None:
+            return diffrax.diffeqsolve(
+                term,
+                diffrax.Tsit5(),
+                0.0,
+                T[-1],
+                1e-3,
+                first,
+                saveat=times,
+                stepsize_controller=control,
+                max_steps=10**6,
+            ).ys
+
+        return lambda: np.asarray(solve(np_.float64(0.0))) / scale
+
+    return {
+        "JAX, RK4 as a compiled scan": lambda: np.asarray(scan(v)) / scale,
+        "diffrax Tsit5, rtol 1e-3": solver(1e-3),
+        "diffrax Tsit5, rtol 1e-8": solver(1e-8),
+    }
 
 
 def _rate(t: float, z: np.ndarray) -> np.ndarray:
