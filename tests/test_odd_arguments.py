@@ -2,6 +2,7 @@
 
 import inspect
 from decimal import Decimal
+from typing import TypeVar
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from support.dampers import conditioned_damper, joint_damper, modified_damper
 
 import mrdamper
 from mrdamper import Condition, Dataset, GasSpring, InputError, Run
-from mrdamper.errors import shown
+from mrdamper.errors import shown, validate_arguments
 from mrdamper.models.bingham import Bingham
 from mrdamper.physics.motion import sine
 from mrdamper.study.parallel import IN_PROCESS
@@ -234,6 +235,20 @@ def test_what_is_no_path_is_not_imported(paths):
 def test_a_folder_in_place_of_a_dataset_is_answered_with_what_reads_it():
     with pytest.raises(InputError, match=r"'rig/'; give it as Dataset, which mrdamper.load_dataset\(folder\) reads"):
         mrdamper.run_study("rig/")
+
+
+def test_annotations_of_numpy_that_are_aliases_take_arrays():
+    """NumPy 2.5 makes them aliases of their own kind, which an older one does not have."""
+
+    def total(masses):
+        return float(np.sum(masses))
+
+    alias = TypeVar("alias")
+    alias.__module__ = "numpy._typing._array_like"
+    total.__annotations__["masses"] = alias
+    assert validate_arguments()(total)([300.0, 40.0]) == validate_arguments()(total)(np.array([300.0, 40.0])) == 340.0
+    with pytest.raises(InputError, match=r"masses is 'heavy'"):
+        validate_arguments()(total)("heavy")
 
 
 def test_arguments_that_a_function_does_not_have_are_answered_with_those_it_has():

@@ -186,7 +186,8 @@ def _fits(value: Any, kind: Any) -> bool:
 def _parts(kind: Any) -> tuple[Any, tuple[Any, ...], bool]:
     """Origin and arguments of an annotation, and if it is one of NumPy's: ArrayLike, NDArray; asked for once."""
     origin = get_origin(kind)
-    of_numbers = "numpy._typing" in str(kind) or getattr(origin, "__module__", "") == "numpy"
+    module = "" if isinstance(kind, type) else getattr(origin or kind, "__module__", "")  # an alias has one since 2.5
+    of_numbers = "numpy._typing" in str(kind) or module.startswith("numpy")
     return origin, get_args(kind), of_numbers
 
 

@@ -162,6 +162,11 @@ def test_two_strokes_one_way_are_one(shape, zeta0, a, b):
     assert twice == pytest.approx(stroke(shape, zeta0, a + b), abs=LEAVING)
 
 
+@given(shapes, st.sampled_from([-1, 1]))
+def test_a_state_that_rounding_carries_beyond_one_is_one(shape, sign):
+    assert stroke(shape, sign * (1 + 1e-9), 0.0) == stroke(shape, float(sign), 0.0)
+
+
 @given(shapes, st.floats(-1, 1), st.floats(0, 5))
 def test_float_and_array_strokes_agree(shape, zeta0, reach):
     one_float = step(shape, zeta0, reach / shape.kappa)

@@ -33,11 +33,11 @@ def follow(shape: Shape, path: Path, zeta0: float = 0.0) -> Floats:
     """(N,) hysteretic state z/z_max [-] of one shape along a motion, from the state zeta0 before its first sample.
 
     Exact for any motion that is monotone between its samples and reversals; the sampling has no effect. Accurate to
-    1e-12 for n = 1 and 2, to 1e-8 for other n. Raises `ParameterError` if that state lies beyond ±1.
+    1e-12 for n = 1 and 2, to 1e-8 for other n. Raises `ParameterError` if that state lies beyond ±1 by more than that.
     """
-    if not abs(zeta0) <= 1:
+    if not abs(zeta0) <= 1 + 1e-8:
         raise ParameterError(f"the state starts at {zeta0:g} z_max", remedy="start within ±z_max")
-    return follow_one(float(shape.kappa), float(shape.rho), shape.n, path, zeta0=float(zeta0))
+    return follow_one(float(shape.kappa), float(shape.rho), shape.n, path, zeta0=min(max(float(zeta0), -1.0), 1.0))
 
 
 def step(shape: Shape, zeta: Any, dx: Any) -> Any:
