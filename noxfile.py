@@ -20,6 +20,13 @@ def tests(session: nox.Session) -> None:
     session.run("pytest", "-m", "not slow", "-n", "auto", *session.posargs)
 
 
+@nox.session(python="3.13")
+def newest(session: nox.Session) -> None:
+    """Run the fast tests with the newest release of every dependency, which is what users install."""
+    session.install("-e", ".[all,fleet,fmu,compiler]", *DEVELOPMENT)
+    session.run("pytest", "-m", "not slow", "-n", "auto", *session.posargs)
+
+
 @nox.session(python="3.11")
 def lint(session: nox.Session) -> None:
     """Check format, style, types and the order of imports."""
