@@ -2,6 +2,7 @@
 
 import json
 
+import h5py
 import numpy as np
 import pytest
 
@@ -1047,6 +1048,7 @@ def test_a_plan_that_lacks_tests_is_named_with_them(tmp_path):
     [
         ("Remark", "INVALID - plug came off, repeated as run 3"), ("Bemerkung", "abgebrochen"), ("note", "warm-up"),
         ("valid", "no"), ("备注", "无效"), ("Status", "cancelled, oil leak"), ("Discard", "yes"), ("Include", "no"),
+        ("Valid", "0.0"), ("valid (1/0)", "0"), ("Remark", "repeat of run 1, aborted"),
         ("Bemerkung", "ungueltig, Stecker lose"), ("remarks", "not valid, plug loose"), ("Notes", "run-in"),
     ],
 )  # fmt: skip
@@ -1075,7 +1077,8 @@ def test_a_test_that_a_plan_calls_invalid_or_a_warm_up_is_asked_about(tmp_path, 
         ("Use cooling", ["no"] * 3), ("Used before [h]", ["0", "3", "3"]), ("Repeated", ["", "yes", ""]),
         ("Remark", ["", "after warm-up", ""]), ("Bemerkung", ["", "nach 10 Einlaufzyklen", ""]),
         ("Remark", ["", "thermocouple failed, forces valid", ""]), ("Specimen", ["Void ratio 0.2"] * 3),
-        ("Remark", ["warm-up"] * 3),
+        ("Remark", ["warm-up"] * 3), ("Remark", ["", "not aborted, valid", ""]),
+        ("Remark", ["", "replaces run 7 (invalid)", ""]), ("Bemerkung", ["", "Wiederholung von ungültigem Lauf 1", ""]),
     ],
 )  # fmt: skip
 def test_a_remark_on_something_else_or_on_every_test_discards_none(tmp_path, heading, cells):
@@ -1113,3 +1116,174 @@ def test_a_plan_whose_rows_state_other_motions_gives_no_currents_until_they_are_
     assert {r.error.code for r in found.refusals} == ({"E_MOTION_CONTRADICTS"} if refused else set())
     profile = parse_profile('[current.values]\n"run_1*" = 0\n"run_2*" = 0.5\n"run_3*" = 1.0\n')
     assert currents(import_files([tmp_path], profile).records) == [0.0, 0.5, 1.0]
+
+
+HEAD = "Time [s],disp [mm],force [N]\n"
+
+
+def write_tests(folder, amperes, name="run_{}.csv", heads=HEAD):
+    """Write a file for each current, in the order of their numbers."""
+    folder.mkdir(exist_ok=True)
+    for i, current in enumerate(amperes, 1):
+        (folder / name.format(i)).write_text(heads.format(current) + rows(T, X, force(current, i)))
+
+
+def by_id(result) -> dict[str, float]:
+    return {record.id: round(float(np.mean(record.current)), 3) for record in result.records}
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "heads"),
+    [
+        ("notes.txt", "Run 1: 0.25 A\nRun 2: 0.5 A, INVALID - plug came off\nRun 3: 0.75 A\n", HEAD),
+        ("plan.csv", "Run,Frequency [Hz],Remark\n1,1,\n2,1,INVALID\n3,1,\n", "# coil current: {} A\n" + HEAD),
+        ("plan.csv", "Run,Valid\n1,1\n2,0\n3,1\n", "# coil current: {} A\n" + HEAD),
+    ],
+    ids=["in a line", "without currents", "as numbers"],
+)
+def test_a_remark_beside_no_column_of_currents_discards_a_test_too(tmp_path, name, text, heads):
+    write_tests(tmp_path, (0.25, 0.5, 0.75), heads=heads)
+    (tmp_path / name).write_text(text)
+    result = import_files([tmp_path])
+    assert [(refusal.error.code, refusal.run) for refusal in result.refusals] == [("E_DISCARDED", "run_2")]
+    assert by_id(result) == {"run_1": 0.25, "run_3": 0.75}
+
+
+@pytest.mark.parametrize("plan", ["Run,Current [A],Remark\n{}", "Current [A],Remark\n{}"], ids=["numbered", "in order"])
+@pytest.mark.parametrize("pattern", ["all_2", "block 2"])
+def test_a_test_that_is_left_out_of_a_file_leaves_the_others_their_numbers(tmp_path, plan, pattern):
+    stated = dict(enumerate((0.0, 0.25, 0.5, 0.75), 1))
+    (tmp_path / "all.csv").write_text("\n".join(HEAD + rows(T, X, force(i, n)) for n, i in stated.items()))
+    lines = [f"{n},{i},{'aborted' * (n == 2)}\n"[0 if "Run" in plan else 2 :] for n, i in stated.items()]
+    (tmp_path / "plan.csv").write_text(plan.format("".join(lines)))
+    (refusal,) = import_files([tmp_path]).refusals
+    assert 'leave_out = ["all_2"]' in refusal.error.remedy
+    result = import_files([tmp_path], parse_profile(f'[file]\nleave_out = ["{pattern}"]'))
+    if pattern == "all_2" or "Run" in plan:
+        assert by_id(result) == {"all_1": 0.0, "all_3": 0.5, "all_4": 0.75}
+        assert not result.refusals
+    else:
+        assert {refusal.error.code for refusal in result.refusals} == {"E_CURRENT_MISSING"}
+    assert ("all_2" in result.left_out) == (pattern == "all_2")
+
+
+def test_files_and_tests_of_one_name_are_left_out_with_their_folder(tmp_path):
+    for day in ("mon", "tue"):
+        write_tests(tmp_path / day, (0.1, 0.2 if day == "mon" else 0.3))
+        (tmp_path / day / "run_2.csv").write_text(HEAD + rows(T, X, force(len(day + day[0]), ord(day[0]))))
+    lines = "".join(
+        f"{day},{n},{n / 10},{'void' * (day == 'tue' and n == 2)}\n" for day in ("mon", "tue") for n in (1, 2)
+    )
+    (tmp_path / "plan.csv").write_text(f"Day,Run,Current [A],Remark\n{lines}")
+    (tmp_path / "tue" / "run_1.csv").write_text(HEAD + rows(T, X, force(0.11, 7)))
+    refused = [refusal for refusal in import_files([tmp_path]).refusals if refusal.error.code == "E_DISCARDED"]
+    assert ["tue/run_2.csv" in refusal.error.remedy for refusal in refused] == [True]
+    left = import_files([tmp_path], parse_profile('[file]\nleave_out = ["tue/run_2.csv"]')).left_out
+    assert left.count("run_2.csv") == 1
+
+
+@pytest.mark.parametrize("warm_up", [False, True])
+@pytest.mark.parametrize("heads", ["first row,last row", "start [s],end [s]"])
+def test_a_plan_of_the_ranges_of_one_record_gives_each_test_the_current_of_its_range(tmp_path, heads, warm_up):
+    motions = [(0.5, 1.0), (0.0, 1.0), (None, 0.4), (1.0, 1.4), (0.25, 1.4)]
+    motions = [motion for motion in motions if warm_up or motion[0] is not None]
+    rest, parts, plan, at = np.zeros(300), [], [], 0
+    for n, (current, size) in enumerate(motions):
+        parts.append((np.r_[size * X, rest], np.r_[force(current or 0.0, n), rest]))
+        end = at + T.size + rest.size
+        bounds = (at + 1, end) if "row" in heads else (at * 0.005, end * 0.005)
+        plan += [] if current is None else [(current, *bounds)]
+        at = end
+    x, f = (np.concatenate(channel) for channel in zip(*parts, strict=True))
+    (tmp_path / "session.csv").write_text(HEAD + rows(0.005 * np.arange(x.size), x, f))
+    lines = [f"{n},{a:g},{b:g},{current}\n" for n, (current, a, b) in enumerate(sorted(plan), 1)]  # in no order of time
+    (tmp_path / "protocol.csv").write_text("".join([f"No.,{heads},current [A]\n", *lines]))
+    result = import_files([tmp_path])
+    assert list(by_id(result).values()) == [0.5, 0.0, 1.0, 0.25]
+    assert result.left_out == (("session_3",) if warm_up else ())
+    lines = [line.replace(f"{n},", f"{n},9", 1) for n, line in enumerate(lines, 1)]  # ranges that are not there
+    (tmp_path / "protocol.csv").write_text("".join([f"No.,{heads},current [A]\n", *lines]))
+    assert not import_files([tmp_path]).records
+
+
+def test_a_step_without_a_current_is_a_pause_only_where_the_record_rests(tmp_path):
+    motions = [X, 0 * X, X, 1.4 * X, 1.4 * X]
+    loads = [force(i, n) * (n != 1) for n, i in enumerate((0.0, 0.0, 0.5, 1.0, 0.25))]
+    steps = np.repeat(np.arange(1, 6), T.size)
+    columns = (0.005 * np.arange(steps.size), np.concatenate(motions), np.concatenate(loads), steps)
+    (tmp_path / "ses.csv").write_text(HEAD.strip() + ",Step\n" + rows(*columns))
+    (tmp_path / "plan.csv").write_text("Step,Type,Current [A]\n1,sine,0\n2,pause,\n3,sine,0.5\n4,sine,\n5,sine,0.25\n")
+    result = import_files([tmp_path])
+    assert [(refusal.error.code, refusal.run) for refusal in result.refusals] == [("E_CURRENT_MISSING", "ses_4")]
+    assert by_id(result) == {"ses_1": 0.0, "ses_3": 0.5, "ses_5": 0.25}
+    (tmp_path / "tests.csv").write_text("file,run,current_A\nses.csv,ses_4,1\nses.csv,ses_5,0.25\n")
+    assert by_id(import_files([tmp_path])) == {"ses_1": 0.0, "ses_3": 0.5, "ses_4": 1.0, "ses_5": 0.25}
+
+
+def test_names_of_columns_in_a_line_give_none_of_them_the_unit_of_another(tmp_path):
+    step = np.repeat([1, 2], T.size // 2)
+    lines = "# Step,Type,Current [A]\n# 1,sine,0\n# 2,sine,0.5\n"
+    (tmp_path / "a.csv").write_text(lines + HEAD.strip() + ",Step\n" + rows(T, X, force(0.5), step))
+    assert not import_files([tmp_path]).records
+
+
+def test_a_plan_on_a_sheet_of_its_tests_is_compared_with_their_motion_and_its_remarks_count(tmp_path):
+    def workbook(frequencies, remarks):
+        book = openpyxl.Workbook()
+        book.active.append(["Test", "Current (A)", "Frequency (Hz)", "Remark"])
+        for n, (frequency, remark) in enumerate(zip(frequencies, remarks, strict=True), 1):
+            book.active.append([n, n / 4, frequency, remark])
+            sheet = book.create_sheet(f"Test {n}")
+            sheet.append(["Time (s)", "Stroke (mm)", "Force (N)"])
+            for row in zip(T / (1 + (n == 2)), X, force(n / 4, n), strict=True):
+                sheet.append(list(map(float, row)))
+        book.save(tmp_path / "all.xlsx")
+        return import_files([tmp_path])
+
+    openpyxl = pytest.importorskip("openpyxl")
+    assert list(by_id(workbook((1, 2, 1), ("", "", ""))).values()) == [0.25, 0.5, 0.75]
+    assert [refusal.error.code for refusal in workbook((2, 1, 1), ("", "", "")).refusals] == [
+        "E_MOTION_CONTRADICTS"
+    ] * 3
+    (refusal,) = workbook((1, 2, 1), ("", "", "aborted")).refusals
+    assert (refusal.error.code, refusal.run) == ("E_DISCARDED", "all_Test_3")
+
+
+@pytest.mark.parametrize(
+    ("line", "contradicts"),
+    [
+        ("Note: the force column is in N (the header of the template says kN).", True), ("Force: N", True),
+        ("| force | N |", True), ("Kraft in kN", False), ("load cell: 25 N", False), ("peak forces in N", False),
+        ("The forces of the paper are in N", False), ("Force in N (until 2020); force in kN (since 2021)", False),
+    ],
+)  # fmt: skip
+def test_a_unit_that_a_text_states_otherwise_than_the_heading_is_asked_about(tmp_path, line, contradicts):
+    (tmp_path / "a_0.5A.csv").write_text(HEAD.replace("[N]", "(kN)") + rows(T, X, force(0.5)))
+    (tmp_path / "README.md").write_text(f"# Tests\n\n{line}\n")
+    refusals = import_files([tmp_path]).refusals
+    assert [(r.error.code, "in kN" in r.error.found, "in N" in r.error.found) for r in refusals] == (
+        [("E_AMBIGUOUS", True, True)] * contradicts
+    )
+    for unit, factor in (("N", 1.0), ("kN", 1e3)):
+        (record,) = import_files([tmp_path], parse_profile(f'[channels.force]\nunit = "{unit}"')).records
+        assert record.force == pytest.approx(factor * force(0.5), abs=1e-2 * factor)
+
+
+def test_a_test_without_a_channel_among_others_in_a_structure_is_refused_and_other_tables_are_named(tmp_path):
+    with h5py.File(tmp_path / "rig.h5", "w") as file:
+        for n, amperes in enumerate((0.0, 0.5, 1.0), 1):
+            group = file.create_group(f"run_{n}")
+            group.attrs["current_A"] = amperes
+            for name, values, unit in (("time", T, "s"), ("displacement", X, "mm"), ("force", force(amperes, n), "N")):
+                if (n, name) != (3, "force"):
+                    group.create_dataset(name, data=values).attrs["units"] = unit
+        sensor = file.create_group("sensor check")
+        for name, unit in (("time", "s"), ("displacement", "mm")):
+            sensor.create_dataset(name, data=T[:40]).attrs["units"] = unit
+    result = import_files([tmp_path])
+    assert by_id(result) == {"rig_run_1": 0.0, "rig_run_2": 0.5}
+    (refusal,) = result.refusals
+    assert refusal.error.code == "E_COLUMN"
+    assert "table run_3: no column is known to be force" in str(refusal.error)
+    assert any("not taken for tests: sensor check" in finding.text for finding in result.records[0].findings)
+    assert not import_files([tmp_path], parse_profile('[file]\nleave_out = ["run_3"]')).refusals

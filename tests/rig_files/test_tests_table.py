@@ -258,3 +258,38 @@ def test_a_table_of_far_too_many_rows_is_refused_at_once(tmp_path):
         load_tests(path)
     assert caught.value.code == "E_TESTS"
     assert time.process_time() - begin < 5.0
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "plan", "accepted"),
+    [
+        ("a_0.5A.csv", "# coil current: 1 A\n", "", (0.5, 1.0)),
+        ("a.csv", "# coil current: 1 A\n", "", (0.5,)),
+        ("a_0.5A.csv", "", "Run,Current [A]\na_0.5A,1.5\nb,0\n", (0.5, 1.5)),
+        ("a.csv", "# coil current: 1 A\n", "Ch4 [A],Ch5 [A]", (0.5, 1.0)),
+    ],
+    ids=["line and name", "line and channel", "name and plan", "line and columns"],
+)
+def test_the_table_decides_between_statements_that_contradict_each_other_but_not_against_a_channel(
+    tmp_path, name, head, plan, accepted
+):
+    more = (plan or "current_A") if name == "a.csv" else ""
+    values = ",0.501,0.7" if plan else ",0.501"
+    lines = text().splitlines()
+    lines = [f"{line}{(',' + more if i == 0 else values) if more else ''}" for i, line in enumerate(lines)]
+    write(tmp_path, name, head + "\n".join(lines) + "\n")
+    if plan.startswith("Run"):
+        write(tmp_path, "b.csv", text(1.01 * rows(seed=3)))
+        write(tmp_path, "plan.csv", plan)
+    stem = name.removesuffix(".csv")
+    (refusal,) = [refusal for refusal in import_files([tmp_path]).refusals if refusal.run == stem]
+    assert refusal.error.code in ("E_CURRENT_CONTRADICTS", "E_AMBIGUOUS")
+    assert "tests.csv (--write-tests)" in refusal.error.remedy
+    for value in (*accepted, 2.5):
+        write(tmp_path, "tests.csv", f"file,current_A\n{name},{value}\n")
+        found = import_files([tmp_path])
+        records = [record for record in found.records if record.id == stem]
+        decided = value in accepted or (head and "_" in name) or plan.startswith("Ch4")
+        assert [round(float(record.current.mean()), 1) for record in records] == [value] * bool(decided)
+        if not decided and more:
+            assert "correct tests.csv; if the channel is wrong, set [channels.current]" in str(found.refusals[0].error)

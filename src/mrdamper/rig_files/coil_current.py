@@ -36,6 +36,10 @@ NO_CHANNEL = "the current channel is "  # beginning of the finding on a column o
 CURRENT_TOO = "and give the current of each test"  # within the remedy of a refusal of units or columns
 _CALIBRATION = 'give its calibration, [channels.current] unit = "A" and scale (A per its unit), in a profile'
 _PROFILE = "profile"  # where a current stands
+_DECIDE = "write the right one into tests.csv (--write-tests), or correct the one that is wrong"
+_CHANNEL_WRONG = (
+    'if the channel is wrong, set [channels.current] unit = "A" and scale in a profile, or leave its column out'
+)
 _OF_ANOTHER = re.compile("(?i)shunt|bridge|brücke")  # resistance or voltage
 _FOLDERS = 3  # above a file, whose names may state its current
 
@@ -68,7 +72,7 @@ def current_of(
         lines = [line for line in table.remarks if line not in table.titles]
         statements = _set_points(table, rows) or stated_in_titles(lines) or _folders(table, path)
     stated = _agreed(statements, channel, where)
-    if stated is not None and channel is None and source is None and all(s.of_line for s in statements):
+    if stated is not None and channel is None and all(s.of_line for s in statements):
         _refuse_contradicted_line(table, stated, rows, where)
     if stated is None or (channel is not None and not stated_by_profile):
         return None, {}
@@ -89,7 +93,7 @@ def _refuse_contradicted_line(table: RawTable, stated: Statement, rows: slice, w
     raise ColumnError(
         printable(f"{stated.whence} gives {stated.amperes:g} A, the column {name!r} {low:.3g} to {high:.3g} A"),
         where=where,
-        remedy=f"if it is the coil's current, correct the line and set {line} in a profile; else set [current.values]",
+        remedy=f"{_DECIDE}: if the line, set {line} in a profile",
         code="E_CURRENT_CONTRADICTS",
     )
 
@@ -109,12 +113,12 @@ def _agreed(statements: list[Statement], channel: Floats | None, where: str) -> 
         code, whence, against = "E_CURRENT_CONTRADICTS", "the profile", [*varies, *measured, *against]
         remedy = "leave [current] out of the profile; if the file is wrong, correct it, or rename it"
     elif over or against:
-        code, remedy = "E_RANGE" if over else "E_AMBIGUOUS", "correct the name or the line that is wrong"
+        code, remedy = "E_RANGE" if over else "E_AMBIGUOUS", _DECIDE
         if over:
             current, whence, against = over[0].amperes, over[0].whence, ["which is no coil current of a damper"]
     else:
         code, against = "E_CURRENT_CONTRADICTS", measured
-        remedy = "if the channel is right, rename; else leave the channel out of the export"
+        remedy = f"if the channel is right, write its current into tests.csv (--write-tests); {_CHANNEL_WRONG}"
     if not against:
         return statements[0]
     problem = f"{whence} gives {current:g} A, {against[0]}"
@@ -138,7 +142,7 @@ def with_value_of_name(record: Record, path: Path, profile: Profile) -> Record:
             printable(f"{patterns[0]!r} and {other!r} give {record.id} {value:g} and {values[other]:g} A"), where=where,
             remedy="correct [current.values] of the profile", code="E_AMBIGUOUS",
         )  # fmt: skip
-    return with_stated_current(record, value, "profile", where)
+    return with_stated_current(replace(record, doubt=None), value, "profile", where)
 
 
 def _places(record: Record, path: Path) -> tuple[str, ...]:
@@ -147,7 +151,9 @@ def _places(record: Record, path: Path) -> tuple[str, ...]:
 
 
 def require_current(record: Record, path: Path = Path()) -> Record:
-    """Return the record of a test of a file; `ColumnError`, E_CURRENT_MISSING, if it has no current."""
+    """Return the record of a test of a file; `ColumnError`, E_CURRENT_MISSING, if it has no current; its doubt."""
+    if record.doubt is not None:
+        raise record.doubt
     if record.current is not None:
         return record
     places = _places(record, path)
@@ -236,14 +242,34 @@ def with_stated_current(record: Record, current: float, whence: str, where: str,
     mean = None if record.current is None else contradicted(record.current, current)
     if mean is not None:
         problem = printable(f"{whence} gives {current:g} A, {record.id} has {mean:g} A ({own or 'current channel'})")
-        remedy = "correct the one that is wrong, leave it out, or rename the file"
+        remedy = _DECIDE if own else f"correct {whence}; {_CHANNEL_WRONG}"
         raise ColumnError(problem, where=printable(where), remedy=remedy, code="E_CURRENT_CONTRADICTS")
     if record.current is not None and not own:
         return record
     findings = tuple(finding for finding in record.findings if not finding.text.startswith(NO_CHANNEL))
     findings += (Finding("W_CHOSEN", printable(note)),) if note else ()
     provenance = {**record.provenance, "current_from": as_data(whence)}
-    return replace(record, current=constant(current, record.time), findings=findings, provenance=provenance)
+    doubt = None if own else record.doubt  # of two statements, one of the user's table among them, this one agrees
+    channel = constant(current, record.time)
+    return replace(record, current=channel, findings=findings, provenance=provenance, doubt=doubt)
+
+
+def with_decided_current(record: Record, current: float, table: str, line: int) -> Record:
+    """Return the record with the current [A] that the user's table states: it decides where others contradict.
+
+    Where it contradicts the only other statement, that is the record's doubt, until a plan of tests agrees with it.
+
+    Raises `ColumnError`: E_CURRENT_CONTRADICTS if the channel has another.
+    """
+    where = f"{table}, line {line}"
+    try:
+        note = f"{table} decides: {record.doubt.found}" if record.doubt else ""
+        return with_stated_current(replace(record, doubt=None), current, table, where, note)
+    except ColumnError as error:
+        if "current_from" not in record.provenance:
+            raise
+        error.remedy = f"correct the one that is wrong, leave the cell of {table} empty, or rename the file"
+        return replace(with_stated_current(replace(record, current=None), current, table, where), doubt=error)
 
 
 def _statements(table: RawTable, path: Path, profile: Profile, force: int | None) -> list[Statement]:

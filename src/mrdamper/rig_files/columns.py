@@ -6,6 +6,7 @@ import contextlib
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from mrdamper.rig_files.column_names import (
     Header,
     Unit,
     holds,
+    is_unit,
     names_command,
     names_compression,
     parse_unit,
@@ -41,6 +43,7 @@ _MOST_RESTARTS = 0.05  # of the samples of a clock that counts within steps
 _TOTAL = re.compile(r"total|absolut|gesamt|cumulat|kumul", re.IGNORECASE)
 _COUNTS = ("counts", *TABLES["unit_names"]["counts"])
 _INDEX, _MEASURED = words("sample"), words("measured")
+_AROUND_UNITS = words("around_units")
 _TIMES = re.compile(r"(?i)(?<!\w)multipl(?:y|ie[ds]?|ier|iz|ic|ik)\w*")  # no multiple, no multiplexer
 _FACTOR = re.compile(r"(?<![\w.,])[0-9]+(?:[.,][0-9]+)?(?!\w)")
 
@@ -388,13 +391,33 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
     return _refusal(UnitError, table, problem, remedy, "E_UNITS_DIMENSION")
 
 
+def units_in(line: str) -> list[tuple[str, str]]:
+    """Return the channels of which a line states the unit and nothing else, and the units: the force column is in N."""
+    cells = [cell.strip(' `*#"') for cell in re.split(r"[,;|\t()]|\. ", line)]
+    cells += [f"{name} in {unit}" for name, unit in pairwise(cells) if is_unit(unit)]
+    stated = []
+    for header in (split_name(re.sub(r"\s*[:=]\s+", " in ", cell.rstrip("."))) for cell in cells):
+        named = [word for word in words_of(header.name) if word.casefold() not in _AROUND_UNITS]
+        role = role_of(named[0]) if len(named) == 1 and header.unit else None
+        stated += [(role, header.unit)] if role and header.dimension == DIMENSION[role] else []
+    return stated
+
+
 def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> None:
-    """Refuse a column whose name and row of units state different units."""
+    """Refuse a column whose name and row of units, or a line beside the columns, state different units."""
     inner = split_name(table.names[column]) if table.units[column] else None
     other = parse_unit(unit)
-    if inner is None or other in (None, inner.known) or inner.dimension != DIMENSION[role]:
+    stated = {
+        of: f"the line {line.strip()[:80]!r}" for line in table.lines for its, of in units_in(line) if its == role
+    }
+    same = any(parse_unit(of) == other for of in stated)  # what else is stated may be that of other files
+    if inner is not None and inner.dimension == DIMENSION[role]:
+        stated, same = {inner.unit: "its name"}, inner.known == other
+    if not stated or same or other is None:
         return
-    problem = f"column {table.names[column]!r} is in {inner.unit} by its name and in {unit} by its row of units"
+    own, where = next(iter(stated.items()))
+    heading = "heading" if inner is None else "row of units"
+    problem = f"column {table.names[column]!r} is in {unit} by its {heading} and in {own} by {where}"
     remedy = f'set one: [channels.{role}] unit = "..." in a profile'
     raise table.source.refuse("E_AMBIGUOUS", problem, remedy, line=table.line, column=column + 1)
 

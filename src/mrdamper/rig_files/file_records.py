@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from mrdamper.data.temporary import temporary_folder
-from mrdamper.errors import ColumnError, CombinedError, InputError, printable
+from mrdamper.errors import ColumnError, CombinedError, InputError, listed, printable
 from mrdamper.rig_files.coil_current import as_data, with_value_of_name
 from mrdamper.rig_files.column_names import COMPUTED, holds, words, words_of
 from mrdamper.rig_files.columns import assign, partly_assigned
@@ -60,13 +60,16 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
     with raw_tables(path, profile.file) as every:
         tables, problems = tables_of_tests(test_tables(described(every, path, profile), profile), profile)
         tables, computed = _without_computed(tables)
+        blocks = [n for n, table in enumerate(tables, 1) if table.label.startswith("block")]
+        numbers = [n for n, t in enumerate(tables, 1) if n not in blocks or not profile.leaves_out(t.label)]
+        count, tables = len(tables), [tables[n - 1] for n in numbers]
         records: list[Record] = []
         for table in tables:
             try:
                 records += records_of(table, profile, path)
             except InputError as error:
                 problems += getattr(error, "errors", (error,))
-        if not records or any(table.label.startswith("block") for table in tables):
+        if not records or blocks:
             CombinedError.raise_from(problems)
         digest = digest_of(path)
     records = joined(records, profile, tables)
@@ -77,8 +80,9 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
     if computed:
         finding = Finding("W_TABLE", f"tables of filtered or computed values are left out: {', '.join(computed)}")
         records[0] = records[0].noticed(finding)
-    if len({record.id for record in records}) < len(records):
-        records = [replace(record, id=f"{record.id}_{i}") for i, record in enumerate(records, 1)]
+    if len({record.id for record in records}) < len(records) or len(records) == len(numbers) < count:
+        numbers = numbers if len(records) == len(numbers) else range(1, len(records) + 1)
+        records = [replace(record, id=f"{record.id}_{n}") for n, record in zip(numbers, records, strict=True)]
     named = []
     for record in records:
         try:
@@ -107,7 +111,7 @@ def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
     kept = [table for table in tables if not (table.label and profile.leaves_out(table.label))]
     if tables and not kept:
         raise tables[0].source.refuse("E_NO_DATA", "every table is left out", "correct [file] leave_out of the profile")
-    tables = kept
+    tables = [table for table in tables if table in kept or table.label.startswith("block")]  # these have a number
     tables = with_joined_rasters([with_time_stated(completed(with_channels_as_columns(table))) for table in tables])
     tables = [with_one_clock(table) for table in tables]
     forms = [form_of_tests(table, profile.file) for table in tables]
@@ -134,13 +138,25 @@ def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawT
             others.append((table, error))
     if not fitting:
         raise others[0][1] if others else RigFileError("E_NO_DATA", "no table in this file")
-    return fitting, [_incomplete(t, error) for t, error in others if _resembles_a_test(t, fitting, profile)]
+    refused = [_resembles_a_test(table, fitting, profile) for table, _ in others]
+    parts = [t.label for (t, _), is_test in zip(others, refused, strict=True) if not is_test and _moves(t, profile)]
+    if parts:
+        text = f"tables without all channels are not taken for tests: {listed(parts, 5)}"
+        fitting[0] = fitting[0].noted(Finding("W_TABLE", printable(text)))
+    return fitting, [_incomplete(*other) for other, is_test in zip(others, refused, strict=True) if is_test]
+
+
+def _moves(table: RawTable, profile: Profile) -> bool:
+    """Tell if a table has a label, and columns of two of the channels that a test needs."""
+    return table.label != "" and len({*REQUIRED} & {*partly_assigned(table, profile)}) > 1
 
 
 def _resembles_a_test(table: RawTable, tests: list[RawTable], profile: Profile) -> bool:
-    """Return whether a table beside tests has as many columns, as many rows and two of their channels."""
+    """Tell if a table beside tests has a label or number of columns like one, its rows and two of their channels."""
     columns = [entry.column for role, entry in partly_assigned(table, profile).items() if role in REQUIRED]
-    alike = next((test for test in tests if len(test.names) == len(table.names)), None)
+    called = re.sub("[0-9]+", "0", table.label)
+    forms = ((test, len(test.names) == len(table.names), re.sub("[0-9]+", "0", test.label) == called) for test in tests)
+    alike = next((test for test, *same in forms if any(same)), None)
     if alike is None or holds(table.label, COMPUTED) or len(columns) < len(REQUIRED) - 1:
         return False
     return _rows(table, columns[0]) >= _ROWS_OF_A_TEST * _rows(alike, assign(alike, profile)["force"].column)
@@ -156,7 +172,7 @@ def _incomplete(table: RawTable, error: InputError) -> InputError:
     return ColumnError(
         error.found,
         where=f"{printable(table.source.name)}, table {printable(table.label)}",
-        remedy=f"give it the headings of the other tables, or set [file] leave_out = [{label}] in a profile",
+        remedy=f"give it the channels of the other tables, or set [file] leave_out = [{label}] in a profile",
         code=error.code,
     )
 

@@ -53,7 +53,7 @@ class FileForm(Table):
     blocks: Literal["join", "split"] | None = None
     """If what looks like several tests (repeated headers, groups of columns, a time that starts again) is one."""
     leave_out: tuple[NAME, ...] = Field(default=(), max_length=100, strict=False)
-    """Patterns with * of files and of tables within them that are no tests: `warmup*`, `*/calibration`."""
+    """Patterns with * of files, and tables or tests within them, to leave out: `warmup*`, `*/calibration`, `b_2`."""
     sample_rate_Hz: float | None = Field(default=None, gt=0, allow_inf_nan=False)
     """Of files without time stamps."""
 
@@ -197,9 +197,10 @@ class Profile(Table):
             remedy = "write names of files or tests, with * for anything"
             raise ProfileError(problem, where="[current.values]", remedy=remedy)
 
-    def leaves_out(self, name: str) -> bool:
-        """Tell if files or tables of this name are no tests."""
-        return any(fnmatchcase(name.casefold(), pattern.casefold()) for pattern in self.file.leave_out)
+    def leaves_out(self, *parts: str) -> bool:
+        """Tell if a file or table of this name, behind those of its folders, or a test behind its file, is left out."""
+        names = {p: "/".join(parts[-1 - p.count("/") :]) for p in self.file.leave_out}
+        return any(fnmatchcase(name.casefold(), pattern.casefold()) for pattern, name in names.items())
 
     def channel(self, name: str) -> Channel:
         """Return the settings of a channel."""

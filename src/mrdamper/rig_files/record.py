@@ -64,6 +64,7 @@ class Record:
     lines: np.ndarray | None = None  # (N,) line of every sample, counted from one, where the file is text
     window: tuple[float, float] | None = None  # steady window of a stored run [s]; of a new record it is found
     steady: SteadyPart | None = None  # found by the checks; of a long record, checked in parts, found afterwards
+    doubt: InputError | None = None  # statements of its current that contradict each other, until another decides
 
     @property
     def channels(self) -> dict[str, Floats]:

@@ -35,13 +35,16 @@ from mrdamper.rig_files.mapping.plans import (
     currents_listed,
     discarded_tests,
     gap_of_plan,
+    lacks_current,
     other_motions,
+    remarks_of,
     results_of,
+    results_within,
     tests_by,
-    within_times,
+    within_ranges,
 )
 from mrdamper.rig_files.mapping.proposals import is_integrated
-from mrdamper.rig_files.mapping.results import Results
+from mrdamper.rig_files.mapping.results import WITHIN, Results
 from mrdamper.rig_files.profile import Profile, profile_of
 from mrdamper.rig_files.quality import check_long_record
 from mrdamper.rig_files.quality.table import to_run
@@ -105,7 +108,7 @@ def read_runs(path: str | Path, profile: Profile | str | Path | None = None) -> 
     """Read every test of a rig's file and check it: testing machines record several blocks; as `read_run`."""
     with np.errstate(all="ignore"):  # numbers near the end of the range overflow in sums and are refused as such
         records, problems = records_of_file(Path(path), profile_of(profile))
-        CombinedError.raise_from(problems)
+        CombinedError.raise_from([*problems, *(record.doubt for record in records if record.doubt)])
         return tuple(check_long_record(record) for record in records)
 
 
@@ -173,8 +176,8 @@ def import_files(
         table = tests if tests is None or isinstance(tests, TestsTable) else load_tests(tests)
         files, left_out = files_in(given)
         texts = [*lists, *(path for path in left_out if path.suffix.lower() in SHORT_TEXTS)]
-        left_out += [*lists, *(path for path in files if profile.leaves_out(path.name))]
-        files, texts = ([path for path in of if not profile.leaves_out(path.name)] for of in (files, texts))
+        left_out += [*lists, *(path for path in files if profile.leaves_out(*path.parts))]
+        files, texts = ([path for path in of if not profile.leaves_out(*path.parts)] for of in (files, texts))
         intake = _Intake(profile, table)
         for number, path in enumerate(files):
             progress(path.name, number / len(files))
@@ -187,7 +190,7 @@ def import_files(
         refusals = intake.refusals or ([] if intake.tests() else intake.notes)
         named = tuple(replace(refusal, file=without_temporary_folder(refusal.file)) for refusal in refusals)
         left_out += [] if refusals is intake.notes else [Path(note.file) for note in intake.notes]
-        left_out += intake.copies
+        left_out += intake.omitted
         names = tuple(path.name for path in left_out)
         reasons = {Path(note.file).name: intake.reason(note) for note in intake.notes}
         return ImportResult(with_unique_ids(_with_folders(intake.tests())), named, names, reasons)
@@ -205,11 +208,12 @@ class _Intake:
         self.unchecked: list[tuple[Path, Record]] = []  # every test, also those refused
         self.refusals: list[Refusal] = []
         self.notes: list[Refusal] = []  # texts of a folder that hold no table
-        self.copies: list[Path] = []  # files of tests that hold the samples of another
+        self.omitted: list[Path] = []  # tests that the profile leaves out, files of those that repeat another
         self.met: list[tuple[Path, str]] = []
         self._given: set[Path] = set()
         self._shares: dict[Path, tuple[str, Profile]] = {}  # files of some channels each, by the profile
         self._results = cache(results_of)  # the table of results that a file holds
+        self._plan: Path | None = None  # which gave tests their current
 
     def read(self, path: Path, *, given: bool) -> None:
         """Read a file, and check the tests in it whose current is known."""
@@ -243,23 +247,33 @@ class _Intake:
 
     def _take(self, path: Path, records: list[Record]) -> None:
         """Check tests with what the table of tests says of them, or keep them until another file states the current."""
+        runs = {row.run for row in (self._table.of_file(path) if self._table else ()) if row.file}
+        as_listed = runs <= {"", *(record.id for record in records)}  # else by the numbers of a plan of tests
         for record in records:
-            self.met.append((path, record.id))
-            problems: list[InputError] = []
-            if self._table is not None:
-                try:
-                    record = applied(record, self._table.of(path, record.id), self._table)
-                except InputError as error:
-                    problems.append(error)
-            if record.current is None and not problems:
+            self.met += [(path, record.id)] * as_listed
+            record = self._applied(path, record) if as_listed else record
+            if record.current is None or record.doubt:
                 self._pending.append((path, record))
             else:
-                self._check(path, record, problems, several=len(records) > 1)
+                self._check(path, record, several=len(records) > 1)
 
-    def _check(self, path: Path, record: Record, problems: list[InputError], *, several: bool) -> None:
+    def _applied(self, path: Path, record: Record) -> Record:
+        """Return a test with what the table of tests states of it; a contradiction is its doubt."""
+        try:
+            row = self._table.of(path, record.id) if self._table else None
+            return applied(record, row, self._table) if self._table else record
+        except InputError as error:
+            return replace(record, doubt=error)
+
+    def _check(self, path: Path, record: Record, *, several: bool) -> None:
+        """Check a test that the profile does not leave out: only here, as plans count those that it does."""
+        if self._profile.leaves_out(*path.parts, record.id):
+            self.omitted.append(Path(record.id))
+            return
         self.unchecked.append((path, record))
-        checked = record
-        for step in (partial(require_current, path=path), check_long_record):
+        checked, problems = record, list[InputError]()
+        steps = (partial(require_current, path=path), check_long_record)
+        for step in steps if record.doubt is None else steps[:1]:
             try:
                 with np.errstate(all="ignore"):
                     checked = step(checked)
@@ -278,23 +292,28 @@ class _Intake:
         used = self._join_channels(others, texts)
         counts = Counter(path for path, _ in self._pending)
         names = {name for path, run in self.met for name in (*path.parts, run)}
+        met = {*self.met}
         for path, record in self._pending:
+            if (path, record.id) not in met:
+                self.met.append((path, record.id))
+                record = self._applied(path, record)
             record = with_current_behind_label(record, path, names)
-            self._check(path, record, [], several=counts[path] > 1)
+            self._check(path, record, several=counts[path] > 1)
         self._refuse_names_without_point()
-        unused = [path for path in (*others, *texts) if path not in used]
+        whence = {file: record.provenance.get("current_from", "") for file, record in self._found}
+        notes = [Path(note.file) for note in self.notes]
+        unused = [path for path in (*others, *notes, *texts) if path not in used - {self._plan}]
         for path in [path for path in unused if self._found or path.stat().st_size <= _LARGEST_LIST]:
-            stated = currents_beside(path, self._results(path), self.tests())
-            if stated and other_motions(path, self._results(path), self.tests()) is None:
-                self._refuse_contradicted(stated, discarded_tests(path, self._results(path), self.tests()))
+            if self._compare(path, self._results(path)):
+                self._drop_refusals({path})
             elif path in others and path not in self._given and self._is_beside_tests(path):
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
-            else:
-                continue
-            self._drop_refusals({path})
+                self._drop_refusals({path})
+        for path in [path for path, of in whence.items() if of.startswith(WITHIN)]:
+            self._compare(path, results_within(path, self._profile.file))
         tests = self.tests()
         again = repeated([record for _, record in tests])
-        self.copies = [path for i, (path, _) in enumerate(tests) if i in again]
+        self.omitted += [path for i, (path, _) in enumerate(tests) if i in again]
         self._found = [test for i, test in enumerate(tests) if i not in again]
         self._refuse(contradictions([record for _, record in self.tests()]))
         tests = self.tests()
@@ -317,14 +336,26 @@ class _Intake:
     def _is_beside_tests(self, path: Path) -> bool:
         return is_list(path) or is_description(path) or is_helper(path, self._order)
 
-    def _refuse_contradicted(self, stated: Sequence[tuple[float, str]], refused: dict[int, InputError]) -> None:
-        """Refuse accepted tests whose current another file contradicts, and those that are refused for a remark."""
-        for i, ((file, record), (current, whence)) in enumerate(zip(self.tests(), stated, strict=True)):
+    def _compare(self, path: Path, results: Results | None) -> bool:
+        """Refuse accepted tests that contradict a plan, in its own file those of that, or that a remark in it discards.
+
+        Tell if it states currents of tests that move as it says.
+        """
+        tests = [(i, test) for i, test in enumerate(self.tests()) if test[0] == path] or [*enumerate(self.tests())]
+        own = [test for _, test in tests]
+        stated, other = currents_beside(path, results, own), other_motions(path, results, own)
+        refused = discarded_tests(path, results or remarks_of(path), own)
+        if other is not None:
+            refused = dict.fromkeys(range(len(own)), other) if own[0][0] == path else {}
+        for i, ((file, record), (current, whence)) in enumerate(zip(own, stated or (), strict=False)):
             try:
-                with_stated_current(record, current, whence, file.name)
+                if other is None:
+                    with_stated_current(record, current, whence, file.name)
             except InputError as error:
-                refused[i] = error
-        self._refuse(refused)
+                if self._table is None or record.provenance.get("current_from") != self._table.path.name:
+                    refused[i] = error
+        self._refuse({tests[i][0]: error for i, error in refused.items()})
+        return bool(stated) and other is None
 
     def _join_channels(self, others: list[Path], texts: Sequence[Path]) -> set[Path]:
         """Join channels of several files, and currents that other files state; the files that were used."""
@@ -377,13 +408,15 @@ class _Intake:
         states others.
         """
         candidates: list[tuple[Path, Results | None, list[tuple[Path, Record]], list[tuple[float, str]]]] = []
+        pending = self._pending
         own = ((path, self._results(path)) for path in paths)
         linked = (
             (path, joined) for path in paths if (results := self._results(path)) for other in paths
             if other != path and (joined := results.joined(short_lines(other)))
         )  # fmt: skip
         for path, results in chain(own, linked):
-            tests = self._numbered(results) if results else self._pending
+            every = self._numbered(results) if results else pending
+            tests = within_ranges([test for test in every if not lacks_current(*test, results)], results)
             stated = currents_beside(path, results, tests)
             if stated and not (results and results.of_supply):
                 candidates = [(path, results, tests, stated)]
@@ -395,12 +428,17 @@ class _Intake:
         path, results, tests, stated = candidates[0]
         other = other_motions(path, results, tests)
         refused = dict.fromkeys(range(len(tests)), other) if other else discarded_tests(path, results, tests)
-        self.refusals += [Refusal(str(tests[i][0]), error, tests[i][1].id) for i, error in refused.items()]
-        self._pending = [
-            (file, with_stated_current(record, *own, file.name, f"its current is the {own[0]:g} A of {own[1]}"))
-            for i, ((file, record), own) in enumerate(zip(within_times(tests, results), stated, strict=True))
-            if i not in refused
-        ]
+        every = self._numbered(results) if results else pending
+        self.met += [(file, record.id) for file, record in every]
+        self._pending = [test for test in every if lacks_current(*test, results)]
+        ids = {record.id for _, record in (*tests, *self._pending)}
+        self.omitted += [Path(record.id) for _, record in every if record.id not in ids]  # in no row's range
+        for i, ((file, record), (current, whence)) in enumerate(zip(tests, stated, strict=True)):
+            with contextlib.suppress(InputError):  # its doubt stays
+                note = f"its current is the {current:g} A of {whence}"
+                record = with_stated_current(record, current, whence, file.name, note)
+            self._pending.append((file, replace(record, doubt=refused.get(i, record.doubt))))
+        self._plan = path
         self.notes = [note for note in self.notes if Path(note.file) != path]
         self._drop_refusals({path})
         return {path}
@@ -413,7 +451,9 @@ class _Intake:
         tests: list[tuple[Path, Record]] = []
         for path in dict.fromkeys(path for path, _ in self._pending):
             numbered = tests_by(path, results, self._profile.of_file(path)[1])
-            tests += [(path, test) for test in numbered] or [test for test in self._pending if test[0] == path]
+            tests += [(path, self._applied(path, test)) for test in numbered] or [
+                test for test in self._pending if test[0] == path
+            ]
         return tests
 
     def _refuse_names_without_point(self) -> None:

@@ -116,7 +116,13 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         if "current" in part:
             part["current"], slow = without_gaps(part["current"])
             noticed = [*findings, *slow]
-        current, whence = current_of(table, profile, path, part.get("current"), stretch, assigned["force"].column)
+        doubt = None
+        try:
+            current, whence = current_of(table, profile, path, part.get("current"), stretch, assigned["force"].column)
+        except ColumnError as error:
+            if error.code == "E_CURRENT_MISSING":
+                raise
+            current, whence, doubt = None, dict[str, str](), error
         if current is not None:
             part["current"] = constant(current, part["time"])
             noticed = [f for f in findings if not f.text.startswith(NO_CHANNEL)]
@@ -126,7 +132,8 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
             Record(
                 id=run,
                 findings=tuple(dict.fromkeys(noticed)), provenance={**remarks, **whence}, rig=profile.rig,
-                excitation=profile.excitation, split=profile.split, lines=its_lines, further=others, **part,  # type: ignore[arg-type]
+                excitation=profile.excitation, split=profile.split, lines=its_lines, further=others,
+                doubt=doubt, **part,  # type: ignore[arg-type]
             )
         )  # fmt: skip
     return records

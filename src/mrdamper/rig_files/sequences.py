@@ -120,7 +120,8 @@ def _concatenated(records: Sequence[Record]) -> Record:
     alike = [name for name in records[0].further if all(name in record.further for record in records)]
     further = {name: np.concatenate([record.further[name] for record in records]) for name in alike}
     findings = dict.fromkeys(finding for record in records for finding in record.findings)
-    return replace(records[0], findings=tuple(findings), lines=lines, further=further, **channels)  # type: ignore[arg-type]
+    doubt = next((record.doubt for record in records if record.doubt), None)
+    return replace(records[0], findings=tuple(findings), lines=lines, further=further, doubt=doubt, **channels)  # type: ignore[arg-type]
 
 
 def _steps_between(one: Record, other: Record) -> float:

@@ -11,7 +11,7 @@ from pathlib import Path, PurePath
 from mrdamper.data import held_current
 from mrdamper.data.strict_text import content_of
 from mrdamper.errors import CombinedError, InputError, listed
-from mrdamper.rig_files.coil_current import with_stated_current
+from mrdamper.rig_files.coil_current import with_decided_current
 from mrdamper.rig_files.column_names import names_condition, split_name, words
 from mrdamper.rig_files.conditions import CELL, LARGEST_STATED, quantity_in_cell
 from mrdamper.rig_files.record import Record
@@ -146,11 +146,11 @@ def load_tests(path: str | Path) -> TestsTable:
 
 
 def applied(record: Record, row: StatedTest | None, table: TestsTable) -> Record:
-    """Apply a row to a record; E_CURRENT_CONTRADICTS if its channel, name or heading states another current."""
+    """Apply a row to a record; E_CURRENT_CONTRADICTS if its channel has another current."""
     if row is None:
         return record
     if row.current is not None:
-        record = with_stated_current(record, row.current, table.path.name, f"{table.path.name}, line {row.line}")
+        record = with_decided_current(record, row.current, table.path.name, row.line)
     changes = {name: value for name, value in (("split", row.split), ("rig", row.rig)) if value}
     return replace(record, provenance={**record.provenance, **row.notes}, **changes)  # type: ignore[arg-type]
 
@@ -160,7 +160,7 @@ def tests_text(records: Sequence[Record]) -> str:
     rows: list[tuple[str, ...]] = [COLUMNS]
     for record in records:
         current = None
-        if record.current is not None:
+        if record.current is not None and record.doubt is None:
             mean, change = held_current(record.current[record.present])
             current = None if change else mean
         notes = record.provenance

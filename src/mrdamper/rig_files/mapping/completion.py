@@ -357,7 +357,13 @@ def _with_listed_units(table: RawTable) -> RawTable:
             i = int(number[1]) - 1 if number else i
             role = (role_of(names[i]) or header.role or "") if i in names else ""
             fits = role_of(meaning) in (role, None) and header.dimension == DIMENSION.get(role, "voltage")
-            if i is None or not fits or re.search(rf"[0-9]\s*(?:[|;\t]\s*|,)?{re.escape(header.unit)}\W*$", text):
+            row = "," in meaning and i in names and role_of(names[i]) is None  # Step, Type, Current [A]
+            if (
+                i is None
+                or row
+                or not fits
+                or re.search(rf"[0-9]\s*(?:[|;\t]\s*|,)?{re.escape(header.unit)}\W*$", text)
+            ):
                 continue  # load cell, 25 kN: a value
             headings = " ".join(part.partition(": ")[0] for part in (line, whole))
             doubt = RATING.search(f"{headings} {meaning}") or _FIGURE.search(line) or re.search("[0-9]", meaning)

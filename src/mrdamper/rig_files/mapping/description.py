@@ -28,6 +28,7 @@ from mrdamper.rig_files.column_names import (
     words,
     words_of,
 )
+from mrdamper.rig_files.columns import units_in
 from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines
 from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, states_si, states_volts
 from mrdamper.rig_files.mapping.results import numbered_tests
@@ -111,12 +112,13 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     texts, listing = (readme, listing) if readme else (above[0], [*listing, *above[2]])
     texts = texts + (structures if lacking or len(structures) <= _FEW_FILES else [])
     texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
-    texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(p.name)]
+    texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(*p.parts)]
     lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
     names = {header.name.casefold() for header in table.headers}
     counted = {line: {match["name"].casefold() for match in NUMBER_IS.finditer(line)} for line in lines}
     stated = [
-        (lacking and _of_channels(line)) or (line if states_sign(line) or names & counted[line] else "")
+        (lacking and _of_channels(line))
+        or (line if states_sign(line) or names & counted[line] or units_in(line) else "")
         for line in lines
     ]
     force = profile.channel("force")
@@ -199,9 +201,9 @@ def _of_channels(line: str) -> str:
 def with_description(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Return the table with what the text or structure of its name, or the only other file of its folder, states."""
     other = _only_other(path)
-    other = other if other and _may_describe(other, path) and not profile.leaves_out(other.name) else None
+    other = other if other and _may_describe(other, path) and not profile.leaves_out(*other.parts) else None
     beside = [path.with_suffix(suffix) for suffix in (*_NAMED, *_TEXTS)]
-    named = [p for p in beside if p != path and p.is_file() and not profile.leaves_out(p.name)]
+    named = [p for p in beside if p != path and p.is_file() and not profile.leaves_out(*p.parts)]
     named = [p for p in (*named, *([other] if other else ())) if p.suffix.lower() in _NAMED or is_description(p)]
     lines = short_lines(named[0]) if named else packaged_lines(path)
     lines = [*lines, *_head_in_yaml(table.remarks)]

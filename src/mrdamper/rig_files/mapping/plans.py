@@ -9,6 +9,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from mrdamper.errors import InputError, QualityError, listed, printable
 from mrdamper.rig_files.coil_current import NO_CHANNEL
 from mrdamper.rig_files.column_names import (
@@ -19,15 +21,24 @@ from mrdamper.rig_files.column_names import (
     words,
     words_of,
 )
-from mrdamper.rig_files.conditions import amperes, series_in
+from mrdamper.rig_files.conditions import LONGEST_LINE, amperes, series_in
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.mapping.comparisons import MOST_SAMPLES, forces_grow
 from mrdamper.rig_files.mapping.description import SHORT_TEXTS, short_lines, with_units_of_notes
-from mrdamper.rig_files.mapping.results import NUMBER, Results, lines_of, results_in
-from mrdamper.rig_files.profile import Profile
+from mrdamper.rig_files.mapping.results import (
+    MOST_ROWS,
+    NUMBER,
+    SEPARATORS,
+    Results,
+    lines_of,
+    results_among,
+    results_in,
+)
+from mrdamper.rig_files.profile import FileForm, Profile
 from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.record import Finding, Record, part_of_record
+from mrdamper.rig_files.text.layout import cells_of
 
 _LEGEND = re.compile(  # I1 = 0.3 A, cur0.8 = coil current 0.8 A (as set)
     r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([^\W\d_][^\d=:]{0,30}\s)?([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)"
@@ -37,8 +48,11 @@ _DECIMAL_CODE = re.compile(r"(?<![a-z])[a-z]{1,6}[0-9]+\.[0-9]+(?![0-9])")
 _SCHEME = re.compile(r"[\w.,+=-]*(?:<[^<>]{1,60}>[\w.,+=-]*)+")  # MRD_A<amplitude in mm>_I<coil current in A>.csv
 _SCHEME_NUMBER = re.compile(r"[0-9]+(?:[.,xp][0-9]+)?")
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
-_DISCARDED, _DISCARDED_FLAG = (re.compile("(?i)" + "|".join(words(of))) for of in ("discarded", "discarded_flag"))
+_DISCARDED, _DISCARDED_FLAG, _NOT_DISCARDED = (
+    re.compile("(?i)" + "|".join(words(of))) for of in ("discarded", "discarded_flag", "not_discarded")
+)
 _FREQUENCY = re.compile(r"(?i)^(?:f\b|freq|frec|fréq|част|频率|周波数|częst)")
+_REST = 0.1  # of the largest motion: less is that of no test
 _OTHER_FREQUENCY = 0.15  # relative difference of the frequencies of two tests
 _REMARKS = frozenset((*words("notes"), *words("remarks")))
 _STAMP = re.compile(  # 20190603_140512, 2019-06-03T14:05:12
@@ -56,6 +70,11 @@ def results_of(path: Path) -> Results | None:
     return tables_of_results[0] if len(tables_of_results) == 1 else None
 
 
+def results_within(path: Path, form: FileForm) -> Results | None:
+    """Return the table of results that a file holds beside its tests; None if it holds none."""
+    return ask_tables(path, lambda tables: results_among(tables)[0], None, form)
+
+
 def currents_beside(
     path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]
 ) -> list[tuple[float, str]] | None:
@@ -63,7 +82,9 @@ def currents_beside(
 
     None unless one of them names every test; a legend's codes stand in the names of files, between separators.
     """
-    timed = results.rows_in_time([record.time for _, record in tests]) if results else {}
+    timed = results.rows_in_range([(record.time, record.lines) for _, record in tests]) if results else {}
+    if results and not timed and results.ranges[1] and len({file for file, _ in tests}) == 1 < len(tests):
+        return None
     by_test = {i: results.current[row] for i, (row, _) in timed.items()} if results else {}
     by_test = by_test or (results.by_test(_called(tests)) if results else {})
     folders = [(file.parent.name,) for file, _ in tests]
@@ -139,10 +160,12 @@ def discarded_tests(path: Path, results: Results | None, tests: Sequence[tuple[P
     numbered = replace(results, current=tuple(float(i) if remark else 0.0 for i, remark in enumerate(remarks, 1)))
     refused: dict[int, InputError] = {}
     files = [file for file, _ in tests]
+    parts = [file.parts if files.count(file) == 1 else (*file.parts, record.id) for file, record in tests]
     for i, (row, _) in enumerate(currents_beside(path, numbered, tests) or ()):
-        file, record = tests[i]
-        name = json.dumps(file.name if files.count(file) == 1 else record.id, ensure_ascii=False)
         if row:
+            file, own = files[i], parts[i]
+            alone = (n for n in range(1, len(own)) if sum(part[-n:] == own[-n:] for part in parts) == 1)
+            name = json.dumps("/".join(own[-next(alone) :]), ensure_ascii=False)
             problem = f"{path.name} has the remark {remarks[int(row) - 1][:80]!r} on this test"
             remedy = f"set [file] leave_out = [{name}] in a profile, or correct the remark if the test is valid"
             refused[i] = QualityError(printable(problem), where=file.name, remedy=remedy, code="E_DISCARDED")
@@ -150,8 +173,29 @@ def discarded_tests(path: Path, results: Results | None, tests: Sequence[tuple[P
 
 
 def _discards(heading: str, cell: str) -> bool:
-    of_remarks = not _REMARKS.isdisjoint(words_of(heading.casefold()))
-    return bool(_DISCARDED_FLAG.search(f"{heading}: {cell}") or (of_remarks and _DISCARDED.search(cell)))
+    parts = () if _REMARKS.isdisjoint(words_of(heading.casefold())) else _DISCARDED.finditer(cell)
+    applies = any(not _NOT_DISCARDED.search(cell[: part.start()]) for part in parts)
+    return applies or _DISCARDED_FLAG.search(f"{heading}: {cell}") is not None
+
+
+def remarks_of(path: Path) -> Results | None:
+    """Return the only table of tests with remarks and without currents that a file holds; its currents are zero."""
+    lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
+    lines = lines or ask_tables(path, lambda tables: [line for t in tables[:20] for line in lines_of(t)], [])
+    tables = []
+    for separator in SEPARATORS[:4]:
+        rows = [[cell.strip(' "') for cell in cells_of(line[:LONGEST_LINE], separator)] for line in lines[:MOST_ROWS]]
+        for at, heads in enumerate(rows):
+            body = [row for row in rows[at + 1 :] if len(row) == len(heads)]
+            if len(heads) > 1 < len(body) and any(map(_heads_remarks, heads)):
+                cells = tuple((str(n), *row) for n, row in enumerate(body, 1))
+                tables.append(Results((0.0,) * len(cells), cells, "", ("", *heads)))
+    return tables[0] if len(tables) == 1 else None
+
+
+def _heads_remarks(cell: str) -> bool:
+    flags = (_DISCARDED_FLAG.search(f"{cell}: {answer}") for answer in ("yes", "no"))
+    return not _REMARKS.isdisjoint(words_of(cell.casefold())) or any(flags)
 
 
 def gap_of_plan(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> Finding | None:
@@ -233,10 +277,11 @@ def _meant(key: str, files: Collection[str]) -> list[str]:
     return [f"{code[1].casefold()}{number}" for number in range(int(code[2]), int(code[3] or code[2]) + 1)]
 
 
-def within_times(tests: Sequence[tuple[Path, Record]], results: Results | None) -> list[tuple[Path, Record]]:
-    """Return the tests between the starts and the ends that a table of results states, if it states them."""
-    timed = results.rows_in_time([record.time for _, record in tests]) if results else {}
-    return [(file, part_of_record(record, timed[i][1]) if timed else record) for i, (file, record) in enumerate(tests)]
+def within_ranges(tests: Sequence[tuple[Path, Record]], results: Results | None) -> list[tuple[Path, Record]]:
+    """Return the tests that have a row in a table of results, between the starts and ends it states, if it does."""
+    rows = results.rows_in_range([(record.time, record.lines) for _, record in tests]) if results else {}
+    parts = [(file, part_of_record(record, rows[i][1])) for i, (file, record) in enumerate(tests) if i in rows]
+    return parts or [*tests]
 
 
 def _called(tests: Sequence[tuple[Path, Record]]) -> list[tuple[str, ...]]:
@@ -255,7 +300,10 @@ def _clocks(record: Record, file: Path) -> set[str]:
 
 
 def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:
-    """The tests of a file whose column numbers them as a table of results does; empty if it has no such column."""
+    """The tests of a file whose column numbers them as a table of results does, without pauses in which it rests.
+
+    Empty if it has no such column.
+    """
     try:
         with raw_tables(path, profile.file) as tables:
             column = results.column_of_tests(tables[0]) if len(tables) == 1 else None
@@ -263,6 +311,14 @@ def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:
             return []
         form = profile.file.model_copy(update={"run_column": column})
         records, _ = records_of_file(path, profile.model_copy(update={"file": form}))
-        return [r for r in records if not results.is_pause(r.id.removeprefix(path.stem).lstrip("_"))]
+        moves = max(float(np.ptp(record.displacement)) for record in records)
+        rest = [r for r in records if lacks_current(path, r, results) and np.ptp(r.displacement) < _REST * moves]
+        return [record for record in records if record not in rest]
     except InputError:
         return []
+
+
+def lacks_current(path: Path, record: Record, results: Results | None) -> bool:
+    """Tell if a test of a file has a number whose row in a table of results states no current."""
+    number = record.id.removeprefix(path.stem).lstrip("_")
+    return results is not None and number != "" and results.is_pause(number)

@@ -15,13 +15,14 @@ from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of, is_units
 
-_SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
+SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]+)?|[.,][0-9]+)")
 _QUANTITY = re.compile(rf"({NUMBER.pattern})\s*(m?A)")
+WITHIN = "table of results"  # within the file of its tests: beginning of where their currents stand
 _SUPPLY = re.compile(r"(?i)\b(?:power[ _-]?)?suppl(?:y|ied)\b|\bpsu\b")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
-_MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
+MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
 _LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: ...
     r"[\s#%*\"-]*(?P<name>[^\W\d_][^\d:=]{0,30}?)[\s_.#-]*(?P<number>[0-9]{1,6})"
     r"(?:\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até)\b)\s*(?:[^\W\d_]{1,30}[\s_.#]*)?(?P<last>[0-9]{1,6}))?\s*[:=;,\t)]"
@@ -29,7 +30,7 @@ _LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: .
 _LABELLED = re.compile(r"(?<![^\W\d_])([^\W\d_]+)[ _.-]?([0-9]+)")
 _CLOCK = re.compile(r"[0-2][0-9]:[0-5][0-9](?::[0-5][0-9])?")
 _MEASURED = tuple(words("measured"))
-_STARTS, _ENDS = words("start"), words("end")
+_STARTS, _ENDS, _ROWS = words("start"), words("end"), words("row")
 _COUNTED = words("run") | words("run_number") | words("table_file")  # what the number in a test's name may be
 _NUMBERED = _COUNTED | {"step", "schritt", "#"}
 _OWN_KEYS = {"id", "nr", "nr.", "no", "no.", "#", "key", "index", "pk"}  # each table has its own
@@ -95,7 +96,7 @@ class Results:
         only one by which all rows fit.
         """
         tables = []
-        for separator in _SEPARATORS[:3]:
+        for separator in SEPARATORS[:3]:
             heads, *rows = [[cell.strip('" ') for cell in cells_of(line, separator)] for line in lines] or [[]]
             rows = [row for row in rows if len(row) == len(heads)]
             common = {*map(_key, heads)} & {_key(key) for key in self.keys if key} - _OWN_KEYS
@@ -142,30 +143,42 @@ class Results:
         names = [column for header, column in zip(headers[1:], columns, strict=True) if header.dimension is None]
         return names if numbered or tests != len(self.current) else [first, *names]
 
-    def rows_in_time(self, times: Sequence[Floats]) -> dict[int, tuple[int, slice]]:
+    def rows_in_range(self, clocks: Sequence[tuple[Floats, np.ndarray | None]]) -> dict[int, tuple[int, slice]]:
         """Return the row of each test by its number, and the samples between the start and the end that it states.
 
-        Empty unless each test has one row, of which it covers more than half, and no row two tests.
+        Each test has its time and the lines of its samples. Empty unless each test has one row, of which it covers
+        more than half, and no row two tests; or each row one test, and others have none.
         """
-        bounds = [self._seconds(words) for words in (_STARTS, _ENDS)]
-        rows: dict[int, tuple[int, slice]] = {}
-        for test, time in enumerate(times if all(bounds) else ()):
-            inside = [slice(*np.searchsorted(time, window)) for window in zip(*bounds, strict=True)]
-            spans = [b - a for a, b in zip(*bounds, strict=True)]
-            covered = [time[s][-1] - time[s][0] if s.stop > s.start else 0.0 for s in inside]
-            own = [row for row, span in enumerate(spans) if span > 0 and covered[row] > 0.5 * span]
-            if len(own) == 1:
-                rows[test] = own[0], inside[own[0]]
-        return rows if len({row for row, _ in rows.values()}) == len(times) else {}
+        (by_rows, windows), rows = self.ranges, dict[int, tuple[int, slice]]()
+        for test, (time, lines) in enumerate(clocks if windows else ()):
+            clock = lines if by_rows else time
+            inside = [slice(*np.searchsorted(clock, window)) for window in windows if clock is not None]
+            covered = [
+                clock[s.stop - 1] - clock[s.start] if clock is not None and s.stop > s.start else 0 for s in inside
+            ]
+            own = [row for row, of in enumerate(covered) if of > 0.5 * (windows[row][1] - windows[row][0]) > 0]
+            rows |= {test: (own[0], inside[own[0]])} if len(own) == 1 else {}
+        different = len({row for row, _ in rows.values()})
+        return rows if different == len(rows) and different in (len(clocks), len(self.cells)) else {}
 
-    def _seconds(self, words: frozenset[str]) -> list[float]:
-        """Return the times [s] of the one column of such a name; empty if there is none."""
+    @property
+    def ranges(self) -> tuple[bool, list[tuple[float, float]]]:
+        """Start and end of every row's test, in rows of a file or in time [s], where the rows state them."""
+        for by_rows in (True, False):
+            starts, ends = (self._bounds(of, by_rows) for of in (_STARTS, _ENDS))
+            if starts and ends:
+                return by_rows, list(zip(starts, ends, strict=True))
+        return False, []
+
+    def _bounds(self, words: frozenset[str], by_rows: bool) -> list[float]:
+        """Return the times [s], or rows, of the one column of such a name; empty if there is none."""
         headers = [split_name(key) for key in self.keys]
-        columns = [i for i, header in enumerate(headers) if words & {w.casefold() for w in words_of(header.name)}]
-        columns = [i for i in columns if headers[i].dimension == "time"]
+        named = [{word.casefold() for word in words_of(header.name)} for header in headers]
+        columns = [i for i, own in enumerate(named) if words & own and bool(_ROWS & own) == by_rows]
+        columns = [i for i in columns if headers[i].dimension == (None if by_rows else "time")]
         cells = [row[columns[0]].replace(",", ".") for row in self.cells] if len(columns) == 1 else []
-        unit = headers[columns[0]].known if cells else None
-        return [unit.factor * float(cell) for cell in cells] if unit and all(map(NUMBER.fullmatch, cells)) else []
+        factor = headers[columns[0]].factor if cells else 1.0
+        return [factor * float(cell) for cell in cells] if all(map(NUMBER.fullmatch, cells)) else []
 
     def column_of_tests(self, table: RawTable) -> str | None:
         """Return the column of a record that numbers its tests as a column of this table, of the same name, does."""
@@ -186,7 +199,7 @@ class Results:
 
 def results_in(lines: Sequence[str]) -> Results | None:
     """Return the table of results among lines of text; None if there is none or several."""
-    for separator in _SEPARATORS:
+    for separator in SEPARATORS:
         tables = {(table.current, table.cells): table for table in _tables(lines[:_MOST_LINES], separator)}
         if tables:
             return next(iter(tables.values())) if len(tables) == 1 else None
@@ -198,18 +211,24 @@ def numbered_tests(lines: Iterable[str]) -> Results | None:
     matches = [match for line in lines if (match := _LISTED_TEST.match(line[:_LONGEST_LINE]))]
     stated = [(match, currents_in(match.string[match.end() :])) for match in matches]
     rows = [
-        (m["name"].strip(), f"{number:0{len(m['number'])}d}", of[0])
+        (m["name"].strip(), f"{number:0{len(m['number'])}d}", of[0], m.string[m.end() :].strip())
         for m, of in stated
-        for number in range(int(m["number"]), int(m["last"] or m["number"]) + 1)[:_MOST_ROWS]
+        for number in range(int(m["number"]), int(m["last"] or m["number"]) + 1)[:MOST_ROWS]
         if len(of) == 1 and not holds(m["name"], COIL)
     ]
-    numbers = {(name.casefold(), int(number)) for name, number, _ in rows}
+    numbers = {(name.casefold(), int(number)) for name, number, *_ in rows}
     if len(numbers) < _FEWEST_ROWS or len(numbers) < len(rows) or len({name for name, _ in numbers}) > 1:
         return None
-    cells = tuple((str(i), f"{name.split()[-1]}{number}", number) for i, (name, number, _) in enumerate(rows, 1))
+    cells = tuple(
+        (str(i), f"{name.split()[-1]}{number}", number, text) for i, (name, number, _, text) in enumerate(rows, 1)
+    )
     counts = any({word.casefold(), word.casefold().rstrip("s")} & _COUNTED for word in words_of(rows[0][0]))
     return Results(
-        tuple(row[2] for row in rows), cells, "a line for each test", ("", "", rows[0][0]), counts_tests=counts
+        tuple(row[2] for row in rows),
+        cells,
+        "a line for each test",
+        ("", "", rows[0][0], "remark"),
+        counts_tests=counts,
     )
 
 
@@ -224,21 +243,23 @@ def form_of_tests(table: RawTable, form: FileForm) -> FileForm:
 
 def with_results(tables: list[RawTable]) -> list[RawTable]:
     """Tables of a file's tests with the currents that its table of results states."""
-    results = results_in(list(dict.fromkeys(line for table in tables for line in table.remarks)))
-    results, tests = (results, tables) if results is not None else _results_apart(tables)
+    results, tests = results_among(tables)
     if results is None or results.of_supply or not tests:
         return tables
     shared = set(tests[0].remarks).intersection(*(table.remarks for table in tests[1:])) if len(tests) > 1 else set()
     currents = results.by_test([[table.label, *_last_lines(table, shared)] for table in tests])
-    note, with_current = f"table of results, {results.title}", list[RawTable]()
+    note, with_current = f"{WITHIN}, {results.title}", list[RawTable]()
     for i, table in enumerate(tests if len(currents) == len(tests) else ()):
         rest = {key: v for key, v in table.constants.items() if not names_condition(split_name(key).name, "current")}
         with_current.append(replace(table, constants={**rest, "current [A]": currents[i]}, stated_in=note))
     return with_current or tables
 
 
-def _results_apart(tables: Sequence[RawTable]) -> tuple[Results | None, list[RawTable]]:
-    """Return the one table of results among tables, and those of tests: others of a workbook list parameters."""
+def results_among(tables: Sequence[RawTable]) -> tuple[Results | None, Sequence[RawTable]]:
+    """Return the table of results above tables, or the one among them, and those of tests: others list parameters."""
+    above = results_in(list(dict.fromkeys(line for table in tables for line in table.remarks)))
+    if above is not None:
+        return above, tables
     stated, tests = list[Results](), list[RawTable]()
     for table in tables:
         may_be = (any(map(_is_current, table.names)) or not any(table.names)) and not table.columns("time")
@@ -258,7 +279,7 @@ def lines_of(table: RawTable) -> list[str]:
         return []
     columns = [table.words(i) for i in range(len(table.names))]
     sizes = {words.codes.size for words in columns}
-    if len(sizes) > 1 or max(sizes, default=0) > _MOST_ROWS:  # channels of several rasters, or of a record
+    if len(sizes) > 1 or max(sizes, default=0) > MOST_ROWS:  # channels of several rasters, or of a record
         return []
     rows = zip(*([words.labels[code] for code in words.codes] for words in columns), strict=True)
     units = (table.units,) if any(table.units) else ()
