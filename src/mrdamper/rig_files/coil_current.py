@@ -257,9 +257,8 @@ def with_stated_current(record: Record, current: float, whence: str, where: str,
 def with_decided_current(record: Record, current: float, table: str, line: int) -> Record:
     """Return the record with the current [A] that the user's table states: it decides where others contradict.
 
-    Where it contradicts the only other statement, that is the record's doubt, until a plan of tests agrees with it.
-
-    Raises `ColumnError`: E_CURRENT_CONTRADICTS if the channel has another.
+    That the channel has another is the record's doubt; that it contradicts the only other statement, until a plan of
+    tests agrees with it.
     """
     where = f"{table}, line {line}"
     try:
@@ -267,7 +266,7 @@ def with_decided_current(record: Record, current: float, table: str, line: int) 
         return with_stated_current(replace(record, doubt=None), current, table, where, note)
     except ColumnError as error:
         if "current_from" not in record.provenance:
-            raise
+            return replace(record, doubt=error)
         error.remedy = f"correct the one that is wrong, leave the cell of {table} empty, or rename the file"
         return replace(with_stated_current(replace(record, current=None), current, table, where), doubt=error)
 

@@ -39,7 +39,6 @@ from mrdamper.rig_files.mapping.plans import (
     other_motions,
     remarks_of,
     results_of,
-    results_within,
     tests_by,
     within_ranges,
 )
@@ -56,6 +55,7 @@ from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, name
 
 _PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")
 _TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
+_Tests = list[tuple[Path, Record]]
 _LARGEST_LIST = 2**16  # bytes of a plan of tests that states the current of none that was read
 _MAY_BE_PARTS = (
     "E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER", "E_FIELD_COUNT"
@@ -251,19 +251,11 @@ class _Intake:
         as_listed = runs <= {"", *(record.id for record in records)}  # else by the numbers of a plan of tests
         for record in records:
             self.met += [(path, record.id)] * as_listed
-            record = self._applied(path, record) if as_listed else record
+            record = applied(record, path, self._table) if as_listed else record
             if record.current is None or record.doubt:
                 self._pending.append((path, record))
             else:
                 self._check(path, record, several=len(records) > 1)
-
-    def _applied(self, path: Path, record: Record) -> Record:
-        """Return a test with what the table of tests states of it; a contradiction is its doubt."""
-        try:
-            row = self._table.of(path, record.id) if self._table else None
-            return applied(record, row, self._table) if self._table else record
-        except InputError as error:
-            return replace(record, doubt=error)
 
     def _check(self, path: Path, record: Record, *, several: bool) -> None:
         """Check a test that the profile does not leave out: only here, as plans count those that it does."""
@@ -296,7 +288,7 @@ class _Intake:
         for path, record in self._pending:
             if (path, record.id) not in met:
                 self.met.append((path, record.id))
-                record = self._applied(path, record)
+                record = applied(record, path, self._table)
             record = with_current_behind_label(record, path, names)
             self._check(path, record, several=counts[path] > 1)
         self._refuse_names_without_point()
@@ -310,7 +302,7 @@ class _Intake:
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
                 self._drop_refusals({path})
         for path in [path for path, of in whence.items() if of.startswith(WITHIN)]:
-            self._compare(path, results_within(path, self._profile.file))
+            self._compare(path, results_of(path, self._profile.file))
         tests = self.tests()
         again = repeated([record for _, record in tests])
         self.omitted += [path for i, (path, _) in enumerate(tests) if i in again]
@@ -407,28 +399,26 @@ class _Intake:
         A list or a supply's current counts only where no table or legend states the coil's, and no other such file
         states others.
         """
-        candidates: list[tuple[Path, Results | None, list[tuple[Path, Record]], list[tuple[float, str]]]] = []
-        pending = self._pending
+        candidates: list[tuple[Path, Results | None, _Tests, _Tests, list[tuple[float, str]]]] = []
         own = ((path, self._results(path)) for path in paths)
         linked = (
             (path, joined) for path in paths if (results := self._results(path)) for other in paths
             if other != path and (joined := results.joined(short_lines(other)))
         )  # fmt: skip
         for path, results in chain(own, linked):
-            every = self._numbered(results) if results else pending
+            every = self._numbered(results) if results else self._pending
             tests = within_ranges([test for test in every if not lacks_current(*test, results)], results)
             stated = currents_beside(path, results, tests)
             if stated and not (results and results.of_supply):
-                candidates = [(path, results, tests, stated)]
+                candidates = [(path, results, every, tests, stated)]
                 break
             stated = stated or currents_listed(path, tests)
-            candidates += [(path, results, tests, stated)] if stated else []
+            candidates += [(path, results, every, tests, stated)] if stated else []
         if len({tuple(current for current, _ in stated) for *_, stated in candidates}) != 1:
             return set()
-        path, results, tests, stated = candidates[0]
+        path, results, every, tests, stated = candidates[0]
         other = other_motions(path, results, tests)
         refused = dict.fromkeys(range(len(tests)), other) if other else discarded_tests(path, results, tests)
-        every = self._numbered(results) if results else pending
         self.met += [(file, record.id) for file, record in every]
         self._pending = [test for test in every if lacks_current(*test, results)]
         ids = {record.id for _, record in (*tests, *self._pending)}
@@ -451,7 +441,7 @@ class _Intake:
         tests: list[tuple[Path, Record]] = []
         for path in dict.fromkeys(path for path, _ in self._pending):
             numbered = tests_by(path, results, self._profile.of_file(path)[1])
-            tests += [(path, self._applied(path, test)) for test in numbered] or [
+            tests += [(path, applied(test, path, self._table)) for test in numbered] or [
                 test for test in self._pending if test[0] == path
             ]
         return tests

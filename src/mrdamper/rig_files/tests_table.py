@@ -145,9 +145,10 @@ def load_tests(path: str | Path) -> TestsTable:
     return TestsTable(path, tuple(stated))
 
 
-def applied(record: Record, row: StatedTest | None, table: TestsTable) -> Record:
-    """Apply a row to a record; E_CURRENT_CONTRADICTS if its channel has another current."""
-    if row is None:
+def applied(record: Record, path: Path, table: TestsTable | None) -> Record:
+    """Apply the row of a test of a file to its record; that its channel has another current is its doubt."""
+    row = table.of(path, record.id) if table else None
+    if row is None or table is None:
         return record
     if row.current is not None:
         record = with_decided_current(record, row.current, table.path.name, row.line)

@@ -21,24 +21,15 @@ from mrdamper.rig_files.column_names import (
     words,
     words_of,
 )
-from mrdamper.rig_files.conditions import LONGEST_LINE, amperes, series_in
+from mrdamper.rig_files.conditions import amperes, series_in
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.mapping.comparisons import MOST_SAMPLES, forces_grow
 from mrdamper.rig_files.mapping.description import SHORT_TEXTS, short_lines, with_units_of_notes
-from mrdamper.rig_files.mapping.results import (
-    MOST_ROWS,
-    NUMBER,
-    SEPARATORS,
-    Results,
-    lines_of,
-    results_among,
-    results_in,
-)
+from mrdamper.rig_files.mapping.results import NUMBER, Results, lines_of, results_among, results_in, rows_below_heads
 from mrdamper.rig_files.profile import FileForm, Profile
 from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.record import Finding, Record, part_of_record
-from mrdamper.rig_files.text.layout import cells_of
 
 _LEGEND = re.compile(  # I1 = 0.3 A, cur0.8 = coil current 0.8 A (as set)
     r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([^\W\d_][^\d=:]{0,30}\s)?([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)"
@@ -61,18 +52,15 @@ _STAMP = re.compile(  # 20190603_140512, 2019-06-03T14:05:12
 )
 
 
-def results_of(path: Path) -> Results | None:
-    """Return the table of results that a file holds; None if it holds none."""
+def results_of(path: Path, form: FileForm | None = None) -> Results | None:
+    """Return the table of results that a file holds, or of a form beside its tests; None if it holds none."""
+    if form is not None:
+        return ask_tables(path, lambda tables: results_among(tables)[0], None, form)
     if path.suffix.lower() in SHORT_TEXTS:
         lines = short_lines(path)
         return results_in(lines) or results_in([with_units_of_notes(line, path) for line in lines[:1]] + lines[1:])
     tables_of_results = ask_tables(path, lambda tables: [r for t in tables[:20] if (r := results_in(lines_of(t)))], [])
     return tables_of_results[0] if len(tables_of_results) == 1 else None
-
-
-def results_within(path: Path, form: FileForm) -> Results | None:
-    """Return the table of results that a file holds beside its tests; None if it holds none."""
-    return ask_tables(path, lambda tables: results_among(tables)[0], None, form)
 
 
 def currents_beside(
@@ -179,23 +167,15 @@ def _discards(heading: str, cell: str) -> bool:
 
 
 def remarks_of(path: Path) -> Results | None:
-    """Return the only table of tests with remarks and without currents that a file holds; its currents are zero."""
+    """Return the table of tests with remarks and without currents that a file holds; its currents are zero."""
     lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
     lines = lines or ask_tables(path, lambda tables: [line for t in tables[:20] for line in lines_of(t)], [])
-    tables = []
-    for separator in SEPARATORS[:4]:
-        rows = [[cell.strip(' "') for cell in cells_of(line[:LONGEST_LINE], separator)] for line in lines[:MOST_ROWS]]
-        for at, heads in enumerate(rows):
-            body = [row for row in rows[at + 1 :] if len(row) == len(heads)]
-            if len(heads) > 1 < len(body) and any(map(_heads_remarks, heads)):
-                cells = tuple((str(n), *row) for n, row in enumerate(body, 1))
-                tables.append(Results((0.0,) * len(cells), cells, "", ("", *heads)))
-    return tables[0] if len(tables) == 1 else None
-
-
-def _heads_remarks(cell: str) -> bool:
-    flags = (_DISCARDED_FLAG.search(f"{cell}: {answer}") for answer in ("yes", "no"))
-    return not _REMARKS.isdisjoint(words_of(cell.casefold())) or any(flags)
+    for heads, rows in rows_below_heads(lines):
+        flags = (_DISCARDED_FLAG.search(f"{head}: {answer}") for head in heads for answer in ("yes", "no"))
+        if any(flags) or not _REMARKS.isdisjoint(word for head in heads for word in words_of(head.casefold())):
+            cells = tuple((str(n), *row) for n, row in enumerate(rows, 1))
+            return Results((0.0,) * len(cells), cells, "", ("", *heads))
+    return None
 
 
 def gap_of_plan(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> Finding | None:

@@ -15,14 +15,14 @@ from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of, is_units
 
-SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
+_SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]+)?|[.,][0-9]+)")
 _QUANTITY = re.compile(rf"({NUMBER.pattern})\s*(m?A)")
 WITHIN = "table of results"  # within the file of its tests: beginning of where their currents stand
 _SUPPLY = re.compile(r"(?i)\b(?:power[ _-]?)?suppl(?:y|ied)\b|\bpsu\b")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
-MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
+_MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
 _LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: ...
     r"[\s#%*\"-]*(?P<name>[^\W\d_][^\d:=]{0,30}?)[\s_.#-]*(?P<number>[0-9]{1,6})"
     r"(?:\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até)\b)\s*(?:[^\W\d_]{1,30}[\s_.#]*)?(?P<last>[0-9]{1,6}))?\s*[:=;,\t)]"
@@ -96,11 +96,9 @@ class Results:
         only one by which all rows fit.
         """
         tables = []
-        for separator in SEPARATORS[:3]:
-            heads, *rows = [[cell.strip('" ') for cell in cells_of(line, separator)] for line in lines] or [[]]
-            rows = [row for row in rows if len(row) == len(heads)]
+        for heads, rows in rows_below_heads(lines):
             common = {*map(_key, heads)} & {_key(key) for key in self.keys if key} - _OWN_KEYS
-            for key in common if len(rows) > 1 else ():
+            for key in common:
                 own = [_key(cells[[*map(_key, self.keys)].index(key)]) for cells in self.cells]
                 theirs = [_key(row[[*map(_key, heads)].index(key)]) for row in rows]
                 if len({*own}) == len(own) and {*theirs} <= {*own}:
@@ -197,9 +195,18 @@ class Results:
         return any(_key(number) in map(_key, cells) for cells in self.pauses)
 
 
+def rows_below_heads(lines: Sequence[str]) -> Iterator[tuple[list[str], list[list[str]]]]:
+    """Yield the cells of the first of lines, and of those below it with as many, by each separator."""
+    for separator in _SEPARATORS[:4]:
+        rows = [[cell.strip('" ') for cell in cells_of(t[:_LONGEST_LINE], separator)] for t in lines[:_MOST_LINES]]
+        below = [row for row in rows[1:] if len(row) == len(rows[0]) > 1]
+        if len(below) > 1:
+            yield rows[0], below
+
+
 def results_in(lines: Sequence[str]) -> Results | None:
     """Return the table of results among lines of text; None if there is none or several."""
-    for separator in SEPARATORS:
+    for separator in _SEPARATORS:
         tables = {(table.current, table.cells): table for table in _tables(lines[:_MOST_LINES], separator)}
         if tables:
             return next(iter(tables.values())) if len(tables) == 1 else None
@@ -213,7 +220,7 @@ def numbered_tests(lines: Iterable[str]) -> Results | None:
     rows = [
         (m["name"].strip(), f"{number:0{len(m['number'])}d}", of[0], m.string[m.end() :].strip())
         for m, of in stated
-        for number in range(int(m["number"]), int(m["last"] or m["number"]) + 1)[:MOST_ROWS]
+        for number in range(int(m["number"]), int(m["last"] or m["number"]) + 1)[:_MOST_ROWS]
         if len(of) == 1 and not holds(m["name"], COIL)
     ]
     numbers = {(name.casefold(), int(number)) for name, number, *_ in rows}
@@ -223,13 +230,8 @@ def numbered_tests(lines: Iterable[str]) -> Results | None:
         (str(i), f"{name.split()[-1]}{number}", number, text) for i, (name, number, _, text) in enumerate(rows, 1)
     )
     counts = any({word.casefold(), word.casefold().rstrip("s")} & _COUNTED for word in words_of(rows[0][0]))
-    return Results(
-        tuple(row[2] for row in rows),
-        cells,
-        "a line for each test",
-        ("", "", rows[0][0], "remark"),
-        counts_tests=counts,
-    )
+    currents, keys = tuple(row[2] for row in rows), ("", "", rows[0][0], "remark")
+    return Results(currents, cells, "a line for each test", keys, counts_tests=counts)
 
 
 def form_of_tests(table: RawTable, form: FileForm) -> FileForm:
@@ -279,7 +281,7 @@ def lines_of(table: RawTable) -> list[str]:
         return []
     columns = [table.words(i) for i in range(len(table.names))]
     sizes = {words.codes.size for words in columns}
-    if len(sizes) > 1 or max(sizes, default=0) > MOST_ROWS:  # channels of several rasters, or of a record
+    if len(sizes) > 1 or max(sizes, default=0) > _MOST_ROWS:  # channels of several rasters, or of a record
         return []
     rows = zip(*([words.labels[code] for code in words.codes] for words in columns), strict=True)
     units = (table.units,) if any(table.units) else ()
