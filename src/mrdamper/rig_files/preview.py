@@ -180,7 +180,7 @@ def question_of(error: InputError, columns: Sequence[str] = ()) -> Question | No
     role = match[1] if match else ""
     if role not in DIMENSION or " scale = " in error.remedy:  # with its unit: two keys
         return None
-    if error.code == "E_UNITS_MISSING":
+    if error.code == "E_UNITS_MISSING" or (error.code == "E_AMBIGUOUS" and "] unit = " in error.remedy):
         units = _UNITS.get(DIMENSION[role], ())
         return Question(f"{error.found}. Unit of the {role}?", tuple(Answer(role, "unit", unit) for unit in units))
     if error.code in ("E_COLUMN", "E_AMBIGUOUS", "E_DUPLICATE_COLUMN"):

@@ -35,7 +35,6 @@ from mrdamper.rig_files.mapping.plans import (
     currents_listed,
     discarded_tests,
     gap_of_plan,
-    lacks_current,
     other_motions,
     remarks_of,
     results_of,
@@ -48,7 +47,7 @@ from mrdamper.rig_files.profile import Profile, profile_of
 from mrdamper.rig_files.quality import check_long_record
 from mrdamper.rig_files.quality.table import to_run
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
-from mrdamper.rig_files.record import Record, Refusal, unique_names
+from mrdamper.rig_files.record import Finding, Record, Refusal, unique_names
 from mrdamper.rig_files.sequences import follows, goes_on, tests_of_files
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, names_tests
@@ -344,7 +343,10 @@ class _Intake:
                 if other is None:
                     with_stated_current(record, current, whence, file.name)
             except InputError as error:
-                if self._table is None or record.provenance.get("current_from") != self._table.path.name:
+                if self._table and record.provenance.get("current_from") == self._table.path.name:
+                    note = Finding("W_CHOSEN", f"{self._table.path.name} decides: {error.found}")
+                    self._found = [(p, r.noticed(note) if r is record else r) for p, r in self._found]
+                else:
                     refused[i] = error
         self._refuse({tests[i][0]: error for i, error in refused.items()})
         return bool(stated) and other is None
@@ -385,12 +387,14 @@ class _Intake:
             )
             error = ColumnError(problem, where=path.name, remedy=remedy)
             self.refusals.append(Refusal(str(path), error))
+        doubtful = [test for test in self._pending if test[1].doubt and "current_from" not in test[1].provenance]
+        self._pending = [test for test in self._pending if test not in doubtful]
         notes = [Path(note.file) for note in self.notes]
         paths = [path for path in (*others, *notes, *texts) if self._pending and path not in used]
         used |= self._join_currents(paths)
         open_tests = [test for test in self._pending if test[1].current is None]
         gaps = tuple(filter(None, (gap_of_plan(path, self._results(path), open_tests) for path in paths)))
-        self._pending = [(path, r.noticed(*gaps) if r.current is None else r) for path, r in self._pending]
+        self._pending = [(path, r.noticed(*gaps) if r.current is None else r) for path, r in self._pending] + doubtful
         return used
 
     def _join_currents(self, paths: Sequence[Path]) -> set[Path]:
@@ -399,7 +403,7 @@ class _Intake:
         A list or a supply's current counts only where no table or legend states the coil's, and no other such file
         states others.
         """
-        candidates: list[tuple[Path, Results | None, _Tests, _Tests, list[tuple[float, str]]]] = []
+        candidates: list[tuple[Path, Results | None, _Tests, _Tests, _Tests, list[tuple[float, str]]]] = []
         own = ((path, self._results(path)) for path in paths)
         linked = (
             (path, joined) for path in paths if (results := self._results(path)) for other in paths
@@ -407,20 +411,20 @@ class _Intake:
         )  # fmt: skip
         for path, results in chain(own, linked):
             every = self._numbered(results) if results else self._pending
-            tests = within_ranges([test for test in every if not lacks_current(*test, results)], results)
+            open_tests = [t for t in every if results and results.lacks_current(t[0], t[1].id)]
+            tests = within_ranges([test for test in every if test not in open_tests], results)
             stated = currents_beside(path, results, tests)
             if stated and not (results and results.of_supply):
-                candidates = [(path, results, every, tests, stated)]
+                candidates = [(path, results, every, open_tests, tests, stated)]
                 break
             stated = stated or currents_listed(path, tests)
-            candidates += [(path, results, every, tests, stated)] if stated else []
+            candidates += [(path, results, every, open_tests, tests, stated)] if stated else []
         if len({tuple(current for current, _ in stated) for *_, stated in candidates}) != 1:
             return set()
-        path, results, every, tests, stated = candidates[0]
+        path, results, every, self._pending, tests, stated = candidates[0]
         other = other_motions(path, results, tests)
         refused = dict.fromkeys(range(len(tests)), other) if other else discarded_tests(path, results, tests)
         self.met += [(file, record.id) for file, record in every]
-        self._pending = [test for test in every if lacks_current(*test, results)]
         ids = {record.id for _, record in (*tests, *self._pending)}
         self.omitted += [Path(record.id) for _, record in every if record.id not in ids]  # in no row's range
         for i, ((file, record), (current, whence)) in enumerate(zip(tests, stated, strict=True)):

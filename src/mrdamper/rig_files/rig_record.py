@@ -120,8 +120,6 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         try:
             current, whence = current_of(table, profile, path, part.get("current"), stretch, assigned["force"].column)
         except ColumnError as error:
-            if error.code == "E_CURRENT_MISSING":
-                raise
             current, whence, doubt = None, dict[str, str](), error
         if current is not None:
             part["current"] = constant(current, part["time"])

@@ -306,7 +306,7 @@ def _print(result: ImportResult, out: Path | None, total: int, new: int, *, dry:
     if result.left_out:
         whys = {name: f" ({reason})" for name, reason in result.reasons.items()}
         print(f"not imported as tests: {listed([name + whys.get(name, '') for name in result.left_out], 5)}")
-    if result.refusals and all(refusal.error.remedy.startswith("write the currents") for refusal in result.refusals):
+    if result.refusals and all(refusal.error.remedy.startswith("write the ") for refusal in result.refusals):
         print(
             "a table takes the current of each test: mrdamper import FILES --write-tests tests.csv, "
             "fill in current_A, import with --tests tests.csv"

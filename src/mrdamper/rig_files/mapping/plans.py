@@ -292,13 +292,6 @@ def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:
         form = profile.file.model_copy(update={"run_column": column})
         records, _ = records_of_file(path, profile.model_copy(update={"file": form}))
         moves = max(float(np.ptp(record.displacement)) for record in records)
-        rest = [r for r in records if lacks_current(path, r, results) and np.ptp(r.displacement) < _REST * moves]
-        return [record for record in records if record not in rest]
+        return [r for r in records if np.ptp(r.displacement) > _REST * moves or not results.lacks_current(path, r.id)]
     except InputError:
         return []
-
-
-def lacks_current(path: Path, record: Record, results: Results | None) -> bool:
-    """Tell if a test of a file has a number whose row in a table of results states no current."""
-    number = record.id.removeprefix(path.stem).lstrip("_")
-    return results is not None and number != "" and results.is_pause(number)

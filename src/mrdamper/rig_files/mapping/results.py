@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -190,9 +191,10 @@ class Results:
                 return name
         return None
 
-    def is_pause(self, number: str) -> bool:
-        """Tell if a row without a current or any other number has this one: a test holds still there."""
-        return any(_key(number) in map(_key, cells) for cells in self.pauses)
+    def lacks_current(self, path: Path, name: str) -> bool:
+        """Tell if a row without a current or any other number has that of a test of a file: a pause, if it rests."""
+        number = _key(name.removeprefix(path.stem).lstrip("_"))
+        return number != "" and any(number in map(_key, cells) for cells in self.pauses)
 
 
 def rows_below_heads(lines: Sequence[str]) -> Iterator[tuple[list[str], list[list[str]]]]:
