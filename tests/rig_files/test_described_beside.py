@@ -516,7 +516,7 @@ def test_a_frequency_of_something_else_than_the_rows_is_no_sampling_rate(text, t
     assert import_files([tmp_path]).records[0].time[-1] == pytest.approx(5.0)
 
 
-@pytest.mark.parametrize("word", ["Signal", "Row", "column"])
+@pytest.mark.parametrize("word", ["Signal", "Row", "column", "Столбец"])
 def test_columns_without_names_are_those_that_a_text_numbers(word, tmp_path):
     for name, amperes in CURRENTS.items():
         np.savetxt(tmp_path / f"{name}.dat", np.column_stack([X, force(amperes), np.full_like(T, amperes), T]))
@@ -559,11 +559,16 @@ def test_codes_below_a_heading_of_ratings_are_no_currents(heading, tmp_path):
     require_the_tests(tmp_path)
 
 
-def test_currents_in_a_line_below_the_units_belong_to_the_columns_beside_one_time(tmp_path):
+@pytest.mark.parametrize("motions", [1, 3])
+def test_currents_in_a_line_below_the_units_belong_to_the_columns_beside_one_time(motions, tmp_path):
     columns = [c for amperes in CURRENTS.values() for c in (X, force(amperes))]
     over = "".join(f"\tI = {amperes} A" * 2 for amperes in CURRENTS.values())
-    head = "Time" + 3 * "\tDisplacement\tForce" + "\ns" + 3 * "\tmm\tN" + f"\n{over}\n"
-    np.savetxt(tmp_path / "book.txt", np.column_stack([T, *columns]), delimiter="\t", header=head[:-1], comments="")
+    head = "Time" + 3 * "\tDisplacement\tForce" + "\ns" + 3 * "\tmm\tN" + f"\n{over}"
+    if motions == 1:
+        columns = [X, *map(force, CURRENTS.values())]
+        over = "".join(f"\tI = {amperes} A" for amperes in CURRENTS.values())
+        head = "Time\tDisplacement" + 3 * "\tForce" + "\ns\tmm" + 3 * "\tN" + f"\n\tsine, 1 Hz{over}"
+    np.savetxt(tmp_path / "book.txt", np.column_stack([T, *columns]), delimiter="\t", header=head, comments="")
     require_the_tests(tmp_path)
 
 

@@ -1050,6 +1050,7 @@ def test_a_plan_that_lacks_tests_is_named_with_them(tmp_path):
         ("valid", "no"), ("备注", "无效"), ("Status", "cancelled, oil leak"), ("Discard", "yes"), ("Include", "no"),
         ("Valid", "0.0"), ("valid (1/0)", "0"), ("Remark", "repeat of run 1, aborted"),
         ("Bemerkung", "ungueltig, Stecker lose"), ("remarks", "not valid, plug loose"), ("Notes", "run-in"),
+        ("Remarks", "repeat of the first run aborted"), ("Remarks", "repeat, first one aborted, aborted again"),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("files", [["run_1", "run_2", "run_3"], ["a_0A", "b_0.5A", "c_0.5A"]])
@@ -1079,6 +1080,8 @@ def test_a_test_that_a_plan_calls_invalid_or_a_warm_up_is_asked_about(tmp_path, 
         ("Remark", ["", "thermocouple failed, forces valid", ""]), ("Specimen", ["Void ratio 0.2"] * 3),
         ("Remark", ["warm-up"] * 3), ("Remark", ["", "not aborted, valid", ""]),
         ("Remark", ["", "replaces run 7 (invalid)", ""]), ("Bemerkung", ["", "Wiederholung von ungültigem Lauf 1", ""]),
+        ("Remark", ["warm-up"] * 3), ("Remarks", ["", "repeat, first one aborted", ""]),
+        ("Bemerkung", ["", "Wiederholung (erster Versuch abgebrochen)", ""]),
     ],
 )  # fmt: skip
 def test_a_remark_on_something_else_or_on_every_test_discards_none(tmp_path, heading, cells):

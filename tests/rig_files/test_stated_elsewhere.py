@@ -561,6 +561,7 @@ def test_a_line_that_counts_both_channels_positive_in_compression_changes_both_s
         ("Force sign: tension +, compression -; stroke sign: compression +", -1, 1),
         ("Effort positif en compression, déplacement positif en détente", 1, -1),
         ("Force positive in tension, displacement positive when retracting", -1, 1),
+        ("Znamenko: dráha kladná při vysunutí, síla kladná v tlaku", 1, -1),
         ("Force positive in tension, displacement positive inwards", 0, 1),
         ("Load cell ±5 kN, tension/compression +/-; displacement +/-50 mm", 1, 1),
     ],

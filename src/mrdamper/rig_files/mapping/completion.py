@@ -79,9 +79,7 @@ _INDEXED = re.compile(
     r"[._ ]*(?(what)|(?P<after>desc|name|label|units?|scale)[A-Za-z]*)\s*[=:]\s*(?P<value>.+?)\s*$",
     re.IGNORECASE,
 )
-_NUMBERS = (
-    r"(?:ch(?:annel)?|kanal|canale?|voie|var(?:iable)?|col(?:umn)?|row|zeile|ligne|fila|riga|signale?)"  # of columns
-)
+_NUMBERS = rf"(?:{'|'.join(words('numbered'))})"
 NUMBERED = re.compile(rf"(?i)(?:{_NUMBERS}?[ ._]?|[a-z]\w*\[)([0-9]{{1,3}})\]?")
 _CHANNEL_IS = re.compile(
     rf"(?i)(?<!\w)(?:{_NUMBERS}[ ._]?|[a-z]\w*[\[(](?::, ?)?)"
@@ -193,7 +191,9 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
         titled = {key.casefold(), key.casefold().rstrip("s")} & _TITLES or (not key and (merged or all(cells)))
         if titled and len(cells) == width - 1 and (*cells,) != table.names[1:]:
             roles = {split_name(cell).role for cell in cells} - {None}
-            if (key and len(roles) > 1) or (stated and all(map(currents_in, stated))):
+            forces = [cells[i - 1] for i in table.columns("force") if i]  # beside a comment on the motion
+            forces = forces if len(forces) > 1 else stated
+            if (key and len(roles) > 1) or (forces and all(map(currents_in, forces))):
                 names = [*table.names]
                 for i, cell in enumerate(cells, 1):
                     names[i] = names[i] or (names[i - 1] if cell and cells[i - 2] else "")  # merged over the currents

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -296,10 +296,15 @@ def _others(clause: str) -> set[str]:
 
 
 def _named(clause: str) -> set[str]:
-    """Return the channels that a clause names, by words that are no senses themselves."""
-    roles = {word: role_of(word) for word in _WORD.findall(_PARTICLE.sub(" ", clause))}
-    named = {role for word, role in roles.items() if role and (role == "force" or not _sign(_SENSES, word))}
-    return {_MOVES.get(role, role) for role in named}
+    """Return the channels that a clause names, by words that are no senses themselves, nor letters before one: v tlaku.
+
+    Such a letter counts where nothing else names a channel.
+    """
+    words = _WORD.findall(_PARTICLE.sub(" ", clause))
+    letters = {letter for letter, word in pairwise(words) if len(letter) == 1 and _sign(_SENSES, word)}
+    roles = {word: role for word in words if (role := role_of(word)) and (role == "force" or not _sign(_SENSES, word))}
+    named = roles.keys() - letters or roles.keys()
+    return {_MOVES.get(role, role) for word, role in roles.items() if word in named}
 
 
 def _signs(stems: Mapping[int, tuple[str, ...]], clause: str) -> list[int]:
