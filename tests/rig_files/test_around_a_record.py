@@ -249,6 +249,9 @@ def test_the_coils_current_is_taken_before_the_supplys_and_never_a_motors(tmp_pa
     assert float(np.mean(read_run(tmp_path / "a.csv").current)) == pytest.approx(0.4)
     (tmp_path / "b.csv").write_text(text().replace("current_A", "motor current [A]"))
     assert read_run(tmp_path / "b.csv").current is None
+    phases = "\n".join(["# Coil current: 0.7 A", HEAD.replace("current_A", "I_U [A],I_V [A]"), *lines[1:], ""])
+    (tmp_path / "c.csv").write_text(phases)
+    assert float(np.mean(read_run(tmp_path / "c.csv").current)) == pytest.approx(0.7)
 
 
 @pytest.mark.parametrize(

@@ -183,6 +183,7 @@ def test_files_of_one_name_in_several_folders_are_told_apart(tmp_path):
     done = run(tmp_path / "raw", "--out", tmp_path / "out")
     assert "2 runs from 2 files" in done.output
     assert [item.notes["file"] for item in load_dataset(tmp_path / "out")] == ["1Hz/0.5A.csv", "2Hz/0.5A.csv"]
+    assert [item.id for item in load_dataset(tmp_path / "out")] == ["1Hz_0.5A", "2Hz_0.5A"]
     run(tmp_path / "raw", "--write-tests", tmp_path / "raw" / "tests.csv")
     assert run(tmp_path / "raw", "--out", tmp_path / "again").exit_code == 0
 
@@ -208,6 +209,17 @@ def test_the_profile_of_a_folder_is_that_of_its_first_test_where_a_table_beside_
     done = run(tmp_path, "--write-profile", "-")
     assert done.exit_code == 0
     assert '[channels.force]\ncolumn = "Load"' in done.output
+
+
+def test_columns_that_are_not_taken_are_named_once_and_the_profile_of_a_folder_is_that_of_a_test(tmp_path):
+    write(tmp_path, "a_plan.csv", "test,current_A\nb0,0.5\nb1,1\n")
+    for i in range(2):
+        table = np.column_stack([rows(seed=i), *np.full((3, 600), 70.0)])
+        write(tmp_path, f"b{i}.csv", text(table, ("time_s,displacement_mm,force_N,Temp (F),TC1,Coil current cmd",)))
+    done = run(tmp_path, "--out", tmp_path / "out")
+    assert done.output.count("columns not used: TC1, Coil current cmd\n") == 1
+    assert load_dataset(tmp_path / "out")["b0"].further["temperature_C"][0] == pytest.approx(21.11, abs=0.01)
+    assert 'column = "force_N"' in run(tmp_path, "--write-profile", "-").output
 
 
 def test_a_key_that_stands_twice_in_a_profile_is_named(tmp_path):

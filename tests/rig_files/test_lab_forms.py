@@ -50,6 +50,8 @@ DUTIES = "| duty | current |\n|---|---|\n| 0 % | 0 A |\n| 50 % | 1.1 A |"
         (["m_A5_I0,00", "m_A5_I1,20"], "Dateinamen: m_A<Amplitude in mm>_I<Spulenstrom in A>.csv", [0.0, 1.2]),
         (["m_000", "m_500"], "names: m_<coil current [mA]>", [0.0, 0.5]),
         (["m_0", "m_2"], "names: m_<current>", []),
+        (["m_0000_1", "m_0500_2"], "File names: m_iiii_f.csv\n  iiii  coil current in mA\n  f  frequency", [0.0, 0.5]),
+        (["m_0000_1", "m_0500_2"], "File names: m_iiii_f.csv\n  iiii  number\n  f  coil current", []),
         (["m_d00", "m_d50"], f"Names: m_d<duty %>.csv.\n\n{DUTIES}", [0.0, 1.1]),
         (["m_d00", "m_d75"], f"Names: m_d<duty %>.csv.\n\n{DUTIES}", []),
     ],
@@ -406,8 +408,14 @@ def test_channels_of_several_groups_follow_the_only_time(places, kind, tmp_path)
     np.testing.assert_allclose((record.time, 1e3 * record.displacement, record.force), (T, X, force(0.5)), atol=1e-9)
 
 
-@pytest.mark.parametrize(("cut", "amperes"), [(1, (0.5, 0.5)), (0, (0.0, 1.0))])
-def test_groups_of_other_length_or_of_another_current_are_not_joined(cut, amperes, tmp_path):
+@pytest.mark.parametrize(
+    ("cut", "amperes", "problem"),
+    [
+        (1, (0.5, 0.5), "E_FIELD_COUNT: columns differ in length (time [s]: {0}, "),
+        (T.size - 9, (0.5, 0.5), "E_COLUMN: no column is known to be force"), (0, (0.0, 1.0), "E_COLUMN: no column"),
+    ],
+)  # fmt: skip
+def test_groups_of_other_length_or_of_another_current_are_not_joined(cut, amperes, problem, tmp_path):
     import h5py
 
     with h5py.File(tmp_path / "tests.h5", "w") as file:
@@ -415,7 +423,8 @@ def test_groups_of_other_length_or_of_another_current_are_not_joined(cut, ampere
         file["run_02/force [N]"] = force(1.0)[: T.size - cut]
         for name, current in zip(("run_01", "run_02"), amperes, strict=True):
             file[name].attrs["current_A"] = current
-    assert [r.error.code for r in import_files([tmp_path]).refusals] == ["E_COLUMN"]
+    (error,) = (refusal.error for refusal in import_files([tmp_path]).refusals)
+    assert f"{error.code}: {error.found}".startswith(problem.format(T.size, T.size - cut))
 
 
 def test_structs_of_tests_by_current_and_frequency_are_tests(tmp_path):
@@ -1031,6 +1040,17 @@ def test_a_plan_of_tests_states_their_currents_by_the_day_that_is_their_folder_a
     assert [round(float(np.mean(r.current)), 3) for r in import_files([tmp_path]).records] == [0.0, 0.4, 0.8, 0.6]
     (tmp_path / "Versuchsplan.csv").write_text("".join(["Datum;Nr;Strom / A;Amplitude / mm\n", *lines[:-1]]))
     assert {r.error.code for r in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
+    from openpyxl import Workbook
+
+    (tmp_path / "Versuchsplan.csv").unlink()
+    book = Workbook()
+    for day in dict.fromkeys(day for day, _ in plan):
+        sheet = book.create_sheet(f"Tag {day}")
+        sheet.append(["Nr", "Strom / A"])
+        for number in (1, 2):
+            sheet.append([number, plan[day, number]])
+    book.save(tmp_path / "Versuchsplan.xlsx")
+    assert [round(float(np.mean(r.current)), 3) for r in import_files([tmp_path]).records] == [0.0, 0.4, 0.8, 0.6]
 
 
 def test_a_plan_that_lacks_tests_is_named_with_them(tmp_path):

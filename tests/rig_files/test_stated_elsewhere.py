@@ -475,6 +475,31 @@ def test_an_attribute_has_the_unit_that_another_attribute_states(tmp_path, key):
     expect(tmp_path, 0.5, 1.0)
 
 
+def test_a_column_with_two_units_in_attributes_is_refused_with_both(tmp_path):
+    with h5py.File(tmp_path / "a_0.5A.h5", "w") as file:
+        for name, unit, values in (("time", "s", T), ("displacement", "mm", X), ("force", "N", force(0.5))):
+            file.create_dataset(name, data=values).attrs.update({"unit": unit, "units": unit.replace("N", "kN")})
+    assert "column 'force' has the unit 'N or kN'" in str(import_files([tmp_path]).refusals[0].error)
+
+
+@pytest.mark.parametrize(
+    ("names", "unit", "codes"),
+    [
+        ("time [s], displacement [mm], force [N]", "V", []), ("time_s, displacement_mm, force_N", "mm", []),
+        ("time [s], displacement [mm], force", "N", []),
+        ("time [s], displacement [mm], force", "V", ["E_UNITS_DIMENSION"]),
+        ("time, displacement [mm], force [N]", "V", ["E_UNITS_MISSING"]),
+    ],
+)  # fmt: skip
+def test_the_unit_of_a_whole_array_is_that_of_a_column_that_states_none(names, unit, codes, tmp_path):
+    with h5py.File(tmp_path / "a_0.5A.h5", "w") as file:
+        file.create_dataset("data", data=np.column_stack([T, X, force(0.5)])).attrs["units"] = unit
+        file.attrs["columns"] = names
+    assert [refusal.error.code for refusal in import_files([tmp_path]).refusals] == codes
+    if not codes:
+        expect(tmp_path, 0.5)
+
+
 def test_a_recorded_velocity_is_integrated_and_said(tmp_path):
     velocity = 2 * np.pi * np.cos(2 * np.pi * T + 0.3) / 100  # [m/s]
     table(tmp_path / "test_0.5A.csv", ["time (s),velocity (m/s),force (N)"], T, velocity, force(0.5))

@@ -42,6 +42,7 @@ _DERIVED = ("velocity", "acceleration")  # of the displacement
 _MOST_RESTARTS = 0.05  # of the samples of a clock that counts within steps
 _TOTAL = re.compile(r"total|absolut|gesamt|cumulat|kumul", re.IGNORECASE)
 _COUNTS = ("counts", *TABLES["unit_names"]["counts"])
+_PHASES = (frozenset("UVW"), frozenset("RST"), frozenset(("L1", "L2", "L3")))  # of a motor, at the end of a name
 _INDEX, _MEASURED = words("sample"), words("measured")
 _AROUND_UNITS = words("around_units")
 _TIMES = re.compile(r"(?i)(?<!\w)multipl(?:y|ie[ds]?|ier|iz|ic|ik)\w*")  # no multiple, no multiplexer
@@ -202,7 +203,9 @@ def coil_currents(table: RawTable) -> list[int]:
     """Return the columns in A that may be measured currents of the coil: no commands, computed ones, other devices."""
     columns = [i for i in table.columns(dimension="current") if not RATING.search(table.names[i])]
     names = {i: table.headers[i].name for i in columns}
-    return [i for i, name in names.items() if role_of(name) == "current" or says_nothing(name)]
+    ends = {i: ["", *words_of(name)][-1].upper() for i, name in names.items()}
+    motors = frozenset().union(*(of for of in _PHASES if len(of & {*ends.values()}) > 1))
+    return [i for i, n in names.items() if ends[i] not in motors and (role_of(n) == "current" or says_nothing(n))]
 
 
 def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
@@ -327,7 +330,7 @@ def _convert(
 ) -> Assigned | None:
     header, channel, sign = table.headers[column], profile.channel(role), sign_of(table, profile, role)
     unit = channel.unit or header.unit
-    unit = "degF" if unit == "F" and role == "temperature" else unit
+    unit = "degF" if role == "temperature" and (unit or unknown_unit(table.names[column])) == "F" else unit
     uncalibrated = channel.scale is None and header.dimension in ("voltage", "count")  # no unit makes them newtons
     for text in (unit, header.unit) if uncalibrated else (unit,):
         problem = _unit_problem(table, "velocity" if channel.integrate else role, column, text)

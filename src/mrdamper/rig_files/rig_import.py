@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import chain
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,7 @@ from mrdamper.rig_files.quality import check_long_record
 from mrdamper.rig_files.quality.table import to_run
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
 from mrdamper.rig_files.record import Finding, Record, Refusal, unique_names
+from mrdamper.rig_files.rig_record import tidy_name
 from mrdamper.rig_files.sequences import follows, goes_on, tests_of_files
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, names_tests
@@ -122,7 +123,8 @@ def file_for_profile(paths: Sequence[str | Path], profile: Profile) -> Iterator[
         result = import_files(given, profile) if len(files) > 1 else ImportResult(())
         refused = {r.file.removesuffix(f": {r.run}") for r in result.refusals if r.error.code != "E_NO_DATA"}
         first = (file for file in files if without_temporary_folder(str(file)) in refused)
-        tests = (file for file in files if file.name not in result.left_out)
+        names = {Path(record.provenance["file"]).name for record in result.records}
+        tests = (file for file in files if file.name in names or (not names and file.name not in result.left_out))
         yield next(chain(first, tests), files[0])
 
 
@@ -525,7 +527,12 @@ def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
 
 
 def with_unique_ids(records: Iterable[Record]) -> tuple[Record, ...]:
-    """Return records told apart by their names: files of different folders may share one."""
+    """Return records told apart by their names: files of different folders may share one, and have those of these."""
     records = tuple(records)
-    names = unique_names(record.id for record in records)
+    counts = Counter(record.id for record in records)
+    folders = (PurePosixPath(record.provenance.get("file", "")).parent.parts for record in records)
+    own = [
+        tidy_name("_".join((*of, r.id))) if counts[r.id] > 1 else r.id for of, r in zip(folders, records, strict=True)
+    ]
+    names = unique_names(own)
     return tuple(r if r.id == name else replace(r, id=name) for r, name in zip(records, names, strict=True))

@@ -287,6 +287,9 @@ def _print(result: ImportResult, out: Path | None, total: int, new: int, *, dry:
         print("Taken for tests:")
     if len(columns) == 1 and len(result.records) > 1:
         print(f"columns: {columns.pop()}")
+    unused = {record.provenance.get("ignored_columns", "") for record in result.records} - {""}
+    if unused:
+        print(f"columns not used: {listed(sorted(unused), 3)}")
     lines = []
     for record in result.records:
         valid = record.time[~(record.time != record.time)]

@@ -145,7 +145,7 @@ def _refusal(record: Record, one: _Point, beside: Record, other: _Point) -> Qual
         f"from peak to peak, that of {beside.id} at the same condition {other[3]:.4g} N",
         where=record.provenance.get("file", record.id),
         remedy="one of them has another current or another unit of force: state the current of each in tests.csv "
-        "(where a name or heading states a wrong one, correct that), or leave one out",
+        "(where a name or heading states a wrong one, correct that), their specimens if they differ, or leave one out",
         code="E_CONDITIONS",
     )
 

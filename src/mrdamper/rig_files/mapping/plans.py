@@ -37,6 +37,9 @@ _LEGEND = re.compile(  # I1 = 0.3 A, cur0.8 = coil current 0.8 A (as set)
 )
 _DECIMAL_CODE = re.compile(r"(?<![a-z])[a-z]{1,6}[0-9]+\.[0-9]+(?![0-9])")
 _SCHEME = re.compile(r"[\w.,+=-]*(?:<[^<>]{1,60}>[\w.,+=-]*)+")  # MRD_A<amplitude in mm>_I<coil current in A>.csv
+_PLACE = re.compile(
+    r"[\s*`-]*([^\W\d_]{1,12})`?(?:\s*[=:]|\s+[-–]\s|\s{2,})\s*([^\s<>][^<>]{0,58}[^\s<>])\s*$"
+)  # in a name
 _SCHEME_NUMBER = re.compile(r"[0-9]+(?:[.,xp][0-9]+)?")
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
 _DISCARDED, _DISCARDED_FLAG, _NOT_DISCARDED = (
@@ -59,8 +62,19 @@ def results_of(path: Path, form: FileForm | None = None) -> Results | None:
     if path.suffix.lower() in SHORT_TEXTS:
         lines = short_lines(path)
         return results_in(lines) or results_in([with_units_of_notes(line, path) for line in lines[:1]] + lines[1:])
-    tables_of_results = ask_tables(path, lambda tables: [r for t in tables[:20] if (r := results_in(lines_of(t)))], [])
-    return tables_of_results[0] if len(tables_of_results) == 1 else None
+    sheets = ask_tables(path, lambda tables: [(t.label, r) for t in tables[:20] if (r := results_in(lines_of(t)))], [])
+    if len({(of.keys, of.title, of.of_supply) for _, of in sheets}) != 1:
+        return None
+    shared = set.intersection(*({*label.split()} for label, _ in sheets))  # Damper FL, Damper RR: FL, RR
+    folders = [" ".join(word for word in label.split() if word not in shared) for label, _ in sheets]
+    rows = [
+        (folder, *row)
+        for folder, (_, of) in zip(folders, sheets, strict=True)
+        for row in zip(of.cells, of.current, strict=True)
+    ]
+    cells = tuple((str(n), folder, *own[1:]) for n, (folder, own, _) in enumerate(rows, 1))
+    several = replace(sheets[0][1], current=tuple(row[2] for row in rows), cells=cells, pauses=())
+    return replace(several, keys=("", "", *several.keys[1:])) if len(sheets) > 1 else sheets[0][1]
 
 
 def currents_beside(
@@ -229,8 +243,12 @@ def _by_scheme(lines: Sequence[str], results: Results | None, files: Sequence[Pa
     """Return the current [A] of each file by a scheme of their names, or by the number in it and a table of results.
 
     Thus <coil current in A>, or <duty %> with a table of the current by the duty; empty unless all files have one.
+    What a letter or word of a name stands for, a line of its own may tell: MRD_iiii_ff.csv, iiii: coil current in mA.
     """
     stated: set[tuple[float, ...]] = set()
+    meant = {m[1]: f"<{m[2]}>" for m in map(_PLACE.match, lines) if m}
+    names = [name for line in lines for name in re.findall(r"\w+_[\w.]+", line) if meant]
+    lines = [*lines, *(re.sub("[^\\W\\d_]+", lambda m: meant.get(m[0], m[0]), name) for name in names)]
     for parts in (re.split("<([^<>]*)>", m[0].rstrip(".,")) for line in lines for m in _SCHEME.finditer(line)):
         pattern = "".join("([^_]+?)" if i % 2 else re.escape(part) for i, part in enumerate(parts))
         names = [re.fullmatch(pattern, file.stem) or re.fullmatch(pattern, file.name) for file in files]

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats, held_current
 from mrdamper.rig_files.column_names import role_of, split_name
+from mrdamper.rig_files.readers.arrays import array_table
 from mrdamper.rig_files.readers.base import Content, RawTable
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding
 
@@ -61,9 +62,10 @@ def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
         lacks = not whole or ("current" in every and "current" not in roles[whole[0]] and len(timed) > 1)
         if len(parts) < 2 or len(whole) > 1 or not needed or not lacks or not joined.keys().isdisjoint(map(id, parts)):
             continue
-        if len(timed) < 2 and (len(set(map(_rows, parts))) > 1 or len(_currents(parts)) > 1):
+        rows = [*map(_rows, parts)]
+        if len(timed) < 2 and (2 * min(rows) < max(rows) or len(_currents(parts)) > 1):
             continue  # a list of something else, or of another test
-        joined[id(parts[0])] = _joined(label, parts)
+        joined[id(parts[0])] = _joined(label, parts, one_clock=len(timed) < 2)
         dropped |= {id(table) for table in parts[1:]}
     return [joined.get(id(table), table) for table in tables if id(table) not in dropped]
 
@@ -87,18 +89,23 @@ def _named(table: RawTable) -> RawTable:
     return replace(table, names=tuple(names)) if len(table.names) <= 2 else table
 
 
-def _joined(label: str, tables: Sequence[RawTable]) -> RawTable:
-    """Return one table of several, the time of each before its channels."""
+def _joined(label: str, tables: Sequence[RawTable], *, one_clock: bool) -> RawTable:
+    """Return one table of several, the time of each before its channels; channels of one clock have one length."""
     clocks = [table.columns("time")[:1] for table in tables]
     orders = [
         sorted(range(len(t.names)), key=lambda i, of=of: i not in of) for t, of in zip(tables, clocks, strict=True)
     ]
     places = [(_named(table), i) for table, order in zip(tables, orders, strict=True) for i in order]
 
+    def load(column: int) -> Floats:
+        table, i = places[column]
+        return table.read([i]).values[i]
+
     def read(columns: Sequence[int]) -> Content:
-        return Content({c: table.read([i]).values[i] for c, (table, i) in ((c, places[c]) for c in columns)})
+        return Content({column: load(column) for column in columns})
 
     names, units = (tuple(getattr(table, key)[i] for table, i in places) for key in ("names", "units"))
+    read = array_table(tables[0].source, names, units, load).read if one_clock else read
     constants = {name: value for table in reversed(tables) for name, value in table.constants.items()}
     remarks = tuple(dict.fromkeys(line for table in tables for line in table.remarks))
     own = {"names": names, "units": units, "label": label, "constants": constants, "remarks": remarks}

@@ -111,13 +111,13 @@ def text_of(item: object) -> str:
 def unit_in(says: Mapping[str, Any], of: str = "") -> str:
     """Return the unit that attributes or properties state, of all or of one of them; of a time without its date.
 
-    A text that is no unit counts if there is none; none counts where two contradict each other.
+    A text that is no unit counts if there is none; where two contradict each other, it is both of them, N or kN.
     """
     names = {name.casefold(): name for name in says}
     keys = [key for key in (f"{of.casefold()}{unit}" for unit in KEYS["unit"]) if key in names]
     stated = [text.partition(" since ")[0] for key in keys if (text := text_of(says[names[key]]))]
     units = {parse_unit(text): text for text in reversed(stated) if is_unit(text)}
-    return next(iter(units.values() if units else stated), "") if len(units) < 2 else ""
+    return " or ".join(reversed(units.values())) if units else next(iter(stated), "")
 
 
 def texts_in(values: Any) -> list[str]:
@@ -169,12 +169,14 @@ def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floa
         return np.array(array, dtype=np.float64)
 
 
-def columns_of(name: str, array: Array, texts: Iterable[Sequence[str]]) -> list[tuple[str, str, Array]]:
+def columns_of(name: str, array: Array, texts: Iterable[Sequence[str]], unit: str = "") -> list[tuple[str, str, Array]]:
     """Return name, unit and values of each column of an array: one of a vector, a matrix with its samples the long way.
 
-    The columns of a matrix have the names and units of the texts beside it that hold one a column, else numbers.
+    The columns of a matrix have the names and units of the texts beside it that hold one a column, else numbers. The
+    unit of a whole matrix is that of a column whose name states none, and of its time only if it is one of a time.
     """
-    inner, unit = [n for n in array.shape if n != 1], "s" if array.dtype.kind in "Mm" else ""
+    inner = [n for n in array.shape if n != 1]
+    unit = "s" if array.dtype.kind in "Mm" else unit if all(map(parse_unit, unit.split(" or "))) else ""
     if len(inner) < 2 or array.dtype.kind == "O":
         return [(name, unit, array)]
     axis = 0 if inner[0] < inner[1] and inner[0] <= _MOST_ACROSS else 1
@@ -187,7 +189,9 @@ def columns_of(name: str, array: Array, texts: Iterable[Sequence[str]]) -> list[
     if not names or any(other != names[0] for other in names):
         names, units = [[name and f"{name}[{i}]" for i in range(1, width + 1)]], []
     parts = [Stored((inner[1 - axis],), array.dtype, partial(_part, array, i, axis)) for i in range(width)]
-    return list(zip(names[0], units[0] if units else [unit] * width, parts, strict=True))
+    heads, clock = [split_name(word) for word in names[0]], split_name("", unit).dimension == "time"
+    own = ["" if head.unit or (head.role == "time" and not clock) else unit for head in heads]
+    return list(zip(names[0], units[0] if units else own, parts, strict=True))
 
 
 def _part(array: Array, i: int, axis: int) -> np.ndarray:

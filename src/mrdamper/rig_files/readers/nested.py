@@ -54,9 +54,8 @@ class _Node:
 
     def add(self, key: str, array: Array) -> None:
         """Add the columns of an array."""
-        unit = self.units.get(key, "")
-        columns = columns_of(key, array, self.lists)
-        self.columns += [_Column(name, own or (unit if parse_unit(unit) else ""), part) for name, own, part in columns]
+        columns = columns_of(key, array, self.lists, self.units.get(key, ""))
+        self.columns += [_Column(*column) for column in columns]
 
 
 def nested_tables(source: Source, tree: Mapping[str, Any], title: str, *, may_be_notes: bool = False) -> list[RawTable]:
@@ -349,8 +348,7 @@ def _channel(key: str, says: Mapping[str, Any], lists: list[list[str]]) -> list[
     name = _title(stated or key)
     if split_name(name).role is None and split_name(key).role is not None:
         name = key
-    unit = unit if parse_unit(unit) else ""
-    columns = [_Column(title, own or unit, part, name) for title, own, part in columns_of(name, data, lists)]
+    columns = [_Column(*column, name) for column in columns_of(name, data, lists, unit)]
     stated_step = stated_clock({key: value for key, value in says.items() if isinstance(value, float)})
     if time is None and stated_step is not None:
         step, start, clock = stated_step
