@@ -559,15 +559,16 @@ def test_codes_below_a_heading_of_ratings_are_no_currents(heading, tmp_path):
     require_the_tests(tmp_path)
 
 
-@pytest.mark.parametrize("motions", [1, 3])
-def test_currents_in_a_line_below_the_units_belong_to_the_columns_beside_one_time(motions, tmp_path):
-    columns = [c for amperes in CURRENTS.values() for c in (X, force(amperes))]
-    over = "".join(f"\tI = {amperes} A" * 2 for amperes in CURRENTS.values())
-    head = "Time" + 3 * "\tDisplacement\tForce" + "\ns" + 3 * "\tmm\tN" + f"\n{over}"
-    if motions == 1:
-        columns = [X, *map(force, CURRENTS.values())]
-        over = "".join(f"\tI = {amperes} A" for amperes in CURRENTS.values())
-        head = "Time\tDisplacement" + 3 * "\tForce" + "\ns\tmm" + 3 * "\tN" + f"\n\tsine, 1 Hz{over}"
+@pytest.mark.parametrize("over", ["\tI = {} A\tI = {} A", "\tI = {} A", "\t{}"])
+def test_currents_in_a_line_below_the_units_belong_to_the_columns_beside_one_time(over, tmp_path):
+    names, units, first = "\tDisplacement\tForce" * 3, "\tmm\tN" * 3, ""
+    columns = [column for amperes in CURRENTS.values() for column in (X, force(amperes))]
+    if over.count("{}") == 1:  # of one motion
+        names, units, first = "\tDisplacement" + "\tForce" * 3, "\tmm" + "\tN" * 3, "\tsine, 1 Hz"
+        columns = columns[:1] + columns[1::2]
+    first = "Current (A)\t" if over == "\t{}" else first
+    line = first + "".join(over.format(amperes, amperes) for amperes in CURRENTS.values())
+    head = f"Time{names}\ns{units}\n{line}"
     np.savetxt(tmp_path / "book.txt", np.column_stack([T, *columns]), delimiter="\t", header=head, comments="")
     require_the_tests(tmp_path)
 

@@ -347,7 +347,8 @@ def _pivoted(
     assert of_table is not None
     column = cache(lambda i: table.read([i]).values[i])
     clocks = [i for i in others if table.headers[i].role == "time"]
-    apart = [n for n, own in enumerate(rows) if not _alike(own, base, [column(i) for i in clocks])]
+    even = [own.size == base.size and all(np.allclose(column(i)[own], column(i)[base]) for i in clocks) for own in rows]
+    apart = [n for n, same in enumerate(even) if not same]
     tests = [i for i in others if i not in clocks and len(np.unique(of_table(i).codes[base])) > 1]
     if apart and (len(clocks) != 1 or tests):
         problem = f"{labels[apart[0]]!r} has other times than the force"
@@ -366,10 +367,6 @@ def _pivoted(
 
     names, own = tuple(name for *_, name, _ in places), tuple(unit for *_, unit in places)
     return replace(table, names=names, units=own, read=read, words=words, odd=(), over=())
-
-
-def _alike(own: np.ndarray, base: np.ndarray, clocks: Sequence[np.ndarray]) -> bool:
-    return own.size == base.size and all(np.allclose(clock[own], clock[base]) for clock in clocks)
 
 
 def _units(table: RawTable, words: Words, column: list[int]) -> list[str] | None:

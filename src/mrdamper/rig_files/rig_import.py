@@ -48,7 +48,6 @@ from mrdamper.rig_files.quality import check_long_record
 from mrdamper.rig_files.quality.table import to_run
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
 from mrdamper.rig_files.record import Finding, Record, Refusal, unique_names
-from mrdamper.rig_files.rig_record import tidy_name
 from mrdamper.rig_files.sequences import follows, goes_on, tests_of_files
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, names_tests
@@ -530,9 +529,8 @@ def with_unique_ids(records: Iterable[Record]) -> tuple[Record, ...]:
     """Return records told apart by their names: files of different folders may share one, and have those of these."""
     records = tuple(records)
     counts = Counter(record.id for record in records)
-    folders = (PurePosixPath(record.provenance.get("file", "")).parent.parts for record in records)
-    own = [
-        tidy_name("_".join((*of, r.id))) if counts[r.id] > 1 else r.id for of, r in zip(folders, records, strict=True)
-    ]
+    paths = (PurePosixPath(record.provenance.get("file", "")).parent / record.id for record in records)
+    longer = [re.sub(r"[^\w.+=-]+", "_", str(path)).lstrip("_=+-.") for path in paths]
+    own = (long if counts[record.id] > 1 else record.id for long, record in zip(longer, records, strict=True))
     names = unique_names(own)
     return tuple(r if r.id == name else replace(r, id=name) for r, name in zip(records, names, strict=True))

@@ -318,12 +318,7 @@ def _run_id(table: RawTable, path: Path) -> str:
     while Path(stem).suffix.lower() in suffixes():
         stem = Path(stem).stem
     label = "" if not table.label or table.label.startswith("block") else f"_{table.label}"
-    return tidy_name(stem + label) or "run"
-
-
-def tidy_name(text: str) -> str:
-    """Return a text as the name of a run."""
-    return re.sub(r"[^\w.+=-]+", "_", text).lstrip("_=+-.").rstrip("_.")[:100]
+    return re.sub(r"[^\w.+=-]+", "_", stem + label).lstrip("_=+-.").rstrip("_.")[:100] or "run"
 
 
 def recording_time(lines: Iterable[str]) -> dict[str, str]:

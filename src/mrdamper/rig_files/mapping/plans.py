@@ -66,15 +66,15 @@ def results_of(path: Path, form: FileForm | None = None) -> Results | None:
     if len({(of.keys, of.title, of.of_supply) for _, of in sheets}) != 1:
         return None
     shared = set.intersection(*({*label.split()} for label, _ in sheets))  # Damper FL, Damper RR: FL, RR
-    folders = [" ".join(word for word in label.split() if word not in shared) for label, _ in sheets]
     rows = [
-        (folder, *row)
-        for folder, (_, of) in zip(folders, sheets, strict=True)
-        for row in zip(of.cells, of.current, strict=True)
+        (" ".join(word for word in label.split() if word not in shared), *cells[1:], current)
+        for label, of in sheets
+        for cells, current in zip(of.cells, of.current, strict=True)
     ]
-    cells = tuple((str(n), folder, *own[1:]) for n, (folder, own, _) in enumerate(rows, 1))
-    several = replace(sheets[0][1], current=tuple(row[2] for row in rows), cells=cells, pauses=())
-    return replace(several, keys=("", "", *several.keys[1:])) if len(sheets) > 1 else sheets[0][1]
+    every, cells = tuple(row[-1] for row in rows), tuple((str(n), *row[:-1]) for n, row in enumerate(rows, 1))
+    first = sheets[0][1]
+    several = replace(first, current=every, cells=cells, keys=("", "", *first.keys[1:]), pauses=())
+    return several if len(sheets) > 1 else first
 
 
 def currents_beside(

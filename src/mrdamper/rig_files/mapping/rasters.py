@@ -63,15 +63,12 @@ def with_joined_rasters(tables: list[RawTable]) -> list[RawTable]:
         if len(parts) < 2 or len(whole) > 1 or not needed or not lacks or not joined.keys().isdisjoint(map(id, parts)):
             continue
         rows = [*map(_rows, parts)]
-        if len(timed) < 2 and (2 * min(rows) < max(rows) or len(_currents(parts)) > 1):
+        currents = {v for t in parts for name, v in t.constants.items() if split_name(name).role == "current"}
+        if len(timed) < 2 and (2 * min(rows) < max(rows) or len(currents) > 1):
             continue  # a list of something else, or of another test
         joined[id(parts[0])] = _joined(label, parts, one_clock=len(timed) < 2)
         dropped |= {id(table) for table in parts[1:]}
     return [joined.get(id(table), table) for table in tables if id(table) not in dropped]
-
-
-def _currents(tables: Sequence[RawTable]) -> set[float]:
-    return {v for table in tables for name, v in table.constants.items() if split_name(name).role == "current"}
 
 
 def _rows(table: RawTable) -> int:

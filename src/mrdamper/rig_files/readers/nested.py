@@ -135,11 +135,8 @@ def _stated_units(tree: Mapping[str, Any]) -> dict[str, str]:
     pairs = next((v for k, v in tree.items() if k.casefold() in KEYS["unit"] and isinstance(v, list)), [])
     pairs = pairs if all(isinstance(item, str) for item in pairs) and {*pairs[::2]} <= {*tree} else []
     stated = stated or dict(zip(pairs[::2], pairs[1::2], strict=False))
-    return _units({key[:-5]: unit for key, unit in tree.items() if key.casefold().endswith("_unit")} | dict(stated))
-
-
-def _units(stated: Mapping[str, Any]) -> dict[str, str]:
-    return {key: unit for key, unit in stated.items() if isinstance(unit, str) and is_unit(unit)}
+    every = {key[:-5]: unit for key, unit in tree.items() if key.casefold().endswith("_unit")} | dict(stated)
+    return {key: unit for key, unit in every.items() if isinstance(unit, str) and is_unit(unit)}
 
 
 def _matrices_of_tests(tree: Mapping[str, Any]) -> list[str]:

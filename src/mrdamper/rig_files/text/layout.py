@@ -458,7 +458,10 @@ def _header_lines(
         fitting = [i for i in candidates if i in cells][-2 if width == 1 else 0 :]
         if not fitting:
             continue
-        last, telling = fitting[-1], [i for i in fitting if roles[i] >= _TELLING]
+        telling = [i for i in fitting if roles[i] >= _TELLING]
+        valued = [i for i in fitting if roles[i] == 1 and sum(cell[:1].isdigit() for cell in cells[i]) > 1]
+        fitting = [i for i in fitting if not telling or i not in valued]  # but Current (A), , 0, 0.5
+        last = fitting[-1]
         if candidates is plain and last != plain[-1] and _names_columns(lines[plain[-1]], separator):
             break
         stated = [i for i in reversed(fitting) if is_units(cells[i])]
