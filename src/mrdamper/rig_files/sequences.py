@@ -30,7 +30,11 @@ OFF_S, OFF_STEPS = 1.0, 20  # a gap in time that is longer than both is a rest: 
 _FEWEST_BLOCKS = 3  # of a rest
 _FEWEST_REVERSALS = 3  # of a test
 _FEWEST_REVERSALS_HELD = 5  # of a test at a current that steps to the next without a rest
-_SETTLED_PERIODS = 0.25  # of the motion: time over which a step of the current is looked for
+_SETTLED_PERIODS = 0.25  # of the motion: time over whose means a step of the current is looked for
+_LEAST_CHANGE_A, _STANDS_OUT = 0.01, 6.0  # of the current's mean from block to block [A]; times the median change
+_LEAST_STEP_A, _ABOVE_NOISE = 0.03, 4.0  # between two levels of a current [A]; times their RMS noise
+_SETTLED = 0.05  # of a step, within which a level is reached
+_LONGEST_TRANSITION = 0.25  # of the shortest level
 _ALIKE = 0.1  # relative difference of period and stroke of two tests at one condition
 _ALIKE_A = 0.05  # difference of current of two tests at one condition [A]
 _LONGEST = 5_000_000  # samples
@@ -203,10 +207,10 @@ def _with_soft_ends(parts: list[slice], time: Floats, x: Floats) -> list[slice]:
 
 
 def _pieces(part: slice, time: Floats, displacement: Floats, current: Floats) -> list[slice]:
-    """Split a part where the current changes from one held value to another while the motion goes on.
+    """Split a part where the current goes from one level that holds to another while the motion goes on.
 
-    Between two steps the motion turns back several times: a shorter stretch is a test of the coil's response.
-    Pieces without motion at the ends are omitted; a part whose current does not step is returned whole.
+    At a level the motion turns back several times: a shorter stretch is a test of the coil's response.
+    Transitions and pieces without motion at the ends are omitted; a part whose current changes otherwise is whole.
     """
     t, x, i = time[part], displacement[part], current[part]
     if i.size < 3 or not np.isfinite(i).all() or not held_current(i)[1]:
@@ -214,20 +218,38 @@ def _pieces(part: slice, time: Floats, displacement: Floats, current: Floats) ->
     strokes = find_strokes(t, x)
     if strokes.period is None:
         return [part]
-    size = max(1, round(_SETTLED_PERIODS * strokes.period / float(np.median(np.diff(t)))))
-    if t.size < 2 * size:
+    levels = _levels(i, round(max(_BLOCK_S, _SETTLED_PERIODS * strokes.period) / float(np.median(np.diff(t)))))
+    pieces = [level for level in levels if _moves(x[level], x)]
+    turns = [np.count_nonzero((strokes.reversals >= s.start) & (strokes.reversals < s.stop)) for s in pieces]
+    if len(levels) < 2 or min(turns, default=0) < _FEWEST_REVERSALS_HELD:
         return [part]
-    ahead = np.abs(i[size:] - i[:-size]) > _ALIKE_A  # two sides of a step are so far apart
-    steps = [(int(a), int(b)) for a, b in zip(*runs_of(ahead), strict=True)]
-    if not steps or any(not 0.5 * size <= b - a <= 2 * size for a, b in steps):
+    longest = max(after.start - before.stop for before, after in pairwise(levels))
+    if longest > _LONGEST_TRANSITION * min(piece.stop - piece.start for piece in pieces):
         return [part]
-    # The first sample of which the one `size` ahead differs stands `size` before the step.
-    starts, stops = [0, *(max(b, a + size) for a, b in steps)], [*(a + size for a, _ in steps), t.size]
-    pieces = [(a, b) for a, b in zip(starts, stops, strict=True) if _moves(x[a:b], x)]
-    turns = [np.count_nonzero((strokes.reversals >= a) & (strokes.reversals < b)) for a, b in pieces]
-    if min(turns, default=0) < _FEWEST_REVERSALS_HELD:
-        return [part]
-    return [slice(part.start + a, part.start + b) for a, b in pieces]
+    return [slice(part.start + piece.start, part.start + piece.stop) for piece in pieces]
+
+
+def _levels(current: Floats, size: int) -> list[slice]:
+    """Return the stretches between steps of a current, where the means of blocks change more than they usually do."""
+    count = current.size // max(1, size)
+    if count < 3:
+        return []
+    blocks = current[: count * size].reshape(count, size)
+    changes = np.abs(np.diff(np.mean(blocks, axis=1)))
+    steps = runs_of(changes > max(_LEAST_CHANGE_A, _STANDS_OUT * float(np.median(changes))))
+    ends = zip([0, *steps[1]], [*(steps[0] + 1), count], strict=True)
+    low, middle, high = np.transpose([np.quantile(blocks[a:b], (0.16, 0.5, 0.84)) for a, b in ends])
+    levels = [slice(0, current.size)]
+    for k, (first, last) in enumerate(zip(*steps, strict=True)):
+        step, noise = abs(middle[k + 1] - middle[k]), max(high[k : k + 2] - low[k : k + 2]) / 2
+        if step < max(_LEAST_STEP_A, _ABOVE_NOISE * noise):
+            continue
+        near = max(_SETTLED * step, 3 * noise)
+        gap = current[first * size : (last + 1) * size]
+        stop = first * size + int(np.argmax(np.abs(gap - middle[k]) > near))
+        start = (last + 1) * size - int(np.argmax(np.abs(gap - middle[k + 1])[::-1] > near))
+        levels[-1:] = [slice(levels[-1].start, stop), slice(max(start, stop), current.size)]
+    return levels
 
 
 def _boundaries(time: Floats, x: Floats) -> list[int]:
