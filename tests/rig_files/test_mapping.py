@@ -17,7 +17,9 @@ from mrdamper.rig_files.mapping.proposals import damping_share
 from mrdamper.rig_files.mapping.results import results_in
 from mrdamper.rig_files.preview import question_of
 from mrdamper.rig_files.profile import CurrentSource, Profile, ProfileError, parse_profile
+from mrdamper.rig_files.quality import check_record
 from mrdamper.rig_files.readers import raw_tables
+from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.rig_import import import_files, to_dataset
 from mrdamper.rig_files.sequences import stretches_of_session
 
@@ -226,6 +228,55 @@ def test_a_session_is_cut_at_the_steps_of_its_current_and_a_response_to_a_step_i
         ["time_s,displacement_mm,force_N,current_A", *rows(test.t, 1e3 * test.x, test.f, stepped)],
     )
     assert len(import_files([tmp_path / "response"]).records) == 1
+
+
+@pytest.mark.parametrize(
+    ("rise_s", "noise_A", "step_A"), [(0.02, 0.003, 0.3), (0.1, 0.003, 0.3), (0.01, 0.01, 0.3), (0.02, 0.003, 0.05)]
+)
+def test_a_session_is_cut_at_steps_of_a_measured_current_whatever_its_coil_and_noise(rise_s, noise_A, step_A):
+    t = np.arange(0, 40, 0.004)
+    x = 0.01 * np.sin(2 * np.pi * 1.5 * t)
+    since = t % 8
+    current = step_A * (np.floor(t / 8) - np.where(t < 8, 0, np.exp(-since / rise_s)))
+    noisy = current + np.random.default_rng(0).normal(0, noise_A, t.size)
+    stretches = stretches_of_session(t, x, noisy)
+    assert [round(float(np.mean(noisy[s])) / step_A, 1) for s in stretches] == [0, 1, 2, 3, 4]
+    assert all(7 < t[s.stop - 1] - t[s.start] < 8.05 for s in stretches)
+    assert all(np.ptp(current[s]) < 0.1 * step_A + 5 * noise_A for s in stretches)
+
+
+def _currents_that_vary(t, x):
+    speed = np.gradient(x, t)
+    random = np.random.default_rng(1)
+    return {
+        "ramp": 0.05 * t,
+        "ramps between levels": np.interp(t, [0, 8, 12, 20, 24, 40], [0, 0, 0.5, 0.5, 1, 1]),
+        "sine": 0.5 + 0.5 * np.sin(2 * np.pi * 0.1 * t),
+        "skyhook": np.where(speed * np.sin(2 * np.pi * 0.37 * t) > 0, 1.0, 0.0),
+        "proportional": 20 * np.abs(speed),
+        "steps at random": np.repeat(random.uniform(0, 1, 40), t.size // 40),
+        "short steps": np.floor(t % 10 / 2) / 5,
+        "random walk": np.abs(np.cumsum(random.normal(0, 0.01, t.size))),
+    }
+
+
+def test_a_record_whose_current_varies_all_the_time_is_one():
+    t = np.arange(0, 40, 0.004)
+    x = 0.01 * np.sin(2 * np.pi * t)
+    noise = np.random.default_rng(0).normal(0, 0.003, t.size)
+    currents = _currents_that_vary(t, x)
+    tests = {kind: len(stretches_of_session(t, x, current + noise)) for kind, current in currents.items()}
+    assert tests == dict.fromkeys(currents, 1)
+
+
+def test_what_a_changing_current_does_to_the_force_is_no_fault_of_the_rig():
+    t = np.arange(0, 40, 0.004)
+    x = 0.01 * np.sin(2 * np.pi * t)
+    current = 0.5 + 0.5 * np.sin(2 * np.pi * 0.05 * t)
+    force = (200 + 800 * current) * np.tanh(np.gradient(x, t) / 0.005) + np.random.default_rng(0).normal(0, 2, t.size)
+    findings = check_record(Record("a", t, x, force, current=current)).findings
+    assert [finding.code for finding in findings] == ["W_CURRENT_VARIES"]
+    assert "export each level as a test" in findings[0].text
 
 
 def test_rows_that_begin_with_a_word_are_all_read(tmp_path):

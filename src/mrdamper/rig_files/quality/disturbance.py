@@ -20,6 +20,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.physics.motion import SINE_DISTORTION_LIMIT
 from mrdamper.rig_files.quality.cycles import POINTS, REFUSED, effect_on, percent, percent_of, steady_cycles
+from mrdamper.rig_files.quality.motion import current_changes
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
@@ -28,6 +29,7 @@ _LINE_POWER = 0.002  # of the velocity's, in one line that is no harmonic: bundl
 _BURST, _BURST_STANDS_OUT = 0.003, 8.0  # of the velocity's power in an eighth of the record; times the median: 0.004, 3
 _PARTS = 8  # of the record, in which bursts are looked for
 _LINE = 0.03  # amplitude of a line in the force, of half its peak-to-peak value
+_LOWEST_ORDER = 20.0  # times the frequency of the motion: of a line in the force while the current changes
 _ABOVE = 12.0  # times the median line around it; noise reaches 8
 _AROUND = 60  # lines on either side
 _NOISE = 0.026  # RMS noise of the force, of its peak-to-peak value: bundled rigs have up to 0.011
@@ -116,7 +118,8 @@ def force_lines(view: View) -> Iterator[Finding]:
         return
     time, force = view.steady.time, view.steady.force
     rest = force - cycles.read(cycles.force.loop, time)
-    lines = [strongest_line(time, rest, 1.5 * motion.condition.frequency_Hz)]
+    order = _LOWEST_ORDER if current_changes(view) else 1.5  # harmonics change with the current
+    lines = [strongest_line(time, rest, order * motion.condition.frequency_Hz)]
     lines.append(_odd_harmonic(cycles.force.loop, 1 / cycles.period))
     strong = [line for line in lines if line is not None and line.above > _ABOVE]
     half = 0.5 * cycles.force.span

@@ -10,7 +10,7 @@ from mrdamper.data import Floats, once_per_run
 from mrdamper.errors import QualityError
 from mrdamper.identification.loop_analysis import damping_share as share_of_damping
 from mrdamper.rig_files.quality.cycles import POINTS, every_cycle, steady_cycles
-from mrdamper.rig_files.quality.motion import LEAST_CYCLES, cycles_of, held_in, steady_window
+from mrdamper.rig_files.quality.motion import LEAST_CYCLES, current_changes, cycles_of, steady_window
 from mrdamper.rig_files.quality.view import MOST_SAMPLES, View, longest_run, sample_noise
 from mrdamper.rig_files.record import SIGNED, Finding, SteadyPart
 
@@ -180,7 +180,7 @@ def repeats(view: View) -> Iterator[Finding]:
     """Report cycles of a record that differ from each other by more than noise."""
     scatter, noise = repeatability(view) or (0.0, 0.0)
     beyond = float(np.sqrt(max(scatter**2 - noise**2, 0.0)))
-    if beyond > POOR_REPEATABILITY:
+    if beyond > POOR_REPEATABILITY and not current_changes(view):
         yield Finding(
             "W_REPEATABILITY",
             f"the force differs from cycle to cycle by {100 * scatter:.1f} % of its peak-to-peak value "
@@ -231,7 +231,7 @@ def force_follows(view: View) -> None:
         raise view.refused("E_NO_ENERGY", problem, "check the load cell, and that the damper is mounted")
     _force_rests_with_the_motion(view)
     scatter, _ = repeatability(view) or (0.0, 0.0)
-    if scatter < _UNLIKE or view.noticed("W_FROZEN") or held_in(view.record, steady_window(view))[1]:
+    if scatter < _UNLIKE or view.noticed("W_FROZEN") or current_changes(view):
         return
     problem = (
         f"the force differs from cycle to cycle by {100 * scatter:.0f} % of its peak-to-peak value: it does not "

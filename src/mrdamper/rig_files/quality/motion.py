@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrdamper.data import Floats, held_current
+from mrdamper.data import Floats, held_current, once_per_run
 from mrdamper.data.arrays import take
 from mrdamper.physics.motion.sines import SINE_DISTORTION_LIMIT
 from mrdamper.rig_files.conditions import motions_in
@@ -130,8 +130,14 @@ def change_of(record: Record, window: tuple[float, float] | None) -> Iterator[Fi
     """Yield the finding that a record's current changes within a window of time."""
     change = held_in(record, window)[1]
     if change:
-        text = f"{change}: only methods that take a current channel use the run, nothing is identified from it alone"
-        yield Finding("W_CURRENT_VARIES", text)
+        use = "a global model uses the run; to identify it alone, hold the current, or export each level as a test"
+        yield Finding("W_CURRENT_VARIES", f"{change}: {use}")
+
+
+@once_per_run
+def current_changes(view: View) -> bool:
+    """Tell if the current changes within the steady motion: then cycles of the force differ, as they should."""
+    return bool(held_in(view.record, steady_window(view))[1])
 
 
 def held_in(record: Record, window: tuple[float, float] | None) -> tuple[float, str]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.rig_files.quality.cycles import Cycles, percent, steady_cycles
+from mrdamper.rig_files.quality.motion import current_changes
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 
@@ -57,6 +58,8 @@ def cycles_are_steady(view: View) -> Iterator[Finding]:
         stroke = 0.0  # the force follows, or the drift is reported
     gain = _largest(np.log(np.maximum(1 + force.gain, 1e-3)) - _followed(cycles))
     offset, late = _largest(force.offset) / force.span, _largest(force.late - motion.late)
+    if current_changes(view):
+        gain = offset = late = 0.0  # of the current
     changes = (
         (stroke, STROKE, f"the amplitude changes by {100 * stroke:+.3g} % over the record and the force does not: "
          f"damping is uncertain by {percent(abs(stroke) / 2)}; check the displacement sensor"),
