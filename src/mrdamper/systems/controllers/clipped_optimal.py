@@ -92,21 +92,11 @@ class ClippedOptimal(Controller):
         """f* of every damper, from an observer of the structure."""
         design, tape = self.design, see.tape
         assert design is not None
-        z = [tape.remember(f"estimate{i}") for i in range(design.A.shape[0])]
-        f = [see.signal(f"{name}.force") for name in design.dampers]
+        z = np.array([tape.remember(f"estimate{i}") for i in range(len(design.A))], dtype=object)
+        f = np.array([see.signal(f"{name}.force") for name in design.dampers], dtype=object)
         y = [see(name, "acceleration") for name in design.coordinates]
         y += [see.signal(f"{name}.stroke") for name in design.dampers]
-        gap = [
-            size * value - _sum(c, z) - _sum(d, f)
-            for size, value, c, d in zip(design.size, y, design.C, design.D, strict=True)
-        ]
-        for i, (a, b, gain) in enumerate(zip(design.A, design.B, design.L, strict=True)):
-            tape.update(z[i], _sum(a, z) + _sum(b, f) + _sum(gain, gap))
-        return {name: -_sum(g, z) for name, g in zip(design.dampers, design.G, strict=True)}
-
-
-def _sum(weights: Floats, values: Sequence[Any]) -> Any:
-    total: Any = 0.0
-    for weight, value in zip(weights.tolist(), values, strict=True):
-        total = total + weight * value
-    return total
+        gap = design.size * np.array(y, dtype=object) - design.C @ z - design.D @ f
+        for memory, value in zip(z, design.A @ z + design.B @ f + design.L @ gap, strict=True):
+            tape.update(memory, value)
+        return dict(zip(design.dampers, -(design.G @ z), strict=True))
