@@ -21,7 +21,7 @@ from mrdamper.dampers.joint import JointDamper, JointProblem
 from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError
 from mrdamper.statistics.metrics import peak_force
-from mrdamper.study.contradictions import ContradictionError, find_contradictions
+from mrdamper.study.contradictions import ContradictionError, compare_runs
 from mrdamper.study.usable_runs import accepted_runs
 
 WORSE = 0.05  # difference of the peak forces of two models from which one is worse
@@ -32,7 +32,7 @@ def verdict(folder: Folder) -> tuple[bool, str, list[Run]]:
     """Tell whether a folder's wrong runs, and no others, are named with an accepted cause; what was found; the rest."""
     runs = accepted_runs(folder.runs)[0]
     try:
-        found = find_contradictions(folder.runs)
+        found = compare_runs(folder.runs).contradictions
         aside = {one.run_id for one in found if one.run_id in {run.id for run in runs}}
     except ContradictionError as refusal:
         return "refused" in folder.causes, str(refusal)[:80], []
@@ -98,7 +98,7 @@ def main() -> None:
                 )
     accused = 0
     for number in range(given.first, given.first + given.sound):
-        found = find_contradictions(sound_folder(number))
+        found = compare_runs(sound_folder(number)).contradictions
         accused += bool(found)
         if found:
             print(f"accused | {number} | {'; '.join(map(str, found))}", flush=True)

@@ -15,7 +15,7 @@ from mrdamper.cli import application
 from mrdamper.data import Dataset, Run
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 from mrdamper.rig_files.rig_import import import_files, to_dataset
-from mrdamper.study.contradictions import ContradictionError, compare_runs, find_contradictions
+from mrdamper.study.contradictions import ContradictionError, compare_runs
 from mrdamper.study.contradictions.evidence import AssumedScatter, Evidence
 from mrdamper.study.contradictions.explanations import Explanation, Trial, completed_matrix_odds
 from mrdamper.study.contradictions.findings import describe
@@ -39,6 +39,10 @@ def sound():
 @pytest.fixture(scope="module")
 def cases():
     return {folder.name: folder for folder in first_set(DAMPERS[0])}
+
+
+def find_contradictions(runs, keep=()):
+    return compare_runs(runs, keep).contradictions
 
 
 def changed(runs, k, **channels):

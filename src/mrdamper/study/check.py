@@ -11,7 +11,7 @@ from mrdamper import identification
 from mrdamper.data import Dataset, Displayable, Run
 from mrdamper.errors import InputError, is_a, validate_arguments
 from mrdamper.rig_files.quality.table import check_run, with_findings
-from mrdamper.study.contradictions import ContradictionError, find_contradictions
+from mrdamper.study.contradictions import ContradictionError, compare_runs
 from mrdamper.study.usable_runs import accepted_runs
 
 Severity = Literal["refused", "set aside", "noted"]
@@ -113,7 +113,7 @@ def _of_run(run: Run) -> list[DatasetFinding]:
 
 def _of_rig(rig: str, runs: Sequence[Run]) -> list[DatasetFinding]:
     try:
-        contradictions = find_contradictions(runs)
+        contradictions = compare_runs(runs).contradictions
     except ContradictionError as refusal:
         return [DatasetFinding("", rig, refusal.code, "refused", str(refusal))]
     return [DatasetFinding(one.run_id, rig, one.code, "set aside", str(one)) for one in contradictions]

@@ -5,12 +5,6 @@ offset, another current, another damper, a copy) is far better than none, the ru
 """
 
 from mrdamper.study.contradictions.findings import Contradiction
-from mrdamper.study.contradictions.rig import (
-    MIN_RUNS,
-    ContradictionError,
-    RunComparison,
-    compare_runs,
-    find_contradictions,
-)
+from mrdamper.study.contradictions.rig import MIN_RUNS, ContradictionError, RunComparison, compare_runs
 
-__all__ = ["MIN_RUNS", "Contradiction", "ContradictionError", "RunComparison", "compare_runs", "find_contradictions"]
+__all__ = ["MIN_RUNS", "Contradiction", "ContradictionError", "RunComparison", "compare_runs"]

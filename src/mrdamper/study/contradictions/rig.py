@@ -41,11 +41,6 @@ class RunComparison:
     undescribed: str = ""  # sentence on the motions at which the model of the comparison fails
 
 
-def find_contradictions(runs: Sequence[Run], keep: Collection[str] = ()) -> list[Contradiction]:
-    """Find the runs of one rig that contradict the others; arguments and errors as `compare_runs`."""
-    return compare_runs(runs, keep).contradictions
-
-
 @on_one_blas_thread
 def compare_runs(runs: Sequence[Run], keep: Collection[str] = ()) -> RunComparison:
     """Find the runs of one rig, accepted by the quality checks, that contradict the others, except those to keep.
@@ -59,8 +54,7 @@ def compare_runs(runs: Sequence[Run], keep: Collection[str] = ()) -> RunComparis
     validated = {run.id for run in runs if run.split == "validate"}
     described = [describe_copy(copy, copy.run_id in validated) for copy in copies]
     contradictions = {one.run_id: one for one in described if one.run_id not in keep}
-    tracks = [t for t in tracks_of([run for run in runs if run.id not in contradictions])]
-    tracks, milliamperes = _in_amperes(tracks, keep)
+    tracks, milliamperes = _in_amperes(tracks_of([run for run in runs if run.id not in contradictions]), keep)
     contradictions |= milliamperes
     train, undescribed = [track for track in tracks if track.run.split == "train"], ""
     if len(train) >= MIN_RUNS:
@@ -95,7 +89,10 @@ def _among(train: Sequence[Track], keep: Collection[str]) -> tuple[dict[str, Con
     incoherent = len(contradictions) > _REFUSED_SHARE * len(train) and (
         search.evidence.spread.misfit >= _MAX_MISFIT_FACTOR or ("damper" in causes and len(causes) > 1)
     )
-    if len(contradictions) > _MAX_SHARE * len(train) or incoherent or _opposed(list(contradictions.values())):
+    # Some runs need a factor and others its inverse: the correct ones cannot be identified.
+    factors = [one.value for one in contradictions.values() if one.cause == "force"]
+    opposed = any(abs(np.log(a * b)) < _INVERSE_TOLERANCE for a, b in combinations(factors, 2))
+    if len(contradictions) > _MAX_SHARE * len(train) or incoherent or opposed:
         raise _disagreement(train, contradictions)
     return contradictions, _undescribed([train[k] for k in sorted(search.unproven)])
 
@@ -108,12 +105,6 @@ def _undescribed(tracks: Sequence[Track]) -> str:
         f"At {listed(list(motions), _MAX_MOTIONS)}, the current changes the force otherwise than at the other "
         "motions, which the comparison of the runs does not describe: a wrong current may not be found there."
     )
-
-
-def _opposed(contradictions: Sequence[Contradiction]) -> bool:
-    """Tell whether some runs need a factor and others its inverse: the correct ones cannot be identified."""
-    factors = [one.value for one in contradictions if one.cause == "force"]
-    return any(abs(np.log(a * b)) < _INVERSE_TOLERANCE for a, b in combinations(factors, 2))
 
 
 def _beside(validation: Sequence[Track], trusted: Sequence[Track]) -> dict[str, Contradiction]:
