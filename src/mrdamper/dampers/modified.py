@@ -204,7 +204,8 @@ def fit_modified(
             conditions,
             values[name],
             log=name in model_type.log_coordinates(),
-            uncertainty=_uncertainty(identifications, name, name in model_type.log_coordinates()),
+            uncertainty=np.array([i.standard_errors.get(name, np.inf) for i in identifications])
+            / (values[name] if name in model_type.log_coordinates() else 1.0),
             dissipating=_dissipating(model_type).get(name, ""),
         )
         for name in candidates
@@ -316,11 +317,6 @@ def _about_forms(functions: Mapping[str, ParameterFunction]) -> dict[str, str]:
     follows = [name for name, function in functions.items() if FORMS[function.form].follows_motion]
     forms = "; ".join(f"{name}: {function.form}" for name, function in functions.items())
     return {"forms": forms, "depends on frequency and amplitude": ", ".join(follows) or "no parameter"}
-
-
-def _uncertainty(identifications: Sequence[Identification], name: str, log: bool) -> Floats:
-    errors = np.array([i.standard_errors.get(name, np.inf) for i in identifications])
-    return errors / np.array([_coordinate(i, name) for i in identifications]) if log else errors
 
 
 def _coordinate(identification: Identification, name: str) -> float:

@@ -54,7 +54,11 @@ class KillableWorker:
         while True:
             answer, died = self._ask({"call": function, "argument": argument, "limits": asdict(self._limits)})
             if answer is not None:
-                return _result(answer)
+                if "result" in answer:
+                    return answer["result"]
+                kind = JobError if answer["code"].startswith("E_JOB") else InputError
+                where, remedy = answer.get("where", ""), answer.get("remedy", "")
+                raise kind(answer["found"], where=where, remedy=remedy, code=answer["code"])
             if died == getattr(signal, "SIGXCPU", None):
                 raise JobError(f"over {self._limits.cpu_s:g} s of processor time", code="E_JOB_TIME")
             killed += died == signal.SIGKILL
@@ -92,13 +96,6 @@ class KillableWorker:
         child, self._child = self._child, None
         if child is not None:
             child.close()
-
-
-def _result(answer: dict[str, Any]) -> Any:
-    if "result" in answer:
-        return answer["result"]
-    error = JobError if answer["code"].startswith("E_JOB") else InputError
-    raise error(answer["found"], where=answer.get("where", ""), remedy=answer.get("remedy", ""), code=answer["code"])
 
 
 def _how(died: int) -> str:

@@ -99,10 +99,6 @@ class PaperOptions(StudyMethod):
             self.bounds,
         )  # fmt: skip
 
-    def assumptions(self, train: Sequence[Run]) -> PaperAssumptions:
-        """Return the parameters that are held in every identification of these runs."""
-        return PaperAssumptions.of(train, self.gas).preset(self.fixed)
-
     def recipe(self, train: Sequence[Run]) -> Recipe:
         """Make the recipe: every sine run by the paper's method, then its functions over the conditions.
 
@@ -111,7 +107,7 @@ class PaperOptions(StudyMethod):
         """
         if self.functions == "paper":
             require_paper_functions(train)
-        assumptions = self.assumptions(train)
+        assumptions = PaperAssumptions.of(train, self.gas).preset(self.fixed)
         return Recipe(
             name=self.name,
             basis=assumptions.basis(self.method()),

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 
 import numpy as np
 
@@ -52,11 +53,6 @@ class LoopElement:
         return self.source.starts
 
     @property
-    def scaled_given(self) -> tuple[float, ...]:
-        """Gain, offset and parameters, concatenated."""
-        return (*self.scale, *self.given)
-
-    @property
     def sizes(self) -> tuple[int, int, int]:
         """Numbers of parameters, derived constants and memory values."""
         return len(self.given), len(self.derived), len(self.start)
@@ -82,10 +78,9 @@ class ElementParameters:
 
     @classmethod
     def of(cls, elements: Sequence[LoopElement]) -> ElementParameters:
-        def joined(name: str) -> Floats:
-            return np.array([value for element in elements for value in getattr(element, name)], dtype=float)
-
-        return cls(joined("scaled_given"), joined("derived"), joined("start"))
+        """Concatenate gain, offset and parameters, derived constants, and memory of every element."""
+        parts = [(*e.scale, *e.given) for e in elements], [e.derived for e in elements], [e.start for e in elements]
+        return cls(*(np.array([*chain.from_iterable(part)], dtype=float) for part in parts))
 
 
 def interpreted_loop(elements: Sequence[LoopElement], control: LoopElement | None) -> Callable[..., int]:

@@ -112,13 +112,8 @@ async def _sweep(sessions: BrowserSessions) -> None:
     while True:
         await asyncio.sleep(_SWEEP_S)
         await asyncio.to_thread(sessions.sweep)
-        await asyncio.to_thread(_return_memory)
-
-
-def _return_memory() -> None:
-    """Return the memory of ended sessions to the system; the allocator would keep it."""
-    gc.collect()
-    _call_allocator("malloc_trim", 0)
+        await asyncio.to_thread(gc.collect)
+        await asyncio.to_thread(_call_allocator, "malloc_trim", 0)  # would keep the memory of ended sessions
 
 
 def _call_allocator(name: str, *arguments: int) -> None:

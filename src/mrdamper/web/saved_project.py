@@ -91,19 +91,14 @@ def save_project(session: Session, state: str, shown: str | None, logo: str = ""
         for name, damper in zip(files, dampers, strict=True):
             archive.writestr(name, dump_model(damper.damper))
         if imported and imported.source != "bundled":
-            _write_data(imported.dataset, archive)
+            with temporary_folder() as folder:
+                save_dataset(imported.dataset, folder / DATA)
+                for path in sorted((folder / DATA).iterdir()):
+                    archive.write(path, f"{DATA}/{path.name}")
     if packed.tell() > FILE_LIMIT:
         problem = f"{packed.tell() / 1e6:.0f} MB, over the {FILE_LIMIT / 1e6:.0f} MB that the app opens"
         raise SavedProjectError(problem, remedy="keep the dataset folder and save the state alone")
     return packed.getvalue()
-
-
-def _write_data(dataset: Dataset, archive: zipfile.ZipFile) -> None:
-    with temporary_folder() as place:
-        folder = place / DATA
-        save_dataset(dataset, folder)
-        for path in sorted(folder.iterdir()):
-            archive.write(path, f"{DATA}/{path.name}")
 
 
 def open_saved_project(path: Path, place: Path) -> SavedProject:

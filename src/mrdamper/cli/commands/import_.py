@@ -75,7 +75,9 @@ def import_(
     if dry and (write_profile is not None or write_tests is not None):
         return
     if dry and not as_json:
-        _print_tree(files, settings)
+        from mrdamper.rig_files.preview import tree_lines
+
+        print("\n  ".join(["In the files:", *tree_lines(files, settings)]))
     with progress_on_stderr(quiet or as_json) as progress:
         result = import_files(files, settings, tests=tests, progress=progress)
         on_terminal = sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()
@@ -246,12 +248,6 @@ def _reads_alike(one: Run, other: Run) -> bool:
 
     channels = ("time", "displacement", "force", "current")
     return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in channels)
-
-
-def _print_tree(files: list[Path], settings: Profile) -> None:
-    from mrdamper.rig_files.preview import tree_lines
-
-    print("\n  ".join(["In the files:", *tree_lines(files, settings)]))
 
 
 def _asked(

@@ -17,7 +17,7 @@ _HIDDEN = 5
 _DECAY = 0.15  # weight of the penalty on the network's weights
 _SEED = 20240813
 _OUTPUTS = ("fy", "kappa", "v0", "c", "k", "f0")
-_LOGARITHMIC = ("fy", "kappa", "v0")
+_LOGARITHMIC = ("fy", "kappa", "v0")  # the first of them
 _INPUTS = 3
 _MAX_WEIGHT = 20.0  # weight
 _WEIGHT_STEP = 1e-6 * (2 * _MAX_WEIGHT)  # of a weight, for derivatives by differences
@@ -56,7 +56,9 @@ class BoadaType(ConditionedDamper):
     @classmethod
     def start(cls, identifications: Sequence[Identification], reference: Condition) -> dict[str, float]:
         inputs = np.array([_raw(i.condition) for i in identifications])
-        outputs = np.array([[_forward(n, i.model.values()[n]) for n in _OUTPUTS] for i in identifications])
+        outputs = np.array([[i.model.values()[name] for name in _OUTPUTS] for i in identifications])
+        logarithmic = slice(len(_LOGARITHMIC))
+        outputs[:, logarithmic] = np.log(np.maximum(outputs[:, logarithmic], 1e-6))
         centre, spread = inputs.mean(axis=0), _spread(inputs)
         middle, width = np.median(outputs, axis=0), _spread(outputs)
         weights = _train((inputs - centre) / spread, np.clip((outputs - middle) / width, -3, 3))
@@ -76,7 +78,8 @@ class BoadaType(ConditionedDamper):
         values: dict[str, float] = {}
         for i, (name, output) in enumerate(zip(_OUTPUTS, outputs, strict=True)):
             middle, width = self.coefficients[f"middle{i}"], self.coefficients[f"width{i}"]
-            values[name] = np.clip(_backward(name, middle + width * np.clip(output, -4, 4)), *bounds[name])
+            value = middle + width * np.clip(output, -4, 4)
+            values[name] = np.clip(np.exp(value) if name in _LOGARITHMIC else value, *bounds[name])
         return Guo(**values)
 
     def _part(self, name: str, count: int) -> Floats:
@@ -85,14 +88,6 @@ class BoadaType(ConditionedDamper):
 
 def _raw(condition: Condition) -> tuple[Any, Any, Any]:
     return condition.current_A, np.log(condition.frequency_Hz), np.log(condition.amplitude_m)
-
-
-def _forward(name: str, value: float) -> float:
-    return float(np.log(max(value, 1e-6))) if name in _LOGARITHMIC else value
-
-
-def _backward(name: str, value: Any) -> Any:
-    return np.exp(value) if name in _LOGARITHMIC else value
 
 
 def _spread(table: Floats) -> Floats:
