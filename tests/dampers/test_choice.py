@@ -60,7 +60,7 @@ def test_lags_of_the_coil_stay_whatever_is_taken_away():
 
 def test_a_term_stays_where_without_it_more_is_missed():
     # Where the values are the residual is noise: without h1 it is large; c1 is made up for by nothing but its own 2.
-    terms = [ModelTerm("h1 matters", ("h1",), (0.0,)), ModelTerm("c1 does not", ("c1",), (0.0,))]
+    terms = [ModelTerm("h1 matters", ("h1",)), ModelTerm("c1 does not", ("c1",))]
     made = evidence(JACOBIAN @ np.array([0.0, 0.0, 2.0, 0.0]) + 0.01 * RNG.standard_normal(N))
     active, tried = made.choose(terms)
     assert active == frozenset(("d", "h1", "f0"))

@@ -38,27 +38,26 @@ class ModelTerm:
 
     title: str
     names: tuple[str, ...]  # parameters it takes
-    neutral: tuple[float, ...]  # their values in the model without the term
     held: tuple[tuple[str, float], ...] = ()  # presets of the model that the term holds at another value
 
 
 _NO_ONSET = (("Ic", _NO_ONSET_A),)
 LEVEL_LAWS = (
-    ModelTerm("yield force rises with the current from no current on", (), (), held=_NO_ONSET),
-    ModelTerm("yield force begins to rise over the current of the preset", (), ()),
-    ModelTerm("yield force rises over a current of its own", ("Ic",), (_NO_ONSET_A,)),
-    ModelTerm("yield force saturates with current", ("si",), (0.0,), held=_NO_ONSET),
-    ModelTerm("yield force saturates, and rises over the current of the preset", ("si",), (0.0,)),
-    ModelTerm("yield force rises and saturates over currents of its own", ("Ic", "si"), (_NO_ONSET_A, 0.0)),
+    ModelTerm("yield force rises with the current from no current on", (), held=_NO_ONSET),
+    ModelTerm("yield force begins to rise over the current of the preset", ()),
+    ModelTerm("yield force rises over a current of its own", ("Ic",)),
+    ModelTerm("yield force saturates with current", ("si",), held=_NO_ONSET),
+    ModelTerm("yield force saturates, and rises over the current of the preset", ("si",)),
+    ModelTerm("yield force rises and saturates over currents of its own", ("Ic", "si")),
 )
 _LEVEL_LAW_PARAMETERS = ("Ic", "si")
 TERMS = (
-    ModelTerm("viscosity differs by direction", ("cq",), (0.0,)),
-    ModelTerm("bypass differs by direction", ("qb",), (0.0,)),
-    ModelTerm("yield force differs by direction", ("asymmetry",), (0.0,)),
-    ModelTerm("viscosity rises with current", ("c1",), (0.0,)),
-    ModelTerm("Stribeck amplitude depends on current", ("h1",), (0.0,)),
-    ModelTerm("inertia", ("m",), (0.0,)),
+    ModelTerm("viscosity differs by direction", ("cq",)),
+    ModelTerm("bypass differs by direction", ("qb",)),
+    ModelTerm("yield force differs by direction", ("asymmetry",)),
+    ModelTerm("viscosity rises with current", ("c1",)),
+    ModelTerm("Stribeck amplitude depends on current", ("h1",)),
+    ModelTerm("inertia", ("m",)),
 )
 
 
@@ -157,7 +156,7 @@ def _with_presets_as_terms(runs: Sequence[Run], model: str) -> JointChoice:
     short = ends.search(rounds=2, most_steps=15, settled=_COARSE_TOLERANCE)
     fit = problem.fit(start=short.point, rounds=1, settled=_COARSE_TOLERANCE / 10)
     evidence = CrossValidation.of(problem, fit)
-    chosen, tried = evidence.choose([ModelTerm(optional[n], (n,), (0.0,)) for n in problem.free if n in optional])
+    chosen, tried = evidence.choose([ModelTerm(optional[n], (n,)) for n in problem.free if n in optional])
     final = problem.with_free(tuple(chosen))
     best = final.fit(start=evidence.start(final), rounds=1, settled=_COARSE_TOLERANCE / 10)
     terms = "; ".join(t.term for t in tried if t.kept) or _PLAIN
