@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from hashlib import sha256
 from html import escape
+from typing import Any
 
 _SPELLED = str.maketrans(
     {"−": "-", "–": "-", "·": "*", "²": "^2", "³": "^3", "√": "sqrt", "≤": "<=", "≥": ">=", "∈": " in "}
@@ -80,6 +81,12 @@ def csv_text(rows: Sequence[Mapping[str, object]], names: Iterable[str] | None =
     for row in rows:  # most fields are numbers
         lines.append(",".join([repr(v) if type(v) is float else _csv_field(v) for v in map(row.get, heads)]))
     return "\n".join([*lines, ""])
+
+
+def rows_of(columns: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return arrays (N,) by name as rows of a table."""
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def file_names(texts: Iterable[str]) -> dict[str, str]:

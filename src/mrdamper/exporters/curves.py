@@ -15,7 +15,7 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data import Condition, Floats
-from mrdamper.data.encoding import c_comment, csv_text
+from mrdamper.data.encoding import c_comment, csv_text, rows_of
 from mrdamper.errors import InputError
 from mrdamper.exporters.base import Exporter, Written
 from mrdamper.exporters.templates import render
@@ -107,8 +107,7 @@ class ForceVelocity:
         """The curve as rows of a table."""
         head = {"current_A": self.current_A, "amplitude_m": self.amplitude_m}
         columns = (self.velocity, self.force, self.peak_force, self.tested.astype(int))
-        points = zip(*(column.tolist() for column in columns), strict=True)
-        return [head | dict(zip(_COLUMNS, point, strict=True)) for point in points]
+        return [head | row for row in rows_of(dict(zip(_COLUMNS, columns, strict=True)))]
 
 
 def force_velocity(given: Damper | Model) -> list[ForceVelocity]:

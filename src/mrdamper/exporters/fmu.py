@@ -17,7 +17,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.joint import damper_of
 from mrdamper.dampers.streaming import FLAGS, Stepper, Stream, stream
 from mrdamper.data import Floats
-from mrdamper.data.encoding import csv_text
+from mrdamper.data.encoding import csv_text, rows_of
 from mrdamper.errors import InputError
 from mrdamper.exporters.base import Exporter, Written, identifier
 from mrdamper.exporters.c import c_facts, c_sources, reference_motion
@@ -203,8 +203,8 @@ def all_texts(
         return _texts({**facts, "token": token}, sources, instance, page) | tables
 
     tables = {
-        "resources/reference_in.csv": _csv_table({"time": time, **given}),
-        "resources/reference_out.csv": _csv_table({"time": time, **outputs}),
+        "resources/reference_in.csv": csv_text(rows_of({"time": time, **given})).encode(),
+        "resources/reference_out.csv": csv_text(rows_of({"time": time, **outputs})).encode(),
     }
     return with_token(token_of(with_token("")))
 
@@ -227,9 +227,3 @@ def _texts(facts: Mapping[str, Any], sources: Mapping[str, str], instance: str, 
         "documentation/index.html": render(f"{page}.html.j2", **facts),
     }
     return {path: text.encode() for path, text in texts.items()}
-
-
-def _csv_table(columns: Mapping[str, np.ndarray]) -> bytes:
-    """Return rows of numbers under their names, with all digits."""
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return csv_text([dict(zip(columns, row, strict=True)) for row in rows]).encode()

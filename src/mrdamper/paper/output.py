@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -152,7 +153,7 @@ def _identified_rows(place: int, study: Reproduction) -> Rows:
     for run in study.amplitude_group(place) if by_run else ():
         if one := by_run.get(run.id):
             first = {"F0 [N]": readings[run.id].amplitude, "phi [rad]": readings[run.id].phase}
-            rows.append({"run_id": run.id, **_condition(one.condition), **first, **_parameters(study, one.model)})
+            rows.append({"run_id": run.id, **asdict(one.condition), **first, **_parameters(study, one.model)})
     return sorted(rows, key=lambda row: (round(row["frequency_Hz"], 2), row["current_A"]))
 
 
@@ -193,7 +194,7 @@ def parameter_rows(study: Reproduction) -> Rows:
 
     def add(title: str, values: str, run_id: str, condition: Condition, model: object) -> None:
         if isinstance(model, BoucWen):
-            row = {"method": title, "values": values, "run_id": run_id, **_condition(condition)}
+            row = {"method": title, "values": values, "run_id": run_id, **asdict(condition)}
             rows.append({**row, **_parameters(study, model)})
 
     for run in study.held_out:
@@ -251,13 +252,9 @@ def _sensitivity_rows(study: Reproduction) -> Rows:
     return rows
 
 
-def _condition(condition: Condition) -> dict[str, float]:
-    return {name: float(getattr(condition, name)) for name in ("current_A", "frequency_Hz", "amplitude_m")}
-
-
 def _scores(score: Any) -> dict[str, float]:
     names = ("mean_relative_error", "wape", "nrmse_pp", "nrmse_std")
-    return {"run_id": score.run_id, **_condition(score.condition), **{n: getattr(score.scores, n) for n in names}}
+    return {"run_id": score.run_id, **asdict(score.condition), **{n: getattr(score.scores, n) for n in names}}
 
 
 NUMBERED = MappingProxyType({
@@ -285,7 +282,7 @@ _TABLES: Mapping[str, Callable[[Reproduction], Rows]] = MappingProxyType({
     "rate": rate_rows,
     "methods": method_rows,
     "tests": lambda study: [
-        {"run_id": loop.run_id, "split": loop.split, **_condition(loop.condition), "peak_force_N": loop.peak_force,
+        {"run_id": loop.run_id, "split": loop.split, **asdict(loop.condition), "peak_force_N": loop.peak_force,
          "dissipated_energy_J": loop.dissipated_energy}
         for loop in study.loops
     ],
@@ -299,7 +296,7 @@ _TABLES: Mapping[str, Callable[[Reproduction], Rows]] = MappingProxyType({
     "functions": _function_rows,
     "sensitivity": _sensitivity_rows,
     "genetic": lambda study: [
-        {**_condition(g.condition), "reached_rmse_N": g.reached, "least_rmse_N": g.optimum,
+        {**asdict(g.condition), "reached_rmse_N": g.reached, "least_rmse_N": g.optimum,
          "evaluations": g.minimum.evaluations, "alpha": float(g.minimum.point[0]), "beta": float(g.minimum.point[1])}
         for g in study.genetic
     ],

@@ -95,7 +95,9 @@ def _rows(rig: RigComparison) -> list[dict[str, Any]]:
             "parameters_per_run": entry.parameters_per_run,
             "parameters": entry.damper.parameter_count,
             "conditions_needed": entry.conditions_needed,
-            "forces_computed_per_run": _evaluations(entry),
+            "forces_computed_per_run": (
+                int(np.median([one.evaluations for one in entry.identifications])) if entry.identifications else None
+            ),
             "seconds": entry.seconds,
             "limits": entry.recipe.limits,
             "source": entry.recipe.source,
@@ -103,12 +105,6 @@ def _rows(rig: RigComparison) -> list[dict[str, Any]]:
         }
         for rank, entry in enumerate(rig.entries, start=1)
     ]
-
-
-def _evaluations(entry: RecipeResult) -> int | None:
-    """Return the number of forces computed by an identification, median over runs."""
-    counts = [i.evaluations for i in entry.identifications]
-    return int(np.median(counts)) if counts else None
 
 
 def _reason(entry: RecipeResult, entries: Sequence[RecipeResult]) -> str:

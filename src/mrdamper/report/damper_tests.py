@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -235,9 +236,7 @@ def _test_rows(specimens: Mapping[str, Characteristics]) -> list[dict[str, Any]]
         {
             "specimen": name,
             "run_id": s.run_id,
-            "current_A": s.condition.current_A,
-            "frequency_Hz": s.condition.frequency_Hz,
-            "amplitude_m": s.condition.amplitude_m,
+            **asdict(s.condition),
             "peak_velocity_rebound_m_s": s.peak_velocity[0],
             "peak_velocity_compression_m_s": s.peak_velocity[1],
             "damping_force_rebound_N": specimen.damping_force(s, 0),

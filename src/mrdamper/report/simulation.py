@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data.atomic import publish
-from mrdamper.data.encoding import csv_text
+from mrdamper.data.encoding import csv_text, rows_of
 from mrdamper.report.page import render_page
 from mrdamper.report.plots.simulation import histories, spectra
 from mrdamper.report.plots.style import save_figure
-from mrdamper.report.tables import rows_of
 from mrdamper.systems.controller_comparison import ControllerComparison
 from mrdamper.systems.measures import benchmark_ratios, measures
 from mrdamper.systems.monte_carlo import LEVELS, Bands

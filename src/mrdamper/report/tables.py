@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from mrdamper.dampers.bands import Band
 from mrdamper.dampers.prediction import Prediction
-from mrdamper.data import Floats
+from mrdamper.data.encoding import rows_of
 from mrdamper.identification import Identification
 from mrdamper.study.validation import SCORES, RunScore
 
@@ -17,32 +18,28 @@ if TYPE_CHECKING:  # commands that write tables of predictions need no study
 
 def identification_rows(identifications: Sequence[Identification], dataset: str = "") -> list[dict[str, Any]]:
     """One row per identification: condition, parameters, scores, message; `dataset` if a run names no rig."""
-    rows = []
-    for identification in identifications:
-        model = identification.model
-        row: dict[str, Any] = {
-            "run_id": identification.run_id,
-            "rig": identification.rig or dataset,
-            "model": model.name,
-            "method": identification.method,
-            "current_A": identification.condition.current_A,
-            "frequency_Hz": identification.condition.frequency_Hz,
-            "amplitude_m": identification.condition.amplitude_m,
-            "nrmse_pp": identification.scores.nrmse_pp,
-            "repeatability_nrmse_pp": identification.floor,
-            "wape": identification.scores.wape,
-            **{f"{info.name} [{info.unit}]": getattr(model, info.name) for info in model.parameters()},
-            **{f"standard error {name}": value for name, value in identification.standard_errors.items()},
-            **_ends(identification),
-            **{f"effective samples {name}": value for name, value in identification.uncertainty.effective.items()},
-            "delay_s": identification.delay,
-            "at_bounds": " ".join(identification.at_bounds),
-            "evaluations": identification.evaluations,
-            "message": str(identification.ending),
-            "notes": "; ".join((*identification.notes, *identification.doubts)),
+    return [
+        {
+            "run_id": one.run_id,
+            "rig": one.rig or dataset,
+            "model": one.model.name,
+            "method": one.method,
+            **asdict(one.condition),
+            "nrmse_pp": one.scores.nrmse_pp,
+            "repeatability_nrmse_pp": one.floor,
+            "wape": one.scores.wape,
+            **{f"{info.name} [{info.unit}]": getattr(one.model, info.name) for info in one.model.parameters()},
+            **{f"standard error {name}": value for name, value in one.standard_errors.items()},
+            **_ends(one),
+            **{f"effective samples {name}": value for name, value in one.uncertainty.effective.items()},
+            "delay_s": one.delay,
+            "at_bounds": " ".join(one.at_bounds),
+            "evaluations": one.evaluations,
+            "message": str(one.ending),
+            "notes": "; ".join((*one.notes, *one.doubts)),
         }
-        rows.append(row)
-    return rows
+        for one in identifications
+    ]
 
 
 def prediction_rows(prediction: Prediction, band: Band | None = None) -> list[dict[str, Any]]:
@@ -50,12 +47,6 @@ def prediction_rows(prediction: Prediction, band: Band | None = None) -> list[di
     ends = {} if band is None else {"force_low_N": band.low, "force_high_N": band.high}
     flag = {"extrapolation": " ".join(prediction.extrapolation)}
     return [row | flag for row in rows_of({**prediction.table, **ends})]
-
-
-def rows_of(columns: Mapping[str, Floats]) -> list[dict[str, Any]]:
-    """Return columns of equal length as rows."""
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def score_row(run: RunScore) -> dict[str, Any]:
