@@ -35,8 +35,6 @@ GROUPS = (
     "mrdamper.inputs",
     "mrdamper.commands",
 )
-
-
 HOOKS = {"mrdamper.commands": "app", "mrdamper.checks": "check"}  # groups of modules: the name each defines
 
 
@@ -69,17 +67,9 @@ def package_of(distribution: Distribution | None) -> str:
 
 @cache
 def provided_modules(group: str) -> tuple[tuple[EntryPoint, tuple[ModuleType, ...] | type], ...]:
-    """Load the entry points of a group: its own first, then by package and name.
+    """Load the entry points of a group, its own first, then by package and name: modules of a package, or a class.
 
-    Returns
-    -------
-    tuple of (entry point, modules or class)
-        Of a package all its modules, of a module that one.
-
-    Warns
-    -----
-    PluginWarning
-        For a package other than mrdamper that cannot be loaded; it is skipped.
+    Another package that cannot be loaded is skipped with a `PluginWarning`.
     """
     loaded: list[tuple[EntryPoint, tuple[ModuleType, ...] | type]] = []
     for point in sorted(_entry_points().select(group=group), key=_order):
@@ -168,10 +158,7 @@ class Registry(Generic[T]):
         return tuple(part for name in self.all() if (part := (self._parts or {}).get(name)))
 
     def type_named(self, name: str) -> type[T]:
-        """Return the class of that name.
-
-        Raises `UnknownNameError` with the near matches.
-        """
+        """Return the class of that name; raises `UnknownNameError` with the near matches."""
         types = self.all()
         if not is_a(name, str) or name not in types:
             raise UnknownNameError.of(self.kind, str(name)[:100], types)

@@ -76,10 +76,7 @@ def is_a(value: object, kind: type | tuple[type, ...]) -> bool:
 
 
 def require(value: object, kind: type | tuple[type, ...], wanted: str, remedy: str = "") -> None:
-    """Refuse an argument of another kind in a public function.
-
-    Raises `InputError`: E_ARGUMENT, naming what came and what is wanted.
-    """
+    """Refuse an argument of another kind in a public function: E_ARGUMENT, naming what came and what is wanted."""
     if not isinstance(value, kind):
         raise InputError(f"a {type(value).__name__} in place of {wanted}", remedy=remedy, code="E_ARGUMENT")
 
@@ -88,12 +85,7 @@ def validate_arguments(*but: str) -> Callable[[Function], Function]:
     """Refuse the arguments of a public function that its annotations do not allow: E_ARGUMENT.
 
     Numbers have to be finite; sequences and mappings hold what they say; arrays, numbers. Of a
-    `Literal` only the kind is looked at.
-
-    Parameters
-    ----------
-    but : str
-        Arguments the function looks at itself.
+    `Literal` only the kind is looked at. The function itself checks the arguments named in `but`.
     """
 
     def guard(function: Function) -> Function:
@@ -200,10 +192,7 @@ def is_series(value: object) -> bool:
 
 
 def numbers(*values: object) -> tuple[float, ...]:
-    """Values as floats.
-
-    Raises `InputError`: E_ARGUMENT if one is no number.
-    """
+    """Values as floats; raises `InputError` (E_ARGUMENT) if one is no number."""
     try:
         return tuple(map(float, values))  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError) as error:
@@ -244,13 +233,7 @@ def listed(names: Sequence[str], most: int) -> str:
 
 
 class CombinedError(InputError):
-    """Several things wrong with one input; its code is that of the first.
-
-    Attributes
-    ----------
-    errors : tuple of InputError
-        At least two.
-    """
+    """Several things wrong with one input: at least two `errors`; its code is that of the first."""
 
     def __init__(self, errors: Iterable[InputError]):
         self.errors = tuple(errors)

@@ -53,10 +53,7 @@ class Displayable(ABC):
         return _library("polars").DataFrame(dict(self.table))
 
     def to_pandas(self) -> Any:
-        """Return the table as a `pandas.DataFrame`.
-
-        Raises `MissingExtraError` if pandas is not installed.
-        """
+        """Return the table as a `pandas.DataFrame`; raises `MissingExtraError` if pandas is not installed."""
         return _library("pandas").DataFrame(dict(self.table))
 
 

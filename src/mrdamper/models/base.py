@@ -175,25 +175,14 @@ class Model(ABC):
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """Coordinates in which the free nonlinear parameters are searched, with their starts.
-
-        Parameters
-        ----------
-        scale : Scale
-            Sizes of the data, which determine the box and the starts.
-        free : sequence of str
-            Names of the parameters to be determined.
-        """
+        """Search coordinates of the `free` nonlinear parameters, their boxes and starts by the sizes of the data."""
         return ()
 
     @classmethod
     def within(cls, axes: tuple[SearchAxis, ...], fixed: Mapping[str, float]) -> tuple[SearchAxis, ...]:
         """Limit search coordinates so that the other parameters are inside their bounds, given the held ones.
 
-        Raises
-        ------
-        IdentificationError
-            If that cannot be decided beforehand.
+        Raises `IdentificationError` if that cannot be decided beforehand.
         """
         return axes
 
@@ -235,10 +224,7 @@ def _limited(value: Any, low: float, high: float) -> Any:
 
 
 def require_positive(where: str, **values: float) -> None:
-    """Refuse parameters of a publication that are denominators and not positive.
-
-    Raises `ParameterError`.
-    """
+    """Refuse parameters of a publication that are denominators and not positive, by a `ParameterError`."""
     for name, value in values.items():
         if not 0 < value < math.inf:
             raise ParameterError(f"{name} = {value:g}", where=where, remedy="give a positive, finite value in SI units")

@@ -105,19 +105,9 @@ def compiled_outputs(
 ) -> Floats | None:
     """(K, N) outputs of a compiled program along a record, or None: no compiler, derivative or solution.
 
-    Parameters
-    ----------
-    key : (type, names)
-        Of the cached programs: traced model type, and parameters of the tangents.
-    values : mapping of str to float
-        Parameters.
-    traced : function (tape, parameters, inputs)
-        Writes the outputs at one sample.
-    inputs : sequence of str
-    channel : function (name)
-        (N,) array of an input; called for the inputs that the program uses.
-    picked, begins : arrays of int, optional
-        Samples of the outputs, and samples at which the memory is reset.
+    `key` is that of the cached programs: traced model type, and parameters of the tangents. `traced` writes the outputs
+    at one sample on a tape, from parameters, whose values are `values`, and inputs. `channel` returns the (N,) array of
+    an input that the program uses. Outputs are those at the samples `picked`, and the memory is reset at `begins`.
     """
     given = tuple(map(float, values.values()))
     # Values are given by position: another order is another program.

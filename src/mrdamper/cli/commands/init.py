@@ -34,10 +34,7 @@ def init(
 
 
 def template(kind: str) -> str:
-    """Return the text of a template.
-
-    Raises `UnknownNameError` if there is no template of that name.
-    """
+    """Return the text of a template; raises `UnknownNameError` if there is none of that name."""
     if kind not in _FILES:
         raise UnknownNameError.of("template", kind, _FILES)
     return files("mrdamper.cli").joinpath("templates", _FILES[kind]).read_text(encoding="utf-8")
