@@ -401,7 +401,7 @@ def units_in(line: str) -> list[tuple[str, str]]:
     stated = []
     for header in (split_name(re.sub(r"\s*[:=]\s+", " in ", cell.rstrip("."))) for cell in cells):
         named = [word for word in words_of(header.name) if word.casefold() not in _AROUND_UNITS]
-        role = role_of(named[0]) if len(named) == 1 and header.unit else None
+        role = role_of(named[0]) if header.unit and [len(word) > 2 for word in named] == [True] else None  # no letter
         stated += [(role, header.unit)] if role and header.dimension == DIMENSION[role] else []
     return stated
 

@@ -241,7 +241,7 @@ def _only_other(path: Path) -> Path | None:
 
 
 def short_lines(path: Path) -> list[str]:
-    """Return the lines of a short text; none of a file that is long, or cannot be read.
+    """Return the lines of a short text; none of a file that is long, of mrdamper's own, or cannot be read.
 
     Of a structure, every quantity and every channel is a line, and a list of objects of one form a table. YAML that
     cannot be parsed has the lines of its text.
@@ -255,7 +255,9 @@ def short_lines(path: Path) -> list[str]:
     suffix = path.suffix.lower()
     if suffix in _STRUCTURED:
         try:
-            return list(_stated(_STRUCTURED[suffix](text), ""))
+            tree = _STRUCTURED[suffix](text)
+            ours = isinstance(tree, dict) and str(tree.get("format", "")).startswith("mrdamper-")  # a saved model
+            return [] if ours else list(_stated(tree, ""))
         except (ValueError, RecursionError, SyntaxError, InputError):
             if suffix in (".json", ".xml"):
                 return []
