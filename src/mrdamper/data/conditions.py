@@ -33,7 +33,7 @@ def _named_with_units(owner: _Class) -> _Class:
         try:
             initialise(self, *given, **named)
         except TypeError as error:
-            problem = str(error).removeprefix("Condition.__init__() ")
+            problem = str(error).removeprefix("Condition.__init__() ").partition(". Did you mean")[0]
             raise ConditionError(problem, remedy="write Condition(current_A=, frequency_Hz=, amplitude_m=)") from error
 
     owner.__init__ = init
