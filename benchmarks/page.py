@@ -41,7 +41,7 @@ def page(results: Results) -> str:
         + "Figures marked * are extrapolated from a part that was measured.",
         "Separate commands: reading a large file, `python -m benchmarks.import_large --megabytes 1000`; "
         "detection by the importer, `python -m benchmarks.import_detection`; the app, `python -m benchmarks.web`. A "
-        "peer that is not installed is omitted (`make bench` does not install `openseespy`).",
+        "peer that is not installed is omitted (`make bench` does not install `openseespy`, `jax` and `diffrax`).",
         "## Goals",
         _table(
             ("goal", "limit", "measured", "verdict", "why missed"),
@@ -90,6 +90,8 @@ def page(results: Results) -> str:
                 for r in results.identification
             ),
         ),
+        "## A search over a population, beside a graphics processor",
+        Path(__file__).with_name("accelerator.md").read_text(encoding="utf-8").strip(),
         "## Many conditions",
         _table(
             ("operation", "ms"),
