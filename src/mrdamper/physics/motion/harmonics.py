@@ -5,6 +5,7 @@ Unlike a Fourier transform it needs neither a whole number of cycles nor uniform
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -18,8 +19,10 @@ from mrdamper.statistics.linear import solve_linear
 _HARMONICS = 3  # by which a frequency is found, from three cycles on
 _FEW = 250  # samples on which a frequency is found to begin with
 _SAMPLES_PER_BLOCK = 50_000  # samples whose waves are held at a time
-_SAMPLES_PER_HALF_PERIOD = 16  # between two changes of sign, with which the strongest line of a long record is found
+_SAMPLES_PER_HALF_PERIOD = 16  # between two changes of sign, with which the strongest line is found
 _MAX_SPECTRUM_SAMPLES = 2**20  # largest number of samples of a zero-padded spectrum
+_MAX_FEW_CYCLES = 4  # cycles of a record below which its line is too broad to be a start value
+_RANGE = 0.92  # of the logarithm of the frequency, to either side, in which the best single sine then lies
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +43,11 @@ class HarmonicSeries:
         given = np.asarray(time, dtype=float)
         if given.ndim == 1 and given.size > _SAMPLES_PER_BLOCK:
             return np.concatenate([self(given[part], derivative) for part in _blocks(given.size)])
-        t = given - self.origin
-        omega = 2 * np.pi * self.frequency
-        scale = (omega * np.arange(1, self.sine.size + 1)) ** derivative
-        trend = {0: self.mean + self.drift * t, 1: np.full_like(t, self.drift)}.get(derivative, np.zeros_like(t))
-        sine, cosine = _waves(omega * t, self.sine.size)
-        for _ in range(derivative % 4):  # a quarter period for each derivative
-            sine, cosine = cosine, -sine
-        return trend + (scale * self.sine) @ sine + (scale * self.cosine) @ cosine
+        mean, drift, sine, cosine = self.mean, self.drift, self.sine, self.cosine
+        omega = 2 * np.pi * self.frequency * np.arange(1, sine.size + 1)
+        for _ in range(derivative):
+            mean, drift, sine, cosine = drift, 0.0, -omega * cosine, omega * sine
+        return np.concatenate([[mean, drift], sine, cosine]) @ _rows(given - self.origin, self.frequency, sine.size)
 
     def amplitude(self, order: int = 1) -> float:
         """Amplitude of one harmonic."""
@@ -91,14 +91,9 @@ def fundamental_frequency(time: Floats, signal: Floats) -> float:
     describe a shorter record.
     """
     t = time - time[0]
-    guess = _spectral_line(time, signal)
-    few = slice(None, None, max(1, t.size // 150))  # for the grid, with less than four cycles
-    if guess * t[-1] < 4:
-        ladder = guess * np.geomspace(0.4, 2.5, 45)
-        guess = ladder[int(np.argmin(_single_sine_costs(t[few], signal[few], ladder)))]
-    orders = _HARMONICS if guess * t[-1] >= 3 else 1
+    near, coefficients = _spectral_line(t, signal), None
+    orders = _HARMONICS if near * t[-1] >= 3 else 1
     # Most steps on few samples: the last ones, on all, decide.
-    near, coefficients = float(guess), None
     if t.size > 4 * _FEW:
         some = slice(None, None, t.size // _FEW)
         near, coefficients = _refined(t[some], signal[some], near, orders, 1e-6)
@@ -139,62 +134,79 @@ def _blocks(size: int) -> Iterator[slice]:
     return (slice(begin, begin + _SAMPLES_PER_BLOCK) for begin in range(0, size, _SAMPLES_PER_BLOCK))
 
 
-def _single_sine_costs(t: Floats, signal: Floats, frequencies: Floats) -> Floats:
-    """Squared residuals of one sine, a mean and a drift at each frequency."""
-    angle = 2 * np.pi * np.multiply.outer(frequencies, t)
-    trend = np.broadcast_to(np.stack([np.ones_like(t), t / t[-1]]), (frequencies.size, 2, t.size))
-    rows = np.concatenate([trend, np.sin(angle)[:, None], np.cos(angle)[:, None]], axis=1)
-    right = rows @ signal
-    coefficients = np.linalg.solve(rows @ rows.transpose(0, 2, 1), right[..., None])[..., 0]
-    return float(signal @ signal) - np.sum(right * coefficients, axis=1)
+def _spectral_line(t: Floats, signal: Floats) -> float:
+    """Find the strongest line of the detrended, zero-padded spectrum [Hz]; of few cycles the best single sine.
 
-
-def _spectral_line(time: Floats, signal: Floats) -> float:
-    """Find the strongest line of the detrended, zero-padded spectrum [Hz].
-
-    A long record is thinned to the samples that its changes of sign require.
+    The record is thinned to the samples that its changes of sign require.
     """
-    if time.size > _SAMPLES_PER_BLOCK:
-        often = _crossings(signal - float(np.mean(signal)))
-        every = max(1, time.size // max(_SAMPLES_PER_BLOCK, _SAMPLES_PER_HALF_PERIOD * often))
-        time, signal = time[::every], signal[::every]
-    size = time.size
-    wave = np.interp(np.linspace(float(time[0]), float(time[-1]), size), time, signal)
-    place = np.arange(size) - (size - 1) / 2
-    wave = wave - wave.mean() - place * (place @ wave / (place @ place))
-    window = np.hanning(size + 2)[1:-1] if _crossings(wave) > 4 else np.ones(size)
-    padded = max(size, min(8 * size, _MAX_SPECTRUM_SAMPLES))
-    power = np.abs(np.fft.rfft(wave * window, padded)) ** 2
+    place, wave = t - float(np.mean(t)), signal - float(np.mean(signal))
+    wave -= place * (place @ wave / (place @ place))
+    often = _crossings(wave)
+    every = max(1, t.size // max(_FEW, _SAMPLES_PER_HALF_PERIOD * often))
+    t, wave = t[::every], wave[::every]
+    size = t.size
+    window = np.hanning(size + 2)[1:-1] if often > 4 else 1.0
+    padded = max(size, min(1 << (8 * size - 1).bit_length(), _MAX_SPECTRUM_SAMPLES))
+    spectrum = np.fft.rfft(np.interp(np.linspace(0.0, float(t[-1]), size), t, wave) * window, padded)
+    power = spectrum.real**2 + spectrum.imag**2
     power[: max(1, padded // size // 2)] = 0.0
-    peak = int(np.argmax(power))
-    return max(peak, 1) * (size - 1) / (padded * float(time[-1] - time[0]))
+    cycles = _vertex(power, max(int(np.argmax(power)), 1)) * (size - 1) / padded
+    if cycles < _MAX_FEW_CYCLES:
+        ladder, sine, cosine = _sines_of_few_cycles()
+        wave = np.interp(np.linspace(0.0, float(t[-1]), sine.shape[1]), t, wave)
+        explained = (sine @ wave) ** 2 + (cosine @ wave) ** 2
+        best = int(np.argmax(explained * (np.abs(np.log(ladder / cycles)) < _RANGE)))
+        cycles = float(ladder[0] * (ladder[1] / ladder[0]) ** _vertex(explained, best))
+    return cycles / float(t[-1])
+
+
+def _vertex(values: Floats, peak: int) -> float:
+    """Place of the vertex of the parabola through a peak and its neighbours, the peak itself where there is none."""
+    if not 0 < peak < values.size - 1:
+        return peak
+    before, here, after = values[peak - 1 : peak + 2].tolist()
+    bend = before - 2 * here + after
+    return peak + (min(max(0.5 * (before - after) / bend, -0.5), 0.5) if bend < 0 else 0.0)
+
+
+@lru_cache
+def _sines_of_few_cycles() -> tuple[Floats, Floats, Floats]:
+    """Return numbers of cycles of a record, and what a mean and a drift leave of their sines and cosines, normalised.
+
+    About the middle of an even record sines and drift are odd, cosines and mean even.
+    """
+    ladder = np.geomspace(0.2, _MAX_FEW_CYCLES * math.exp(_RANGE), 97)
+    place = np.linspace(-0.5, 0.5, 128)
+    angle = 2 * np.pi * np.multiply.outer(ladder, place)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    sine -= np.multiply.outer(sine @ place / (place @ place), place)
+    cosine -= np.mean(cosine, axis=1, keepdims=True)
+    return ladder, *(wave / np.linalg.norm(wave, axis=1, keepdims=True) for wave in (sine, cosine))
 
 
 def _crossings(wave: Floats) -> int:
     return int(np.count_nonzero(np.diff(np.signbit(wave))))
 
 
-def _waves(angle: Floats, orders: int) -> tuple[Floats, Floats]:
-    """Sines and cosines of 1...orders times an angle, (K, N) each: powers of one complex number."""
-    sine, cosine = np.empty((2, orders, angle.size))
-    _fill_waves(angle, sine, cosine)
-    return sine, cosine
-
-
-def _fill_waves(angle: Floats, sine: Floats, cosine: Floats) -> None:
-    np.sin(angle, out=sine[0])
-    np.cos(angle, out=cosine[0])
-    for k in range(1, len(sine)):
-        sine[k] = sine[k - 1] * cosine[0] + cosine[k - 1] * sine[0]
-        cosine[k] = cosine[k - 1] * cosine[0] - sine[k - 1] * sine[0]
+def _waves(angle: Floats, orders: int, out: Floats | None = None) -> Floats:
+    """(2, K, N) sines and cosines of 1...orders times an angle, each from the two orders before it."""
+    waves = np.empty((2, orders, angle.size)) if out is None else out
+    np.sin(angle, out=waves[0, 0])
+    np.cos(angle, out=waves[1, 0])
+    twice, before = 2 * waves[1, 0], np.array([[0.0], [1.0]])
+    for k in range(1, orders):
+        np.multiply(twice, waves[:, k - 1], out=waves[:, k])
+        waves[:, k] -= before
+        before = waves[:, k - 1]
+    return waves
 
 
 @lru_cache
-def _cycle(orders: int) -> tuple[Floats, Floats]:
+def _cycle(orders: int) -> Floats:
     return _waves(np.linspace(0, 2 * np.pi, 2048, endpoint=False), orders)
 
 
-def _rows(t: Floats, frequency: float, orders: int, drift: bool, coefficients: Floats | None = None) -> Floats:
+def _rows(t: Floats, frequency: float, orders: int, drift: bool = True, coefficients: Floats | None = None) -> Floats:
     """(L, N) mean, drift, sines and cosines: the transpose of a least-squares table, whose rows are long.
 
     With coefficients, the derivative of their sum with respect to the frequency as a last row.
@@ -204,10 +216,9 @@ def _rows(t: Floats, frequency: float, orders: int, drift: bool, coefficients: F
     rows[0] = 1.0
     if drift:
         rows[1] = t
-    sine, cosine = rows[lead : lead + orders], rows[lead + orders : last]
-    _fill_waves(2 * np.pi * frequency * t, sine, cosine)
+    _waves(2 * np.pi * frequency * t, orders, rows[lead:last].reshape(2, orders, t.size))
     if coefficients is not None:
-        k = np.arange(1, orders + 1)
+        k = 2 * np.pi * np.arange(1, orders + 1)
         of_sine, of_cosine = np.reshape(coefficients[lead:], (2, orders))
-        rows[-1] = 2 * np.pi * t * ((k * of_sine) @ cosine - (k * of_cosine) @ sine)
+        np.multiply(t, np.concatenate([-k * of_cosine, k * of_sine]) @ rows[lead:last], out=rows[-1])
     return rows
