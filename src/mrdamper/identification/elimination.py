@@ -13,7 +13,6 @@ from functools import cached_property, lru_cache
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import ParameterInfo
@@ -46,19 +45,19 @@ class Elimination:
             return None
         return cls(problem, kind)
 
-    def fixed_columns(self, rows: slice | NDArray[np.intp] = slice(None)) -> FixedColumns:
-        """Constant columns, and measured force less the force without linear parameters [N], at scored samples."""
-        motion = self.problem.seen.part(rows)
+    @cached_property
+    def fixed_columns(self) -> FixedColumns:
+        """Constant columns, and measured force less the force without linear parameters [N], factored once."""
+        motion = self.problem.seen
         base, columns = linear_table(self.kind.bare, self.kind.others, motion, np.zeros(len(motion)))
-        right = self.problem.force[rows] - base
+        right = self.problem.force - base
         del base  # kept for long records, too
         return FixedColumns.of(columns, right)
 
     @cached_property
     def _fixed(self) -> FixedColumns | None:
-        """The constant columns at all scored samples, factored once; None where they depend on each other."""
-        fixed = self.fixed_columns()
-        return fixed if fixed.independent else None
+        """The constant columns; None where they depend on each other."""
+        return self.fixed_columns if self.fixed_columns.independent else None
 
     @cached_property
     def _bounds(self) -> tuple[Floats, Floats]:

@@ -33,6 +33,7 @@ GENERAL_FORMS = (
     "quadratic-current-speed",
     "plane",
 )
+YIELD_DISPLACEMENTS = np.geomspace(1e-4, 2.0, 14)  # over the amplitude: where the search of one starts
 
 
 @dataclass(frozen=True, slots=True)

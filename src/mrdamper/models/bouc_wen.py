@@ -12,7 +12,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
 from mrdamper.errors import IdentificationError
-from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis, require_positive
+from mrdamper.models.base import GENERAL_FORMS, YIELD_DISPLACEMENTS, Model, Scale, SearchAxis, require_positive
 from mrdamper.models.recorded import recorded
 from mrdamper.physics.hysteresis import Shape, follow
 from mrdamper.physics.motion import Excitation
@@ -87,7 +87,7 @@ class BoucWen(Model):
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Yield displacement (log), asymmetry (gamma − beta)/(gamma + beta) and n: nearly orthogonal."""
         amplitude = scale.amplitude
-        ladder = tuple(amplitude * np.geomspace(1e-4, 2.0, 14))
+        ladder = tuple((amplitude * YIELD_DISPLACEMENTS).tolist())
         axes: list[SearchAxis] = []
         if "beta" in free or "gamma" in free:
             axes.append(SearchAxis("yield_displacement", amplitude * 1e-5, amplitude * 10, ladder, log=True))

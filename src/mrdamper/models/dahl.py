@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
-from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis, axes_of
+from mrdamper.models.base import GENERAL_FORMS, YIELD_DISPLACEMENTS, Model, Scale, SearchAxis, axes_of
 from mrdamper.physics.hysteresis import Shape, follow
 from mrdamper.physics.motion import Excitation
 
@@ -57,7 +57,7 @@ class Dahl(Model):
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
         """Search the displacement over which the friction increases."""
         amplitude = scale.amplitude
-        ladder = tuple(amplitude * np.geomspace(1e-4, 2.0, 14))
+        ladder = tuple((amplitude * YIELD_DISPLACEMENTS).tolist())
         return axes_of(free, SearchAxis("yield_displacement", amplitude * 1e-5, amplitude * 10, ladder, log=True))
 
     @classmethod

@@ -21,6 +21,7 @@ from mrdamper.tracing.tangent import with_tangents
 _MOVES = ("turn", "turn_back", "move")
 CHANNELS = ("displacement", "velocity", "acceleration", "current", "dt", *_MOVES)
 S = TypeVar("S", bound=Callable[..., Floats])
+_MIN_STROKE_SAMPLES = 200  # of a stroke, in the mean, from which array code computes it faster
 _MIN_COMPILED_SAMPLES = 2_000  # samples of a motion, from which compiled code is used, independent of earlier calls
 
 
@@ -33,7 +34,7 @@ def recorded(state: S) -> S:
 
     @wraps(state)
     def along(self: Any, motion: Excitation | TracedMotion) -> Floats:
-        if not isinstance(motion, Excitation):
+        if not isinstance(motion, Excitation) or _has_long_strokes(self, motion):
             return state(self, motion)
         outputs = _along(self, motion, None, lambda free, traced, tape: {"state": state(free, traced)})
         return state(self, motion) if outputs is None else outputs[0]
@@ -44,9 +45,16 @@ def recorded(state: S) -> S:
 
 def response(model: Any, motion: Excitation) -> tuple[Floats, Floats]:
     """(N,) force and state of a model along a motion, in one compiled pass where there is a compiler."""
+    if _has_long_strokes(model, motion):
+        return _response(model, motion)
     names = ("force", "state")
     both = _along(model, motion, names, lambda free, traced, _: dict(zip(names, _response(free, traced), strict=True)))
     return _response(model, motion) if both is None else (both[0], both[1])
+
+
+def _has_long_strokes(model: Any, motion: Excitation) -> bool:
+    """Tell if the array code is faster: it computes few strokes at once where the state is one curve along each."""
+    return model.shape is not None and len(motion) > _MIN_STROKE_SAMPLES * len(motion.path.lengths)
 
 
 def _response(model: Any, motion: Any) -> tuple[Any, Any]:

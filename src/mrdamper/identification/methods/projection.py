@@ -27,7 +27,7 @@ from mrdamper.physics.hysteresis import Shape
 from mrdamper.physics.hysteresis.batch import batch_cost
 from mrdamper.physics.motion import Path
 from mrdamper.statistics.levenberg_marquardt import Minimum, forward_differences, least_squares
-from mrdamper.statistics.linear import on_one_blas_thread, project_out_columns, solve_bounded
+from mrdamper.statistics.linear import FixedColumns, on_one_blas_thread, project_out_columns, solve_bounded
 from mrdamper.statistics.scalar_least_squares import least_squares_in_one
 from mrdamper.statistics.stop_reason import StopReason
 
@@ -185,7 +185,8 @@ def _best_of_grid(
 def _batched_costs(elimination: Elimination, points: list[dict[str, float]]) -> Floats:
     """Costs of the grid on a few cycles, all shapes of one n at once."""
     path, rows = _few_cycles(elimination.problem)
-    fixed = elimination.fixed_columns(rows)
+    whole = elimination.fixed_columns
+    fixed = FixedColumns.of(whole.basis[rows], whole.rest[rows])  # the same columns in another basis
     shapes = np.array([elimination.kind.shape(point) for point in points], dtype=float)
     costs = np.empty(len(points))
     for n in set(shapes[:, 2].tolist()):

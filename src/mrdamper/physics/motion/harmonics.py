@@ -5,7 +5,6 @@ Unlike a Fourier transform it needs neither a whole number of cycles nor uniform
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,7 +21,7 @@ _SAMPLES_PER_BLOCK = 50_000  # samples whose waves are held at a time
 _SAMPLES_PER_HALF_PERIOD = 16  # between two changes of sign, with which the strongest line is found
 _MAX_SPECTRUM_SAMPLES = 2**20  # largest number of samples of a zero-padded spectrum
 _MAX_FEW_CYCLES = 4  # cycles of a record below which its line is too broad to be a start value
-_RANGE = 0.92  # of the logarithm of the frequency, to either side, in which the best single sine then lies
+_RANGE = 2.5  # factor of the frequency, to either side, in which the best single sine then lies
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +69,7 @@ def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float
     """
     origin = float(time[0])
     nyquist = 0.5 * (time.size - 1) / float(time[-1] - time[0])
-    orders = int(np.clip(nyquist / frequency, 1, orders))
+    orders = min(max(int(nyquist / frequency), 1), orders)
     coefficients = _solved(time.size, signal, lambda part: _rows(time[part] - origin, frequency, orders, drift))
     lead = 2 if drift else 1
     return HarmonicSeries(
@@ -113,7 +112,7 @@ def _refined(
     for _ in range(30):
         solution = _solved(t.size, signal, rows)
         coefficients, step = solution[:-1], float(solution[-1])
-        frequency += float(np.clip(step, -0.1 * frequency, 0.1 * frequency))
+        frequency += min(max(step, -0.1 * frequency), 0.1 * frequency)
         if abs(step) < tolerance * frequency:
             break
     return frequency, coefficients
@@ -152,36 +151,36 @@ def _spectral_line(t: Floats, signal: Floats) -> float:
     power[: max(1, padded // size // 2)] = 0.0
     cycles = _vertex(power, max(int(np.argmax(power)), 1)) * (size - 1) / padded
     if cycles < _MAX_FEW_CYCLES:
-        ladder, sine, cosine = _sines_of_few_cycles()
-        wave = np.interp(np.linspace(0.0, float(t[-1]), sine.shape[1]), t, wave)
-        explained = (sine @ wave) ** 2 + (cosine @ wave) ** 2
-        best = int(np.argmax(explained * (np.abs(np.log(ladder / cycles)) < _RANGE)))
-        cycles = float(ladder[0] * (ladder[1] / ladder[0]) ** _vertex(explained, best))
+        ladder, waves = _sines_of_few_cycles()
+        begin, end = np.searchsorted(ladder, (cycles / _RANGE, cycles * _RANGE))
+        wave = np.interp(np.linspace(0.0, float(t[-1]), waves.shape[2]), t, wave)
+        explained = np.sum((waves[begin:end] @ wave) ** 2, axis=1)
+        cycles = float(ladder[begin] * (ladder[1] / ladder[0]) ** _vertex(explained, int(np.argmax(explained))))
     return cycles / float(t[-1])
 
 
 def _vertex(values: Floats, peak: int) -> float:
-    """Place of the vertex of the parabola through a peak and its neighbours, the peak itself where there is none."""
+    """Place of the vertex of the parabola through a peak and its neighbours; the peak itself at an end."""
     if not 0 < peak < values.size - 1:
         return peak
     before, here, after = values[peak - 1 : peak + 2].tolist()
-    bend = before - 2 * here + after
-    return peak + (min(max(0.5 * (before - after) / bend, -0.5), 0.5) if bend < 0 else 0.0)
+    return peak + 0.5 * (after - before) / ((here - before) + (here - after) or 1.0)
 
 
 @lru_cache
-def _sines_of_few_cycles() -> tuple[Floats, Floats, Floats]:
+def _sines_of_few_cycles() -> tuple[Floats, Floats]:
     """Return numbers of cycles of a record, and what a mean and a drift leave of their sines and cosines, normalised.
 
     About the middle of an even record sines and drift are odd, cosines and mean even.
     """
-    ladder = np.geomspace(0.2, _MAX_FEW_CYCLES * math.exp(_RANGE), 97)
-    place = np.linspace(-0.5, 0.5, 128)
+    ladder = np.geomspace(0.2, _MAX_FEW_CYCLES * _RANGE, 97)
+    place = np.linspace(-0.5, 0.5, 64)
     angle = 2 * np.pi * np.multiply.outer(ladder, place)
     sine, cosine = np.sin(angle), np.cos(angle)
     sine -= np.multiply.outer(sine @ place / (place @ place), place)
     cosine -= np.mean(cosine, axis=1, keepdims=True)
-    return ladder, *(wave / np.linalg.norm(wave, axis=1, keepdims=True) for wave in (sine, cosine))
+    waves = np.stack([sine, cosine], axis=1)
+    return ladder, waves / np.linalg.norm(waves, axis=2, keepdims=True)
 
 
 def _crossings(wave: Floats) -> int:

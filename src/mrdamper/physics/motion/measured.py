@@ -48,7 +48,7 @@ def smooth(time: Floats, signal: Floats, span: float | None = None) -> Floats:
     if span is None:
         span = _characteristic_period(time, signal) / 40
     spacing = float(time[-1] - time[0]) / (size - 1)
-    half = int(np.clip(round(span / spacing / 2), 2, max((size - 1) // 2, 1)))
+    half = min(max(round(span / spacing / 2), 2), max((size - 1) // 2, 1))
     width = min(2 * half + 1, size)
     uniform = width == 2 * half + 1 and np.ptp(np.diff(time)) < _UNIFORM * spacing
     c = _fits_uniform(signal, half) if uniform else _fits(time, signal, half, width, spacing)
