@@ -11,7 +11,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from math import inf, lgamma
 
-from mrdamper.study.contradictions.evidence import Evidence, Moments, RowProducts
+from mrdamper.study.contradictions.evidence import Evidence, Moments, Posterior, RowProducts
 
 _GAIN = 0.6  # standard deviation of the gain of a run of another damper
 _MISFITS = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 4.0)  # factors of the usual model error that are tried
@@ -36,23 +36,23 @@ def gain_differences(evidence: Evidence, products: Sequence[RowProducts]) -> Gai
     for variant in (products, usual) if any(run.misfit != 1.0 for run in products) else (products,):
         for misfit in _MISFITS:
             evidence.spread = replace(scatter, misfit=misfit)
-            odds = evidence.log_evidence(_weighed(evidence, variant, ()))
+            odds = evidence.log_evidence(_expected(evidence, variant).weigh(variant))
             if best is None or odds > best[0]:
                 best = odds, misfit, variant
     assert best is not None
     evidence.spread = replace(scatter, misfit=best[1])
-    differences = _grown(evidence, best[2])
+    differences = _grown(evidence, best[2], best[0])
     evidence.spread = scatter
     return differences
 
 
-def _grown(evidence: Evidence, products: Sequence[RowProducts]) -> GainDifferences:
-    """Add a run to the group or remove one from it for as long as this raises the odds."""
+def _grown(evidence: Evidence, products: Sequence[RowProducts], none: float) -> GainDifferences:
+    """Add a run to the group or remove one from it for as long as this raises the odds; `none` are those of none."""
     group, size, now = frozenset[int](), len(products), -inf
-    every = range(size)
+    every, free = range(size), [replace(run, gain=_GAIN) for run in products]
     for _ in range(_ROUNDS):
-        usual = _weighed(evidence, products, group)
-        wide = _weighed(evidence, products, group, every)
+        expected = _expected(evidence, [free[k] if k in group else products[k] for k in every])
+        usual, wide = expected.weigh(products), expected.weigh(free)
 
         def odds(members: Collection[int], usual: Sequence[Moments] = usual, wide: Sequence[Moments] = wide) -> float:
             chosen = lgamma(size + 1) - lgamma(len(members) + 1) - lgamma(size - len(members) + 1)
@@ -67,19 +67,12 @@ def _grown(evidence: Evidence, products: Sequence[RowProducts]) -> GainDifferenc
         settled, group = grown == group, grown
         if settled:
             break
-    free = _weighed(evidence, products, every, every)
-    none = evidence.log_evidence(_weighed(evidence, products, ()))
-    return GainDifferences(group, now - none, evidence.log_evidence(free) - none)
+    return GainDifferences(group, now - none, evidence.log_evidence(_expected(evidence, free).weigh(free)) - none)
 
 
-def _weighed(
-    evidence: Evidence, products: Sequence[RowProducts], group: Collection[int], wide: Collection[int] = ()
-) -> list[Moments]:
-    """Weighted products at the coefficients that follow if a group has gains of its own; wide gains of some runs."""
+def _expected(evidence: Evidence, products: Sequence[RowProducts]) -> Posterior:
+    """Coefficients of runs, some of which may have gains of their own."""
     expected = evidence.prior
-    of_group, of_wide = (
-        [replace(run, gain=_GAIN) if k in runs else run for k, run in enumerate(products)] for runs in (group, wide)
-    )
     for _ in range(_REFITS + 1):
-        expected = evidence.posterior(expected.weigh(of_group))
-    return expected.weigh(of_wide)
+        expected = evidence.posterior(expected.weigh(products))
+    return expected

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import combinations, product
 
 import numpy as np
@@ -204,10 +204,14 @@ class Search:
         for _ in range(2):
             expected = self.evidence.posterior(expected.weigh([self._products[k] for k in agreeing]))
         scores: dict[AssumedScatter, float] = {}
+        weighed: dict[tuple[float, ...], list[Moments]] = {}  # by all that the weights depend on
 
         def score(spread: AssumedScatter) -> float:
             self.evidence.spread = spread
-            members = expected.weigh([self._products[k] for k in agreeing])
+            scatter = spread.misfit, spread.gain, spread.offset
+            if scatter not in weighed:
+                weighed[scatter] = expected.weigh([self._products[k] for k in agreeing])
+            members = weighed[scatter]
             posterior = self.evidence.posterior(members)
             return float(np.median(posterior.log_probabilities_by_others(members))) - _LEAK_ODDS * spread.leak
 
@@ -381,7 +385,7 @@ class Search:
         ranked = sorted(order, key=gains.__getitem__)
         third = len(ranked) // 3
         seeds = (*([k] for k in order[:_GROUP_SEEDS]), ranked[:third], ranked[-third:])
-        sets += [self._grown(group, posterior) for group in dict.fromkeys(map(tuple, seeds))]
+        sets += self._grown(map(frozenset, seeds), posterior)
         return list(dict.fromkeys(tuple(sorted(s)) for s in sets if 2 <= len(s) <= len(self.tracks) // 2))
 
     def _alike(self) -> list[tuple[int, ...]]:
@@ -405,30 +409,33 @@ class Search:
         swing = expected - products.constant * float(products.constant @ products.gram @ expected) / products.rows
         return float(swing @ products.moment) / max(float(swing @ products.gram @ swing), 1e-12)
 
-    def _grown(self, seeds: Sequence[int], posterior: Posterior) -> list[int]:
-        """Return the group of runs about some that follow another damper than the others."""
-        every = [k for k in self._agreeing() if k not in self.found]
-        spread = self.evidence.spread
+    def _grown(self, seeds: Iterable[frozenset[int]], posterior: Posterior) -> list[list[int]]:
+        """Return the groups of runs, each about some, that follow another damper than the others."""
+        spread, groups = self.evidence.spread, list[list[int]]()
         self.evidence.spread = replace(spread, misfit=max(spread.misfit / _GROUP_ERROR_RATIO, _MIN_MISFIT))
         agreeing = self._agreeing()
         members = dict(zip(agreeing, posterior.weigh([self._products[k] for k in agreeing]), strict=True))
-        group = set(seeds)
-        for _ in range(_ROUNDS):
-            if not 0 < len(group) < len(members):
-                break
+
+        @cache
+        def moved(group: frozenset[int]) -> frozenset[int]:
             own = self.evidence.posterior([members[k] for k in group])
             rest = self.evidence.posterior([members[k] for k in members if k not in group])
-            moved: set[int] = set()
-            for part, its, others in ((group, own, rest), (set(members) - group, rest, own)):
-                of = [k for k in every if k in part]
+            nearer = set[int]()
+            for its, others, is_own in ((own, rest, True), (rest, own, False)):
+                of = [k for k in members if k not in self.found and (k in group) == is_own]
                 runs = [members[k] for k in of]
                 pairs = zip(of, its.log_probabilities_by_others(runs), others.log_probabilities(runs), strict=True)
-                moved |= {k for k, inside, outside in pairs if (inside > outside) == (part is group)}
-            if moved == group:
-                break
-            group = moved
+                nearer |= {k for k, inside, outside in pairs if (inside > outside) == is_own}
+            return frozenset(nearer)
+
+        for group in seeds:
+            for _ in range(_ROUNDS):
+                if not 0 < len(group) < len(members) or moved(group) == group:
+                    break
+                group = moved(group)
+            groups.append(sorted(group))
         self.evidence.spread = spread
-        return sorted(group)
+        return groups
 
     def _of_group(self, group: tuple[int, ...]) -> JointExplanation:
         """Return the best explanation that several runs have in common: one cause with one value, or another damper."""
