@@ -107,6 +107,7 @@ class Posterior:
     mean: Floats  # (P,)
     root: Floats  # (P, P) the covariance is root root'
     evidence: Evidence
+    log_evidence: float = 0.0  # logarithm of the evidence that the runs follow one model
     # mean and covariance at the currents that were asked for
     known: dict[bytes, tuple[Floats, Floats]] = field(default_factory=dict[bytes, tuple[Floats, Floats]])
 
@@ -225,10 +226,13 @@ class Evidence:
     def posterior(self, members: Sequence[Moments]) -> Posterior:
         """Coefficients determined by runs."""
         gram, moment = self._scaled(members)
-        inverse = inverse_of_triangle(np.linalg.cholesky(gram))
+        factor = np.linalg.cholesky(gram)
+        inverse = inverse_of_triangle(factor)
         nodes, weights, _ = self._course
-        spread = weights[:, None] * _along_nodes(nodes, inverse.T)
-        return Posterior(spread @ (inverse @ moment), spread, self)
+        spread, half = weights[:, None] * _along_nodes(nodes, inverse.T), inverse @ moment
+        power = sum(member.power for member in members)
+        log_evidence = 0.5 * float(half @ half - power) - float(np.sum(np.log(factor.diagonal())))
+        return Posterior(spread @ half, spread, self, log_evidence)
 
     def log_evidence(self, members: Sequence[Moments]) -> float:
         """Logarithm of the evidence that runs follow one model."""
@@ -286,14 +290,11 @@ class Evidence:
         linear = [np.ones(rows.size), x, x * x, v, track.acceleration[rows] / self._acceleration]
         uneven = [np.abs(v), np.abs(friction[1])]
         table = np.clip(np.column_stack([*linear, *friction, *led, *uneven, stops]), -_MAX_ELEMENT, _MAX_ELEMENT)
-        over = self.shares(track.current[rows] if track.current_changes else track.current[:1])
-        if track.current_changes:
-            table = (over[:, :, None] * table[:, None, :]).reshape(rows.size, -1)
+        over = None if track.current_changes else self.share(float(track.current[0]))
+        if over is None:
+            table = (self.shares(track.current[rows])[:, :, None] * table[:, None, :]).reshape(rows.size, -1)
         y = track.force[rows] / self.force
-        return RowProducts(
-            table.T @ table, table.T @ y, float(y @ y), rows.size, track.half_range / self.force,
-            None if track.current_changes else over[0],
-        )  # fmt: skip
+        return RowProducts(table.T @ table, table.T @ y, float(y @ y), rows.size, track.half_range / self.force, over)
 
     def share(self, current: float) -> Floats:
         """(K,) shares of the nodes at one current [A]."""

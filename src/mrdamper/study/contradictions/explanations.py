@@ -136,8 +136,8 @@ class ExplanationCandidate:
             if not like or any(trial.is_like(one) for one in like):
                 yield trial, self.changed(trial)
         if not self._motions:
-            trials = list(self._of_the_motion())
-            self._motions = list(zip(trials, self.evidence.products([self.moved(t) for t in trials]), strict=True))
+            trials, moved = zip(*self._of_the_motion(), strict=True)
+            self._motions = list(zip(trials, self.evidence.products(moved), strict=True))
         for trial, products in self._motions:
             if not like or any(trial.is_like(one) for one in like):
                 yield (
@@ -171,9 +171,10 @@ class ExplanationCandidate:
             for level in np.linspace(0, levels[-1], _TRIED_CURRENTS)[1:-1].tolist()
         )
 
-    def _of_the_motion(self) -> Iterator[Trial]:
-        """Yield a factor of displacement or time; both channels inverted."""
-        yield Trial("sign", -1.0, "", _SIGN_ODDS)
+    def _of_the_motion(self) -> Iterator[tuple[Trial, Track]]:
+        """Yield a factor of displacement or time, with the run as corrected; both channels inverted."""
+        inverted = Trial("sign", -1.0, "", _SIGN_ODDS)
+        yield inverted, self.moved(inverted)
         kinds: tuple[tuple[Cause, dict[str, float]], ...] = (("displacement", LENGTH_UNITS), ("time", TIME_UNITS))
         for cause, units in kinds:
             named = [(unit, factor) for unit, factor in _both_ways(units) if self._is_nearer(cause, factor)]
@@ -192,7 +193,7 @@ class ExplanationCandidate:
                 odds -= _TESTED_MOTION_ODDS * tested + _USUAL_STEP * (cause == "time") * self._is_usual(factor)
                 if tested != 0:
                     odds = completed_matrix_odds(odds, [*self._others, self.track], {-1: moved})
-                yield replace(trial, odds=odds)
+                yield replace(trial, odds=odds), moved
 
     def _ratios(self, cause: Cause) -> list[float]:
         """Factors that bring the motion to one that other runs have."""

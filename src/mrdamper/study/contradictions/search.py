@@ -340,7 +340,8 @@ class Search:
         for factor in _ERROR_FACTORS:
             self.evidence.spread = replace(spread, misfit=max(factor * spread.misfit, _MISFITS[-1]))
             members = expected.weigh(products)
-            total = self.evidence.log_evidence(members) - self._falling(members)
+            posterior = self.evidence.posterior(members)
+            total = posterior.log_evidence - self._falling(members, posterior)
             for group in apart:
                 own = self.evidence.posterior(expected.weigh(group))
                 total += self.evidence.log_evidence(own.weigh(group))
@@ -348,13 +349,12 @@ class Search:
         self.evidence.spread = spread
         return best
 
-    def _falling(self, members: Sequence[Moments]) -> float:
+    def _falling(self, members: Sequence[Moments], posterior: Posterior) -> float:
         """Logarithm of the prior odds against a force that falls with the current, by its relative decrease."""
         occupied = np.sum([m.over for m in members if m.over is not None and m.over.max() > _AT_NODE], axis=0)
         if np.ndim(occupied) == 0 or np.count_nonzero(np.asarray(occupied) > 0) < 2:
             return 0.0
         nodes = np.eye(self.evidence.nodes.size)[np.asarray(occupied) > 0]
-        posterior = self.evidence.posterior(members)
         sizes = np.array(
             [np.sqrt(mean @ self._usual_gram @ mean) for mean in (posterior.at(node)[0] for node in nodes)]
         )
