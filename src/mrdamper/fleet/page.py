@@ -18,7 +18,7 @@ from mrdamper.fleet.plan import Plan
 from mrdamper.fleet.profile import ColumnLimits
 from mrdamper.fleet.verdicts import FEATURES, clock_findings, drift, suspects, with_features
 from mrdamper.report.page import render_page
-from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.figure import Figure, new_figure
 from mrdamper.report.plots.style import PALETTE, picture_of
 
 if TYPE_CHECKING:
@@ -135,8 +135,7 @@ def _described(line: pl.DataFrame, name: str, about: tuple[str, str]) -> dict[st
 
 
 def _chart(values: Floats, first: Any, ranges: Any, average: Any, about: tuple[str, str]) -> Figure:
-    figure = Figure(2, 2, 4.6)
-    axes = figure.axes
+    figure, *axes = new_figure(2, 2, 4.6)
     name = f"{about[0]} ({about[1]})"
     heights, edges = np.histogram(values, min(60, max(8, int(np.sqrt(values.size)))))
     axes[0].bars(edges, heights, PALETTE[1])
@@ -165,15 +164,11 @@ def _worst(table: Path, line: pl.DataFrame, plan: Plan | None) -> dict[str, Any]
         return None
     far = line.drop_nulls("loop_deviation").sort("loop_deviation", descending=True).head(_WORST)
     keys = far.select("serial", "session")
-    loops = (
-        pl.scan_parquet(table)
-        .select("serial", "session", "loops")
-        .join(keys.lazy(), on=["serial", "session"])
-        .collect()
-    )
-    by_name = {(r[0], r[1]): r[2] for r in loops.iter_rows()}
-    figure = Figure(1, min(4, len(plan.matrix)), 2.6)
-    for number, place in enumerate(figure.axes):
+    every = pl.scan_parquet(table).select("serial", "session", "loops")
+    loops = every.join(keys.lazy(), on=["serial", "session"]).collect()
+    by_name = {(serial, session): loop for serial, session, loop in loops.iter_rows()}
+    figure, *axes = new_figure(1, min(4, len(plan.matrix)), 2.6)
+    for number, place in enumerate(axes):
         current, frequency, amplitude = plan.matrix[number]
         phase = 2 * np.pi * (np.arange(len(plan.loops[number])) + 0.5) / len(plan.loops[number])
         speed = 1e3 * 2 * np.pi * frequency * amplitude * np.cos(phase)

@@ -24,7 +24,7 @@ from mrdamper.physics.motion import equivalent_sine, measured_motion
 from mrdamper.physics.simulation import simulate
 from mrdamper.report.plots.comparison import overlaid_loops
 from mrdamper.report.plots.cycle import draw_loop, last_cycle
-from mrdamper.report.plots.figure import Axes, Figure
+from mrdamper.report.plots.figure import Axes, Figure, new_figure
 from mrdamper.report.plots.rig_tests import test_analysis, test_matrix
 from mrdamper.report.plots.style import (
     MEASURED,
@@ -78,12 +78,12 @@ def pictures(
     return drawn
 
 
-def _figure(axes: Texts, height: float, **margins: Any) -> Figure:
-    """Make a row of panels with these texts of the axes."""
-    figure = Figure(1, len(axes), height, **margins)
-    for panel, texts in zip(figure.axes, axes, strict=True):
+def _figure(axes: Texts, height: float, **margins: Any) -> tuple[Figure, *tuple[Axes, ...]]:
+    """Return a figure and its row of panels with these texts of the axes."""
+    figure, *panels = new_figure(1, len(axes), height, **margins)
+    for panel, texts in zip(panels, axes, strict=True):
         panel.label(*texts)
-    return figure
+    return figure, *panels
 
 
 def _listed_above(panel: Axes) -> None:
@@ -110,8 +110,7 @@ def _friction(study: Reproduction, axes: Texts) -> Drawing:
         return "the data hold no friction test"
     x, force = (thin(channel, 1500) for channel in (study.friction.displacement, study.friction.force))
     at, friction = friction_along(study.friction)
-    figure = _figure(axes, 2.9)
-    slow, along = figure.axes
+    figure, slow, along = _figure(axes, 2.9)
     slow.plot(MM * x, force, color=MEASURED, lw=0.6)
     along.plot(MM * at, friction, color=PALETTE[1], lw=_LINE)
     along.y.low = 0.0
@@ -139,10 +138,9 @@ def _loops_by(vary: str, place: int, study: Reproduction, axes: Texts) -> Drawin
     chosen = sorted(identified or largest, key=order)[place]
     group = [chosen[key] for key in sorted(chosen)][:_MOST_LOOPS]
     shades = current_colours([float(k) for k in range(len(group))])
-    figure = _figure(axes, 3.2, right=1.5)
+    figure, over_x, over_v = _figure(axes, 3.2, right=1.5)
     for k, (run, condition) in enumerate(group):
-        _plot_loop(figure.axes, run, run.force, label=_QUANTITIES[vary][1](condition), color=shades[float(k)])
-    over_x, over_v = figure.axes
+        _plot_loop((over_x, over_v), run, run.force, label=_QUANTITIES[vary][1](condition), color=shades[float(k)])
     over_x.title = ", ".join(text(group[0][1]) for name, (_, text) in _QUANTITIES.items() if name != vary)
     over_v.legend("right", size=_SMALL)
     return figure
@@ -226,8 +224,7 @@ def _over_current(name: str, form: str, study: Reproduction, axes: Texts) -> Dra
     (x, y), power = axes[0], 1.0
     if not log:
         y, power = powered(y, float(np.max(np.abs(values))))
-    figure = _figure([(x, y)], 3.4, right=2.3)
-    (panel,) = figure.axes
+    figure, panel = _figure([(x, y)], 3.4, right=2.3)
     shades = current_colours([study.conditions[g[0]].peak_velocity for g in motions(study)])
     for group in motions(study):
         conditions = [study.conditions[i] for i in group]
@@ -281,8 +278,7 @@ def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> 
             shares[motion_name(conditions[0]).replace(", ", "\n")] = fit.r2
     if not shares:
         return "too few currents at every motion"
-    figure = _figure(axes, 2.6)
-    (panel,) = figure.axes
+    figure, panel = _figure(axes, 2.6)
     panel.plot(range(len(shares)), list(shares.values()), label="R²", color=MEASURED, ls=":", **_POINTS)
     panel.x.places, panel.x.texts, panel.y.low = range(len(shares)), list(shares), min(0.0, *shares.values())
     return figure
@@ -306,8 +302,7 @@ def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Dr
     y, power = powered(y, float(np.max(np.abs(level))))
     u = [MM * c.frequency_Hz * c.amplitude_m if by_speed else c.frequency_Hz for c in firsts]
     shades, dash = current_colours([c.peak_velocity for c in firsts]), {"mark": "_", "ms": 11, "mew": 1.4}
-    figure = _figure([(x, y)], 3.0, right=2.0)
-    (panel,) = figure.axes
+    figure, panel = _figure([(x, y)], 3.0, right=2.0)
     for c, at, value, curve in zip(firsts, u, power * level, power * fitted, strict=True):
         panel.plot([at], [value], label=motion_name(c), color=shades[c.peak_velocity], **_POINTS)
         panel.plot([at], [curve], color=shades[c.peak_velocity], **dash)
@@ -341,23 +336,22 @@ def _accuracy_rate(study: Reproduction, axes: Texts) -> Drawing:
     rows = [row for row in rate_rows(study) if np.isfinite(row["nrmse_pp"])]
     if not rows:
         return "nothing predicts a validation run"
-    figure = _figure(axes, 2.9, top=0.5)
+    figure, *panels = _figure(axes, 2.9, top=0.5)
     scales = {"nrmse_pp": 100, "mean_relative_error": 100, "forces_until_settled": 1}
-    for panel, (name, scale) in zip(figure.axes, scales.items(), strict=True):
+    for panel, (name, scale) in zip(panels, scales.items(), strict=True):
         panel.y.log = name == "forces_until_settled"
         for method, colour in zip(dict.fromkeys(row["method"] for row in rows), PALETTE[1:], strict=False):
             own = [(r["current_A"], scale * r[name]) for r in rows if r["method"] == method and r[name] is not None]
             x, y = np.reshape(own, (-1, 2)).T
             panel.plot(x, y, label=method, color=colour, ls="-", **_POINTS)
-    _listed_above(figure.axes[0])
+    _listed_above(panels[0])
     return figure
 
 
 def _errors(study: Reproduction, axes: Texts) -> Drawing:
     if not study.held_out:
         return "nothing predicts a validation run"
-    figure = _figure(axes, 3.4, right=2.6)
-    (panel,) = figure.axes
+    figure, panel = _figure(axes, 3.4, right=2.6)
     for number, method in enumerate(study.contenders):
         again, place = divmod(number, 7)  # yellow is hardly visible on white
         runs = sorted(method.validation.runs, key=lambda r: r.condition.current_A)
@@ -372,8 +366,7 @@ def _errors(study: Reproduction, axes: Texts) -> Drawing:
 def _genetic(study: Reproduction, axes: Texts) -> Drawing:
     if not study.genetic:
         return "no genetic search was made"
-    figure = _figure(axes, 2.8, top=0.5)
-    (panel,) = figure.axes
+    figure, panel = _figure(axes, 2.8, top=0.5)
     for check, colour in zip(study.genetic, PALETTE[1:], strict=False):
         # The search uses a part of the samples; its error is converted to that of all samples.
         carried = check.minimum.history * check.reached / check.minimum.cost
@@ -387,8 +380,7 @@ def _genetic(study: Reproduction, axes: Texts) -> Drawing:
 def _seeds(study: Reproduction, axes: Texts) -> Drawing:
     if not study.seed_errors:
         return "noise seeds need a virtual rig"
-    figure = _figure(axes, 2.4, left=2.2)
-    (panel,) = figure.axes
+    figure, panel = _figure(axes, 2.4, left=2.2)
     for row, errors in enumerate(study.seed_errors.values()):
         panel.plot(100 * errors, np.full(errors.size, -row), "|", ms=9, color=PALETTE[1])
     _name_rows(panel, list(study.seed_errors))
@@ -400,8 +392,7 @@ def _sensitivity(study: Reproduction, axes: Texts) -> Drawing:
     effects, indices = study.sensitivity, study.sobol
     if not effects or indices is None:
         return "no run was identified by the consistent method"
-    figure = _figure(axes, 3.2, left=1.3, gap=1.3, top=0.45)
-    single, total = figure.axes
+    figure, single, total = _figure(axes, 3.2, left=1.3, gap=1.3, top=0.45)
     left = [max(e.left, 1e-8) for e in effects]
     rows = -np.arange(len(effects))
     single.plot([e.effect for e in effects], rows, label="others held", color=PALETTE[6], **_POINTS)

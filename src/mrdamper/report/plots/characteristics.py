@@ -8,7 +8,7 @@ from mrdamper.data import Dataset
 from mrdamper.identification.characteristics import Characteristics
 from mrdamper.physics.motion import centred_motion
 from mrdamper.report.plots.cycle import draw_loop, last_cycle
-from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.figure import Figure, new_figure
 from mrdamper.report.plots.style import current_colours, motion_name
 
 _MARKS = ("o", "s", "^", "D", "v", "P")
@@ -22,8 +22,7 @@ def peak_velocity_plot(
     Currents are distinguished by colour, specimens by mark. Limits are current [A], velocity [m/s], lower and upper
     force [N], each drawn as a bar.
     """
-    figure = Figure(1, 1, 4.2, right=1.9)
-    (axes,) = figure.axes
+    figure, axes = new_figure(1, 1, 4.2, right=1.9)
     colours = _colours(specimens)
     for mark, key, specimen, current in _series(specimens):
         strokes = specimen.at(current)
@@ -48,8 +47,7 @@ def peak_velocity_plot(
 
 def continuous_velocity_plot(dataset: Dataset, specimen: Characteristics) -> Figure:
     """Draw force over velocity and displacement (CVP) of the fastest motion at each current."""
-    figure = Figure(1, 2, 3.4)
-    axes = figure.axes
+    figure, *axes = new_figure(1, 2, 3.4)
     colours = current_colours(list(specimen.currents))
     for current in specimen.currents:
         stroke = specimen.at(current)[-1]
@@ -67,8 +65,7 @@ def continuous_velocity_plot(dataset: Dataset, specimen: Characteristics) -> Fig
 
 def figures_over_current(specimens: Mapping[str, Characteristics]) -> Figure:
     """Draw mean resisting force and zero-force velocity over peak velocity, one line per current."""
-    figure = Figure(1, 2, 3.2, right=1.9)
-    axes = figure.axes
+    figure, *axes = new_figure(1, 2, 3.2, right=1.9)
     colours = _colours(specimens)
     for mark, key, specimen, current in _series(specimens):
         strokes = specimen.at(current)

@@ -10,14 +10,13 @@ from mrdamper.dampers.base import Damper
 from mrdamper.data import Run
 from mrdamper.physics.motion import centred_motion, equivalent_sine
 from mrdamper.report.plots.cycle import draw_loop, last_cycle
-from mrdamper.report.plots.figure import Figure, room_beside
+from mrdamper.report.plots.figure import Figure, new_figure, room_beside
 from mrdamper.report.plots.style import MEASURED, PALETTE
 
 
 def ranking(scores: Mapping[str, tuple[float, float, float]]) -> Figure:
     """Draw the median error of every model, best first: identification, cross-validation, validation runs."""
-    figure = Figure(1, 1, 0.9 + 0.24 * len(scores), left=room_beside(scores), right=0.3)
-    (axes,) = figure.axes
+    figure, axes = new_figure(1, 1, 0.9 + 0.24 * len(scores), left=room_beside(scores), right=0.3)
     rows = np.arange(len(scores))[::-1]
     marks = zip(
         ("identification", "cross-validation", "validation"), "osD", (PALETTE[i] for i in (6, 1, 2)), strict=True

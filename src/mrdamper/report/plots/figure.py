@@ -373,3 +373,9 @@ class Figure:
             yield DrawnText(left + wide + _TICK + _GAP, place + 0.35 * _SMALL, tick, _SMALL)
         aside = left + wide + _TICK + 2 * _GAP + widest + 0.8 * _SIZE
         yield DrawnText(aside, top + high_pt / 2, text, _SIZE, "middle", turned=True)
+
+
+def new_figure(rows: int, columns: int, height: float, **layout: Any) -> tuple[Figure, *tuple[Axes, ...]]:
+    """Return a figure in a layout of `Figure`, and its panels row by row."""
+    figure = Figure(rows, columns, height, **layout)
+    return figure, *figure.axes

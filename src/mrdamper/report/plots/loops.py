@@ -9,7 +9,7 @@ from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError, UnknownNameError, require, shown
 from mrdamper.physics.motion import measured_motion
-from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.figure import Figure, new_figure
 from mrdamper.report.plots.style import KN, MM, PREDICTED
 
 if TYPE_CHECKING:
@@ -102,8 +102,7 @@ def predicted_force(prediction: Prediction, interval: Band | None = None, level:
     abscissas = [("Time (s)", motion.time)]
     if prediction.is_sine:
         abscissas = [("Displacement (mm)", MM * motion.displacement), ("Velocity (m/s)", motion.velocity)]
-    figure = Figure(1, len(abscissas), 3.2)
-    panels = figure.axes
+    figure, *panels = new_figure(1, len(abscissas), 3.2)
     for axes, (name, x) in zip(panels, abscissas, strict=True):
         axes.plot(x, prediction.force, color=PREDICTED, label="predicted")
         for number, edge in enumerate((interval.low, interval.high) if interval else ()):

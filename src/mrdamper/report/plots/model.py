@@ -13,7 +13,7 @@ from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.data import Floats, Run, same_motion
 from mrdamper.physics.motion import equivalent_sine
 from mrdamper.report.plots.cycle import draw_loop, last_cycle
-from mrdamper.report.plots.figure import Figure, room_beside
+from mrdamper.report.plots.figure import Figure, new_figure, room_beside
 from mrdamper.report.plots.style import (
     MEASURED,
     MOST_NAMED,
@@ -44,8 +44,7 @@ _AXES = {
 def predicted_loops(damper: Damper, runs: Sequence[Run]) -> Figure:
     """Measured and predicted force–velocity and force–displacement loops, last cycle in the window."""
     columns = 2 if len(runs) in (1, 2, 4) else 3
-    figure = Figure(2 * -(-len(runs) // columns), columns, 4.6 * -(-len(runs) // columns))
-    axes = figure.axes
+    figure, *axes = new_figure(2 * -(-len(runs) // columns), columns, 4.6 * -(-len(runs) // columns))
     for number, run in enumerate(runs):
         row, column = divmod(number, columns)
         over_x, over_v = panels = axes[2 * row * columns + column], axes[(2 * row + 1) * columns + column]
@@ -75,8 +74,7 @@ def parameter_curves(fit: ModifiedFit) -> Figure:
     """Return identified values over current, one colour per motion, and the fitted functions."""
     names = [name for name in fit.functions if np.ptp(fit.values[name]) > 0] or list(fit.functions)
     rows = -(-len(names) // 2)
-    figure = Figure(rows, 2, 2.5 * rows, right=1.75)
-    axes = figure.axes
+    figure, *axes = new_figure(rows, 2, 2.5 * rows, right=1.75)
     groups = sorted(motions_of(fit), key=lambda g: fit.conditions[g[0]].peak_velocity)
     speeds = [fit.conditions[g[0]].peak_velocity for g in groups]
     few = len(groups) <= MOST_NAMED
@@ -109,8 +107,7 @@ def score_strip(validations: Mapping[str, Validation]) -> Figure:
 
     Errors beyond 25 % are arrows at the edge.
     """
-    figure = Figure(1, 1, 0.8 + 0.3 * len(validations), left=room_beside(validations))
-    (axes,) = figure.axes
+    figure, axes = new_figure(1, 1, 0.8 + 0.3 * len(validations), left=room_beside(validations))
     for row, validation in enumerate(validations.values()):
         colour = PALETTE[1 + row % (len(PALETTE) - 2)]
         values = 100 * np.array([run.scores.nrmse_pp for run in validation.runs])
@@ -128,8 +125,7 @@ def score_strip(validations: Mapping[str, Validation]) -> Figure:
 
 def residual_map(damper: Damper, runs: Sequence[Run]) -> Figure:
     """Draw mean and spread of the residual over velocity and phase, relative to the peak-to-peak force."""
-    figure = Figure(1, 2, 2.8, right=1.1, share_y=True)
-    over_v, over_phase = figure.axes
+    figure, over_v, over_phase = new_figure(1, 2, 2.8, right=1.1, share_y=True)
     steps = levels([run.mean_current for run in runs])
     colours = current_colours(steps)
     for step, run in zip(steps, runs, strict=True):

@@ -8,7 +8,7 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats, Run
-from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.figure import Figure, new_figure
 from mrdamper.report.plots.style import MM, PREDICTED, current_colours, levels
 
 _FARTHEST = 1.5e-3  # m
@@ -19,8 +19,7 @@ def force_since_reversal(runs: Sequence[Run], damper: Damper) -> Figure:
 
     Colours are currents; the thin line on each is the damper's prediction.
     """
-    figure = Figure(1, 1, 3.0, right=1.2)
-    (axes,) = figure.axes
+    figure, axes = new_figure(1, 1, 3.0, right=1.2)
     steps = levels([run.mean_current for run in runs])
     colours = current_colours(steps)
     bins = np.concatenate([np.linspace(0, 0.6e-3, 31), np.linspace(0.65e-3, _FARTHEST, 18)])

@@ -11,7 +11,7 @@ from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis
 from mrdamper.physics.motion import centred_motion
 from mrdamper.report.plots.cycle import draw_loop, last_cycle, spread_out
 from mrdamper.report.plots.drawing import INCH
-from mrdamper.report.plots.figure import Axes, Figure
+from mrdamper.report.plots.figure import Axes, Figure, new_figure
 from mrdamper.report.plots.style import KN, MM, MOST_NAMED, current_colours, levels, motion_name, speed_colours
 
 _BESIDE = 0.07  # inches between the marks of two currents
@@ -23,8 +23,7 @@ def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
     steps = levels([loop.condition.current_A for loop in loops])
     colours = current_colours(steps)
     entries = len({(step, loop.split) for step, loop in zip(steps, loops, strict=True)})
-    figure = Figure(1, 1, max(3.0, 0.8 + 0.16 * entries), right=1.7)
-    (axes,) = figure.axes
+    figure, axes = new_figure(1, 1, max(3.0, 0.8 + 0.16 * entries), right=1.7)
     for number, (current, colour) in enumerate(colours.items()):
         # Marks of one motion are drawn side by side, one per current.
         aside = (number - (len(colours) - 1) / 2) * _BESIDE
@@ -46,8 +45,7 @@ def test_matrix(loops: Sequence[LoopAnalysis]) -> Figure:
 
 def measured_loops(dataset: Dataset, loops: Sequence[LoopAnalysis]) -> Figure:
     """Force–displacement and force–velocity loops: over current, then over the motion at one current."""
-    figure = Figure(2, 2, 5.6, right=1.7)
-    axes = figure.axes
+    figure, *axes = new_figure(2, 2, 5.6, right=1.7)
     over_current = _over_current(loops)
     colours = current_colours(list(over_current))
     for current, loop in over_current.items():
@@ -68,8 +66,7 @@ def measured_loops(dataset: Dataset, loops: Sequence[LoopAnalysis]) -> Figure:
 
 def test_analysis(loops: Sequence[LoopAnalysis], ranges: Sequence[DynamicRange]) -> Figure:
     """Peak force, dissipated energy, equivalent damping and dynamic range over current."""
-    figure = Figure(2, 2, 5.2, right=1.75)
-    axes = figure.axes
+    figure, *axes = new_figure(2, 2, 5.2, right=1.75)
     quantities: list[tuple[str, Callable[[LoopAnalysis], float]]] = [
         ("Peak force (N)", lambda loop: loop.peak_force),
         ("Dissipated energy (J per cycle)", lambda loop: loop.dissipated_energy),

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.report.plots.figure import Figure
+from mrdamper.report.plots.figure import Figure, new_figure
 from mrdamper.report.plots.style import MM, PALETTE
 from mrdamper.systems.result import Simulation
 
@@ -21,8 +21,7 @@ def histories(runs: Mapping[str, Simulation]) -> Figure:
     first = next(iter(shown.values()))
     point = int(np.argmax(first.peaks["acceleration_m_s2"])) if first.system.ground is not None else 0
     span = list(first.system.spans)[int(np.argmax(first.peaks["drift_m"]))]
-    figure = Figure(3, 1, 6.4)
-    top, middle, bottom = figure.axes
+    figure, top, middle, bottom = new_figure(3, 1, 6.4)
     for colour, (title, run) in zip(PALETTE, shown.items(), strict=False):
         every = slice(None, None, max(1, run.time.size // _POINTS))
         top.plot(run.time[every], run.a[every, point], color=colour, lw=0.8, label=title)
@@ -40,8 +39,7 @@ def spectra(runs: Mapping[str, Simulation]) -> Figure:
     """Draw the power spectral density of the accelerations among the objectives."""
     first = next(iter(runs.values()))
     point = int(np.argmax(first.peaks["acceleration_m_s2"])) if first.system.ground is not None else 0
-    figure = Figure(1, 2, 3.0)
-    left, right = figure.axes
+    figure, left, right = new_figure(1, 2, 3.0)
     left.x.log = left.y.log = True
     for colour, (title, run) in zip(PALETTE, runs.items(), strict=False):
         size = min(run.time.size, int(4 / run.step))
