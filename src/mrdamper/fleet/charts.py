@@ -99,9 +99,7 @@ def capability(values: Floats, lower: float | None, upper: float | None) -> Capa
     outside, count = int(np.sum(below | above)), values.size
     if is_normal(values):
         middle, deviation = np.mean(values), np.std(values, ddof=1)
-        ppk = float(
-            _nearest(np.array([middle - 3 * deviation, middle, middle + 3 * deviation], dtype=float), lower, upper)
-        )
+        ppk = float(_nearest(middle + deviation * np.array([-3.0, 0.0, 3.0]), lower, upper))
         half = 1.959963985 * float(np.sqrt(1 / (9 * count) + ppk**2 / (2 * (count - 1))))
         return Capability(ppk, ppk - half, ppk + half, "normal", count, outside)
     if count < FEWEST_PERCENTILES:

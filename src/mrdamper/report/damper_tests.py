@@ -137,20 +137,20 @@ def provenance(specimens: Mapping[str, Dataset]) -> list[tuple[str, str]]:
     """List the sources of a report: runs, sampling rates, dates, files and a hash of the samples."""
     rows = []
     for name, dataset in specimens.items():
-        rates = sorted({float(number(_rate(run))) for run in dataset.runs})
-        span = f"{rates[0]:g} Hz" if len(rates) == 1 else f"{rates[0]:g} to {rates[-1]:g} Hz"
+        rates = {float(number((run.time.size - 1) / (run.time[-1] - run.time[0]))) for run in dataset.runs}
+        span = _span([f"{rate:g}" for rate in sorted(rates)])
         notes = [run.notes for run in dataset.runs]
         files = sorted({note[key] for note in notes for key in _SOURCES if note.get(key)})
         dates = sorted({note["recorded_at"][:10] for note in notes if note.get("recorded_at")})
-        rows.append((name, f"{len(dataset)} runs at {span}" + (f", recorded {_span(dates)}" if dates else "")))
+        rows.append((name, f"{len(dataset)} runs at {span} Hz" + (f", recorded {_span(dates)}" if dates else "")))
         if files:
             rows.append((f"{name}: files", ", ".join(files)))
         rows.append((f"{name}: SHA-256 of the samples", data_hash(dataset.runs)))
     return [*rows, ("software", f"mrdamper {version('mrdamper')}")]
 
 
-def _span(dates: Sequence[str]) -> str:
-    return dates[0] if len(dates) == 1 else f"{dates[0]} to {dates[-1]}"
+def _span(texts: Sequence[str]) -> str:
+    return texts[0] if len(texts) == 1 else f"{texts[0]} to {texts[-1]}"
 
 
 def data_hash(runs: Sequence[Run]) -> str:
@@ -161,10 +161,6 @@ def data_hash(runs: Sequence[Run]) -> str:
         for channel in (run.time, run.displacement, run.force, run.current):
             digest.update(np.ascontiguousarray(channel, dtype="<f8").tobytes())
     return digest.hexdigest()
-
-
-def _rate(run: Run) -> float:
-    return float((run.time.size - 1) / (run.time[-1] - run.time[0]))
 
 
 def _characterised(name: str, dataset: Dataset) -> Characteristics:
