@@ -138,17 +138,13 @@ def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawT
             others.append((table, error))
     if not fitting:
         raise others[0][1] if others else RigFileError("E_NO_DATA", "no table in this file")
-    refused = [_resembles_a_test(table, fitting, profile) for table, _ in others]
-    parts = [t.label for (t, _), is_test in zip(others, refused, strict=True) if not is_test and _moves(t, profile)]
+    tests = [i for i, (table, _) in enumerate(others) if _resembles_a_test(table, fitting, profile)]
+    apart = [table for i, (table, _) in enumerate(others) if table.label and i not in tests]
+    parts = [table.label for table in apart if len({*REQUIRED} & {*partly_assigned(table, profile)}) > 1]
     if parts:
-        text = f"tables without all channels are not taken for tests: {listed(parts, 5)}"
-        fitting[0] = fitting[0].noted(Finding("W_TABLE", printable(text)))
-    return fitting, [_incomplete(*other) for other, is_test in zip(others, refused, strict=True) if is_test]
-
-
-def _moves(table: RawTable, profile: Profile) -> bool:
-    """Tell if a table has a label, and columns of two of the channels that a test needs."""
-    return table.label != "" and len({*REQUIRED} & {*partly_assigned(table, profile)}) > 1
+        text = printable(f"tables without all channels are not taken for tests: {listed(parts, 5)}")
+        fitting[0] = fitting[0].noted(Finding("W_TABLE", text))
+    return fitting, [_incomplete(*others[i]) for i in tests]
 
 
 def _resembles_a_test(table: RawTable, tests: list[RawTable], profile: Profile) -> bool:

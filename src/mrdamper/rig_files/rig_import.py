@@ -20,14 +20,7 @@ from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files.coil_current import as_data, require_current, with_current_behind_label, with_stated_current
 from mrdamper.rig_files.file_records import files_in, records_of_file, unpacked
-from mrdamper.rig_files.mapping.companions import (
-    holds_channels,
-    is_helper,
-    is_list,
-    joined_files,
-    number_of,
-    part_of,
-)
+from mrdamper.rig_files.mapping.companions import holds_channels, is_helper, is_list, joined_files, number_of, part_of
 from mrdamper.rig_files.mapping.comparisons import contradictions, repeated, stated_as_amplitudes
 from mrdamper.rig_files.mapping.description import SHORT_TEXTS, is_description, is_readme, short_lines
 from mrdamper.rig_files.mapping.plans import (

@@ -14,13 +14,7 @@ from mrdamper.data import Floats
 from mrdamper.data.arrays import rescale
 from mrdamper.errors import InputError
 from mrdamper.rig_files.coil_current import as_data, current_of, with_value_of_name
-from mrdamper.rig_files.column_names import (
-    SI,
-    is_unit,
-    role_of,
-    split_name,
-    words_of,
-)
+from mrdamper.rig_files.column_names import SI, is_unit, role_of, split_name, words_of
 from mrdamper.rig_files.columns import partly_assigned
 from mrdamper.rig_files.file_records import digest_of
 from mrdamper.rig_files.mapping.completion import completed, item_of

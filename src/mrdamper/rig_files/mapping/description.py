@@ -160,18 +160,6 @@ def _texts_in(folder: Path, changed_ns: int) -> tuple[list[Path], list[Path], li
     return [folder / name for name in names if _README.fullmatch(name)], structures, listing
 
 
-def with_units_of_notes(heads: str, path: Path) -> str:
-    """Return a row of names with the units that notes in the folder of its file give them: intensity [A]."""
-    notes, _, _ = _texts_in(path.parent, path.parent.stat().st_mtime_ns)
-    parts = (part for note in notes for line in short_lines(note) for part in re.split(r"[,;\t|]|: ", line))
-    units: dict[str, set[str]] = {}
-    for item in map(item_of, parts):
-        units.setdefault(item.name.casefold(), set()).update({item.unit} - {""})
-    one = {name: of.pop() for name, of in units.items() if len(of) == 1 and name}
-    named = [(cell, one.get(cell.strip(' "').casefold())) for cell in re.split(r"([,;\t|])", heads)]
-    return "".join(cell.strip(' "') + f" [{unit}]" if unit else cell for cell, unit in named)
-
-
 def is_readme(path: Path) -> bool:
     """Tell if a file is one of notes by its name: README.md, LIESMICH.txt."""
     return _README.fullmatch(path.name) is not None

@@ -13,22 +13,17 @@ import numpy as np
 
 from mrdamper.errors import InputError, QualityError, listed, printable
 from mrdamper.rig_files.coil_current import NO_CHANNEL
-from mrdamper.rig_files.column_names import (
-    RATING,
-    names_condition,
-    role_of,
-    split_name,
-    words,
-    words_of,
-)
+from mrdamper.rig_files.column_names import RATING, names_condition, role_of, split_name, words, words_of
 from mrdamper.rig_files.conditions import amperes, series_in
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.mapping.comparisons import MOST_SAMPLES, forces_grow
-from mrdamper.rig_files.mapping.description import SHORT_TEXTS, short_lines, with_units_of_notes
+from mrdamper.rig_files.mapping.completion import completed
+from mrdamper.rig_files.mapping.description import SHORT_TEXTS, short_lines, with_notes
 from mrdamper.rig_files.mapping.results import NUMBER, Results, lines_of, results_among, results_in, rows_below_heads
 from mrdamper.rig_files.profile import FileForm, Profile
 from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.readers import ask_tables, raw_tables
+from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding, Record, part_of_record
 
 _LEGEND = re.compile(  # I1 = 0.3 A, cur0.8 = coil current 0.8 A (as set)
@@ -59,10 +54,14 @@ def results_of(path: Path, form: FileForm | None = None) -> Results | None:
     """Return the table of results that a file holds, or of a form beside its tests; None if it holds none."""
     if form is not None:
         return ask_tables(path, lambda tables: results_among(tables)[0], None, form)
-    if path.suffix.lower() in SHORT_TEXTS:
-        lines = short_lines(path)
-        return results_in(lines) or results_in([with_units_of_notes(line, path) for line in lines[:1]] + lines[1:])
-    sheets = ask_tables(path, lambda tables: [(t.label, r) for t in tables[:20] if (r := results_in(lines_of(t)))], [])
+    if path.suffix.lower() in SHORT_TEXTS and (stated := results_in(short_lines(path))):
+        return stated
+
+    def results_apart(tables: Sequence[RawTable]) -> list[tuple[str, Results]]:
+        every = ((t.label, results_in(lines_of(completed(with_notes(t, path, Profile()))))) for t in tables[:20])
+        return [(label, results) for label, results in every if results]
+
+    sheets = ask_tables(path, results_apart, [])
     if len({(of.keys, of.title, of.of_supply) for _, of in sheets}) != 1:
         return None
     shared = set.intersection(*({*label.split()} for label, _ in sheets))  # Damper FL, Damper RR: FL, RR
