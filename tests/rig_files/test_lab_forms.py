@@ -1127,18 +1127,27 @@ def test_samples_of_a_current_over_time_are_no_plan(tmp_path):
     assert not import_files([tmp_path]).records
 
 
-@pytest.mark.parametrize(("frequencies", "refused"), [([1, 2, 1], False), ([1, 1, 1], True), ([2, 1, 1], True)])
+@pytest.mark.parametrize(
+    ("frequencies", "amplitudes", "refused"),
+    [
+        ([1, 2, 1], [10, 10, 5], False), ([1, 2, 1], [20, 20, 10], False), ([1, 1, 1], [10, 10, 5], True),
+        ([2, 1, 1], [10, 10, 5], True), ([1, 2, 1], [5, 10, 10], True),
+    ],
+)  # fmt: skip
 def test_a_plan_whose_rows_state_other_motions_gives_no_currents_until_they_are_answered(
-    frequencies, refused, tmp_path
+    frequencies, amplitudes, refused, tmp_path
 ):
-    for i, factor in enumerate((1, 2, 1)):
-        (tmp_path / f"run_{i + 1}.csv").write_text("Time [s],disp [mm],force [N]\n" + rows(T / factor, X, force(i / 2)))
-    lines = [f"{i + 1},{i / 2},{f},10\n" for i, f in enumerate(frequencies)]
+    for i, (factor, size) in enumerate(((1, 1.0), (2, 1.0), (1, 0.5))):
+        record = rows(T / factor, size * X, force(i / 2))
+        (tmp_path / f"run_{i + 1}.csv").write_text("Time [s],disp [mm],force [N]\n" + record)
+    lines = [f"{i + 1},{i / 2},{f},{a}\n" for i, (f, a) in enumerate(zip(frequencies, amplitudes, strict=True))]
     (tmp_path / "plan.csv").write_text("Nr,Current [A],Frequency [Hz],Amplitude [mm]\n" + "".join(lines))
     found = import_files([tmp_path])
     assert {r.error.code for r in found.refusals} == ({"E_MOTION_CONTRADICTS"} if refused else set())
     profile = parse_profile('[current.values]\n"run_1*" = 0\n"run_2*" = 0.5\n"run_3*" = 1.0\n')
     assert currents(import_files([tmp_path], profile).records) == [0.0, 0.5, 1.0]
+    (tmp_path / "run_2.csv").rename(tmp_path / "1.5A_run_2.csv")  # its name contradicts the plan, whatever moves
+    assert "E_CURRENT_CONTRADICTS" in {refusal.error.code for refusal in import_files([tmp_path]).refusals} or refused
 
 
 HEAD = "Time [s],disp [mm],force [N]\n"

@@ -332,13 +332,14 @@ class _Intake:
         refused = discarded_tests(path, results or remarks_of(path), own)
         if other is not None:
             refused = dict.fromkeys(range(len(own)), other) if own[0][0] == path else {}
+        answers = [self._table.path.name] if self._table else []
+        answers += ["profile"] if other else []
         for i, ((file, record), (current, whence)) in enumerate(zip(own, stated or (), strict=False)):
             try:
-                if other is None:
-                    with_stated_current(record, current, whence, file.name)
+                with_stated_current(record, current, whence, file.name)
             except InputError as error:
-                if self._table and record.provenance.get("current_from") == self._table.path.name:
-                    note = Finding("W_CHOSEN", f"{self._table.path.name} decides: {error.found}")
+                if (answer := record.provenance.get("current_from", "")) in answers:
+                    note = Finding("W_CHOSEN", f"{answer} decides: {error.found}")
                     self._found = [(p, r.noticed(note) if r is record else r) for p, r in self._found]
                 else:
                     refused[i] = error

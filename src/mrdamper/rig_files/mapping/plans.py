@@ -40,9 +40,11 @@ _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9
 _DISCARDED, _DISCARDED_FLAG, _NOT_DISCARDED = (
     re.compile("(?i)" + "|".join(words(of))) for of in ("discarded", "discarded_flag", "not_discarded")
 )
-_FREQUENCY = re.compile(r"(?i)^(?:f\b|freq|frec|fréq|част|频率|周波数|częst)")
 _REST = 0.1  # of the largest motion: less is that of no test
-_OTHER_FREQUENCY = 0.15  # relative difference of the frequencies of two tests
+_MOTIONS = (  # dimension and name of a column, relative difference of two tests, unit of messages and its number per SI
+    ("frequency", re.compile(r"(?i)^(?:f\b|freq|frec|fréq|част|频率|周波数|częst)"), 0.15, "Hz", 1.0),
+    ("length", re.compile(r"(?i)ampl|^x_?0$|^(?:stroke|hub|course|carrera|corsa)$|振幅|행정|行程"), 0.5, "mm", 1e3),
+)
 _REMARKS = frozenset((*words("notes"), *words("remarks")))
 _STAMP = re.compile(  # 20190603_140512, 2019-06-03T14:05:12
     r"(?<![0-9])20[0-9]{2}-?[01][0-9]-?[0-3][0-9][T_ -](?P<hour>[0-2][0-9])[:-]?(?P<minute>[0-5][0-9])"
@@ -128,27 +130,40 @@ def currents_beside(
 
 
 def other_motions(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> InputError | None:
-    """Return the refusal of a plan of which a test moves at another frequency than its row states."""
+    """Return the refusal of a plan of which a test moves at another frequency, or by another amplitude, than its row.
+
+    Amplitudes, which may be strokes peak to peak, are compared with each other.
+    """
     headers = [split_name(key) for key in results.keys] if results else []
-    columns = [
-        i for i, header in enumerate(headers) if header.dimension == "frequency" and _FREQUENCY.search(header.name)
-    ]
-    cells = [row[columns[0]].replace(",", ".") for row in results.cells] if results and len(columns) == 1 else []
-    if results is None or not cells or not all(map(NUMBER.fullmatch, cells)):
-        return None
-    rows = currents_beside(path, replace(results, current=tuple(map(float, cells)), of_supply=False), tests) or ()
     texts: list[str] = []
-    for (stated, _), (_, record) in zip(rows, tests, strict=False):
-        thinned = slice(None, None, max(1, record.time.size // MOST_SAMPLES))
-        strokes = find_strokes(record.time[thinned], record.displacement[thinned])
-        if strokes.steady and strokes.period and stated and abs(1 / (strokes.period * stated) - 1) > _OTHER_FREQUENCY:
-            moves = f"{record.id}, which moves at {1 / strokes.period:.3g} Hz"
-            texts.append(f"{path.name} states {stated:g} Hz of {moves}")
+    for dimension, called, limit, unit, size in _MOTIONS:
+        columns = [i for i, h in enumerate(headers) if h.dimension == dimension and called.search(h.name)]
+        cells = [row[columns[0]].replace(",", ".") for row in results.cells] if results and len(columns) == 1 else []
+        if results is None or not cells or not all(map(NUMBER.fullmatch, cells)):
+            continue
+        values = tuple(headers[columns[0]].factor * float(cell) for cell in cells)
+        rows = currents_beside(path, replace(results, current=values, of_supply=False), tests) or ()
+        pairs = [(record, stated, _motion(record)[unit]) for (stated, _), (_, record) in zip(rows, tests, strict=False)]
+        pairs = [pair for pair in pairs if pair[1] > 0 and pair[2] > 0]
+        usual = 1.0 if unit == "Hz" or not pairs else float(np.median([moves / stated for _, stated, moves in pairs]))
+        for record, stated, moves in pairs:
+            if max(share := moves / stated / usual, 1 / share) > 1 + limit:
+                moving = f"{record.id}, which moves {'at' if unit == 'Hz' else 'by'} {size * moves:.3g} {unit}"
+                texts.append(f"{path.name} states {size * stated:g} {unit} of {moving}")
     if not texts:
         return None
     problem = f"{listed(texts, 2)}: are its rows those of other tests?"
     remedy = "write the current of each test into tests.csv (--write-tests), or correct the plan"
     return QualityError(printable(problem), where=path.name, remedy=remedy, code="E_MOTION_CONTRADICTS")
+
+
+def _motion(record: Record) -> dict[str, float]:
+    """Return the frequency [Hz] and amplitude [m] of a steady motion; zero where there is none."""
+    thinned = slice(None, None, max(1, record.time.size // MOST_SAMPLES))
+    strokes = find_strokes(record.time[thinned], record.displacement[thinned])
+    if not strokes.steady or not strokes.period:
+        return {"Hz": 0.0, "mm": 0.0}
+    return {"Hz": 1 / strokes.period, "mm": float(np.median(strokes.lengths)) / 2}
 
 
 def discarded_tests(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> dict[int, InputError]:
