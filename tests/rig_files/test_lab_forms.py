@@ -1319,3 +1319,14 @@ def test_a_test_without_a_channel_among_others_in_a_structure_is_refused_and_oth
     assert "table run_3: no column is known to be force" in str(refusal.error)
     assert any("not taken for tests: sensor check" in finding.text for finding in result.records[0].findings)
     assert not import_files([tmp_path], parse_profile('[file]\nleave_out = ["run_3"]')).refusals
+
+
+def test_a_plan_that_names_some_of_the_tests_is_compared_with_them(tmp_path):
+    write_tests(tmp_path, (0.25, 0.5, 0.75, 1.0), heads="# coil current: {} A\n" + HEAD)
+    (tmp_path / "plan.csv").write_text("Run,Current [A],Remark\nrun_1,0.25,\nrun_2,0.5,INVALID\nrun_3,1.5,\n")
+    refused = {refusal.run: refusal.error.code for refusal in import_files([tmp_path]).refusals}
+    assert refused == {"run_2": "E_DISCARDED", "run_3": "E_CURRENT_CONTRADICTS"}
+    (tmp_path / "tests.csv").write_text("file,current_A\nrun_3.csv,0.75\n")
+    result = import_files([tmp_path], parse_profile('[file]\nleave_out = ["run_2.csv"]'))
+    assert by_id(result) == {"run_1": 0.25, "run_3": 0.75, "run_4": 1.0}
+    assert any("tests.csv decides: plan.csv" in finding.text for finding in result.records[1].findings)

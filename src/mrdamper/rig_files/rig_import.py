@@ -28,6 +28,7 @@ from mrdamper.rig_files.mapping.plans import (
     currents_listed,
     discarded_tests,
     gap_of_plan,
+    named_tests,
     other_motions,
     remarks_of,
     results_of,
@@ -327,9 +328,12 @@ class _Intake:
         Tell if it states currents of tests that move as it says.
         """
         tests = [(i, test) for i, test in enumerate(self.tests()) if test[0] == path] or [*enumerate(self.tests())]
-        own = [test for _, test in tests]
+        own, remarks = [test for _, test in tests], results or remarks_of(path)
+        if currents_beside(path, remarks, own) is None:  # of some tests, by their names
+            tests = [tests[i] for i in named_tests(remarks, own)]
+            own = [test for _, test in tests]
         stated, other = currents_beside(path, results, own), other_motions(path, results, own)
-        refused = discarded_tests(path, results or remarks_of(path), own)
+        refused = discarded_tests(path, remarks, own)
         if other is not None:
             refused = dict.fromkeys(range(len(own)), other) if own[0][0] == path else {}
         answers = [self._table.path.name] if self._table else []

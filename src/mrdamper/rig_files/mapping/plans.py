@@ -206,10 +206,16 @@ def remarks_of(path: Path) -> Results | None:
     return None
 
 
+def named_tests(results: Results | None, tests: Sequence[tuple[Path, Record]]) -> list[int]:
+    """Return the places of the tests that a table of results names, by more than a number."""
+    cells = {cell.casefold() for row in (results.cells if results else ()) for cell in row if not cell.isdigit()}
+    return [i for i, names in enumerate(_called(tests)) if (cells - {""}) & {name.casefold() for name in names}]
+
+
 def gap_of_plan(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> Finding | None:
     """Return the finding that a plan, which names some of the tests without a current, lacks others."""
-    cells = {cell.casefold() for row in (results.cells if results else ()) for cell in row if not cell.isdigit()}
-    absent = [names[0] for names in _called(tests) if not cells & {name.casefold() for name in names}]
+    named = named_tests(results, tests)
+    absent = [record.id for i, (_, record) in enumerate(tests) if i not in named]
     if not 0 < len(absent) < len(tests):
         return None
     text = f"{path.name} names {len(tests) - len(absent)} of {len(tests)} tests and may lack {listed(absent, 3)}"
