@@ -108,10 +108,10 @@ def digest_of(path: Path) -> str:
 
 def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
     """Split and complete the tables of a file until each holds one test, or none."""
-    kept = [table for table in tables if not (table.label and profile.leaves_out(table.label))]
-    if tables and not kept:
+    omitted = [table.label != "" and profile.leaves_out(table.label) for table in tables]
+    if tables and all(omitted):
         raise tables[0].source.refuse("E_NO_DATA", "every table is left out", "correct [file] leave_out of the profile")
-    tables = [table for table in tables if table in kept or table.label.startswith("block")]  # these have a number
+    tables = [t for t, out in zip(tables, omitted, strict=True) if not out or t.label.startswith("block")]  # numbered
     tables = with_joined_rasters([with_time_stated(completed(with_channels_as_columns(table))) for table in tables])
     tables = [with_one_clock(table) for table in tables]
     forms = [form_of_tests(table, profile.file) for table in tables]
@@ -150,9 +150,9 @@ def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawT
 def _resembles_a_test(table: RawTable, tests: list[RawTable], profile: Profile) -> bool:
     """Tell if a table beside tests has a label or number of columns like one, its rows and two of their channels."""
     columns = [entry.column for role, entry in partly_assigned(table, profile).items() if role in REQUIRED]
-    called = re.sub("[0-9]+", "0", table.label)
-    forms = ((test, len(test.names) == len(table.names), re.sub("[0-9]+", "0", test.label) == called) for test in tests)
-    alike = next((test for test, *same in forms if any(same)), None)
+    forms = {re.sub("[0-9]+", "0", test.label): test for test in tests if test.label}
+    alike = next((test for test in tests if len(test.names) == len(table.names)), None)
+    alike = alike or forms.get(re.sub("[0-9]+", "0", table.label))
     if alike is None or holds(table.label, COMPUTED) or len(columns) < len(REQUIRED) - 1:
         return False
     return _rows(table, columns[0]) >= _ROWS_OF_A_TEST * _rows(alike, assign(alike, profile)["force"].column)
