@@ -1285,6 +1285,7 @@ def test_a_plan_on_a_sheet_of_its_tests_is_compared_with_their_motion_and_its_re
     ("line", "contradicts"),
     [
         ("Note: the force column is in N (the header of the template says kN).", True), ("Force: N", True),
+        ("All forces in N.", True),
         ("| force | N |", True), ("Kraft in kN", False), ("load cell: 25 N", False), ("peak forces in N", False),
         ("The forces of the paper are in N", False), ("Force in N (until 2020); force in kN (since 2021)", False),
     ],

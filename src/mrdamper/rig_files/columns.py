@@ -401,7 +401,8 @@ def units_in(line: str) -> list[tuple[str, str]]:
     stated = []
     for header in (split_name(re.sub(r"\s*[:=]\s+", " in ", cell.rstrip("."))) for cell in cells):
         named = [word for word in words_of(header.name) if word.casefold() not in _AROUND_UNITS]
-        role = role_of(named[0]) if header.unit and [len(word) > 2 for word in named] == [True] else None  # no letter
+        one = header.unit and [len(word) > 2 for word in named] == [True]  # no letter
+        role = role_of(named[0].removesuffix("s")) if one else None  # forces
         stated += [(role, header.unit)] if role and header.dimension == DIMENSION[role] else []
     return stated
 
