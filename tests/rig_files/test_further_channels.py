@@ -36,6 +36,15 @@ def test_further_channels_are_kept_in_si_and_summarised(path, tmp_path):
     assert all(values.size == 40 for values in part.further.values())
 
 
+def test_a_temperature_of_another_length_is_left_out_and_named(tmp_path):
+    needed = dict(zip(("time_s", "displacement_mm", "force_N"), rows().T, strict=True))
+    np.savez(tmp_path / "a_1A.npz", **needed, temperature_C=np.full(9, 20.0))
+    record = read_run(tmp_path / "a_1A.npz")
+    assert record.temperature is None
+    texts = [finding.text for finding in record.findings]
+    assert "the temperature channel is not used: it has 9 samples, the force 600" in texts
+
+
 def test_a_further_channel_of_another_length_is_refused():
     time = np.arange(5.0)
     with pytest.raises(RunError, match="temperature_C has 4 samples"):

@@ -150,7 +150,10 @@ def _read(table: RawTable, assigned: dict[str, Assigned], profile: Profile):
     findings = [*table.findings, *content.findings]
     for name in [name for name in assigned if name in _LENIENT]:
         try:
-            raw[assigned[name].column] = table.read([assigned[name].column]).values[assigned[name].column]
+            values = table.read([assigned[name].column]).values[assigned[name].column]
+            if values.size != (size := content.values[assigned["force"].column].size):
+                raise table.source.refuse("E_FIELD_COUNT", f"it has {values.size} samples, the force {size}")
+            raw[assigned[name].column] = values
         except InputError as error:
             code = "W_ENCODING" if error.code == "E_ENCODING" else "W_COLUMN"
             findings.append(Finding(code, f"the {name} channel is not used: {error.found}"))
