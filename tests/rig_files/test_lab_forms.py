@@ -598,6 +598,25 @@ def test_a_profile_joins_files_of_one_name_in_a_folder_for_each_test(tmp_path):
         import_files([tmp_path], parse_profile(FOLDERS.replace("{run}/wire", "wire_{run}")))
 
 
+@pytest.mark.parametrize("mark", [";", "#"])
+@pytest.mark.parametrize("rate", ["", "sample_rate_Hz = 200.0\n"])
+def test_a_profile_joins_files_of_one_channel_each_by_the_rate_that_it_or_they_state(tmp_path, mark, rate):
+    head = "" if rate else f"{mark} Sample rate: 200 Hz\n"
+    for run in ("a", "b"):
+        for name, values in (("ch1", X / 5), ("ch2", force(0.5))):
+            text = f"{mark} Unit: V\n{head}{mark} Samples: {T.size}\n{rows(values)}"
+            (tmp_path / f"{run}_{name}.asc").write_text(text)
+    profile = (
+        f"[file]\n{rate}[current]\nvalue = 0.5\n"
+        '[channels.displacement]\ncolumn = 1\nunit = "mm"\nscale = 5.0\nfile = "{run}_ch1.asc"\n'
+        '[channels.force]\ncolumn = 1\nunit = "N"\nscale = 1.0\nfile = "{run}_ch2.asc"\n'
+    )
+    found = import_files([tmp_path], parse_profile(profile))
+    assert [record.id for record in found.records] == ["a"], [str(r.error) for r in found.refusals]  # b is a copy
+    np.testing.assert_allclose(found.records[0].time, T, atol=1e-9)
+    np.testing.assert_allclose(found.records[0].displacement, 1e-3 * X, atol=1e-6)
+
+
 def test_a_file_of_a_profile_without_its_channel_or_a_time_is_refused_with_what_it_lacks(tmp_path):
     for folder in (tmp_path / "1", tmp_path / "2"):
         folder.mkdir()

@@ -83,13 +83,11 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
     if not channels or not (alone or timed):
         return part_of(path, other_logger, run) if run and other_logger != profile else None
     words = [word for word in words_of(split_name(path.stem).name) if role_of(word) not in assigned]
-    test = (
-        path.parent / "_".join(words) if alone and words else path.parent if alone else path.with_name(run or path.name)
-    )
-    remarks = [] if current is None else [f"current: {current!r} A"]
+    test = path.with_name(run or path.name) if run or not alone else path.parent / "_".join(words)
+    remarks = list(table.remarks) if alone else [] if current is None else [f"current: {current!r} A"]
     columns = ", ".join(f"{role} = {e.name} in {e.unit}" for role, e in assigned.items())
     values = _table_of(table.source, channels, remarks)
-    key = ("column", str(test)) if alone else (run,) if run else number_of(path)
+    key = (run,) if run else ("column", str(test)) if alone else number_of(path)
     return Part(path, values.noted(*table.findings, *raw.findings), key, test, columns)
 
 
@@ -141,7 +139,10 @@ def _together(parts: Sequence[Part]) -> RawTable | None:
         folder = parts[0].test
         texts = sorted({*folder.iterdir()} - {part.path for part in parts}) if folder.is_dir() else []
         lines = [line for path in texts if path.suffix.lower() in SHORT_TEXTS for line in short_lines(path)]
-        return _table_of(tables[0].source, columns, lines[:_FEWEST_ROWS])
+        own = dict.fromkeys(line for table in tables for line in table.remarks)
+        return _table_of(tables[0].source, columns, [*own, *lines[:_FEWEST_ROWS]])
+    if any("time" not in table.names for table in tables):
+        return None
     clocks = [_arrays(table)[table.names.index("time")] for table in tables]
     moving = [time for time, table in zip(clocks, tables, strict=True) if {"displacement", "force"} & {*table.names}]
     span = clocks[0][-1] - clocks[0][0]

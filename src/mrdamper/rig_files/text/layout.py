@@ -25,11 +25,16 @@ Kind = Literal["number", "stamp", "text"]
 SPACES = " "  # stands for any run of spaces
 X_VALUE = "X_Value"  # the clock of LabVIEW, whose cells may be empty
 _SEPARATORS = (";", "\t", ",", "|", SPACES)
-_COMMENT = re.compile(r"^\s*(#(?!N/A|REF!|VALUE!|DIV/0|NAME\?|NULL!|NUM!)|%|//)+")  # a sheet's errors are cells
+_COMMENT = re.compile(  # a sheet's errors are cells, and so is what semicolons separate
+    r"^\s*(?:(?:#(?!N/A|REF!|VALUE!|DIV/0|NAME\?|NULL!|NUM!)|%|//)+|;(?=\s+[^\W\d_]{4}[^;]*$))"
+)
+_KEY_AND_VALUE = re.compile(  # Samples: 4850, Unit: V
+    rf"(?i)[^:=]*[^\W\d_][^:=]*[:=]\s*[-+0-9.,]+\W*[^\W\d_]*|(?:{'|'.join(UNIT_KEYS)})\s*[:=].*"
+)
 _LISTING = re.compile(
     r"^\s*(?:columns?|channels?|fields?|spalten|kanäle|colonnes|header|names)\s*[:=]\s*", re.IGNORECASE
 )
-_MARKS, _DIGITS = frozenset("#%/"), frozenset("0123456789+-.")
+_MARKS, _DIGITS = frozenset("#%/;"), frozenset("0123456789+-.")
 _FEWEST_LINES = 20  # of a text: fewer, with words among the numbers, are notes
 _SAMPLE = 60  # rows looked at
 _STRAY = 0.1  # of the sampled numbers: fewer with the other decimal mark are single bad cells
@@ -454,7 +459,8 @@ def _header_lines(
     keyed = _keyed_lines({i: cells[i] for i in plain if i in cells}, roles)
     if keyed:
         return keyed
-    for candidates in (plain, marked):
+    named = [i for i in marked if width > 1 or not _KEY_AND_VALUE.fullmatch(cells.get(i, ("",))[0])]
+    for candidates in (plain, named):
         fitting = [i for i in candidates if i in cells][-2 if width == 1 else 0 :]
         if not fitting:
             continue
