@@ -7,6 +7,7 @@ from itertools import pairwise
 from time import process_time
 
 import numpy as np
+import openpyxl
 import pytest
 
 from mrdamper import import_files
@@ -112,8 +113,8 @@ def test_levels_of_a_structure_give_the_currents_of_the_tests_that_a_column_call
     assert currents == ([] if unit == "V" else pytest.approx([0.2, 0.9]))
 
 
-@pytest.mark.parametrize("pause", ["hold;", "hold;ramp"])
-def test_steps_of_a_record_that_a_plan_gives_no_current_are_no_tests(tmp_path, pause):
+@pytest.mark.parametrize("pause", ["hold;;", "hold;ramp;", "hold;;0.2"])
+def test_steps_of_a_record_that_rest_are_no_tests_whatever_the_plan_gives_them(tmp_path, pause):
     rows, start = ["t (s);x (mm);F (N);Step"], 0.0
     for step, amperes in enumerate((None, 0.2, None, 0.9), 1):
         still = T[:60] if amperes is None else T
@@ -121,12 +122,34 @@ def test_steps_of_a_record_that_a_plan_gives_no_current_are_no_tests(tmp_path, p
         rows += [f"{start + t:.3f};{a:.5f};{b:.4f};{step}" for t, a, b in zip(still, x, f, strict=True)]
         start += still[-1] + 0.005
     (tmp_path / "record.csv").write_text("\n".join(rows) + "\n")
-    plan = f"1;{pause};\n2;sine;1;0.2\n3;{pause};\n4;sine;1;0.9\n"
+    plan = f"1;{pause}\n2;sine;1;0.2\n3;{pause}\n4;sine;1;0.9\n"
     (tmp_path / "plan.csv").write_text(f"Step;kind;f (Hz);coil current (A)\n{plan}")
     result = import_files([tmp_path])
     assert not [str(refusal.error) for refusal in result.refusals]
     assert [float(np.mean(record.current)) for record in result.records] == pytest.approx([0.2, 0.9])
     assert [record.time.size for record in result.records] == [T.size, T.size]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".xlsx"])
+def test_the_first_row_of_a_log_may_be_a_reading_of_zero_without_numbers(tmp_path, suffix):
+    write(tmp_path, UNITS)
+    still = "".join(
+        f"{t:.3f},{x:.6f},0\n" for t, x in zip(T, np.random.default_rng(0).normal(0, 0.002, T.size), strict=True)
+    )
+    (tmp_path / "m06.csv").write_text(UNITS + still)
+    rows = [["Date", "File", "f [Hz]", "Coil current [A]", "Notes"], ["12-05-2021", "m06.csv", "", "", "zero, clamped"]]
+    rows += [
+        ["12-05-2021", f"{name}.csv", 1, amperes, "" if amperes else "oil warm"] for name, amperes in CURRENTS.items()
+    ]
+    if suffix == ".xlsx":
+        book = openpyxl.Workbook()
+        for row in (["Test log"], [], *rows):
+            book.active.append(row)
+        book.save(tmp_path / "log.xlsx")
+    else:
+        (tmp_path / "log.csv").write_text("".join(";".join(map(str, row)) + "\n" for row in rows))
+    require_the_tests(tmp_path)
+    assert "m06" in import_files([tmp_path]).left_out
 
 
 @pytest.mark.parametrize("folder", ["", "data"])

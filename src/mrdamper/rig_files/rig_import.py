@@ -31,6 +31,7 @@ from mrdamper.rig_files.mapping.plans import (
     named_tests,
     other_motions,
     remarks_of,
+    rests,
     results_of,
     tests_by,
     within_ranges,
@@ -423,6 +424,7 @@ class _Intake:
         path, results, every, self._pending, tests, stated = candidates[0]
         other = other_motions(path, results, tests)
         refused = dict.fromkeys(range(len(tests)), other) if other else discarded_tests(path, results, tests)
+        self._pending = [test for test in self._pending if not rests(test[1])]  # a reading of zero
         self.met += [(file, record.id) for file, record in every]
         ids = {record.id for _, record in (*tests, *self._pending)}
         self.omitted += [Path(record.id) for _, record in every if record.id not in ids]  # in no row's range

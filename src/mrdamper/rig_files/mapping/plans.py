@@ -21,7 +21,8 @@ from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.description import SHORT_TEXTS, short_lines, with_notes
 from mrdamper.rig_files.mapping.results import NUMBER, Results, lines_of, results_among, results_in, rows_below_heads
 from mrdamper.rig_files.profile import FileForm, Profile
-from mrdamper.rig_files.quality.view import find_strokes
+from mrdamper.rig_files.quality.motion import moves
+from mrdamper.rig_files.quality.view import View, find_strokes
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding, Record, part_of_record
@@ -317,6 +318,14 @@ def _clocks(record: Record, file: Path) -> set[str]:
     return {f"{m['hour']}:{m['minute']}{more}" for m in stated if m for more in ("", f":{m['second']}")}
 
 
+def rests(record: Record) -> bool:
+    """Tell if a record holds no motion."""
+    try:
+        return moves(View(record)) is not None
+    except QualityError:
+        return True
+
+
 def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:
     """The tests of a file whose column numbers them as a table of results does, without pauses in which it rests.
 
@@ -329,7 +338,8 @@ def tests_by(path: Path, results: Results, profile: Profile) -> list[Record]:
             return []
         form = profile.file.model_copy(update={"run_column": column})
         records, _ = records_of_file(path, profile.model_copy(update={"file": form}))
-        moves = max(float(np.ptp(record.displacement)) for record in records)
-        return [r for r in records if np.ptp(r.displacement) > _REST * moves or not results.lacks_current(path, r.id)]
+        largest = max(float(np.ptp(record.displacement)) for record in records)
+        moving = [record for record in records if not rests(record)]
+        return [r for r in moving if np.ptp(r.displacement) > _REST * largest or not results.lacks_current(path, r.id)]
     except InputError:
         return []

@@ -192,9 +192,9 @@ class Results:
         return None
 
     def lacks_current(self, path: Path, name: str) -> bool:
-        """Tell if a row without a current or any other number has that of a test of a file: a pause, if it rests."""
-        number = _key(name.removeprefix(path.stem).lstrip("_"))
-        return number != "" and any(number in map(_key, cells) for cells in self.pauses)
+        """Tell if a row without a current or any other number is that of a test of a file: a pause, if it rests."""
+        names = {_key(own) for own in (name, name.removeprefix(path.stem).lstrip("_"), path.name)} - {""}
+        return any(not names.isdisjoint(map(_key, cells)) for cells in self.pauses)
 
 
 def rows_below_heads(lines: Sequence[str]) -> Iterator[tuple[list[str], list[list[str]]]]:

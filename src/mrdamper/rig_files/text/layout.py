@@ -53,6 +53,7 @@ LISTED = re.compile(  # a numbered line that names a column and its unit: 1=Time
 )
 _DECIMAL = re.compile(r"(?i)decimal[ _](?:separator|mark|sign|symbol)\"?\s*[:=;,\t]\s*\"?([.,])\"?;?")
 _CURRENT = re.compile(r":\s*[0-9.,]+ ?m?A\b")
+_ENTRY = re.compile(r"[0-9]{1,4}([-./])[0-9]{1,2}\1[0-9]{1,4}|\S+\.[A-Za-z][A-Za-z0-9]{1,3}")  # a date, a file: no name
 _DATE = re.compile(r"[0-9]{1,2}\.[0-9]{1,2}\.[0-9]{2,4}|[0-9]{4}\.[0-9]{1,2}\.[0-9]{1,2}")
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 
@@ -126,6 +127,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         "number" if unit else _kind(column) for column, unit in zip(columns, behind, strict=True)
     )
     above = lines[: min(first, len(lines)) if header is None else header]
+    first -= next((n for n in range(len(below), 0, -1) if _lacks_numbers(lines[first - n], separator, rows[0])), 0)
     names, units, notes = with_notes_beside(rows, names, units)
     return Layout(
         separator,
@@ -462,6 +464,7 @@ def _header_lines(
     named = [i for i in marked if width > 1 or not _KEY_AND_VALUE.fullmatch(cells.get(i, ("",))[0])]
     for candidates in (plain, named):
         fitting = [i for i in candidates if i in cells][-2 if width == 1 else 0 :]
+        fitting = [i for i in fitting if not any(map(_ENTRY.fullmatch, cells[i]))] or fitting
         if not fitting:
             continue
         telling = [i for i in fitting if roles[i] >= _TELLING]
@@ -561,6 +564,15 @@ def _unbracket(unit: str) -> str:
     if len(unit) > 2 and unit[0] + unit[-1] in ("[]", "()", "{}", "<>"):
         unit = unit[1:-1].strip()
     return "" if unit in ("-", "--") else unit
+
+
+def _lacks_numbers(line: str, separator: str, row: Sequence[str]) -> bool:
+    """Tell if a line has a date or a file where a row of a log has one, and no numbers: a test that was not run."""
+    cells = _cells(line, separator, len(row))
+    if len(cells) != len(row):
+        return False
+    others = [a for a, b in zip(cells, row, strict=True) if not (_ENTRY.fullmatch(a) and _ENTRY.fullmatch(b))]
+    return len(others) < len(cells) and not any(map(looks_numeric, filter(None, others)))
 
 
 def _kind(cells: Sequence[str]) -> Kind:
