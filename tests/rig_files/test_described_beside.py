@@ -54,10 +54,13 @@ UNITS = "time [s],displacement [mm],force [N]\n"
         ({"log.csv": "Uhrzeit;Art;Strom (A)\n14:05;Sinus;0,2\n14:11;Sinus;0,9\n14:12;Sinus;0\n14:18;Ende;\n"},
          {"m07": "R_20230603_140512", "m08": "R_20230603_141130", "m09": "R_20230603_141259"}),
         ({"plan.csv": "test,I (A)\nm07,.2\nm08,.9\nm09,0\n"}, {}),
+        ({"plan.csv": "id,frequency,current\nm07,1,0.2\nm08,1,0.9\nm09,1,0\n",
+          "codebook.csv": "table,variable,unit,text\nsignals,force,N,load\nplan,frequency,Hz,sine\nplan,current,A,coil\n"},
+         {}),
     ],
     ids=[
         "by an id of another table", "by the word before the number", "by two numbers", "measured beside set",
-        "time of day", ".2",
+        "time of day", ".2", "unit in a code book",
     ],
 )  # fmt: skip
 def test_currents_of_a_table_that_names_the_tests_by_keys(tmp_path, tables, names):

@@ -146,10 +146,10 @@ def other_motions(path: Path, results: Results | None, tests: Sequence[tuple[Pat
         rows = currents_beside(path, replace(results, current=values, of_supply=False), tests) or ()
         pairs = [(record, stated, _motion(record)[unit]) for (stated, _), (_, record) in zip(rows, tests, strict=False)]
         pairs = [pair for pair in pairs if pair[1] > 0 and pair[2] > 0]
-        usual = 1.0 if unit == "Hz" or not pairs else float(np.median([moves / stated for _, stated, moves in pairs]))
-        for record, stated, moves in pairs:
-            if max(share := moves / stated / usual, 1 / share) > 1 + limit:
-                moving = f"{record.id}, which moves {'at' if unit == 'Hz' else 'by'} {size * moves:.3g} {unit}"
+        usual = 1.0 if unit == "Hz" or not pairs else float(np.median([ours / theirs for _, theirs, ours in pairs]))
+        for record, stated, own in pairs:
+            if max(share := own / stated / usual, 1 / share) > 1 + limit:
+                moving = f"{record.id}, which moves {'at' if unit == 'Hz' else 'by'} {size * own:.3g} {unit}"
                 texts.append(f"{path.name} states {size * stated:g} {unit} of {moving}")
     if not texts:
         return None
