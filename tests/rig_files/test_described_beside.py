@@ -133,6 +133,14 @@ def test_steps_of_a_record_that_rest_are_no_tests_whatever_the_plan_gives_them(t
     assert [record.time.size for record in result.records] == [T.size, T.size]
 
 
+def test_a_list_of_the_laboratory_called_tests_csv_does_not_keep_the_user_from_an_answer(tmp_path):
+    write(tmp_path, UNITS)
+    (tmp_path / "tests.csv").write_text("test_no,frequency_Hz,remark\n7,1,\n8,1,\n9,1,\n")
+    result = import_files([tmp_path])
+    assert {refusal.error.code for refusal in result.refusals} == {"E_CURRENT_MISSING"}
+    assert "tests.csv" in result.left_out
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".xlsx"])
 def test_the_first_row_of_a_log_may_be_a_reading_of_zero_without_numbers(tmp_path, suffix):
     write(tmp_path, UNITS)

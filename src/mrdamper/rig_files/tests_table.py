@@ -12,7 +12,7 @@ from mrdamper.data import held_current
 from mrdamper.data.strict_text import content_of
 from mrdamper.errors import CombinedError, InputError, listed
 from mrdamper.rig_files.coil_current import with_decided_current
-from mrdamper.rig_files.column_names import names_condition, split_name, words
+from mrdamper.rig_files.column_names import split_name, words
 from mrdamper.rig_files.conditions import CELL, LARGEST_STATED, quantity_in_cell
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.text.stream import decoded
@@ -106,12 +106,12 @@ def _is_file(name: str, path: Path) -> bool:
 
 
 def names_tests(path: Path) -> bool:
-    """Tell if a table has a column of files or of runs, or cannot be read; a laboratory's own list may have neither."""
+    """Tell if a table names files, runs or splits, or cannot be read; a laboratory's own list may have none of them."""
     try:
         keys = {_key(name.strip()) for name in _cells(path)[0][1]}
     except TestsTableError:
         return True
-    return len(keys) < 2 or bool(keys & {"file", "run"}) or not any(names_condition(key, "current") for key in keys)
+    return len(keys) < 2 or bool(keys & {"file", "run", "split"})
 
 
 def load_tests(path: str | Path) -> TestsTable:
