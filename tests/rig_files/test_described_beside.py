@@ -13,6 +13,7 @@ import pytest
 from mrdamper import import_files
 from mrdamper.rig_files.mapping.description import short_lines
 from mrdamper.rig_files.profile import Profile
+from mrdamper.rig_files.tests_table import tests_text
 
 T = np.arange(1001) / 200.0
 X = 12.0 * np.sin(2 * np.pi * T)
@@ -131,6 +132,23 @@ def test_steps_of_a_record_that_rest_are_no_tests_whatever_the_plan_gives_them(t
     assert not [str(refusal.error) for refusal in result.refusals]
     assert [float(np.mean(record.current)) for record in result.records] == pytest.approx([0.2, 0.9])
     assert [record.time.size for record in result.records] == [T.size, T.size]
+
+
+def test_a_plan_names_blocks_by_a_line_above_each(tmp_path):
+    for file, steps in (("a", ((1, 0.9), (2, 0.0))), ("b", ((3, 0.2), (4, 0.5)))):
+        text = ""
+        for step, amperes in steps:
+            rows = zip(T + 60 * step, X, force(amperes), strict=True)
+            text += (
+                f"\nAcquisition: DAQ_0{step}\t\tTime: {60 * step}.0\tSec\nStation: big frame\n\nTime\tStroke\tLoad\n"
+            )
+            text += "Sec\tmm\tN\n" + "".join(f"{t:.3f}\t{x:.5f}\t{f:.4f}\n" for t, x, f in rows)
+        (tmp_path / f"{file}.dat").write_text(text)
+    (tmp_path / "plan.csv").write_text("Step,f (Hz),Current (A)\nDAQ_01,1,0.9\nDAQ_02,1,0\nDAQ_03,1,0.2\nDAQ_04,1,0.5\n")
+    result = import_files([tmp_path])
+    assert not [str(refusal.error) for refusal in result.refusals]
+    assert [float(np.mean(record.current)) for record in result.records] == pytest.approx([0.9, 0.0, 0.2, 0.5])
+    assert ",DAQ_02, 1 Hz, 12 mm" in tests_text(result.records).replace('"', "")
 
 
 def test_a_list_of_the_laboratory_called_tests_csv_does_not_keep_the_user_from_an_answer(tmp_path):

@@ -42,7 +42,7 @@ from mrdamper.rig_files.readers.archive import (
 from mrdamper.rig_files.readers.base import MOST_RATIO, MOST_UNPACKED, RawTable, RigFileError, Source
 from mrdamper.rig_files.record import REQUIRED, Finding, Record
 from mrdamper.rig_files.rig_record import records_of
-from mrdamper.rig_files.sequences import joined
+from mrdamper.rig_files.sequences import joined, names_of_blocks
 from mrdamper.rig_files.tests_table import NAME as TESTS
 
 _ROWS_OF_A_TEST = 0.25  # share of the rows of another test of the file that a test has at least
@@ -73,6 +73,10 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
             CombinedError.raise_from(problems)
         digest = digest_of(path)
     records = joined(records, profile, tables)
+    names = names_of_blocks(tables) if all(table.label.startswith("block") for table in tables) else []
+    if names and len(names) == len(records):
+        named = zip(records, names, strict=True)
+        records = [replace(r, provenance={**r.provenance, "block": as_data(name)}) for r, name in named]
     remarks = {"file": as_data(path.name), "sha256": digest}
     if profile != Profile():
         remarks["profile_sha256"] = profile_hash(profile)

@@ -22,6 +22,9 @@ from mrdamper.rig_files.record import OPTIONAL, Finding, Record, part_of_record
 _NUMBERED = re.compile(
     r"(?i)(?P<name>.*?)[ _-]*(?:(?:part|teil|partie|parte|seq|buffer)[ _-]*)?(?<![0-9.,])(?P<n>[0-9]+)"
 )
+_BLOCK_NAME = re.compile(  # Data Acquisition: DAQ_02; no date
+    r"[\s#%]*([^\W\d_][^:=\t;]{1,40}?)\s*[:=]\s*\"?(?![0-9]+[:/.-][0-9])([^\t;,\"]*[^\W\d_][^\t;,\"]*)"
+)
 _MOST_STEPS = 3.0  # between the last sample of a file and the first of the next
 MOST_TESTS = 500  # of a record: more is a cut at noise
 _BLOCK_S = 0.1  # [s] in which a motion at rest stays within a share of its range
@@ -57,6 +60,16 @@ def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> l
         else:
             chains.append([record])
     return [test for chain in chains for test in (_tests_of(chain) if len(chain) > 1 else chain)]
+
+
+def names_of_blocks(tables: Sequence[RawTable]) -> list[str]:
+    """Return the name of every block of a file, by the first key above them that names each otherwise; none if none."""
+    stated = [dict(m.groups() for line in table.remarks if (m := _BLOCK_NAME.match(line))) for table in tables]
+    for key in stated[0] if len(stated) > 1 else ():
+        names = [of.get(key, "").strip() for of in stated]
+        if "" not in names and len({*names}) == len(names):
+            return names
+    return []
 
 
 def goes_on(records: Sequence[Record]) -> bool:

@@ -7,6 +7,7 @@ import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
+from statistics import median
 
 from mrdamper.data import held_current
 from mrdamper.data.strict_text import content_of
@@ -14,6 +15,7 @@ from mrdamper.errors import CombinedError, InputError, listed
 from mrdamper.rig_files.coil_current import with_decided_current
 from mrdamper.rig_files.column_names import split_name, words
 from mrdamper.rig_files.conditions import CELL, LARGEST_STATED, quantity_in_cell
+from mrdamper.rig_files.quality.view import strokes_of
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.text.stream import decoded
 
@@ -167,10 +169,17 @@ def tests_text(records: Sequence[Record]) -> str:
         notes = record.provenance
         stated = "" if current is None else f"{current:g}"
         file, temperature, session, specimen = (notes.get(key, "") for key in _NOTED)
-        rows.append((file, record.id, stated, temperature, record.split, session, specimen, ""))
+        rows.append((file, record.id, stated, temperature, record.split, session, specimen, _description(record)))
     target = io.StringIO()
     csv.writer(target, lineterminator="\n").writerows(rows)
     return target.getvalue()
+
+
+def _description(record: Record) -> str:
+    """Return the name of a test's block and its measured motion, by which a reader tells the tests apart."""
+    strokes, name = strokes_of(record), record.provenance.get("block", "")
+    motion = f"{1 / strokes.period:.3g} Hz, {500 * median(strokes.lengths):.3g} mm" if strokes.period else "no motion"
+    return f"{name}, {motion}" if name else motion
 
 
 def _cells(path: Path) -> list[tuple[int, list[str]]]:

@@ -16,13 +16,13 @@ from mrdamper.rig_files.coil_current import NO_CHANNEL
 from mrdamper.rig_files.column_names import RATING, names_condition, role_of, split_name, words, words_of
 from mrdamper.rig_files.conditions import amperes, series_in
 from mrdamper.rig_files.file_records import records_of_file
-from mrdamper.rig_files.mapping.comparisons import MOST_SAMPLES, forces_grow
+from mrdamper.rig_files.mapping.comparisons import forces_grow
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.description import SHORT_TEXTS, short_lines, with_notes
 from mrdamper.rig_files.mapping.results import NUMBER, Results, lines_of, results_among, results_in, rows_below_heads
 from mrdamper.rig_files.profile import FileForm, Profile
 from mrdamper.rig_files.quality.motion import moves
-from mrdamper.rig_files.quality.view import View, find_strokes
+from mrdamper.rig_files.quality.view import View, strokes_of
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding, Record, part_of_record
@@ -160,8 +160,7 @@ def other_motions(path: Path, results: Results | None, tests: Sequence[tuple[Pat
 
 def _motion(record: Record) -> dict[str, float]:
     """Return the frequency [Hz] and amplitude [m] of a steady motion; zero where there is none."""
-    thinned = slice(None, None, max(1, record.time.size // MOST_SAMPLES))
-    strokes = find_strokes(record.time[thinned], record.displacement[thinned])
+    strokes = strokes_of(record)
     if not strokes.steady or not strokes.period:
         return {"Hz": 0.0, "mm": 0.0}
     return {"Hz": 1 / strokes.period, "mm": float(np.median(strokes.lengths)) / 2}
@@ -304,11 +303,12 @@ def within_ranges(tests: Sequence[tuple[Path, Record]], results: Results | None)
 
 
 def _called(tests: Sequence[tuple[Path, Record]]) -> list[tuple[str, ...]]:
-    """Names of each test: its own, that of its file, its own without that of its file, and when it was recorded."""
+    """Names of each test: its own, of its file, its own without that, of its block, and when it was recorded."""
     stems = [re.sub(r"[^\w.+=-]+", "_", file.stem) for file, _ in tests]
+    blocks = [record.provenance.get("block", "") for _, record in tests]
     return [
-        (record.id, file.name, file.stem, record.id.removeprefix(stem).lstrip("_"), *_clocks(record, file))
-        for (file, record), stem in zip(tests, stems, strict=True)
+        (record.id, file.name, file.stem, record.id.removeprefix(stem).lstrip("_"), block, *_clocks(record, file))
+        for (file, record), stem, block in zip(tests, stems, blocks, strict=True)
     ]
 
 

@@ -246,6 +246,12 @@ def find_strokes(time: Floats, displacement: Floats) -> Strokes:
     return Strokes(reversals, lengths, durations, steady, period)
 
 
+def strokes_of(record: Record) -> Strokes:
+    """Cut the motion of a record at its reversals, thinned where it is long."""
+    thinned = slice(None, None, max(1, record.time.size // MOST_SAMPLES))
+    return find_strokes(record.time[thinned], record.displacement[thinned])
+
+
 def _reversals(x: Floats) -> np.ndarray:
     """Find reversals prominent on both sides, as scipy.signal.find_peaks does, which takes half a second to import."""
     least = _PROMINENCE * float(np.ptp(x))
