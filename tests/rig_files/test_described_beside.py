@@ -55,13 +55,15 @@ UNITS = "time [s],displacement [mm],force [N]\n"
         ({"log.csv": "Uhrzeit;Art;Strom (A)\n14:05;Sinus;0,2\n14:11;Sinus;0,9\n14:12;Sinus;0\n14:18;Ende;\n"},
          {"m07": "R_20230603_140512", "m08": "R_20230603_141130", "m09": "R_20230603_141259"}),
         ({"plan.csv": "test,I (A)\nm07,.2\nm08,.9\nm09,0\n"}, {}),
+        ({"listing.txt": "Step name   Program   PSU set point (current mode)\n-------------------------\n"
+          "m07   Sine 1 Hz, 12 mm   0.2 A\nm08   Sine 1 Hz, 12 mm   0.9 A\nm09   Sine 1 Hz, 12 mm   0.0 A\n"}, {}),
         ({"plan.csv": "id,frequency,current\nm07,1,0.2\nm08,1,0.9\nm09,1,0\n",
           "codebook.csv": "table,variable,unit,text\nsignals,force,N,load\nplan,frequency,Hz,sine\nplan,current,A,coil\n"},
          {}),
     ],
     ids=[
         "by an id of another table", "by the word before the number", "by two numbers", "measured beside set",
-        "time of day", ".2", "unit in a code book",
+        "time of day", ".2", "set point of the supply", "unit in a code book",
     ],
 )  # fmt: skip
 def test_currents_of_a_table_that_names_the_tests_by_keys(tmp_path, tables, names):
@@ -144,11 +146,23 @@ def test_a_plan_names_blocks_by_a_line_above_each(tmp_path):
             )
             text += "Sec\tmm\tN\n" + "".join(f"{t:.3f}\t{x:.5f}\t{f:.4f}\n" for t, x, f in rows)
         (tmp_path / f"{file}.dat").write_text(text)
-    (tmp_path / "plan.csv").write_text("Step,f (Hz),Current (A)\nDAQ_01,1,0.9\nDAQ_02,1,0\nDAQ_03,1,0.2\nDAQ_04,1,0.5\n")
+    (tmp_path / "plan.csv").write_text(
+        "Step,f (Hz),Current (A)\nDAQ_01,1,0.9\nDAQ_02,1,0\nDAQ_03,1,0.2\nDAQ_04,1,0.5\n"
+    )
     result = import_files([tmp_path])
     assert not [str(refusal.error) for refusal in result.refusals]
     assert [float(np.mean(record.current)) for record in result.records] == pytest.approx([0.9, 0.0, 0.2, 0.5])
     assert ",DAQ_02, 1 Hz, 12 mm" in tests_text(result.records).replace('"', "")
+
+
+@pytest.mark.parametrize(
+    ("rows", "misfit"),
+    [("7;0.2\n8;0.9\n8;0.5\n9;0\n", "'Versuch' has '8' twice"), ("7;0.2\n9;0\n", "'Versuch' lacks m08")],
+)
+def test_a_plan_that_does_not_fit_its_tests_is_told_where(tmp_path, rows, misfit):
+    write(tmp_path, UNITS)
+    (tmp_path / "plan.csv").write_text(f"Versuch;Strom (A)\n{rows}")
+    assert misfit in import_files([tmp_path]).reasons["plan.csv"]
 
 
 def test_a_list_of_the_laboratory_called_tests_csv_does_not_keep_the_user_from_an_answer(tmp_path):

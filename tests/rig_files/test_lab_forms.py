@@ -629,7 +629,8 @@ def test_a_file_of_a_profile_without_its_channel_or_a_time_is_refused_with_what_
     }
 
 
-@pytest.mark.parametrize("line", ["Stage {}: sine 1 Hz, coil at {} A", "stage {} = {} A", "* Stage {}) {} A, 10 mm"])
+@pytest.mark.parametrize("line", ["Stage {}: sine 1 Hz, coil at {} A", "stage {} = {} A", "* Stage {}) {} A, 10 mm",
+                                  "Stage {}: sine 1 Hz, 8 cycles. Coil supply {} A"])  # fmt: skip
 def test_a_text_that_lists_the_stages_of_a_record_gives_each_its_current(tmp_path, line):
     both = (np.r_[T, T + 9], np.r_[X, X], np.r_[force(0.2), force(0.8)], np.repeat([1, 2], T.size))
     (tmp_path / "night.csv").write_text("time [s],stroke [mm],load [N],Stage\n" + rows(*both))

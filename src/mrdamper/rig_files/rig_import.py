@@ -28,6 +28,7 @@ from mrdamper.rig_files.mapping.plans import (
     currents_listed,
     discarded_tests,
     gap_of_plan,
+    misfit_of_plan,
     named_tests,
     other_motions,
     remarks_of,
@@ -317,7 +318,8 @@ class _Intake:
             return note.error.found
         keys = ", ".join(filter(None, results.keys))
         missing = any(refusal.error.code == "E_CURRENT_MISSING" for refusal in self.refusals)
-        why = f": no column beside it names every test ({keys or 'none'})" if missing else ""
+        misfit = misfit_of_plan(results, self.unchecked) or keys or "none"
+        why = f": no column beside it names every test ({misfit})" if missing else ""
         return f"currents under {results.title!r}, not used{why}"
 
     def _is_beside_tests(self, path: Path) -> bool:

@@ -212,6 +212,11 @@ def named_tests(results: Results | None, tests: Sequence[tuple[Path, Record]]) -
     return [i for i, names in enumerate(_called(tests)) if (cells - {""}) & {name.casefold() for name in names}]
 
 
+def misfit_of_plan(results: Results, tests: Sequence[tuple[Path, Record]]) -> str:
+    """Tell which test a plan names twice or not at all; empty if it names them by no column."""
+    return results.misfit(_called([test for test in tests if test[1].current is None]))
+
+
 def gap_of_plan(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> Finding | None:
     """Return the finding that a plan, which names some of the tests without a current, lacks others."""
     named = named_tests(results, tests)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.errors import listed
 from mrdamper.rig_files.column_names import COIL, headers_of, holds, names_condition, split_name, words, words_of
 from mrdamper.rig_files.conditions import contradicts, currents_in, names_only_currents, quantity_in_cell
 from mrdamper.rig_files.profile import FileForm
@@ -20,6 +22,7 @@ _SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]+)?|[.,][0-9]+)")
 _QUANTITY = re.compile(rf"({NUMBER.pattern})\s*(m?A)")
 WITHIN = "table of results"  # within the file of its tests: beginning of where their currents stand
+_RULE = re.compile(r"[-=+|:\s]{3,}")  # below the names of columns
 _SUPPLY = re.compile(r"(?i)\b(?:power[ _-]?)?suppl(?:y|ied)\b|\bpsu\b")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
@@ -122,6 +125,20 @@ class Results:
                 return currents
         return {}
 
+    def misfit(self, tests: Sequence[Iterable[str]]) -> str:
+        """Tell what the column that names most tests, and more than half, has twice, or which of them it lacks."""
+        tests = [list(texts) for texts in tests]
+        named = [whole | numbers for whole, numbers in map(_names, tests)]
+        fewest, text = 0.5 * len(tests), ""
+        for key, column in zip(self.keys, zip(*self.cells, strict=True), strict=True):
+            cells = Counter(map(_key, column))
+            absent = [own[0] for own, names in zip(tests, named, strict=True) if names.isdisjoint(cells)]
+            twice = [cell for cell, count in cells.items() if cell and count > 1]
+            if key and len(absent) < fewest and (twice or absent) and not split_name(key).dimension:
+                fewest = len(absent)
+                text = f"{key!r} has {twice[0]!r} twice" if twice else f"{key!r} lacks {listed(absent, 3)}"
+        return text
+
     def _columns_of_names(self, tests: int) -> list[Sequence[str]]:
         """Return the columns that may name as many tests: none of a quantity, and no numbers of the rows of a log.
 
@@ -215,8 +232,16 @@ def results_in(lines: Sequence[str]) -> Results | None:
     return numbered_tests(lines[:_MOST_LINES])
 
 
-def numbered_tests(lines: Iterable[str]) -> Results | None:
-    """Return the tests that lines list by their numbers, with one current each: Step 3: sine, 2 Hz, coil at 0.4 A."""
+def numbered_tests(lines: Sequence[str]) -> Results | None:
+    """Return the tests that lines list by their numbers, with one current each: Step 3: sine, 2 Hz, coil at 0.4 A.
+
+    Where none states the coil's, it is that of the supply: Step 3: sine, coil supply 0.4 A.
+    """
+    of_supply = _numbered_tests([_SUPPLY.sub("", line[:_LONGEST_LINE]) for line in lines])
+    return _numbered_tests(lines) or (replace(of_supply, of_supply=True) if of_supply else None)
+
+
+def _numbered_tests(lines: Iterable[str]) -> Results | None:
     matches = [match for line in lines if (match := _LISTED_TEST.match(line[:_LONGEST_LINE]))]
     stated = [(match, currents_in(match.string[match.end() :])) for match in matches]
     rows = [
@@ -302,12 +327,13 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
     split = [
         re.split(r" {2,}", t.strip()) if wide else cells_of(t, separator) for t in (x[:_LONGEST_LINE] for x in lines)
     ]
-    rows = [_headings([cell.strip('"').strip() for cell in cells]) for cells in split]
+    rows = [_headings([c.strip('"').strip() for c in cells]) for cells in split if not _RULE.fullmatch("".join(cells))]
     for at, row in enumerate(rows):
         if sum(map(bool, row)) < 2:  # most lines are one cell where another character separates them
             continue
         columns = [i for i, cell in enumerate(row) if cell and not NUMBER.fullmatch(cell) and _is_current(cell)]
-        supply = [] if columns else [i for i, cell in enumerate(row) if _is_of_supply(cell)]
+        below = rows[at + 1] if at + 1 < len(rows) else []
+        supply = [] if columns else [i for i, cell in enumerate(row) if _is_of_supply(cell, *below[i : i + 1])]
         columns = (
             columns or supply or [i for i, cell in enumerate(row) if holds(cell, COIL) and cell.isalpha()]
         )  # above 0.5 A
@@ -364,8 +390,11 @@ def _is_current(cell: str) -> bool:
     return named and not currents_in(cell)  # coil current 0.5 A heads no column
 
 
-def _is_of_supply(cell: str) -> bool:
+def _is_of_supply(cell: str, below: str = "") -> bool:
+    """Tell if a cell heads currents of a supply, by its name or by the first of them: PSU set point, 0.5 A."""
     bare = _SUPPLY.sub("", cell)
+    if bare != cell and _QUANTITY.fullmatch(below):
+        return True
     return bare != cell and _is_current(bare) and names_only_currents(split_name(bare).name)
 
 
