@@ -11,9 +11,9 @@ import openpyxl
 import pytest
 
 from mrdamper import import_files
+from mrdamper.rig_files import tests_table
 from mrdamper.rig_files.mapping.description import short_lines
 from mrdamper.rig_files.profile import Profile
-from mrdamper.rig_files.tests_table import tests_text
 
 T = np.arange(1001) / 200.0
 X = 12.0 * np.sin(2 * np.pi * T)
@@ -58,7 +58,7 @@ UNITS = "time [s],displacement [mm],force [N]\n"
         ({"listing.txt": "Step name   Program   PSU set point (current mode)\n-------------------------\n"
           "m07   Sine 1 Hz, 12 mm   0.2 A\nm08   Sine 1 Hz, 12 mm   0.9 A\nm09   Sine 1 Hz, 12 mm   0.0 A\n"}, {}),
         ({"plan.csv": "id,frequency,current\nm07,1,0.2\nm08,1,0.9\nm09,1,0\n",
-          "codebook.csv": "table,variable,unit,text\nsignals,force,N,load\nplan,frequency,Hz,sine\nplan,current,A,coil\n"},
+          "codebook.csv": "table,variable,unit\nsignals,force,N\nplan,frequency,Hz\nplan,current,A\n"},
          {}),
     ],
     ids=[
@@ -152,7 +152,7 @@ def test_a_plan_names_blocks_by_a_line_above_each(tmp_path):
     result = import_files([tmp_path])
     assert not [str(refusal.error) for refusal in result.refusals]
     assert [float(np.mean(record.current)) for record in result.records] == pytest.approx([0.9, 0.0, 0.2, 0.5])
-    assert ",DAQ_02, 1 Hz, 12 mm" in tests_text(result.records).replace('"', "")
+    assert ",DAQ_02, 1 Hz, 12 mm" in tests_table.tests_text(result.records).replace('"', "")
 
 
 @pytest.mark.parametrize(

@@ -63,17 +63,10 @@ class Envelope:
     @classmethod
     def of(cls, conditions: Sequence[Condition]) -> Envelope:
         """Return the envelope of a set of tested conditions."""
-
-        def span(values: list[float]) -> tuple[float, float]:
-            return min(values), max(values)
-
-        return cls(
-            span([c.current_A for c in conditions]),
-            span([c.frequency_Hz for c in conditions]),
-            span([c.amplitude_m for c in conditions]),
-            span([c.peak_velocity for c in conditions]),
-            conditions=tuple(_point(conditions[group[0]]) for group in same_condition(conditions)),
-        )
+        rows = [(c.current_A, c.frequency_Hz, c.amplitude_m, c.peak_velocity) for c in conditions]
+        tested = tuple(_point(conditions[group[0]]) for group in same_condition(conditions))
+        current, frequency, amplitude, velocity = ((min(values), max(values)) for values in zip(*rows, strict=True))
+        return cls(current, frequency, amplitude, velocity, conditions=tested)
 
     def with_motion(self, current: Floats, displacement: Floats, velocity: Floats) -> Envelope:
         """Return the envelope widened by the samples of a record that is no sine at one current."""
@@ -182,9 +175,7 @@ def _point(condition: Condition) -> tuple[float, float, float]:
 
 
 def _features(point: tuple[float, float, float], current_scale: float) -> Floats:
-    return np.array(
-        [point[0] / current_scale, np.log(max(point[1], _LOGARITHM_FLOOR)), np.log(max(point[2], _LOGARITHM_FLOOR))]
-    )
+    return np.array([point[0] / current_scale, *np.log(np.maximum(point[1:], _LOGARITHM_FLOOR))])
 
 
 _ANY = (-np.inf, np.inf)

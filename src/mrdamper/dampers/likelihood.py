@@ -173,13 +173,11 @@ def profile(likelihood: Likelihood, name: str) -> LikelihoodProfile:
     best = int(np.argmin(fall))
     low, high = _crossing(us[: best + 1][::-1], fall[: best + 1][::-1]), _crossing(us[best:], fall[best:])
     log = likelihood.logs[i]
-    ends = [float(np.exp(u)) if log else u for u in (low, high)]
-    ends[0] = max(ends[0], own.bounds[0])
-    ends[1] = min(ends[1], own.bounds[1])
+    lower, upper = np.clip(np.exp([low, high]) if log else [low, high], *own.bounds).tolist()
     closed = int(np.isfinite(low)) + int(np.isfinite(high))
     kind: Kind = ("flat", "one-sided", "bounded")[closed]
     values = np.exp(us) if log else us
-    return LikelihoodProfile(name, own.unit, values, fall, own.value, (ends[0], ends[1]), kind)
+    return LikelihoodProfile(name, own.unit, values, fall, own.value, (lower, upper), kind)
 
 
 _NO_PARAMETERS = Uncertainty((), (), np.zeros((0, 0)), np.zeros(0))

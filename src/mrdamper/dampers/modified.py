@@ -210,13 +210,12 @@ def fit_modified(
         )
         for name in candidates
     }
+    functions = {name: fit.function for name, fit in fits.items()}
     damper = ModifiedModel(
+        ParameterMap(model_type, functions, MotionHull.of(conditions)),
         rig=rig,
-        parameters=ParameterMap(
-            model_type, {name: fit.function for name, fit in fits.items()}, MotionHull.of(conditions)
-        ),
         envelope=Envelope.of(conditions),
-        provenance={**(provenance or {}), **_about_forms({name: fit.function for name, fit in fits.items()})},
+        provenance={**(provenance or {}), **_about_forms(functions)},
     )
     broken = {f"{name}: {form}": why for name, fit in fits.items() for form, why in fit.refused.items()}
     return ModifiedFit(damper, fits, values, conditions, functions_at_bounds(damper.parameters, conditions), broken)

@@ -40,9 +40,8 @@ from mrdamper.statistics.linear import (
 
 _GRID_RATIO = 1500 ** (1 / 40)  # from one yield displacement to the next; between them Gram matrices are interpolated
 _GRID_ORIGIN_M = 2e-6  # m, a grid point for any data
-_MIN_LENGTH_RATIO = (
-    5e-4  # yield displacement looked for, in the smallest amplitude; the longest is the largest amplitude
-)
+# yield displacement looked for, in the smallest amplitude; the longest is the largest amplitude
+_MIN_LENGTH_RATIO = 5e-4
 _MAX_STATES = 2**17  # states held at a time
 _SEARCH_TOLERANCE = 1e-6  # relative gain of a step at which a search ends
 _WEIGHT_TOLERANCE = 1e-3  # change of the robust weights below which the rounds end

@@ -48,11 +48,8 @@ def posterior(likelihood: Likelihood, steps: int = 2000) -> Samples:
 
     def wide(points: Floats) -> Floats:
         """Logarithm of the density the proposals come from: Student's t of five degrees."""
-        return (
-            -0.5
-            * (_PROPOSAL_DOF + size)
-            * np.log1p(np.sum(((points - likelihood.start) @ inverse.T) ** 2, axis=1) / _PROPOSAL_DOF)
-        )
+        squares = np.sum(((points - likelihood.start) @ inverse.T) ** 2, axis=1)
+        return -0.5 * (_PROPOSAL_DOF + size) * np.log1p(squares / _PROPOSAL_DOF)
 
     def propose(points: Floats, random: np.random.RandomState) -> tuple[Floats, Floats]:
         shape = points.shape
@@ -80,13 +77,8 @@ def posterior(likelihood: Likelihood, steps: int = 2000) -> Samples:
             code="E_CONVERGENCE",
         )
     flat = kept[:: max(1, int(time))].reshape(-1, size)
-    return Samples(
-        likelihood.names,
-        np.where(likelihood.logs, np.exp(np.where(likelihood.logs, flat, 0)), flat),
-        time,
-        len(kept),
-        rhat,
-    )
+    values = np.where(likelihood.logs, np.exp(np.where(likelihood.logs, flat, 0)), flat)
+    return Samples(likelihood.names, values, time, len(kept), rhat)
 
 
 def split_rhat(chains: Floats) -> float:

@@ -26,9 +26,8 @@ if TYPE_CHECKING:
 
 UNKNOWN, KNOWN = "unknown", "known"  # session of a score: predicted as it is, or corrected by other runs of the day
 _CORRELATION_HOURS = (0.5, 1.0, 2.0, 4.0, 8.0)  # correlation times within a session [h]
-_MIN_RUN_SHARE = (
-    0.2  # smallest share of the scatter of each run alone, because the model error differs at every condition
-)
+# smallest share of the scatter of each run alone, because the model error differs at every condition
+_MIN_RUN_SHARE = 0.2
 _MIN_DEVIATION = 0.04  # relative deviation of a session's gain from which it is named
 _DEVIATION_RATIO = 4.0  # the same, as a multiple of the standard deviation of the other sessions
 _REMEDY = "repeat a condition on each of three days or more; state recorded_at or session in runs.csv"

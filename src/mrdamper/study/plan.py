@@ -140,15 +140,8 @@ class ExperimentDesign:
             goal[names.index(about), names.index(about)] = 1 if own.log else 1 / (own.value or 1.0) ** 2
         grams = np.einsum("cdkp,cdkq->cdpq", stacked, stacked) / max(uncertainty.force, _MIN_ERROR_RATIO) ** 2
         half = 1 / float(np.mean(stacked[..., -1]))
-        session = (
-            np.array(
-                [
-                    max(uncertainty.total_gain, _MIN_SESSION_GAIN),
-                    max(uncertainty.total_offset, _MIN_SESSION_OFFSET * half),
-                ]
-            )
-            ** -2.0
-        )
+        least = (_MIN_SESSION_GAIN, _MIN_SESSION_OFFSET * half)
+        session = np.maximum((uncertainty.total_gain, uncertainty.total_offset), least) ** -2.0
         mean = np.mean(doubt[..., len(names) :] ** 2, axis=(0, 1, 2))
         beside = float(mean @ [uncertainty.total_gain**2, uncertainty.total_offset**2]) + uncertainty.force**2
         words = about if isinstance(about, str) else f"at {about}" if about else "over the envelope"

@@ -130,15 +130,12 @@ def fit_and_score(
     pieces = [piece for run in train for piece in stretches(run)] if recipe.basis is None else list(train)
     result = recipe.make(pieces, identifications)
     seconds = spent + time.perf_counter() - begin
-    title, left_out = result.damper.title, None
-    without: list[Damper] = []
+    title, without = result.damper.title, list[Damper]()
 
     def refit(rows: Sequence[int]) -> Damper:
         without.append(result.refit(rows))
         return without[-1]
 
-    if leave_out:
-        left_out = cross_validate(pieces, refit, title)
     errors = [i.scores.nrmse_pp for i in identifications]
     return RecipeResult(
         recipe=recipe,
@@ -147,7 +144,7 @@ def fit_and_score(
         identifications=tuple(identifications),
         per_run=float(np.median(errors)) if errors else float("nan"),
         train=validate(result.damper, train),
-        cross_validated=left_out or Validation(title, ()),
+        cross_validated=cross_validate(pieces, refit, title) if leave_out else Validation(title, ()),
         validation=validate(result.damper, held_out),
         seconds=seconds,
         by_kind=cross_validate_by_kind(pieces, result.refit, title) if kinds else {},

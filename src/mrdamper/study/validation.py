@@ -157,7 +157,7 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> Run
         run.id,
         run.rig,
         prediction.condition,
-        _scores(run, prediction),
+        score(run.force[inside], prediction.force[inside], prediction.motion.velocity[inside], run.time[inside]),
         run.repeatability,
         prediction.extrapolation,
         _at_rest(run, prediction),
@@ -210,9 +210,3 @@ def leave_out(
             damper = fit(rest)
             scored |= {i: score_run(damper, runs[i]) for i in fold}
     return Validation(title, tuple(scored[i] for i in sorted(scored)))
-
-
-def _scores(run: Run, prediction: Prediction) -> Scores:
-    inside = run.in_window
-    motion = prediction.motion
-    return score(run.force[inside], prediction.force[inside], motion.velocity[inside], run.time[inside])

@@ -250,11 +250,8 @@ class SystemLoop:
         if self.system.ground is not None:
             return self.source.value(time), still, still
         late = [time - behind / self.source.speed_m_s for behind in self.system.behind]
-        return (
-            np.zeros(time.size),
-            np.column_stack([self.source.value(t) for t in late]),
-            np.column_stack([self.source.rate(t) for t in late]),
-        )
+        height, rate = (np.column_stack([of(t) for t in late]) for of in (self.source.value, self.source.rate))
+        return np.zeros(time.size), height, rate
 
     def _load(self, ground: Floats, road: Floats, road_rate: Floats) -> Floats:
         """(N, n) forces of the input on the coordinates."""

@@ -86,8 +86,7 @@ class ConditionedDamper(Damper):
 
         Raises `IdentificationError` if there are fewer than three runs or the identifications are of another model.
         """
-        damper = cls.regressed(identifications, provenance)
-        return damper.refined(runs)
+        return cls.regressed(identifications, provenance).refined(runs)
 
     @classmethod
     def regressed(cls, identifications: Sequence[Identification], provenance: Mapping[str, str] | None = None) -> Self:
@@ -127,9 +126,9 @@ class ConditionedDamper(Damper):
             return forward_differences(residual, u, residual(u), lower, upper) if exact is None else exact * size
 
         solution = least_squares(residual, begin / size, lower, upper, most_steps=_MAX_STEPS, slopes=slopes)
-        refined = replace(self, coefficients=dict(zip(names, (solution.point * size).tolist(), strict=True)))
         ended = np.abs(solution.point - begin / size) > (1 - 1e-6) * _COEFFICIENT_RANGE
-        return refined.stating_bounds([name for name, at_bound in zip(names, ended, strict=True) if at_bound])
+        at_bounds = [name for name, at_bound in zip(names, ended, strict=True) if at_bound]
+        return damper(solution.point).stating_bounds(at_bounds)
 
     def stating_bounds(self, names: Sequence[str]) -> Self:
         """Return the damper whose provenance names the coefficients that ended at a bound of the search."""

@@ -106,13 +106,8 @@ def _rising(name: str, currents: Floats, values: Floats, knee: float) -> dict[st
     lift = np.where(currents > knee, 1 - np.exp(-_RISE * (currents - knee)), 0.0)
     below = np.clip(1 - currents / knee, 0.0, None)
     table = np.column_stack([1 - below, lift, below])
-    solution = np.linalg.lstsq(table, values, rcond=1e-8)[0]
-    return {
-        f"{name}1": float(solution[0]),
-        f"{name}2": float(solution[1]),
-        f"{name}3": _RISE,
-        f"{name}4": float(solution[2]),
-    }
+    at_break, rise, at_zero = np.linalg.lstsq(table, values, rcond=1e-8)[0].tolist()
+    return {f"{name}1": at_break, f"{name}2": rise, f"{name}3": _RISE, f"{name}4": at_zero}
 
 
 def _law(given: Mapping[str, float], name: str, current: float, knee: float) -> float:

@@ -20,9 +20,8 @@ _RANGE_SAMPLES = 4000  # samples from which ranges are taken
 _SAME_RANGE = 0.15  # relative difference of their peak-to-peak forces
 _MIN_OVERLAP = 150  # samples two records have to share
 _MIN_CORRELATION = 0.35  # of the noise of two copies
-_MIN_EXCESS_CORRELATION = (
-    0.25  # by which it exceeds the largest correlation of a run's noise with itself at another time
-)
+# by which it exceeds the largest correlation of a run's noise with itself at another time
+_MIN_EXCESS_CORRELATION = 0.25
 _SIGNIFICANCE = 9.0  # standard deviations of a correlation by chance
 _MAX_RATE_RATIO = 10  # ratio of two sample rates
 _PHASES = 8  # fractions of a sample by which a run is shifted before the comparison at another sample rate

@@ -140,10 +140,7 @@ class ExplanationCandidate:
             self._motions = list(zip(trials, self.evidence.products(moved), strict=True))
         for trial, products in self._motions:
             if not like or any(trial.is_like(one) for one in like):
-                yield (
-                    trial,
-                    products if products.misfit == self.own.misfit else replace(products, misfit=self.own.misfit),
-                )
+                yield trial, replace(products, misfit=self.own.misfit)
 
     def _of_the_force(self, others: Posterior) -> Iterator[Trial]:
         """Yield a factor or an offset of the force."""
@@ -192,7 +189,7 @@ class ExplanationCandidate:
                     odds += _LOST_MOTION_ODDS
                 odds -= _TESTED_MOTION_ODDS * tested + _USUAL_STEP * (cause == "time") * self._is_usual(factor)
                 if tested != 0:
-                    odds = completed_matrix_odds(odds, [*self._others, self.track], {-1: moved})
+                    odds = completed_matrix_odds(odds, [*self._others, self.track], {len(self._others): moved})
                 yield replace(trial, odds=odds), moved
 
     def _ratios(self, cause: Cause) -> list[float]:
@@ -279,14 +276,10 @@ def completed_matrix_odds(odds: float, tracks: Sequence[Track], moved: Mapping[i
     They are higher where cells become empty. `odds` are those where no cell is filled; `tracks` are all runs, and
     `moved` those with other motions, by position.
     """
-    before = list(tracks)
-    after = list(tracks)
-    for k, track in moved.items():
-        after[k] = track
-    kept = [k for k, track in enumerate(before) if not track.current_changes]
-    currents = [float(before[k].current[0]) for k in kept]
-    missing = irregularity([after[k] for k in kept], currents)
-    present = irregularity([before[k] for k in kept], currents)
+    kept = {k: track for k, track in enumerate(tracks) if not track.current_changes}
+    currents = [float(track.current[0]) for track in kept.values()]
+    missing = irregularity([moved.get(k, track) for k, track in kept.items()], currents)
+    present = irregularity(list(kept.values()), currents)
     if min(present, missing) > MAX_IRREGULARITY * len(kept):
         return odds
     return max(odds - EMPTY_CELL_ODDS * (present - missing), min(odds, -EMPTY_CELL_ODDS))
