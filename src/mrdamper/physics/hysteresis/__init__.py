@@ -22,17 +22,6 @@ derived for this package.
 
 from mrdamper.physics.hysteresis.response import follow, step
 from mrdamper.physics.hysteresis.shape import Shape, dissipates, z_max
-from mrdamper.physics.hysteresis.steady import (
-    loop_harmonics,
-    steady_loop,
-)
+from mrdamper.physics.hysteresis.steady import loop_harmonics, steady_loop
 
-__all__ = [
-    "Shape",
-    "dissipates",
-    "follow",
-    "loop_harmonics",
-    "steady_loop",
-    "step",
-    "z_max",
-]
+__all__ = ["Shape", "dissipates", "follow", "loop_harmonics", "steady_loop", "step", "z_max"]
