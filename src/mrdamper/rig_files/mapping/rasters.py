@@ -98,11 +98,11 @@ def _joined(label: str, tables: Sequence[RawTable], *, one_clock: bool) -> RawTa
         table, i = places[column]
         return table.read([i]).values[i]
 
-    def read(columns: Sequence[int]) -> Content:
+    def apart(columns: Sequence[int]) -> Content:
         return Content({column: load(column) for column in columns})
 
     names, units = (tuple(getattr(table, key)[i] for table, i in places) for key in ("names", "units"))
-    read = array_table(tables[0].source, names, units, load).read if one_clock else read
+    read = array_table(tables[0].source, names, units, load).read if one_clock else apart
     constants = {name: value for table in reversed(tables) for name, value in table.constants.items()}
     remarks = tuple(dict.fromkeys(line for table in tables for line in table.remarks))
     own = {"names": names, "units": units, "label": label, "constants": constants, "remarks": remarks}
