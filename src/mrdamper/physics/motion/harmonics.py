@@ -20,6 +20,7 @@ _FEW = 250  # samples on which a frequency is found to begin with
 _SAMPLES_PER_BLOCK = 50_000  # samples whose waves are held at a time
 _SAMPLES_PER_HALF_PERIOD = 16  # between two changes of sign, with which the strongest line is found
 _MAX_SPECTRUM_SAMPLES = 2**20  # largest number of samples of a zero-padded spectrum
+_MIN_CYCLES = 0.25  # cycles of a record below which there is no sine to be found
 _MAX_FEW_CYCLES = 4  # cycles of a record below which its line is too broad to be a start value
 _RANGE = 2.5  # factor of the frequency, to either side, in which the best single sine then lies
 
@@ -102,7 +103,7 @@ def fundamental_frequency(time: Floats, signal: Floats) -> float:
 def _refined(
     t: Floats, signal: Floats, frequency: float, orders: int, tolerance: float, coefficients: Floats | None = None
 ) -> tuple[float, Floats]:
-    """Gauss–Newton on frequency and coefficients, until a step is below a share of the frequency."""
+    """Gauss–Newton on frequency and coefficients, until a step is below a share of the frequency, or it is lost."""
 
     def rows(part: slice) -> Floats:
         return _rows(t[part], frequency, orders, True, coefficients)
@@ -113,7 +114,7 @@ def _refined(
         solution = _solved(t.size, signal, rows)
         coefficients, step = solution[:-1], float(solution[-1])
         frequency += min(max(step, -0.1 * frequency), 0.1 * frequency)
-        if abs(step) < tolerance * frequency:
+        if abs(step) < tolerance * frequency or frequency * t[-1] < _MIN_CYCLES:
             break
     return frequency, coefficients
 
