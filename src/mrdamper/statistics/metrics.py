@@ -5,7 +5,6 @@ Every score is a fraction, not per cent. Arguments are (N,) forces [N], measured
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +14,7 @@ from mrdamper.data.arrays import Floats
 
 def rmse(measured: Floats, predicted: Floats) -> float:
     """Root mean square error [N]."""
-    error = predicted - measured
-    return math.sqrt(float(error @ error) / error.size)
+    return float(np.linalg.norm(predicted - measured) / np.sqrt(measured.size))
 
 
 def nrmse_pp(measured: Floats, predicted: Floats) -> float:

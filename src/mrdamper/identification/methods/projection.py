@@ -185,8 +185,7 @@ def _best_of_grid(
 def _batched_costs(elimination: Elimination, points: list[dict[str, float]]) -> Floats:
     """Costs of the grid on a few cycles, all shapes of one n at once."""
     path, rows = _few_cycles(elimination.problem)
-    whole = elimination.fixed_columns
-    fixed = FixedColumns.of(whole.basis[rows], whole.rest[rows])  # the same columns in another basis
+    fixed = FixedColumns.of(elimination.fixed_columns.basis[rows], elimination.fixed_columns.rest[rows])
     shapes = np.array([elimination.kind.shape(point) for point in points], dtype=float)
     costs = np.empty(len(points))
     for n in set(shapes[:, 2].tolist()):

@@ -5,7 +5,7 @@ Unlike a Fourier transform it needs neither a whole number of cycles nor uniform
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.data.arrays import Floats
+from mrdamper.physics.motion.measured import blocks
 from mrdamper.statistics.linear import solve_linear
 
 _HARMONICS = 3  # by which a frequency is found, from three cycles on
@@ -42,7 +43,7 @@ class HarmonicSeries:
         """Evaluate the series (or a derivative with respect to time) at the given times."""
         given = np.asarray(time, dtype=float)
         if given.ndim == 1 and given.size > _SAMPLES_PER_BLOCK:
-            return np.concatenate([self(given[part], derivative) for part in _blocks(given.size)])
+            return np.concatenate([self(given[part], derivative) for part in blocks(given.size, _SAMPLES_PER_BLOCK)])
         mean, drift, sine, cosine = self.mean, self.drift, self.sine, self.cosine
         omega = 2 * np.pi * self.frequency * np.arange(1, sine.size + 1)
         for _ in range(derivative):
@@ -59,8 +60,7 @@ class HarmonicSeries:
 
     def half_peak_to_peak(self) -> float:
         """Half the difference of maximum and minimum of the periodic part."""
-        sine, cosine = _cycle(self.sine.size)
-        return float(np.ptp(self.sine @ sine + self.cosine @ cosine) / 2)
+        return float(np.ptp(np.concatenate([self.sine, self.cosine]) @ _cycle(self.sine.size)) / 2)
 
 
 def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float, drift: bool = True) -> HarmonicSeries:
@@ -72,15 +72,9 @@ def fit_harmonics(time: Floats, signal: Floats, orders: int, *, frequency: float
     nyquist = 0.5 * (time.size - 1) / float(time[-1] - time[0])
     orders = min(max(int(nyquist / frequency), 1), orders)
     coefficients = _solved(time.size, signal, lambda part: _rows(time[part] - origin, frequency, orders, drift))
-    lead = 2 if drift else 1
-    return HarmonicSeries(
-        frequency=frequency,
-        origin=origin,
-        mean=float(coefficients[0]),
-        drift=float(coefficients[1]) if drift else 0.0,
-        sine=coefficients[lead : lead + orders],
-        cosine=coefficients[lead + orders :],
-    )
+    sine, cosine = np.reshape(coefficients[1 + drift :], (2, orders))
+    slope = float(coefficients[1]) if drift else 0.0
+    return HarmonicSeries(frequency, origin, float(coefficients[0]), slope, sine, cosine)
 
 
 def fundamental_frequency(time: Floats, signal: Floats) -> float:
@@ -124,14 +118,10 @@ def _solved(size: int, signal: Floats, rows: Callable[[slice], Floats]) -> Float
     if size <= _SAMPLES_PER_BLOCK:
         return solve_linear(rows(slice(None)).T, signal)
     triangle: Floats = np.empty((0, rows(slice(0, 1)).shape[0] + 1))
-    for part in _blocks(size):
+    for part in blocks(size, _SAMPLES_PER_BLOCK):
         table = np.vstack([rows(part), signal[part]]).T
         triangle = np.asarray(np.linalg.qr(np.vstack([triangle, table]), mode="r"))
     return solve_linear(triangle[:, :-1], triangle[:, -1])
-
-
-def _blocks(size: int) -> Iterator[slice]:
-    return (slice(begin, begin + _SAMPLES_PER_BLOCK) for begin in range(0, size, _SAMPLES_PER_BLOCK))
 
 
 def _spectral_line(t: Floats, signal: Floats) -> float:
@@ -141,7 +131,7 @@ def _spectral_line(t: Floats, signal: Floats) -> float:
     """
     place, wave = t - float(np.mean(t)), signal - float(np.mean(signal))
     wave -= place * (place @ wave / (place @ place))
-    often = _crossings(wave)
+    often = int(np.count_nonzero(np.diff(np.signbit(wave))))  # changes of sign
     every = max(1, t.size // max(_FEW, _SAMPLES_PER_HALF_PERIOD * often))
     t, wave = t[::every], wave[::every]
     size = t.size
@@ -150,22 +140,13 @@ def _spectral_line(t: Floats, signal: Floats) -> float:
     spectrum = np.fft.rfft(np.interp(np.linspace(0.0, float(t[-1]), size), t, wave) * window, padded)
     power = spectrum.real**2 + spectrum.imag**2
     power[: max(1, padded // size // 2)] = 0.0
-    cycles = _vertex(power, max(int(np.argmax(power)), 1)) * (size - 1) / padded
+    cycles = max(int(np.argmax(power)), 1) * (size - 1) / padded
     if cycles < _MAX_FEW_CYCLES:
         ladder, waves = _sines_of_few_cycles()
         begin, end = np.searchsorted(ladder, (cycles / _RANGE, cycles * _RANGE))
         wave = np.interp(np.linspace(0.0, float(t[-1]), waves.shape[2]), t, wave)
-        explained = np.sum((waves[begin:end] @ wave) ** 2, axis=1)
-        cycles = float(ladder[begin] * (ladder[1] / ladder[0]) ** _vertex(explained, int(np.argmax(explained))))
+        cycles = float(ladder[begin + np.argmax(np.sum((waves[begin:end] @ wave) ** 2, axis=1))])
     return cycles / float(t[-1])
-
-
-def _vertex(values: Floats, peak: int) -> float:
-    """Place of the vertex of the parabola through a peak and its neighbours; the peak itself at an end."""
-    if not 0 < peak < values.size - 1:
-        return peak
-    before, here, after = values[peak - 1 : peak + 2].tolist()
-    return peak + 0.5 * (after - before) / ((here - before) + (here - after) or 1.0)
 
 
 @lru_cache
@@ -184,39 +165,31 @@ def _sines_of_few_cycles() -> tuple[Floats, Floats]:
     return ladder, waves / np.linalg.norm(waves, axis=2, keepdims=True)
 
 
-def _crossings(wave: Floats) -> int:
-    return int(np.count_nonzero(np.diff(np.signbit(wave))))
-
-
-def _waves(angle: Floats, orders: int, out: Floats | None = None) -> Floats:
-    """(2, K, N) sines and cosines of 1...orders times an angle, each from the two orders before it."""
-    waves = np.empty((2, orders, angle.size)) if out is None else out
-    np.sin(angle, out=waves[0, 0])
-    np.cos(angle, out=waves[1, 0])
-    twice, before = 2 * waves[1, 0], np.array([[0.0], [1.0]])
-    for k in range(1, orders):
-        np.multiply(twice, waves[:, k - 1], out=waves[:, k])
-        waves[:, k] -= before
-        before = waves[:, k - 1]
-    return waves
-
-
 @lru_cache
 def _cycle(orders: int) -> Floats:
-    return _waves(np.linspace(0, 2 * np.pi, 2048, endpoint=False), orders)
+    return _rows(np.linspace(0, 1, 2048, endpoint=False), 1.0, orders, drift=False)[1:]
 
 
 def _rows(t: Floats, frequency: float, orders: int, drift: bool = True, coefficients: Floats | None = None) -> Floats:
     """(L, N) mean, drift, sines and cosines: the transpose of a least-squares table, whose rows are long.
 
-    With coefficients, the derivative of their sum with respect to the frequency as a last row.
+    Sines and cosines follow from those of the two orders before. With coefficients, the derivative of their sum with
+    respect to the frequency is a last row.
     """
     lead, last = 1 + drift, 1 + drift + 2 * orders
     rows = np.empty((last + (coefficients is not None), t.size))
     rows[0] = 1.0
     if drift:
         rows[1] = t
-    _waves(2 * np.pi * frequency * t, orders, rows[lead:last].reshape(2, orders, t.size))
+    waves = rows[lead:last].reshape(2, orders, t.size)
+    np.multiply(2 * np.pi * frequency, t, out=waves[1, 0])
+    np.sin(waves[1, 0], out=waves[0, 0])
+    np.cos(waves[1, 0], out=waves[1, 0])
+    twice, before = 2 * waves[1, 0], np.array([[0.0], [1.0]])
+    for k in range(1, orders):
+        np.multiply(twice, waves[:, k - 1], out=waves[:, k])
+        waves[:, k] -= before
+        before = waves[:, k - 1]
     if coefficients is not None:
         k = 2 * np.pi * np.arange(1, orders + 1)
         of_sine, of_cosine = np.reshape(coefficients[lead:], (2, orders))

@@ -18,8 +18,7 @@ from mrdamper.physics.motion.path import memoize_per_path
 _UNIFORM = 1e-8  # spread of the sampling interval, relative, up to which it counts as one
 _ROUNDING = 4 * float(np.finfo(float).eps)  # of the largest value: a smaller slope per sample is rounding
 _CELLS = 4_000_000  # largest number of values of all windows in memory
-_CACHED = 100_000  # the same for the processor's cache
-_NEIGHBOURS = 24  # samples whose windows are fitted by one matrix
+_CACHED_CELLS = 8_000  # the same for the processor's cache
 
 
 @once_per_run
@@ -62,7 +61,7 @@ def _fits(time: Floats, signal: Floats, half: int, width: int, spacing: float) -
     size = signal.size
     windows = np.lib.stride_tricks.sliding_window_view
     c = np.empty((size, 3))
-    for rows in _blocks(size, width):
+    for rows in blocks(size, _CELLS // width):
         start = np.clip(np.arange(size)[rows] - half, 0, size - width)
         tau = (windows(time, width)[start] - time[rows, None]) / spacing
         values = windows(signal, width)[start] - signal[rows, None]
@@ -73,9 +72,9 @@ def _fits(time: Floats, signal: Floats, half: int, width: int, spacing: float) -
     return c
 
 
-def _blocks(size: int, width: int, cells: int = _CELLS) -> Iterator[slice]:
-    step = max(1, cells // width)
-    return (slice(begin, min(begin + step, size)) for begin in range(0, size, step))
+def blocks(size: int, step: int) -> Iterator[slice]:
+    """Slices of at most so many samples."""
+    return (slice(begin, min(begin + step, size)) for begin in range(0, size, max(1, step)))
 
 
 def whole_clock(time: Floats) -> Floats:
@@ -93,36 +92,27 @@ def whole_clock(time: Floats) -> Floats:
 
 
 def _fits_uniform(signal: Floats, half: int) -> Floats:
-    """Fit equal windows (Savitzky and Golay), those of a few neighbouring samples by one matrix.
+    """Fit equal windows (Savitzky and Golay).
 
-    They are taken relative to a sample, so that a signal at rest has a slope of exactly zero.
+    Windows are taken relative to their sample and the two sides in pairs, so that a signal at rest, or
+    one that turns symmetrically about a sample, has a slope of exactly zero there.
     """
     tau, fit = _quadratic(half)
     last = signal.size - half
-    c, few = np.empty((signal.size, 3)), min(_NEIGHBOURS, last - half)
-    table = _neighbours(half, few)
-    windows = np.lib.stride_tricks.sliding_window_view(signal, len(table))
-    groups = [(few * rows.start, windows[::few][rows]) for rows in _blocks((last - half) // few, len(table), _CACHED)]
-    for begin, group in (*groups, (last - half - few, windows[-1:])):  # the last overlaps the one before it
-        fits = c[half + begin :][: few * len(group)].reshape(len(group), -1)
-        np.matmul(group - group[:, half, None], table, out=fits)
+    windows = np.lib.stride_tricks.sliding_window_view
+    after, before = windows(signal[half + 1 :], half), windows(signal[: last - 1], half)[:, ::-1]
+    c, even, odd = np.empty((signal.size, 3)), fit[half + 1 :, ::2].copy(), fit[half + 1 :, 1].copy()
+    for rows in blocks(last - half, _CACHED_CELLS // half):
+        middle = signal[half:last][rows, None]
+        ahead, behind = after[rows] - middle, before[rows] - middle
+        c[half:last][rows, ::2] = (ahead + behind) @ even
+        c[half:last][rows, 1] = (ahead - behind) @ odd
     ends = (signal[: tau.size], slice(0, half)), (signal[-tau.size :], slice(last, None))
     for window, away in ends:
         d0, d1, d2 = ((window - signal[away, None]) @ fit).T  # outside the middle of the window
         at = tau[:half] if away.start == 0 else tau[half + 1 :]
         c[away] = np.stack([d0 + at * (d1 + at * d2), d1 + 2 * at * d2, d2], axis=1)
     return c
-
-
-@lru_cache(maxsize=8)
-def _neighbours(half: int, few: int) -> Floats:
-    """(few + 2 half, 3 few) weights of the quadratics about a few samples, their values less the sample."""
-    _, fit = _quadratic(half)
-    table = np.zeros((few + 2 * half, few, 3))
-    for i in range(few):
-        table[i : i + len(fit), i] = fit
-        table[i + half, i, 0] -= 1.0
-    return table.reshape(len(table), -1)
 
 
 @lru_cache(maxsize=64)

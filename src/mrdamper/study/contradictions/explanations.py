@@ -170,8 +170,7 @@ class ExplanationCandidate:
 
     def _of_the_motion(self) -> Iterator[tuple[Trial, Track]]:
         """Yield a factor of displacement or time, with the run as corrected; both channels inverted."""
-        inverted = Trial("sign", -1.0, "", _SIGN_ODDS)
-        yield inverted, self.moved(inverted)
+        yield (inverted := Trial("sign", -1.0, "", _SIGN_ODDS)), self.moved(inverted)
         kinds: tuple[tuple[Cause, dict[str, float]], ...] = (("displacement", LENGTH_UNITS), ("time", TIME_UNITS))
         for cause, units in kinds:
             named = [(unit, factor) for unit, factor in _both_ways(units) if self._is_nearer(cause, factor)]

@@ -313,10 +313,9 @@ class Search:
     def _of_one(self, i: int) -> JointExplanation:
         """Return the best explanation of a run."""
         others = self.posterior([i])
-        alone = self._candidates[i].alone(others)
-        self._options[i] = self._candidates[i].explanations(others)
-        named = next(iter(self._options[i]), None)
-        best = named if named is not None and alone.gain - named.gain < _TIE_ODDS else alone
+        alone, named = self._candidates[i].alone(others), self._candidates[i].explanations(others)
+        self._options[i] = named
+        best = named[0] if named and alone.gain - named[0].gain < _TIE_ODDS else alone
         return JointExplanation({i: best}, best.gain)
 
     def _refined(self, proposal: JointExplanation) -> JointExplanation:
@@ -355,9 +354,8 @@ class Search:
         if np.ndim(occupied) == 0 or np.count_nonzero(np.asarray(occupied) > 0) < 2:
             return 0.0
         nodes = np.eye(self.evidence.nodes.size)[np.asarray(occupied) > 0]
-        sizes = np.array(
-            [np.sqrt(mean @ self._usual_gram @ mean) for mean in (posterior.at(node)[0] for node in nodes)]
-        )
+        means = [posterior.at(node)[0] for node in nodes]
+        sizes = np.sqrt([mean @ self._usual_gram @ mean for mean in means])
         fall = float(np.max(1 - sizes / np.maximum.accumulate(sizes)))
         return min(_FALLING_ODDS * max(fall - _MIN_FALL, 0.0), _MAX_FALLING_ODDS)
 
