@@ -155,14 +155,23 @@ def test_a_plan_names_blocks_by_a_line_above_each(tmp_path):
     assert ",DAQ_02, 1 Hz, 12 mm" in tests_table.tests_text(result.records).replace('"', "")
 
 
+def test_a_remark_in_brackets_behind_a_legend_may_have_a_comma(tmp_path):
+    write(tmp_path, UNITS)
+    (tmp_path / "README.txt").write_text("Codes: m07 = 0.2 A, m08 = 0.9 A, m09 = 0 A (coil current, held constant)\n")
+    require_the_tests(tmp_path)
+
+
 @pytest.mark.parametrize(
     ("rows", "misfit"),
-    [("7;0.2\n8;0.9\n8;0.5\n9;0\n", "'Versuch' has '8' twice"), ("7;0.2\n9;0\n", "'Versuch' lacks m08")],
+    [
+        ("7;0.2\n8;0.9\n8;0.5\n9;0\n", "plan.csv has '8' twice under 'Versuch'"),
+        ("7;0.2\n9;0\n", "plan.csv names 2 of 3 tests and may lack m08"),
+    ],
 )
 def test_a_plan_that_does_not_fit_its_tests_is_told_where(tmp_path, rows, misfit):
     write(tmp_path, UNITS)
     (tmp_path / "plan.csv").write_text(f"Versuch;Strom (A)\n{rows}")
-    assert misfit in import_files([tmp_path]).reasons["plan.csv"]
+    assert all(misfit in refusal.error.found for refusal in import_files([tmp_path]).refusals)
 
 
 def test_a_list_of_the_laboratory_called_tests_csv_does_not_keep_the_user_from_an_answer(tmp_path):
@@ -217,6 +226,7 @@ def test_a_list_of_variables_names_columns_called_by_number_also_from_the_folder
         ("{name} = {what}, {unit}\n", ""),
         ("{name} ({unit}): {what}\n", ""),
         ("Column {number}: {what} ({unit})\n", ""),
+        ("Column {number}: {what}, {word}, positive when the rod extends\n", ""),
         ("{what} {name} in {word}, ", "."),
         ("| {name} | {what} in {unit} |\n", ""),
         ("{name}: {what} in {word} (as recorded)\n", ""),

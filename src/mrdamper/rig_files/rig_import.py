@@ -27,7 +27,6 @@ from mrdamper.rig_files.mapping.plans import (
     currents_beside,
     currents_listed,
     discarded_tests,
-    gap_of_plan,
     misfit_of_plan,
     named_tests,
     other_motions,
@@ -318,8 +317,7 @@ class _Intake:
             return note.error.found
         keys = ", ".join(filter(None, results.keys))
         missing = any(refusal.error.code == "E_CURRENT_MISSING" for refusal in self.refusals)
-        misfit = misfit_of_plan(results, self.unchecked) or keys or "none"
-        why = f": no column beside it names every test ({misfit})" if missing else ""
+        why = f": no column beside it names every test ({keys or 'none'})" if missing else ""
         return f"currents under {results.title!r}, not used{why}"
 
     def _is_beside_tests(self, path: Path) -> bool:
@@ -395,7 +393,7 @@ class _Intake:
         paths = [path for path in (*others, *notes, *texts) if self._pending and path not in used]
         used |= self._join_currents(paths)
         open_tests = [test for test in self._pending if test[1].current is None]
-        gaps = tuple(filter(None, (gap_of_plan(path, self._results(path), open_tests) for path in paths)))
+        gaps = tuple(filter(None, (misfit_of_plan(path, self._results(path), open_tests) for path in paths)))
         self._pending = [(path, r.noticed(*gaps) if r.current is None else r) for path, r in self._pending] + doubtful
         return used
 

@@ -70,7 +70,8 @@ _LABVIEW = ("Delta_X", "X_Dimension")
 _BEHIND_NAME = re.compile(r"\s*[:=|,]\s*|\s[-–—]\s|$")  # in front of what a name means: t - time
 _OTHER_FORCE = re.compile("(?i)" + "|".join(words("other_force")))  # than the damper's
 _FIGURE = re.compile("(?i)" + "|".join(words("figure")))  # in a line that is not about the columns
-_ASIDE = re.compile(r"\s*\([^()]*\)$")  # (tension positive)
+_SIGNS = "|".join(map(re.escape, words("positive_stems") | words("negative_stems")))
+_ASIDE = re.compile(rf"(?i)\s*(?:\([^()]*\)|,\s(?:{_SIGNS})[^,;|\t]*)$")  # (tension positive); , positive in tension
 _MARK = re.compile(r"^(?:[\s#>•*|–-]|[0-9]{1,2}[.)]\s)+|[\s.|]+$")  # of a list or a table
 _COLON = re.compile(r"^([^:=]+)(?::\s+|\s*=\s*)([^\s:=]{1,12})$")  # force: N; force=N
 _PLAIN = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?")

@@ -109,7 +109,7 @@ def currents_beside(
     called = set().union(*files)
     stated, ratings = set(), False
     for line in lines:
-        parts = re.split(r"\s*[;|]\s*|,\s+|[.:]\s+(?=\w+ ?=)", line)
+        parts = re.split(r"\s*[;|]\s*|,\s+(?![^()]*\))|[.:]\s+(?=\w+ ?=)", line)
         matches = [m for m in map(_LEGEND.match, parts) if m and (not m[2] or role_of(m[2]) == "current")]
         legends = [(name, amperes(m[3], m[4])) for m in matches for name in _meant(m[1], called)]
         rating = RATING.search(line) is not None
@@ -212,19 +212,11 @@ def named_tests(results: Results | None, tests: Sequence[tuple[Path, Record]]) -
     return [i for i, names in enumerate(_called(tests)) if (cells - {""}) & {name.casefold() for name in names}]
 
 
-def misfit_of_plan(results: Results, tests: Sequence[tuple[Path, Record]]) -> str:
-    """Tell which test a plan names twice or not at all; empty if it names them by no column."""
-    return results.misfit(_called([test for test in tests if test[1].current is None]))
-
-
-def gap_of_plan(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> Finding | None:
-    """Return the finding that a plan, which names some of the tests without a current, lacks others."""
-    named = named_tests(results, tests)
-    absent = [record.id for i, (_, record) in enumerate(tests) if i not in named]
-    if not 0 < len(absent) < len(tests):
-        return None
-    text = f"{path.name} names {len(tests) - len(absent)} of {len(tests)} tests and may lack {listed(absent, 3)}"
-    return Finding("W_COLUMN", printable(f"{NO_CHANNEL}missing: {text}: if so, add what it lacks"))
+def misfit_of_plan(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> Finding | None:
+    """Return the finding that a plan, which names most tests without a current, has one twice or lacks others."""
+    text = results.misfit(_called(tests)) if results else ""
+    problem = printable(f"{NO_CHANNEL}missing: {path.name} {text}: if so, correct the plan")
+    return Finding("W_COLUMN", problem) if text else None
 
 
 def currents_listed(path: Path, tests: Sequence[tuple[Path, Record]]) -> list[tuple[float, str]] | None:

@@ -136,7 +136,8 @@ class Results:
             twice = [cell for cell, count in cells.items() if cell and count > 1]
             if key and len(absent) < fewest and (twice or absent) and not split_name(key).dimension:
                 fewest = len(absent)
-                text = f"{key!r} has {twice[0]!r} twice" if twice else f"{key!r} lacks {listed(absent, 3)}"
+                lacks = f"names {len(tests) - fewest} of {len(tests)} tests and may lack {listed(absent, 3)}"
+                text = f"has {twice[0]!r} twice under {key!r}" if twice else lacks
         return text
 
     def _columns_of_names(self, tests: int) -> list[Sequence[str]]:
@@ -237,12 +238,12 @@ def numbered_tests(lines: Sequence[str]) -> Results | None:
 
     Where none states the coil's, it is that of the supply: Step 3: sine, coil supply 0.4 A.
     """
-    of_supply = _numbered_tests([_SUPPLY.sub("", line[:_LONGEST_LINE]) for line in lines])
-    return _numbered_tests(lines) or (replace(of_supply, of_supply=True) if of_supply else None)
+    lines = [line[:_LONGEST_LINE] for line in lines]
+    return _numbered_tests(lines) or _numbered_tests([_SUPPLY.sub("", line) for line in lines], of_supply=True)
 
 
-def _numbered_tests(lines: Iterable[str]) -> Results | None:
-    matches = [match for line in lines if (match := _LISTED_TEST.match(line[:_LONGEST_LINE]))]
+def _numbered_tests(lines: Iterable[str], *, of_supply: bool = False) -> Results | None:
+    matches = [match for line in lines if (match := _LISTED_TEST.match(line))]
     stated = [(match, currents_in(match.string[match.end() :])) for match in matches]
     rows = [
         (m["name"].strip(), f"{number:0{len(m['number'])}d}", of[0], m.string[m.end() :].strip())
@@ -258,7 +259,7 @@ def _numbered_tests(lines: Iterable[str]) -> Results | None:
     )
     counts = any({word.casefold(), word.casefold().rstrip("s")} & _COUNTED for word in words_of(rows[0][0]))
     currents, keys = tuple(row[2] for row in rows), ("", "", rows[0][0], "remark")
-    return Results(currents, cells, "a line for each test", keys, counts_tests=counts)
+    return Results(currents, cells, "a line for each test", keys, of_supply, counts_tests=counts)
 
 
 def form_of_tests(table: RawTable, form: FileForm) -> FileForm:
