@@ -127,7 +127,8 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         "number" if unit else _kind(column) for column, unit in zip(columns, behind, strict=True)
     )
     above = lines[: min(first, len(lines)) if header is None else header]
-    first -= next((n for n in range(len(below), 0, -1) if _lacks_numbers(lines[first - n], separator, rows[0])), 0)
+    row = rows[0] if rows else []
+    first -= next((n for n in range(len(below), 0, -1) if _lacks_numbers(lines[first - n], separator, row)), 0)
     names, units, notes = with_notes_beside(rows, names, units)
     return Layout(
         separator,
