@@ -174,6 +174,20 @@ def test_a_plan_that_does_not_fit_its_tests_is_told_where(tmp_path, rows, misfit
     assert all(misfit in refusal.error.found for refusal in import_files([tmp_path]).refusals)
 
 
+def test_a_script_beside_files_of_another_suffix_is_no_test_and_notes_are_named_once(tmp_path):
+    write(tmp_path, UNITS)
+    for path in [*tmp_path.iterdir()]:
+        path.rename(path.with_suffix(".out"))
+    script = "node 1 0.0\nfix 1 1\nuniaxialMaterial Maxwell 1 20.0 3.5 0.4\nelement twoNodeLink 1 1 2 -mat 1 -dir 1\n"
+    (tmp_path / "fit.tcl").write_text(script)
+    (tmp_path / "README.md").write_text(
+        "| Test | f (Hz) | Current (A) |\n|---|---|---|\n| T1 | 1 | 0 |\n| T2 | 1 | 1 |\n"
+    )
+    result = import_files([tmp_path])
+    assert {refusal.error.code for refusal in result.refusals} == {"E_CURRENT_MISSING"}
+    assert sorted(result.left_out) == ["README.md", "fit.tcl"]
+
+
 def test_a_list_of_the_laboratory_called_tests_csv_does_not_keep_the_user_from_an_answer(tmp_path):
     write(tmp_path, UNITS)
     (tmp_path / "tests.csv").write_text("test_no,frequency_Hz,remark\n7,1,\n8,1,\n9,1,\n")

@@ -41,6 +41,7 @@ from mrdamper.rig_files.mapping.results import WITHIN, Results
 from mrdamper.rig_files.profile import Profile, profile_of
 from mrdamper.rig_files.quality import check_long_record
 from mrdamper.rig_files.quality.table import to_run
+from mrdamper.rig_files.readers import suffixes
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
 from mrdamper.rig_files.record import Finding, Record, Refusal, unique_names
 from mrdamper.rig_files.sequences import follows, goes_on, tests_of_files
@@ -184,7 +185,7 @@ def import_files(
         profile.require_matches([*intake.met, *((path, "") for path in files)])
         refusals = intake.refusals or ([] if intake.tests() else intake.notes)
         named = tuple(replace(refusal, file=without_temporary_folder(refusal.file)) for refusal in refusals)
-        left_out += [] if refusals is intake.notes else [Path(note.file) for note in intake.notes]
+        left_out += [] if refusals is intake.notes else dict.fromkeys(Path(note.file) for note in intake.notes)
         left_out += intake.omitted
         names = tuple(path.name for path in left_out)
         reasons = {Path(note.file).name: intake.reason(note) for note in intake.notes}
@@ -321,7 +322,9 @@ class _Intake:
         return f"currents under {results.title!r}, not used{why}"
 
     def _is_beside_tests(self, path: Path) -> bool:
-        return is_list(path) or is_description(path) or is_helper(path, self._order)
+        alone = [other.suffix for other in self._order].count(path.suffix) == 1 < len(self._order)
+        script = alone and path.suffix[1:].isalpha() and path.suffix.lower() not in suffixes()  # calibrate.tcl
+        return script or is_list(path) or is_description(path) or is_helper(path, self._order)
 
     def _compare(self, path: Path, results: Results | None) -> bool:
         """Refuse accepted tests that contradict a plan, in its own file those of that, or that a remark in it discards.

@@ -178,8 +178,8 @@ def tests_text(records: Sequence[Record]) -> str:
 def _description(record: Record) -> str:
     """Return the name of a test's block and its measured motion, by which a reader tells the tests apart."""
     strokes, name = strokes_of(record), record.provenance.get("block", "")
-    motion = f"{1 / strokes.period:.3g} Hz, {500 * median(strokes.lengths):.3g} mm" if strokes.period else "no motion"
-    return f"{name}, {motion}" if name else motion
+    motion = f"{1 / strokes.period:.3g} Hz, {500 * median(strokes.lengths):.3g} mm" if strokes.period else ""
+    return ", ".join(filter(None, (name, motion)))
 
 
 def _cells(path: Path) -> list[tuple[int, list[str]]]:
