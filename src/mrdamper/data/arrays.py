@@ -21,6 +21,11 @@ def chunks(values: NDArray[T], overlap: int = 0) -> Iterator[tuple[int, NDArray[
         drop_pages(values)
 
 
+def blocks(size: int, step: int) -> Iterator[slice]:
+    """Slices of at most so many samples."""
+    return (slice(begin, min(begin + step, size)) for begin in range(0, size, max(1, step)))
+
+
 def take(values: NDArray[T], index: NDArray[np.intp]) -> NDArray[T]:
     """Return the samples of an increasing index, without holding all of a memory-mapped array at once."""
     if index.size == values.size <= CHUNK:

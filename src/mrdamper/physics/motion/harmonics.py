@@ -12,8 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mrdamper.data.arrays import Floats
-from mrdamper.physics.motion.measured import blocks
+from mrdamper.data.arrays import Floats, blocks
 from mrdamper.statistics.linear import solve_linear
 
 _HARMONICS = 3  # by which a frequency is found, from three cycles on

@@ -5,12 +5,11 @@ Calculations use the measured motion and not the commanded one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cache, lru_cache
 
 import numpy as np
 
-from mrdamper.data.arrays import Floats
+from mrdamper.data.arrays import Floats, blocks
 from mrdamper.data.runs import Run, once_per_run
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.path import memoize_per_path
@@ -70,11 +69,6 @@ def _fits(time: Floats, signal: Floats, half: int, width: int, spacing: float) -
         right = np.stack([np.sum(p * values, axis=1) for p in moments])
         c[rows] = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0]
     return c
-
-
-def blocks(size: int, step: int) -> Iterator[slice]:
-    """Slices of at most so many samples."""
-    return (slice(begin, min(begin + step, size)) for begin in range(0, size, max(1, step)))
 
 
 def whole_clock(time: Floats) -> Floats:
