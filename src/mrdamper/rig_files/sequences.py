@@ -64,8 +64,7 @@ def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> l
 
 def names_of_blocks(tables: Sequence[RawTable]) -> list[str]:
     """Return the name of every block of a file, by the first key above them that names each otherwise; none if none."""
-    matches = [[match for line in table.remarks if (match := _BLOCK_NAME.match(line))] for table in tables]
-    stated = [{str(match[1]): str(match[2]) for match in of} for of in matches]
+    stated = [{m[1]: m[2] for line in table.remarks if (m := _BLOCK_NAME.match(line))} for table in tables]
     for key in stated[0] if len(stated) > 1 else ():
         names = [of.get(key, "").strip() for of in stated]
         if "" not in names and len({*names}) == len(names):
