@@ -174,6 +174,15 @@ def test_a_plan_that_does_not_fit_its_tests_is_told_where(tmp_path, rows, misfit
     assert all(misfit in refusal.error.found for refusal in import_files([tmp_path]).refusals)
 
 
+def test_a_date_among_keys_above_the_rows_is_no_row_of_a_log(tmp_path):
+    head = '"HeaderSize","9"\n"Model Name","DL850E"\n"BlockNumber",1\n"TraceName","Stroke","Load","Coil"\n'
+    head += '"VUnit","mm","N","A"\n"SampleRate",200,200,200\n"HResolution",5E-3,5E-3,5E-3\n"HUnit","s","s","s"\n'
+    rows = "".join(f",{x:.7f},{f:.4f},0.5\n" for x, f in zip(X, force(0.5), strict=True))
+    (tmp_path / "D0.csv").write_text(head + '"Date","2022/07/05","2022/07/05","2022/07/05"\n' + rows)
+    (record,) = import_files([tmp_path]).records
+    np.testing.assert_allclose(record.displacement, 1e-3 * X, rtol=0, atol=1e-8)
+
+
 def test_a_script_beside_files_of_another_suffix_is_no_test_and_notes_are_named_once(tmp_path):
     write(tmp_path, UNITS)
     for path in [*tmp_path.iterdir()]:

@@ -465,7 +465,9 @@ def _header_lines(
     named = [i for i in marked if width > 1 or not _KEY_AND_VALUE.fullmatch(cells.get(i, ("",))[0])]
     for candidates in (plain, named):
         fitting = [i for i in candidates if i in cells][-2 if width == 1 else 0 :]
-        fitting = [i for i in fitting if not any(map(_ENTRY.fullmatch, cells[i]))] or fitting
+        entered = [i for i in fitting if any(map(_ENTRY.fullmatch, cells[i]))]  # not "Date","2022/07/05"
+        entered = [i for i in entered if looks_numeric(cells[i][0]) or _ENTRY.fullmatch(cells[i][0])]
+        fitting = [i for i in fitting if i not in entered] or fitting
         if not fitting:
             continue
         telling = [i for i in fitting if roles[i] >= _TELLING]
