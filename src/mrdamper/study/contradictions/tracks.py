@@ -90,7 +90,7 @@ def irregularity(tracks: Sequence[Track], currents: Sequence[float]) -> int:
     alike = (frequency > 0)[:, None] & np.logical_and(
         *(np.abs(size[:, None] - size) <= _SAME_MOTION * size for size in (frequency, amplitude))
     )
-    first: list[int] = np.argmax(alike | np.eye(len(tracks), dtype=bool), axis=0).tolist()  # run at each motion
+    first = [int(np.argmax(column)) for column in (alike | np.eye(len(tracks), dtype=bool)).T]  # run at each motion
     cells = set(zip(currents, first, strict=True))
     return len(tracks) - len(cells) + len(set(currents)) * len(set(first)) - len(cells)
 
