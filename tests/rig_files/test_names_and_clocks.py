@@ -188,3 +188,4 @@ def test_folders_of_a_profile_may_be_all_that_a_path_has(tmp_path, monkeypatch):
 
 def test_a_clock_of_megahertz_is_no_frequency_of_the_motion():
     assert motions_in("base clock: 2 MHz, 500 mHz, 3HZ", "Hz") == {0.5, 3.0}
+    assert motions_in("f_=_0_5_Hz", "Hz") == set()  # of an id: 0.5 Hz, or 5 Hz

@@ -84,6 +84,17 @@ def test_a_template_has_the_currents_that_a_plan_states_and_a_number_may_begin_w
     assert {item.current_A for item in load_dataset(tmp_path / "ds")} == {0.0, 0.6, 1.2}
 
 
+def test_a_template_leaves_a_current_open_that_a_plan_contradicts(rig, lab, tmp_path):
+    (rig / "tests.csv").unlink()
+    for n, test in enumerate(lab.tests, 1):
+        (rig / f"t{n:02}.csv").rename(rig / f"t{n:02}_{test.current}A.csv")
+    rows = [f"t{n:02}_{test.current}A,{1.2 if n == 1 else test.current}" for n, test in enumerate(lab.tests, 1)]
+    (rig / "plan.csv").write_text("\n".join(["Test,Current (A)", *rows]) + "\n")
+    table = tmp_path / "table.csv"
+    run("import", rig, "--write-tests", table)
+    assert pl.read_csv(table)["current_A"].to_list() == [None, *(test.current for test in lab.tests[1:])]
+
+
 @pytest.mark.parametrize(
     ("table", "found"),
     {

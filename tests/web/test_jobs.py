@@ -48,7 +48,7 @@ def test_a_report_that_is_kept_holds_no_descriptor():
     for job in jobs:
         job.wait(30)
         job.cancel()  # harmless
-    assert len(list(Path("/proc/self/fd").iterdir())) == before
+    assert len(list(Path("/proc/self/fd").iterdir())) <= before
 
 
 def test_a_refusal_keeps_what_where_and_remedy():

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data import Floats
-from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, printable
+from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, listed, printable
 from mrdamper.rig_files.column_names import (
     COIL,
     DIMENSION,
@@ -164,6 +164,11 @@ def noted_columns(table: RawTable, profile: Profile, assigned: Mapping[str, Assi
     if columns["force"] in named and others:
         text = f"the tests of {len(others)} columns named after other currents are not taken: {', '.join(others)}; "
         yield Finding("W_COLUMN", f"{text}to take each, leave [channels.force] column out of the profile")
+    both = [role for role in ("displacement", "force") if role in columns and profile.channel(role).column is not None]
+    further = [[i for i in table.columns(of, table.headers[columns[of]].dimension) if i != columns[of]] for of in both]
+    if len(both) > 1 and all(further) and not others:
+        text = " and ".join(listed([table.names[i] for i in own], 3) for own in further)
+        yield Finding("W_COLUMN", f"{text} not taken; if they are further tests, import each with a profile of its own")
     for role in [role for role in SIGNED if role in assigned]:
         same = _differing(table, columns[role])
         numbers = ", ".join(str(i + 1) for i in same if i != columns[role])

@@ -81,8 +81,8 @@ _SERIES = re.compile(
 _LABELLED_RATING = re.compile(
     "|".join([r"fuse|suppl|amplif|rated|range|clamp|(?<![a-z])(?:max|limit)(?![a-z])", *words("probe")]), re.IGNORECASE
 )
-_MOTIONS = {
-    unit: re.compile(rf"(?<![\d.,xX])(?<!\d[pP])(\d{{1,4}}(?:[.,xpXP]\d{{1,4}})?)[ _]?{behind}")
+_MOTIONS = {  # an id has 0_5_Hz of the title 0,5 Hz
+    unit: re.compile(rf"(?<![\d.,xX])(?<!\d[pP])(?<!\D0_)(\d{{1,4}}(?:[.,xpXP]\d{{1,4}})?)[ _]?{behind}")
     for unit, behind in (("Hz", "(m?)(?i:hz(?![a-z]))"), ("mm", "(?i:mm)()(?![A-Za-z/]|[ _]?[sS])"))  # MHz: a clock
 }
 _SAMPLING = "|".join(words("sampling"))

@@ -351,6 +351,9 @@ class _Intake:
                     self._found = [(p, r.noticed(note) if r is record else r) for p, r in self._found]
                 else:
                     refused[i] = error
+                    self.unchecked = [
+                        (p, replace(r, doubt=error) if r.id == record.id else r) for p, r in self.unchecked
+                    ]
         self._refuse({tests[i][0]: error for i, error in refused.items()})
         return bool(stated) and other is None
 
