@@ -38,6 +38,7 @@ _STARTS, _ENDS, _ROWS = words("start"), words("end"), words("row")
 _COUNTED = words("run") | words("run_number") | words("table_file")  # what the number in a test's name may be
 _NUMBERED = _COUNTED | {"step", "schritt", "#"}
 _OWN_KEYS = {"id", "nr", "nr.", "no", "no.", "#", "key", "index", "pk"}  # each table has its own
+_QUANTITY = re.compile(r"(?<![A-Za-z0-9])[0-9]+(?:[.,_][0-9]+)?[ _]?(?:m?A|m?Hz|mm)(?![A-Za-z])")  # no number of a test
 _SPECIMEN = re.compile(
     r"(?i)^(?:specimen|probe|prüfkörper|test|versuch|run|sample|essai|éprouvette|ensayo|no|nr)\b[\s.:#]*"
 )
@@ -416,7 +417,7 @@ def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:
         for part in (bare, *re.split(r"[:=;,\t/]", bare)):
             part = part.strip().strip('"').strip()
             whole |= {_key(part), _key(_SPECIMEN.sub("", part))} - {""}
-        tail = re.search(r"([0-9]+)\D*$", _SPECIMEN.sub("", bare)) if len(bare) < 60 else None
+        tail = re.search(r"([0-9]+)\D*$", _QUANTITY.sub("", _SPECIMEN.sub("", bare))) if len(bare) < 60 else None
         if tail:
             numbers.add(str(int(tail[1])))
     return whole, numbers
