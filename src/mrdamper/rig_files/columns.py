@@ -401,14 +401,19 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
 
 def units_in(line: str) -> list[tuple[str, str]]:
     """Return the channels of which a line states the unit and nothing else, and the units: the force column is in N."""
+    line = re.sub(r"\(([^()]*)\)", lambda aside: aside[0] if is_unit(aside[1]) else "", line)
     cells = [cell.strip(' `*#"') for cell in re.split(r"[,;|\t()]|\. ", line)]
-    cells += [f"{name} in {unit}" for name, unit in pairwise(cells) if is_unit(unit)]
     stated = []
-    for header in (split_name(re.sub(r"\s*[:=]\s+", " in ", cell.rstrip("."))) for cell in cells):
+    for cell, behind in pairwise([*cells, ""]):
+        text = f"{cell} in {behind}" if is_unit(behind) else re.sub(r"\s*[:=]\s+", " in ", cell.rstrip("."))
+        header = split_name(text)
         named = [word for word in words_of(header.name) if word.casefold() not in _AROUND_UNITS]
         one = header.unit and [len(word) > 2 for word in named] == [True]  # no letter
         role = role_of(named[0].removesuffix("s")) if one else None  # forces
-        stated += [(role, header.unit)] if role and header.dimension == DIMENSION[role] else []
+        if role and header.dimension == DIMENSION[role]:
+            stated.append((role, header.unit))
+        elif named and not is_unit(cell):
+            return []  # of a table, a figure or another file
     return stated
 
 
