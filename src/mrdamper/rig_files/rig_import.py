@@ -418,6 +418,11 @@ class _Intake:
         for path, results in chain(own, linked):
             every = self._numbered(results) if results else self._pending
             open_tests = [t for t in every if results and results.lacks_current(t[0], t[1].id)]
+            cut = [test for test in every if any(finding.code == "W_CUT" for finding in test[1].findings)]
+            if results and cut and len({file for file, _ in every}) == 1 and not results.ranges[1]:
+                moving = [test for test in cut if test in open_tests and not rests(test[1])]
+                if moving or len(results.cells) > len(every):
+                    continue  # its rows count the rests between the tests, too
             tests = within_ranges([test for test in every if test not in open_tests], results)
             stated = currents_beside(path, results, tests)
             if stated and not (results and results.of_supply):

@@ -86,8 +86,9 @@ def currents_beside(
 
     None unless one of them names every test; a legend's codes stand in the names of files, between separators.
     """
-    timed = results.rows_in_range([(record.time, record.lines) for _, record in tests]) if results else {}
-    if results and not timed and results.ranges[1] and len({file for file, _ in tests}) == 1 < len(tests):
+    clocks = [(record.time, record.lines) for _, record in tests]
+    timed = results.rows_in_range(clocks) if results else {}
+    if results and not timed and results.on_clock(clocks) and len({file for file, _ in tests}) == 1 < len(tests):
         return None
     by_test = {i: results.current[row] for i, (row, _) in timed.items()} if results else {}
     by_test = by_test or (results.by_test(_called(tests)) if results else {})
@@ -146,6 +147,8 @@ def other_motions(path: Path, results: Results | None, tests: Sequence[tuple[Pat
         rows = currents_beside(path, replace(results, current=values, of_supply=False), tests) or ()
         pairs = [(record, stated, _motion(record)[unit]) for (stated, _), (_, record) in zip(rows, tests, strict=False)]
         pairs = [pair for pair in pairs if pair[1] > 0 and pair[2] > 0]
+        if unit == "mm" and len({stated for _, stated, _ in pairs}) < 2:
+            continue  # may be the damper's stroke, or a tolerance
         usual = 1.0 if unit == "Hz" or not pairs else float(np.median([ours / theirs for _, theirs, ours in pairs]))
         for record, stated, own in pairs:
             if max(share := own / stated / usual, 1 / share) > 1 + limit:

@@ -179,6 +179,13 @@ class Results:
         different = len({row for row, _ in rows.values()})
         return rows if different == len(rows) and different in (len(clocks), len(self.cells)) else {}
 
+    def on_clock(self, clocks: Sequence[tuple[Floats, np.ndarray | None]]) -> bool:
+        """Tell if the rows state different ranges, one of them within a test or in another order than that of time."""
+        by_rows, windows = self.ranges
+        ends = [(own[0], own[-1]) for time, lines in clocks if (own := lines if by_rows else time) is not None]
+        within = any(first < end and begin < last for first, last in ends for begin, end in windows)
+        return len({*windows}) > 1 and (within or windows != sorted(windows))
+
     @property
     def ranges(self) -> tuple[bool, list[tuple[float, float]]]:
         """Start and end of every row's test, in rows of a file or in time [s], where the rows state them."""
