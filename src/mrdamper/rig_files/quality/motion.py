@@ -27,6 +27,7 @@ FEWEST_LEVELS, _MANY = 16, 8  # values of a channel, and samples for each
 _SAME_FREQUENCY = 0.2  # relative difference of what is measured
 # Measured amplitude over the one stated, which may be the stroke peak to peak: a machine falls short of its command.
 _AMPLITUDES = (0.25, 1.6)
+_HEATING = 0.2  # of the current at most, by which a heated coil lowers it in a test
 _UNITS = np.array([2.54, 10, 25.4, 39.37, 100, 1000])  # factors between units of length
 _SAME_FACTOR = 0.015  # relative difference from it: 2.5 and 25 are none
 
@@ -136,8 +137,12 @@ def change_of(record: Record, window: tuple[float, float] | None) -> Iterator[Fi
 
 @once_per_run
 def current_changes(view: View) -> bool:
-    """Tell if the current changes within the steady motion: then cycles of the force differ, as they should."""
-    return bool(held_in(view.record, steady_window(view))[1])
+    """Tell if the current changes by more than heat explains in the steady motion: then cycles of the force differ."""
+    window = steady_window(view)
+    if not held_in(view.record, window)[1]:
+        return False
+    low, high = np.quantile(np.abs(current_in(view.record, window)), (0.02, 0.98))
+    return bool(high - low > _HEATING * high)
 
 
 def held_in(record: Record, window: tuple[float, float] | None) -> tuple[float, str]:
