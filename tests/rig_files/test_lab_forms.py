@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mrdamper.errors import InputError
+from mrdamper.rig_files.columns import units_in
 from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.readers.arrays import unit_in
@@ -1351,3 +1352,45 @@ def test_a_plan_that_names_some_of_the_tests_is_compared_with_them(tmp_path):
     result = import_files([tmp_path], parse_profile('[file]\nleave_out = ["run_2.csv"]'))
     assert by_id(result) == {"run_1": 0.25, "run_3": 0.75, "run_4": 1.0}
     assert any("tests.csv decides: plan.csv" in finding.text for finding in result.records[1].findings)
+
+
+@pytest.mark.parametrize(
+    ("line", "stated"),
+    [
+        ("The forces are in N (the template says kN).", [("force", "N")]),
+        ("displacement (mm), force (kN)", [("displacement", "mm"), ("force", "kN")]),
+        ("| Amplitude (mm) | Current (A) | Force (kN) |", []), ("Test  Current (A)  Force (kN)", []),
+        ("Figure 1: force (kN), displacement (mm)", []), ("model.py expects displacement in m, force in kN.", []),
+        ("Max. values: Displacement (mm): 10.0, Force (kN): 1.2", []),
+    ],
+)  # fmt: skip
+def test_a_line_on_something_else_states_no_units_of_columns(line, stated):
+    assert units_in(line) == stated
+
+
+@pytest.mark.parametrize("rest", ["", "0"])
+def test_a_plan_that_counts_the_rests_of_a_session_gives_its_tests_no_currents(tmp_path, rest):
+    pause = np.zeros(300)
+    x = np.concatenate([np.r_[X, pause] for _ in range(3)])
+    f = np.concatenate([np.r_[force(i, n), pause] for n, i in enumerate((0.25, 0.5, 1.0))])
+    (tmp_path / "session.csv").write_text(HEAD + rows(0.005 * np.arange(x.size), x, f))
+    steps = "".join(f"{2 * n + 1},rest,{rest}\n{2 * n + 2},sine,{i}\n" for n, i in enumerate((0.25, 0.5, 1.0)))
+    (tmp_path / "plan.csv").write_text(f"Step,Type,Current [A]\n{steps}")
+    result = import_files([tmp_path])
+    assert not result.records
+    assert {refusal.error.code for refusal in result.refusals} == {"E_CURRENT_MISSING"}
+
+
+def test_a_stroke_that_all_tests_of_a_plan_have_may_be_the_dampers(tmp_path):
+    for n, size in enumerate((1.0, 0.4, 1.6), 1):
+        (tmp_path / f"run_{n}.csv").write_text(HEAD + rows(T, size * X, force(n / 4, n)))
+    (tmp_path / "plan.csv").write_text("Run,Stroke [mm],Current [A]\n1,55,0.25\n2,55,0.5\n3,55,0.75\n")
+    assert currents(import_files([tmp_path]).records) == [0.25, 0.5, 0.75]
+
+
+def test_a_current_that_heat_lowers_does_not_excuse_a_force_that_fades(tmp_path):
+    fading, current = np.linspace(1.0, 0.5, T.size), np.linspace(1.0, 0.93, T.size)
+    heads = "time [s],displacement [mm],force [N],current [A]\n"
+    (tmp_path / "run_1.csv").write_text(heads + rows(T, X, fading * force(1.0, 1), current))
+    (record,) = import_files([tmp_path]).records
+    assert "W_UNSTEADY" in {finding.code for finding in record.findings}
