@@ -95,4 +95,4 @@ GROUPS = (
 
 # A fault that every valid trial detects: the sign in the root mean square error.
 CERTAIN = _group("statistics.metrics", "test_metrics.py")
-CERTAIN_FAULT = ("return float(np.sqrt(np.mean((predicted - measured) ** 2)))", "Sub → Add")
+CERTAIN_FAULT = ("return float(np.linalg.norm(predicted - measured) / np.sqrt(measured.size))", "Sub → Add")
