@@ -198,7 +198,7 @@ class Profile(Table):
             raise ProfileError(problem, where="[current.values]", remedy=remedy)
 
     def leaves_out(self, *parts: str) -> bool:
-        """Tell if a file or table of this name, behind those of its folders, or a test behind its file, is left out."""
+        """Tell if a file or table of this name, behind those of its folders, or a test behind its file, is omitted."""
         names = {p: "/".join(parts[-1 - p.count("/") :]) for p in self.file.leave_out}
         return any(fnmatchcase(name.casefold(), pattern.casefold()) for pattern, name in names.items())
 
