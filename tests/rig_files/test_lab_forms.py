@@ -1081,7 +1081,7 @@ def test_a_plan_that_lacks_tests_is_named_with_them(tmp_path):
     errors = [refusal.error for refusal in import_files([tmp_path]).refusals]
     assert len(errors) == 3
     assert all("plan.csv names 2 of 3 tests and may lack run03" in error.found for error in errors)
-    assert all(error.remedy.startswith("correct the plan if it is wrong; else write the currents") for error in errors)
+    assert all(error.remedy.startswith("if so, correct the plan; else write the currents") for error in errors)
 
 
 @pytest.mark.parametrize(

@@ -218,7 +218,7 @@ def named_tests(results: Results | None, tests: Sequence[tuple[Path, Record]]) -
 def misfit_of_plan(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> Finding | None:
     """Return the finding that a plan, which names most tests without a current, has one twice or lacks others."""
     text = results.misfit(_called(tests)) if results else ""
-    problem = printable(f"{NO_CHANNEL}missing: {path.name} {text}: correct the plan if it is wrong")
+    problem = printable(f"{NO_CHANNEL}missing: {path.name} {text}: if so, correct the plan")
     return Finding("W_COLUMN", problem) if text else None
 
 

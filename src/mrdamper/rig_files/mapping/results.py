@@ -138,7 +138,7 @@ class Results:
             if key and len(absent) < fewest and (twice or absent) and not split_name(key).dimension:
                 fewest = len(absent)
                 lacks = f"names {len(tests) - fewest} of {len(tests)} tests and may lack {listed(absent, 3)}"
-                text = f"has {twice[0]!r} twice under {key!r}" if twice else lacks
+                text = f"has {twice[0]!r} twice under {key!r}, which may be a mistake" if twice else lacks
         return text
 
     def _columns_of_names(self, tests: int) -> list[Sequence[str]]:
