@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import chain
@@ -105,22 +105,6 @@ def read_runs(path: str | Path, profile: Profile | str | Path | None = None) -> 
         records, problems = records_of_file(Path(path), profile_of(profile))
         CombinedError.raise_from([*problems, *(record.doubt for record in records if record.doubt)])
         return tuple(check_long_record(record) for record in records)
-
-
-@contextlib.contextmanager
-def file_for_profile(paths: Sequence[str | Path], profile: Profile) -> Iterator[Path]:
-    """Yield the first refused file among files, folders and archives, for as long as the block goes.
-
-    Where none is refused it is the first that holds a test, else the first that is no README.
-    """
-    with unpacked(paths) as given:
-        files = [file for file in files_in(given)[0] if not is_readme(file)] or files_in(given)[0]
-        result = import_files(given, profile) if len(files) > 1 else ImportResult(())
-        refused = {r.file.removesuffix(f": {r.run}") for r in result.refusals if r.error.code != "E_NO_DATA"}
-        first = (file for file in files if without_temporary_folder(str(file)) in refused)
-        names = {Path(record.provenance["file"]).name for record in result.records}
-        tests = (file for file in files if file.name in names or (not names and file.name not in result.left_out))
-        yield next(chain(first, tests), files[0])
 
 
 @validate_arguments("paths")

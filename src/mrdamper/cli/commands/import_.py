@@ -7,8 +7,6 @@ import os
 import re
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
-from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +17,6 @@ from mrdamper.cli.progress import progress_on_stderr
 from mrdamper.errors import InputError, OutputError, listed
 
 if TYPE_CHECKING:
-    from mrdamper.data import Dataset, Run
     from mrdamper.rig_files.profile import Profile
     from mrdamper.rig_files.record import Record, Refusal
     from mrdamper.rig_files.rig_import import ImportResult
@@ -124,64 +121,16 @@ def _write_tests(files: list[Path], settings: Profile, target: Path) -> None:
 
 
 def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
-    from mrdamper.rig_files.preview import columns_of, guess_profile
-    from mrdamper.rig_files.profile import profile_text
-    from mrdamper.rig_files.rig_import import file_for_profile, read_runs
+    from mrdamper.rig_files.profile_template import profile_template
 
-    with file_for_profile(files, settings) as first:
-        guess = guess_profile(first, settings)
-        columns = columns_of(first, settings)
-        text = profile_text(guess) + _alternatives(columns) + _missing_currents(files, guess, columns)
-        try:
-            read_runs(first, guess)
-        except InputError as error:
-            problems = dict.fromkeys(str(problem) for problem in getattr(error, "errors", (error,)))
-            warn(f"the profile does not suffice yet: {problem}" for problem in problems)
+    text, problems = profile_template(files, settings)
+    warn(f"the profile does not suffice yet: {problem}" for problem in problems)
     put_text(text, target)
-
-
-def _missing_currents(files: list[Path], guess: Profile, columns: tuple[str, ...]) -> str:
-    """List what a person fills in for tests without a current, as comments: their currents, or a column's scale."""
-    from mrdamper.rig_files.coil_current import CURRENT_TOO
-    from mrdamper.rig_files.rig_import import import_files
-
-    refusals = import_files(files, guess).refusals if guess.current is None else ()
-    missing = [r for r in refusals if r.error.code == "E_CURRENT_MISSING" or CURRENT_TOO in r.error.remedy]
-    if not missing:
-        return ""
-    lines = []
-    reasons = ["" if r.error.code != "E_CURRENT_MISSING" else r.error.found for r in missing]  # else of units
-    column = next((name for name in columns if name and any(f"column {name!r}" in why for why in reasons)), None)
-    if column is not None:
-        shown = json.dumps(column, ensure_ascii=False)
-        lines = ["# Calibration of the current: A for 1 of the column:", "#[channels.current]", f"#column = {shown}"]
-        lines += ['#unit = "A"', "#scale =", ""]
-    runs = [r.run or Path(r.file).stem for r in missing]
-    names = [
-        escape(run) if runs.count(run) == 1 else "*/" + escape("/".join(Path(r.file).parts[-2:]).replace(": ", "/"))
-        for run, r in zip(runs, missing, strict=True)
-    ]
-    lines += ["# Tests without a current: remove the #, and write each current [A] behind its =:", "#[current.values]"]
-    whys = [f"  # {text}" if text and not text.startswith("no coil current") else "" for text in reasons]
-    lines += [f"#{json.dumps(name, ensure_ascii=False)} ={why}" for name, why in zip(names, whys, strict=True)]
-    return "\n".join(["", *lines, ""])
-
-
-def _alternatives(columns: tuple[str, ...]) -> str:
-    """List the columns and the most used keys of a profile as comments."""
-    named = [f"#   {number}  {json.dumps(name, ensure_ascii=False)}" for number, name in enumerate(columns, 1) if name]
-    return "\n".join(
-        [
-            "", "# Columns of the file, for column = \"...\" or column = NUMBER:", *named,
-            "# One current for all files ([current] value), or one in their names or folders:",
-            '# pattern = "*_{current}A_*" or "*/{current}A/*"; {run}, {frequency}, {amplitude} stand for other numbers',
-            '# Files and tables that are no tests: [file] leave_out = ["warmup*"]', "",
-        ]
-    )  # fmt: skip
 
 
 def _write_dataset(result: ImportResult, profile: Profile, out: Path, add: bool) -> tuple[int, int]:
     """Write or add; return the number of runs in the dataset, and of new ones."""
+    from mrdamper.rig_files.dataset_addition import with_tests
     from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
     from mrdamper.rig_files.profile import Profile, profile_text
     from mrdamper.rig_files.rig_import import to_dataset
@@ -189,65 +138,14 @@ def _write_dataset(result: ImportResult, profile: Profile, out: Path, add: bool)
     dataset = to_dataset(result.records, out.name)
     if add:
         before = load_dataset(out)
-        dataset = _joined(before, dataset)
+        dataset, replaced = with_tests(before, dataset)
+        if replaced:
+            warn([f"read otherwise than before and replaced: {listed(replaced, 5)}"])
         save_dataset(dataset, out, replace=True)
         return len(dataset), len(dataset) - len(before)
     extra = {"rig.toml": profile_text(profile)} if profile != Profile() else None
     save_dataset(dataset, out, extra_files=extra)
     return len(dataset), len(dataset)
-
-
-def _joined(old: Dataset, new: Dataset) -> Dataset:
-    """Both datasets' runs, told apart by their names; a test of the same file replaces one that was read otherwise."""
-    from mrdamper.data import Dataset
-    from mrdamper.rig_files.record import unique_names
-
-    stored, given = _by_file(old), _by_file(new)
-    again: dict[str, Run] = {}  # by the name of the run that it replaces
-    for before, now in ((stored[digest], runs) for digest, runs in given.items() if digest in stored):
-        if len(before) != len(now):
-            raise OutputError(
-                f"{listed([run.id for run in before], 5)} are of the same file, which gives {len(now)} tests now",
-                where=f"dataset {old.name}", remedy="delete them from runs.csv, or import into a new folder",
-            )  # fmt: skip
-        again |= {one.id: other for one, other in zip(before, now, strict=True)}
-    same = [run.id for run in old if run.id in again and _reads_alike(run, again[run.id])]
-    if same:
-        raise OutputError(
-            f"there already, read in the same way: {listed(same, 5)}",
-            where=f"dataset {old.name}", remedy="give new files only, or a profile that reads these otherwise",
-        )  # fmt: skip
-    if again:
-        typer.echo(f"read otherwise than before and replaced: {listed([*again], 5)}", err=True)
-    kept = [_replaced(run, again[run.id]) if run.id in again else run for run in old]
-    fresh = [run for run in new if run.notes.get("sha256") not in stored]
-    names = unique_names((run.id for run in fresh), (run.id for run in old))
-    added = (run if name == run.id else replace(run, id=name) for run, name in zip(fresh, names, strict=True))
-    return Dataset((*kept, *added), old.name)
-
-
-def _by_file(runs: Dataset) -> dict[str, list[Run]]:
-    """Return runs by the digest of their file, in their order."""
-    files: dict[str, list[Run]] = {}
-    for run in runs:
-        if digest := run.notes.get("sha256"):
-            files.setdefault(digest, []).append(run)
-    return files
-
-
-def _replaced(before: Run, now: Run) -> Run:
-    """Return a run that was read again, with the name, split and further columns of runs.csv of the old one."""
-    anew = ("columns", "sign_changed", "scaled", "time_from", "motion_stated", "findings")
-    stated = {key: text for key, text in before.notes.items() if key not in anew}
-    return replace(now, id=before.id, split=before.split, rig=now.rig or before.rig, notes={**now.notes, **stated})
-
-
-def _reads_alike(one: Run, other: Run) -> bool:
-    """Tell if two readings of a file gave the same samples."""
-    import numpy as np
-
-    channels = ("time", "displacement", "force", "current")
-    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in channels)
 
 
 def _asked(

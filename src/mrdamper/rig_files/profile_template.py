@@ -1,0 +1,88 @@
+"""A profile that a person completes: how a file was read, and what its folder leaves open, as comments."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Iterator, Sequence
+from glob import escape
+from itertools import chain
+from pathlib import Path
+
+from mrdamper.data.temporary import without_temporary_folder
+from mrdamper.errors import InputError
+from mrdamper.rig_files.coil_current import CURRENT_TOO
+from mrdamper.rig_files.file_records import files_in, unpacked
+from mrdamper.rig_files.mapping.description import is_readme
+from mrdamper.rig_files.preview import columns_of, guess_profile
+from mrdamper.rig_files.profile import Profile, profile_text
+from mrdamper.rig_files.rig_import import ImportResult, import_files, read_runs
+
+
+def profile_template(paths: Sequence[str | Path], profile: Profile) -> tuple[str, list[str]]:
+    """Return the text of a profile for files, and the problems that reading one of them with it still has.
+
+    Raises `InputError` if the form of the file cannot be found.
+    """
+    with _file_for_profile(paths, profile) as first:
+        guess = guess_profile(first, profile)
+        columns = columns_of(first, profile)
+        text = profile_text(guess) + _alternatives(columns) + _missing_currents(paths, guess, columns)
+        try:
+            read_runs(first, guess)
+        except InputError as error:
+            return text, list(dict.fromkeys(str(problem) for problem in getattr(error, "errors", (error,))))
+    return text, []
+
+
+@contextlib.contextmanager
+def _file_for_profile(paths: Sequence[str | Path], profile: Profile) -> Iterator[Path]:
+    """Yield the first refused file among files, folders and archives, for as long as the block goes.
+
+    Where none is refused it is the first that holds a test, else the first that is no README.
+    """
+    with unpacked(paths) as given:
+        files = [file for file in files_in(given)[0] if not is_readme(file)] or files_in(given)[0]
+        result = import_files(given, profile) if len(files) > 1 else ImportResult(())
+        refused = {r.file.removesuffix(f": {r.run}") for r in result.refusals if r.error.code != "E_NO_DATA"}
+        first = (file for file in files if without_temporary_folder(str(file)) in refused)
+        names = {Path(record.provenance["file"]).name for record in result.records}
+        tests = (file for file in files if file.name in names or (not names and file.name not in result.left_out))
+        yield next(chain(first, tests), files[0])
+
+
+def _missing_currents(paths: Sequence[str | Path], guess: Profile, columns: tuple[str, ...]) -> str:
+    """List what a person fills in for tests without a current, as comments: their currents, or a column's scale."""
+    refusals = import_files(paths, guess).refusals if guess.current is None else ()
+    missing = [r for r in refusals if r.error.code == "E_CURRENT_MISSING" or CURRENT_TOO in r.error.remedy]
+    if not missing:
+        return ""
+    lines = []
+    reasons = ["" if r.error.code != "E_CURRENT_MISSING" else r.error.found for r in missing]  # else of units
+    column = next((name for name in columns if name and any(f"column {name!r}" in why for why in reasons)), None)
+    if column is not None:
+        shown = json.dumps(column, ensure_ascii=False)
+        lines = ["# Calibration of the current: A for 1 of the column:", "#[channels.current]", f"#column = {shown}"]
+        lines += ['#unit = "A"', "#scale =", ""]
+    runs = [r.run or Path(r.file).stem for r in missing]
+    names = [
+        escape(run) if runs.count(run) == 1 else "*/" + escape("/".join(Path(r.file).parts[-2:]).replace(": ", "/"))
+        for run, r in zip(runs, missing, strict=True)
+    ]
+    lines += ["# Tests without a current: remove the #, and write each current [A] behind its =:", "#[current.values]"]
+    whys = [f"  # {text}" if text and not text.startswith("no coil current") else "" for text in reasons]
+    lines += [f"#{json.dumps(name, ensure_ascii=False)} ={why}" for name, why in zip(names, whys, strict=True)]
+    return "\n".join(["", *lines, ""])
+
+
+def _alternatives(columns: tuple[str, ...]) -> str:
+    """List the columns and the most used keys of a profile as comments."""
+    named = [f"#   {number}  {json.dumps(name, ensure_ascii=False)}" for number, name in enumerate(columns, 1) if name]
+    return "\n".join(
+        [
+            "", "# Columns of the file, for column = \"...\" or column = NUMBER:", *named,
+            "# One current for all files ([current] value), or one in their names or folders:",
+            '# pattern = "*_{current}A_*" or "*/{current}A/*"; {run}, {frequency}, {amplitude} stand for other numbers',
+            '# Files and tables that are no tests: [file] leave_out = ["warmup*"]', "",
+        ]
+    )  # fmt: skip
