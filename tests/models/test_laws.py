@@ -107,3 +107,11 @@ def test_a_model_says_all_a_table_needs(name):
         assert info.bounds[0] < info.bounds[1]
     assert "References" in cls.__doc__
     assert cls(**example(name).values()) == example(name)
+
+
+def test_a_loop_whose_state_creeps_is_near_that_of_thousands_of_cycles():
+    """A soft spring k0 moves its mean for longer than any test lasts; the force hardly changes by it."""
+    creeping = replace(example("spencer"), k0_rate=0.002)
+    long = simulate(creeping, sine(SLOW, 4000, 100)).force[-101:]
+    force = steady_loop(creeping, SLOW, 100).force
+    assert np.abs(force - long).max() < 1e-3 * np.ptp(long)
