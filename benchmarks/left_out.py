@@ -14,9 +14,8 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.choice import JointChoice, identify_jointly
-from mrdamper.dampers.current_levels import levels_of
 from mrdamper.dampers.fold_fits import FoldFits
-from mrdamper.data import Dataset, Run, same_condition
+from mrdamper.data import Dataset, Run, condition_groups, level_groups
 from mrdamper.rig_files.dataset_folder import load_dataset
 
 GOALS = {  # interior current, condition, whole record [-]
@@ -31,7 +30,8 @@ def errors(rig: Dataset) -> tuple[JointChoice, dict[str, list[float]]]:
     choice = identify_jointly(runs)
     problem, fit = choice.problem, choice.fit
     found: dict[str, list[float]] = {"current": [], "condition": [], "whole record": []}
-    levels, conditions = levels_of(problem.currents)[1:-1], same_condition([part.condition for part in problem.parts])
+    levels = [*level_groups(problem.currents).values()][1:-1]
+    conditions = condition_groups([part.condition for part in problem.parts])
     fits = FoldFits(problem, [*levels, *conditions], choice.searched)
     for level in levels:
         damper = _without(fits, level)

@@ -7,32 +7,27 @@ import pytest
 
 from mrdamper.dampers import choice
 from mrdamper.dampers.choice import CrossValidation, ModelTerm
-from mrdamper.dampers.current_levels import level_count, levels_of, undetermined
-from mrdamper.data import Condition
+from mrdamper.dampers.current_levels import level_count, undetermined
+from mrdamper.data import Condition, level_groups
 from mrdamper.models.play_bypass import RISE_CURRENT, PlayBypass, _level_law
 
 RNG = np.random.default_rng(2)
 N, NAMES = 120, ("d", "h1", "c1", "f0")
 JACOBIAN = RNG.standard_normal((N, 4)) * [1.0, 2.0, 0.5, 3.0]
 VALUES = np.array([0.4, 0.3, 2.0, 1.0])
-NEUTRAL = np.array([0.4, 0.0, 0.0, 1.0])
 GROUPS = [np.arange(k, N, 4) for k in range(4)]
 RESIDUAL = RNG.standard_normal(N) + np.repeat([0.0, 1.0], N // 2)
 
 
-def rms(weighted, group):
-    return float(np.sqrt(np.mean(weighted[group] ** 2)))
-
-
 def evidence(residual=RESIDUAL, groups=None, names=NAMES):
-    return CrossValidation(names, VALUES, NEUTRAL, residual, JACOBIAN, groups or {"condition": GROUPS}, rms)
+    return CrossValidation(names, VALUES, residual, JACOBIAN, np.ones(N), np.ones(N), groups or {"condition": GROUPS})
 
 
 def left_out(active, residual=RESIDUAL, groups=GROUPS):
-    """Every group predicted by least squares on the other rows alone; parameters that are off at their neutral."""
+    """Every group predicted by least squares on the other rows alone; parameters that are off at zero."""
     on = [i for i, name in enumerate(NAMES) if name in active]
     off = [i for i in range(4) if i not in on]
-    base = residual + JACOBIAN[:, off] @ (NEUTRAL - VALUES)[off]
+    base = residual - JACOBIAN[:, off] @ VALUES[off]
     errors = []
     for group in groups:
         rest = np.setdiff1d(np.arange(N), group)
@@ -71,14 +66,15 @@ def test_a_term_stays_where_without_it_more_is_missed():
 
 
 def part(current, changes=False, is_sine=True):
-    return SimpleNamespace(condition=Condition(current, 1.0, 0.01), changes=changes, is_sine=is_sine)
+    condition = Condition(current, 1.0, 0.01)
+    return SimpleNamespace(condition=condition, sine=condition if is_sine and not changes else None)
 
 
 def test_levels_are_runs_of_constant_current_from_the_lowest():
     currents = [1.0, 0.0, 0.5, 1.004, 0.004, 0.3]
-    assert levels_of([*currents, None]) == [[1, 4], [5], [2], [0, 3]]
-    assert levels_of([0.0, 2.0, 1.9, None, -2.0]) == [[0], [2], [1, 4]]
-    assert levels_of([None]) == []
+    assert level_groups([*currents, None]) == {0.0: [1, 4], 0.3: [5], 0.5: [2], 1.0: [0, 3]}
+    assert level_groups([0.0, 2.0, 1.9, None, -2.0]) == {0.0: [0], 1.9: [2], 2.0: [1, 4]}
+    assert level_groups([None]) == level_groups([]) == {}
 
 
 @pytest.mark.parametrize(
@@ -127,17 +123,20 @@ def test_conditions_are_left_out_whole_and_other_records_in_stretches():
     for each in parts:
         each.motion = motion
     owner = np.repeat([0, 1, 2, 3], [3, 2, 3, 20])
-    (groups,) = choice._by_condition(SimpleNamespace(parts=parts), owner).values()
+    (groups,) = choice._folds(SimpleNamespace(parts=parts), owner, False).values()
     assert [g.tolist() for g in groups[:2]] == [[0, 1, 2, 5, 6, 7], [3, 4]]
     assert [g.size for g in groups[2:]] == [4] * 5  # sixty cycles, a dozen each
     assert sorted(np.concatenate(groups).tolist()) == list(range(28))
-    assert choice._by_condition(SimpleNamespace(parts=parts[:2]), owner[:5]) == {}
+    assert choice._folds(SimpleNamespace(parts=parts[:2]), owner[:5], False) == {}
 
 
 def test_sessions_are_left_out_where_some_hold_several_runs():
     def asked(*names):
         runs = [SimpleNamespace(id=str(i), notes={"session": name}) for i, name in enumerate(names)]
-        found = choice._by_session(SimpleNamespace(runs=runs), np.repeat(np.arange(len(names)), 2))
+        motion = SimpleNamespace(time=np.array([0.0, 9.0]))
+        parts = [SimpleNamespace(**vars(part(0.0)), motion=motion) for _ in names]
+        problem = SimpleNamespace(runs=runs, parts=parts)
+        found = choice._folds(problem, np.repeat(np.arange(len(names)), 2), True)
         return [g.tolist() for g in found.get("session", [])]
 
     assert asked("a", "b", "a", "c") == [[0, 1, 4, 5], [2, 3], [6, 7]]
@@ -165,6 +164,6 @@ def test_a_current_is_predicted_by_a_fit_to_the_others_from_a_start_that_never_s
             return np.array([0.1 * i for i in level])
 
     problem = Problem()
-    found = choice._left_out_current(problem, ["a", "b"], levels_of(problem.currents)[1:-1])
+    found = choice._left_out_current(problem, ["a", "b"], [*level_groups(problem.currents).values()][1:-1])
     assert asked == [([0, 2, 4], "point of a"), ([0, 1, 3, 4], "point of b")]
     assert found == pytest.approx([0.1, 0.3, 0.2])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mrdamper.dampers import fold_fits
-from mrdamper.dampers.current_levels import levels_of
 from mrdamper.dampers.fold_fits import FoldFits
 from mrdamper.dampers.joint import JointProblem
+from mrdamper.data import level_groups
 
 FOLDS = [[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11], [0, 3, 6, 9], [1, 4], [11]]
 COUNT = 12
@@ -55,7 +55,7 @@ def test_no_start_saw_what_is_left_out_and_the_best_end_is_taken(fold, monkeypat
 
 def test_a_search_frees_no_effect_of_the_current_that_its_runs_do_not_determine(bundled):
     runs = [run for run in bundled.rig("utfsm").split("train") if run.excitation == "sine"]
-    levels = levels_of(JointProblem(runs, "tanh").currents)
+    levels = [*level_groups(JointProblem(runs, "tanh").currents).values()]
     few = [runs[i] for level in levels[:3] for i in level[:2]]
     problem = JointProblem(few, "tanh", free=("si",))
     assert [axis.name for axis in problem.axes] == ["vy", "shift", "si"]
@@ -66,7 +66,7 @@ def test_a_search_frees_no_effect_of_the_current_that_its_runs_do_not_determine(
 def test_a_search_of_the_same_runs_and_parameters_is_made_once(bundled, monkeypatch):
     """Fits without an effect of the current search the blocks of those with it anew, and often the same."""
     runs = [run for run in bundled.rig("utfsm").split("train") if run.excitation == "sine"]
-    levels = levels_of(JointProblem(runs, "tanh").currents)
+    levels = [*level_groups(JointProblem(runs, "tanh").currents).values()]
     problem = JointProblem([runs[i] for level in levels[:3] for i in level[:2]], "tanh", free=("si",))
     searched, fit = [], JointProblem.fit
     monkeypatch.setattr(JointProblem, "fit", lambda self, *given, **how: searched.append(self.free) or fit(self, **how))

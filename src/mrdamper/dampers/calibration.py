@@ -26,7 +26,7 @@ from mrdamper.data.runs import Run, once_per_run
 from mrdamper.data.sessions import session_of
 from mrdamper.data.strict_text import STRICT
 from mrdamper.identification.intervals import student
-from mrdamper.physics.motion.sines import equivalent_sine
+from mrdamper.physics.motion.sines import equivalent_sine, sine_condition
 from mrdamper.statistics.linear import nonnegative_least_squares
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 
@@ -123,7 +123,7 @@ def _loops(run: Run) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     sine, at = equivalent_sine(run), np.flatnonzero(run.in_window)
     frequency = sine.condition.frequency_Hz
     loops, count = [at], int(np.ptp(run.time[at]) * frequency)
-    if count >= 2 and (run.current_changes or not sine.is_sine):
+    if count >= 2 and sine_condition(run) is None:
         cycles = np.array_split(at, count)
         moved = [np.ptp(run.displacement[cycle]) for cycle in cycles]
         loops = [c for c, swing in zip(cycles, moved, strict=True) if swing >= sine.condition.amplitude_m] or [at]

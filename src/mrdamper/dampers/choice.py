@@ -7,18 +7,18 @@ terms are fitted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.current_levels import level_count, levels_of
+from mrdamper.dampers.current_levels import level_count
 from mrdamper.dampers.fold_fits import FoldFits
 from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem, LocalMinimum
-from mrdamper.data import SESSIONS_NEEDED, Floats, Run, same_condition, session_of
-from mrdamper.errors import InputError
+from mrdamper.data import Floats, Run, condition_groups, level_groups, session_folds
 from mrdamper.models import model_type
 from mrdamper.statistics.functions.selection import Errors, smaller_wins
 from mrdamper.statistics.linear import on_one_blas_thread, solve_linear
@@ -116,7 +116,7 @@ def _of_play_and_bypass(runs: Sequence[Run]) -> JointChoice:
     off |= dict.fromkeys(gone, 0.0)
     if off or coil != problem.given_coil:
         final = JointProblem(runs, MODEL, {**problem.fixed, **off}, free=problem.free, coil=coil, parts=problem.parts)
-        best = final.fit(start=evidence.start(final), rounds=1, settled=_COARSE_TOLERANCE / 10)
+        best = final.fit(start=evidence.start(final, chosen), rounds=1, settled=_COARSE_TOLERANCE / 10)
     coil, gone = _absent(final, best)
     if gone or coil != final.given_coil:
         fixed = {**final.fixed, **dict.fromkeys(gone, 0.0)}
@@ -139,8 +139,8 @@ def _conclude(
     left_out, before = (CrossValidation.of(*each).everything() for each in (selected, full))
     final, best = selected if smaller_wins(left_out, before) else full
     best = final.fit(start=best.point, rounds=1, settled=_COARSE_TOLERANCE / 10, to_the_last_digit=True)
-    evidence = (CrossValidation.of(final, best), CrossValidation.of(final, best, _by_session))
-    means = _means({**evidence[0].everything(), **current, **evidence[1].everything()})
+    evidence = CrossValidation.of(final, best, sessions=True)
+    means = _means(dict(sorted({**evidence.everything(), **current}.items())))
     about = {**best.damper.provenance, "terms": terms}
     about |= {f"cross-validation, {what}": f"{100 * error:.2f} %" for what, error in means.items()}
     best = replace(best, damper=replace(best.damper, provenance=about), second=second)
@@ -158,7 +158,7 @@ def _with_presets_as_terms(runs: Sequence[Run], model: str) -> JointChoice:
     evidence = CrossValidation.of(problem, fit)
     chosen, tried = evidence.choose([ModelTerm(optional[n], (n,)) for n in problem.free if n in optional])
     final = problem.with_free(tuple(chosen))
-    best = final.fit(start=evidence.start(final), rounds=1, settled=_COARSE_TOLERANCE / 10)
+    best = final.fit(start=evidence.start(final, chosen), rounds=1, settled=_COARSE_TOLERANCE / 10)
     terms = "; ".join(t.term for t in tried if t.kept) or _PLAIN
     return _conclude((problem, fit), (final, best), short.second, tried, terms, {})
 
@@ -215,7 +215,7 @@ def _level_law(
     currents. The search began with every parameter of the function, because the others compensate for a form that is
     too short.
     """
-    levels = levels_of(longest.currents)[1:-1] if len(forms) > 1 else []
+    levels = [*level_groups(longest.currents).values()][1:-1] if len(forms) > 1 else []
     without = FoldFits(longest, levels)
     starts = [without.refit([i for i in range(len(longest.parts)) if i not in level]) for level in levels]
     tried: list[TermTrial] = []
@@ -251,67 +251,48 @@ def _left_out_current(problem: JointProblem, starts: Sequence[JointFit], levels:
     return np.concatenate(errors)
 
 
-Grouping = Callable[[JointProblem, np.ndarray], dict[str, list[np.ndarray]]]
-
-
+@dataclass(frozen=True, eq=False)
 class CrossValidation:
-    """Cross-validation of terms on the linearisation of a fit by all parameters."""
+    """Cross-validation of terms on the linearisation of a fit by all parameters; an omitted parameter is zero."""
 
-    def __init__(
-        self,
-        names: Sequence[str],
-        values: Floats,
-        neutral: Floats,
-        residual: Floats,
-        jacobian: Floats,
-        groups: Mapping[str, Sequence[np.ndarray]],
-        error: Callable[[Floats, np.ndarray], float],
-    ):
-        self.names, self.values, self.neutral = tuple(names), values, neutral
-        self.residual, self.jacobian = residual, jacobian
-        self.groups, self.error = groups, error
-        self.step = np.zeros(len(self.names))
+    names: tuple[str, ...]  # length P, parameters of the search axes and linear ones
+    values: Floats  # (P,) at the end of the fit
+    residual: Floats  # (N,) weighted
+    jacobian: Floats  # (N, P)
+    weights: Floats  # (N,) robust weight of the run of each sample
+    share: Floats  # (N,) share of its run that each sample represents
+    folds: Mapping[str, Sequence[np.ndarray]]  # samples omitted together, by kind
 
     @classmethod
-    def of(cls, problem: JointProblem, fit: JointFit, by: Grouping | None = None) -> CrossValidation:
-        """Linearise a problem where a fit of it ended; by default conditions are omitted."""
+    def of(cls, problem: JointProblem, fit: JointFit, *, sessions: bool = False) -> CrossValidation:
+        """Linearise a problem where a fit of it ended; conditions are omitted, and sessions if asked for."""
         linearised = problem.linearised(fit)
-        table, owner = linearised.table, linearised.table.owner
-        names = [*(a.name for a in problem.axes), *(i.name for i in problem.linear)]
+        table = linearised.table
+        names = (*(a.name for a in problem.axes), *(i.name for i in problem.linear))
         values = np.array([*fit.point, *(getattr(fit.damper.model, i.name) for i in problem.linear)])
-        rows = (by or _by_condition)(problem, owner)
-
-        def error(weighted: Floats, group: np.ndarray) -> float:
-            runs = float(np.sum(table.share[group]))  # one for each whole run
-            return float(np.sqrt(np.sum((weighted[group] / table.weights[owner[group]]) ** 2) / runs))
-
-        return cls(names, values, np.zeros(values.size), linearised.residual, linearised.jacobian, rows, error)
+        return cls(
+            names, values, linearised.residual, linearised.jacobian, table.weights[table.owner], table.share,
+            _folds(problem, table.owner, sessions),
+        )  # fmt: skip
 
     def everything(self) -> dict[str, Floats]:
         """Return the cross-validated errors with all parameters."""
         return self.scores(frozenset(self.names))
 
     def scores(self, active: frozenset[str]) -> dict[str, Floats]:
-        """Return the cross-validated error of every group by kind of fold, with the other parameters neutral."""
-        on = np.array([n in active or n.startswith("coil.") for n in self.names])
-        shift = np.where(on, 0.0, self.neutral - self.values)
-        base = self.residual + self.jacobian @ shift
-        errors_by_fold: dict[str, Floats] = {}
+        """Return the cross-validated error of every fold by kind, without the other parameters."""
+        on, base = self._without(active)
+        errors: dict[str, Floats] = {}
         normal, right = self.jacobian[:, on].T @ self.jacobian[:, on], self.jacobian[:, on].T @ base
-        for what, groups in self.groups.items():
-            errors: list[float] = []
-            for group in groups:
-                J = self.jacobian[np.ix_(group, on)]
-                step = _damped(normal - J.T @ J, -(right - J.T @ base[group]))
-                errors.append(self.error_of(base[group] + J @ step, group))
-            errors_by_fold[what] = np.array(errors)
-        return errors_by_fold
-
-    def error_of(self, weighted: Floats, group: np.ndarray) -> float:
-        """Unweighted error of some rows."""
-        whole = np.zeros(self.residual.size)
-        whole[group] = weighted
-        return self.error(whole, group)
+        for kind, folds in self.folds.items():
+            errors[kind] = np.zeros(len(folds))
+            for i, fold in enumerate(folds):
+                J = self.jacobian[np.ix_(fold, on)]
+                step = _damped(normal - J.T @ J, -(right - J.T @ base[fold]))
+                with np.errstate(over="ignore"):  # infinite where the rest determines a parameter by rounding only
+                    squares = np.sum(((base[fold] + J @ step) / self.weights[fold]) ** 2)
+                errors[kind][i] = np.sqrt(squares / np.sum(self.share[fold]))  # one for each whole run
+        return errors
 
     def choose(self, removable: Sequence[ModelTerm]) -> tuple[frozenset[str], tuple[TermTrial, ...]]:
         """Select the terms without which the cross-validated error increases, one after the other."""
@@ -324,20 +305,22 @@ class CrossValidation:
                 tried.append(_tried(term.title, keep, now, without))
                 if not keep:
                     active, now = active - set(term.names), without
-        self.active = active
         return active, tuple(tried)
 
-    def start(self, problem: JointProblem) -> Floats:
-        """Return the start of the selected problem: one step of the linearisation from the fit."""
-        on = np.array([n in self.active or n.startswith("coil.") for n in self.names])
-        shift = np.where(on, 0.0, self.neutral - self.values)
-        J, base = self.jacobian[:, on], self.residual + self.jacobian @ shift
-        moved = self.values + shift
-        moved[on] += solve_linear(J, -base, rank_limit=1e-10)
+    def start(self, problem: JointProblem, active: frozenset[str]) -> Floats:
+        """Return the start of the problem of the selected parameters: one step of the linearisation from the fit."""
+        on, base = self._without(active)
+        moved = np.where(on, self.values, 0.0)
+        moved[on] += solve_linear(self.jacobian[:, on], -base, rank_limit=1e-10)
         values = dict(zip(self.names, moved.tolist(), strict=True))
         lower, upper = problem.box()
         margin = 0.02 * (upper - lower)
         return np.clip([values[a.name] for a in problem.axes], lower + margin, upper - margin)
+
+    def _without(self, active: frozenset[str]) -> tuple[NDArray[np.bool_], Floats]:
+        """Return the parameters that are active, lags of the coil always, and the residual without the others."""
+        on = np.array([n in active or n.startswith("coil.") for n in self.names])
+        return on, self.residual - self.jacobian @ np.where(on, 0.0, self.values)
 
 
 def _damped(normal: Floats, right: Floats) -> Floats:
@@ -355,30 +338,17 @@ def _means(errors: Errors) -> dict[str, float]:
     return {kind: float(np.mean(values)) for kind, values in errors.items()}
 
 
-def _by_condition(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndarray]]:
-    """Rows omitted together: of a condition, or a stretch of another record."""
-    rows_by_key: dict[str, list[np.ndarray]] = {}
-    sines = [i for i, part in enumerate(problem.parts) if part.is_sine and not part.changes]
-    conditions = [problem.parts[i].condition for i in sines]
-    groups = [np.flatnonzero(np.isin(owner, [sines[k] for k in group])) for group in same_condition(conditions)]
-    for i, part in enumerate(problem.parts):
-        if i not in sines:
-            rows = np.flatnonzero(owner == i)
-            cycles = (part.motion.time[-1] - part.motion.time[0]) * part.condition.frequency_Hz
-            groups += np.array_split(rows, max(4, int(cycles / _BLOCK_CYCLES)))
-    if len(groups) > 2:
-        rows_by_key["condition"] = groups
-    return rows_by_key
+def _folds(problem: JointProblem, owner: NDArray[np.intp], sessions: bool) -> dict[str, list[NDArray[np.intp]]]:
+    """Return samples omitted together, by kind: of a condition, or a stretch of another record; of a session if asked.
 
-
-def _by_session(problem: JointProblem, owner: np.ndarray) -> dict[str, list[np.ndarray]]:
-    """Rows of runs recorded in one session, where there are sessions of several runs."""
-    try:
-        sessions = [session_of(run) for run in problem.runs]
-    except InputError:
-        return {}  # a clock that is no date is refused where sessions are used
-    sessions_of_runs = [session for session in sessions if session is not None]
-    rows = dict.fromkeys(sessions_of_runs)
-    if not SESSIONS_NEEDED <= len(rows) < len(sessions_of_runs):
-        return {}
-    return {"session": [np.flatnonzero(np.isin(owner, [i for i, s in enumerate(sessions) if s == n])) for n in rows]}
+    A record that is no sine is a condition by itself; its stretches are predicted from the rest of it, too.
+    """
+    conditions: list[NDArray[np.intp]] = []
+    for group in condition_groups([part.sine for part in problem.parts]):
+        rows, part = np.flatnonzero(np.isin(owner, group)), problem.parts[group[0]]
+        cycles = (part.motion.time[-1] - part.motion.time[0]) * part.condition.frequency_Hz
+        conditions += [rows] if part.sine else np.array_split(rows, max(4, int(cycles / _BLOCK_CYCLES)))
+    folds = {"condition": conditions} if len(conditions) > 2 else {}
+    if sessions and (groups := session_folds(problem.runs)):
+        folds["session"] = [np.flatnonzero(np.isin(owner, group)) for group in groups]
+    return folds

@@ -114,6 +114,11 @@ class RunRows:
             (index_at(at, inside[0]), index_at(at, inside[-1])),
         )
 
+    @property
+    def sine(self) -> Condition | None:
+        """Condition of a sine at one current; None of any other record."""
+        return self.condition if self.is_sine and not self.changes else None
+
     def steady_end(self) -> RunRows:
         """Return the last cycles of the steady part, of other records the last third: enough to compare starts."""
         kept = np.flatnonzero((self.picked >= self.steady[0]) & (self.picked <= self.steady[1]))
@@ -132,7 +137,7 @@ class RunRows:
 
 def envelope_of(parts: Sequence[RunRows]) -> Envelope:
     """Return the ranges of the sines at one current, and every sample and the extreme strokes of the others."""
-    others = [part for part in parts if part.changes or not part.is_sine]
+    others = [part for part in parts if part.sine is None]
     strokes = [stroke for part in others if not part.is_sine for stroke in extreme_strokes(part.motion)]
     envelope = Envelope.of([*(part.condition for part in parts), *strokes])
     extent = np.array([[part.lowest, part.highest] for part in others])

@@ -24,7 +24,7 @@ from mrdamper.dampers.refits import refitted
 from mrdamper.dampers.run_residuals import RunResiduals, normal_matrix
 from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
-from mrdamper.data import Floats, Run, same_condition
+from mrdamper.data import Floats, Run, condition_groups
 from mrdamper.identification.covariance import alike_groups, score_covariance
 from mrdamper.identification.intervals import dof_of_quantile, interval_about, relative_width, student, weaknesses
 from mrdamper.statistics.metrics import dissipated_power, peak_force
@@ -314,11 +314,9 @@ def _without_their_condition(
     scale = np.sqrt(np.diag(normal))
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     root, back = vectors / np.sqrt(values) / scale[:, None], (vectors * np.sqrt(values)).T * scale
-    sines = [k for k, part in enumerate(parts) if part.stretches[0].frequency is not None]
-    folds = [[sines[i] for i in group] for group in same_condition([parts[k].prediction.condition for k in sines])]
-    folds += [[k] for k in range(len(parts)) if k not in sines]
+    sines = [part.prediction.condition if part.stretches[0].frequency is not None else None for part in parts]
     variances = dict[str, _WithoutCondition]()
-    for fold in folds:
+    for fold in condition_groups(sines):
         tables = np.concatenate([parts[k].weighted(slopes[k]) for k in fold]) @ root
         force = np.concatenate([parts[k].weight * parts[k].predicted for k in fold])
         taken, axes = np.linalg.eigh(tables.T @ tables)

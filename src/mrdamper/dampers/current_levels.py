@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mrdamper.data import current_levels
+from mrdamper.data import level_groups
 from mrdamper.models.base import Model
 
 _PASSED_LEVELS = 5  # number of levels of a changing current, which passes through all
 
 
-def levels_of(currents: Sequence[float | None]) -> list[list[int]]:
-    """Return indices of the runs of constant current, by level from the lowest; None: the current changes."""
-    sizes = {i: abs(current) for i, current in enumerate(currents) if current is not None}
-    levels = dict(zip(sizes, current_levels([*sizes.values()]), strict=True)) if sizes else {}
-    return [[i for i in levels if levels[i] == level] for level in sorted({*levels.values()})]
-
-
 def level_count(currents: Sequence[float | None]) -> int:
     """Count the levels of the current."""
-    return _PASSED_LEVELS if None in currents else len(levels_of(currents))
+    return _PASSED_LEVELS if None in currents else len(level_groups(currents))
 
 
 def undetermined(model: type[Model], currents: Sequence[float | None]) -> tuple[str, ...]:

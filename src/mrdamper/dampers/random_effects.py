@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.run_residuals import RunResiduals
-from mrdamper.data import SESSIONS_NEEDED, Floats
+from mrdamper.data import Floats, session_groups
 
 _MIN_RETAINED = 0.05  # share of a variance that the fit must have left in the residuals for it to be estimated
 _MAX_CONDITION = 100.0  # condition number of the equations; beyond, runs and sessions are not separated
@@ -104,9 +104,7 @@ class GainsAndOffsets:
             self._shown[own, own] += solve @ table
             rest = run.residual - table @ self._read[own]
             self._noise[own] = np.sum(solve**2, axis=1) * float(np.average(rest**2, weights=run.weight**2))
-        names = sorted({run.session for run in runs if run.session is not None})
-        members = [[k for k, run in enumerate(runs) if run.session == name] for name in names]
-        self.sessions = members if len(names) >= SESSIONS_NEEDED else []
+        self.sessions = session_groups(run.session for run in runs)
         turned, sizes, _ = np.linalg.svd(self._shown)
         self._turned = turned[:, sizes > _MIN_RETAINED].T  # to the part that the fit has not absorbed
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from mrdamper.data.arrays import Floats
 from mrdamper.data.runs import Run
-from mrdamper.data.sessions import SESSIONS_NEEDED, hour_of, session_of
+from mrdamper.data.sessions import SESSIONS_NEEDED, hour_of, session_folds, session_groups, session_of
 from mrdamper.data.strict_text import STRICT
 from mrdamper.errors import InputError
 
@@ -190,9 +190,8 @@ class Sessions:
         """
         when = tuple(RecordingTime.of(run) for run in runs)
         _refuse_disorder(runs, when)
-        names = [w.session for w in when if w.session is not None]
-        count = len(set(names))
-        if count < SESSIONS_NEEDED or count == len(names):
+        if not session_folds(runs):
+            count = len({w.session for w in when} - {None})
             reason = "every session holds one run" if count >= SESSIONS_NEEDED else f"{count} known sessions"
             raise InputError(
                 f"{reason}: the scatter between sessions cannot be estimated", remedy=_REMEDY, code="E_SESSION"
@@ -214,20 +213,16 @@ class Sessions:
 
     def deviating(self) -> dict[str, float]:
         """Return the gains [-] of sessions that differ from the others far more than these from each other."""
-        gains: dict[str, list[float]] = {}
-        for when, gain in zip(self.when, self.gains, strict=True):
-            gains.setdefault(when.session or "", []).append(gain)
-        gains.pop("", None)
+        groups = session_groups(when.session for when in self.when)
         alone = float(np.hypot(self.gain.hour, self.gain.run))
+        gains = [[self.gains[i] for i in group] for group in groups]
         ratios: dict[str, float] = {}
-        for name, own in gains.items():
-            others = [float(np.mean(values)) for other, values in gains.items() if other != name]
-            if len(others) + 1 < SESSIONS_NEEDED:
-                break
+        for group, own in zip(groups, gains, strict=True):
+            others = [float(np.mean(values)) for values in gains if values is not own]
             usual = float(np.median(others))
             scatter = np.hypot(np.std(others, ddof=1), alone / np.sqrt(len(own)))
             if abs(np.mean(own) - usual) > max(_MIN_DEVIATION, _DEVIATION_RATIO * float(scatter)) * usual:
-                ratios[name] = float(np.mean(own)) / usual
+                ratios[str(self.when[group[0]].session)] = float(np.mean(own)) / usual
         return ratios
 
     def seen(self, damper: Damper, runs: Iterable[Run], own: bool) -> Sessions:

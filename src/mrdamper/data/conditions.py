@@ -133,6 +133,26 @@ def _levels(currents: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(levels.tolist())
 
 
+def level_groups(currents: Sequence[float | None]) -> dict[float, list[int]]:
+    """Group the indices of currents by their level of the test matrix [A], from the lowest, in either direction.
+
+    None is a current that changes, which is of no level.
+    """
+    constant = {i: abs(current) for i, current in enumerate(currents) if current is not None}
+    groups: dict[float, list[int]] = {}
+    for i, level in zip(constant, current_levels([*constant.values()]), strict=True):
+        groups.setdefault(level, []).append(i)
+    return dict(sorted(groups.items()))
+
+
+def condition_groups(conditions: Sequence[Condition | None]) -> list[list[int]]:
+    """Group the indices of runs by condition; each run of none, as a record that is no sine, is a group by itself."""
+    rows = [i for i, condition in enumerate(conditions) if condition is not None]
+    groups = same_condition([condition for condition in conditions if condition is not None])
+    alone = [[i] for i, condition in enumerate(conditions) if condition is None]
+    return [[rows[k] for k in group] for group in groups] + alone
+
+
 def same_condition(conditions: Sequence[Condition]) -> list[list[int]]:
     """Group the indices of conditions that agree in current and, to 3 %, in frequency and amplitude."""
     return [list(group) for group in _grouped(tuple(conditions), _SAME, True)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 
 from mrdamper.data.runs import Run
@@ -28,6 +29,30 @@ def session_of(run: Run) -> str | None:
         return stated
     clock = _clock_of(run)
     return None if clock is None else clock.date().isoformat()
+
+
+def session_groups(sessions: Iterable[str | None]) -> list[list[int]]:
+    """Group the indices of runs by session, in the order of the names; empty under three known sessions.
+
+    A run of unknown session is in no group.
+    """
+    groups: dict[str, list[int]] = {}
+    for i, session in enumerate(sessions):
+        if session is not None:
+            groups.setdefault(session, []).append(i)
+    return [groups[name] for name in sorted(groups)] if len(groups) >= SESSIONS_NEEDED else []
+
+
+def session_folds(runs: Sequence[Run]) -> list[list[int]]:
+    """Return the indices of runs omitted together as a session; empty where each session holds one run.
+
+    Also empty where the clock of a run is no date, which is refused where sessions are asked for.
+    """
+    try:
+        groups = session_groups([session_of(run) for run in runs])
+    except InputError:
+        return []
+    return groups if any(len(group) > 1 for group in groups) else []
 
 
 def hour_of(run: Run) -> float | None:

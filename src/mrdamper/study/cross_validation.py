@@ -6,7 +6,7 @@ stretch of a long record. Every run is predicted by a damper identified without 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from itertools import pairwise
 
@@ -14,10 +14,11 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import PredictedRun
-from mrdamper.data import SESSIONS_NEEDED, Condition, Run, current_levels, same_condition, same_motion, session_of
+from mrdamper.data import Condition, Run, condition_groups, level_groups, same_motion, session_folds
 from mrdamper.data.arrays import index_at
 from mrdamper.errors import InputError
 from mrdamper.physics.motion import equivalent_sine
+from mrdamper.physics.motion.sines import sine_condition
 from mrdamper.study.validation import RunScore, Validation, leave_out
 
 _MOTION_TOLERANCE = 0.05  # frequencies and amplitudes this close are one motion
@@ -44,21 +45,19 @@ def folds_by_kind(pieces: Sequence[Run]) -> dict[str, list[list[int]]]:
     "other records": all records except sines at one current. A kind is absent where it would leave fewer than two
     levels, two motions or two sessions.
     """
-    motions = [equivalent_sine(piece) for piece in pieces]
-    sines = [i for i, motion in enumerate(motions) if motion.is_sine and not pieces[i].current_changes]
-    conditions = [motions[i].condition for i in sines]
+    sines = {i: condition for i, piece in enumerate(pieces) if (condition := sine_condition(piece))}
     folds: dict[str, list[list[int]]] = {}
-    levels = np.array(current_levels([c.current_A for c in conditions]))
-    if np.unique(levels).size > 2:
-        by_level = {level: [sines[k] for k in np.flatnonzero(levels == level)] for level in np.unique(levels)}
+    by_level = level_groups([sines[i].current_A if i in sines else None for i in range(len(pieces))])
+    if len(by_level) > 2:
         folds["current"] = [group for level, group in by_level.items() if level > 0]
         if 0.0 in by_level:
             folds[NO_CURRENT] = [by_level[0.0]]
-    if fastest := _fastest([motions[i].condition for i in sines]):
-        folds["fastest motions"] = [[sines[k] for k in fastest]]
-    if sessions := _sessions(pieces):
+    if fastest := _fastest(sines):
+        folds["fastest motions"] = [fastest]
+    sessions = session_folds(pieces)
+    if sum(map(len, sessions)) == len(pieces):  # errors by session are compared between models, of all runs
         folds["session"] = sessions
-    others = [i for i in range(len(pieces)) if i not in set(sines)]
+    others = [i for i in range(len(pieces)) if i not in sines]
     if others and len(sines) > 2:
         folds["other records"] = [others]
     return folds
@@ -71,34 +70,19 @@ def all_folds(pieces: Sequence[Run]) -> list[list[int]]:
 
 def condition_folds(pieces: Sequence[Run]) -> list[list[int]]:
     """Return indices of the runs of every condition; records that are no sine at one current are a condition each."""
-    motions = [equivalent_sine(piece) for piece in pieces]
-    sines = [i for i, motion in enumerate(motions) if motion.is_sine and not pieces[i].current_changes]
-    groups = same_condition([motions[i].condition for i in sines])
-    alone = [[i] for i in range(len(pieces)) if i not in set(sines)]
-    return [[sines[k] for k in group] for group in groups] + alone
+    return condition_groups([sine_condition(piece) for piece in pieces])
 
 
-def _fastest(conditions: Sequence[Condition]) -> list[int]:
+def _fastest(sines: Mapping[int, Condition]) -> list[int]:
     """Return the sines of the largest peak velocities, one motion at least; empty if fewer than two would remain."""
-    groups = same_motion(conditions, _MOTION_TOLERANCE) if conditions else []
-    groups.sort(key=lambda group: -max(conditions[k].peak_velocity for k in group))
+    rows = [*sines]
+    groups = [[rows[k] for k in group] for group in same_motion([*sines.values()], _MOTION_TOLERANCE)]
+    groups.sort(key=lambda group: -max(sines[i].peak_velocity for i in group))
     if len(groups) < 3:
         return []
-    speeds = [max(conditions[k].peak_velocity for k in group) for group in groups]
+    speeds = [max(sines[i].peak_velocity for i in group) for group in groups]
     count = int(np.clip(np.sum(np.array(speeds) >= _FAST_VELOCITY_RATIO * speeds[0]), 1, len(groups) - 2))
-    return [k for group in groups[:count] for k in group]
-
-
-def _sessions(pieces: Sequence[Run]) -> list[list[int]]:
-    """Return runs of every session; none where a session is unknown, where there are fewer than three, or one a run."""
-    try:
-        named = [session_of(piece) for piece in pieces]
-    except InputError:
-        return []  # a clock that is no date is refused where sessions are asked for
-    names = sorted({name for name in named if name is not None})
-    if len(names) < SESSIONS_NEEDED or len(names) == len(pieces) or None in named:
-        return []
-    return [[i for i, own in enumerate(named) if own == name] for name in names]
+    return [i for group in groups[:count] for i in group]
 
 
 def cross_validate_by_kind(
@@ -123,11 +107,10 @@ def cross_validate_by_kind(
 
 def stretches(run: Run) -> list[Run]:
     """Divide a record that is no sine into stretches of a dozen cycles or more, eight at most; keep a sine."""
-    motion = equivalent_sine(run)
-    period = 1 / motion.condition.frequency_Hz
+    period = 1 / equivalent_sine(run).condition.frequency_Hz
     begin, end = run.window or (float(run.time[0]), float(run.time[-1]))
     count = min(_MAX_STRETCHES, int((end - begin) / period / _MIN_STRETCH_CYCLES))
-    if (motion.is_sine and not run.current_changes) or count < 2:
+    if sine_condition(run) is not None or count < 2:
         return [run]
     cuts: list[int] = np.searchsorted(run.time, np.linspace(begin, end, count + 1)).tolist()
     parts: list[Run] = []

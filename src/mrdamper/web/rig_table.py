@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from mrdamper.data import Condition, Dataset, Run, current_levels, same_motion
+from mrdamper.data import Condition, Dataset, Run, level_groups, same_motion
 from mrdamper.data.encoding import finite
 from mrdamper.errors import InputError
 from mrdamper.identification.loop_analysis import LoopAnalysis, analyse_loop
@@ -81,7 +81,7 @@ class RigTable:
     @property
     def currents(self) -> list[float]:
         """Levels of the steady sines [A], ascending."""
-        return sorted(set(current_levels([condition.current_A for _, condition in self.steady])))
+        return [*level_groups([condition.current_A for _, condition in self.steady])]
 
     def row(self, key: str) -> TableRow:
         """Return a row by its key; raises `InputError` if there is none."""

@@ -108,6 +108,12 @@ def equivalent_sine(run: Run) -> EquivalentSine:
     return EquivalentSine(condition, float(np.mean(motion.displacement)), False)
 
 
+def sine_condition(run: Run) -> Condition | None:
+    """Return the condition of a run that is a sine at one current; None of any other record."""
+    sine = equivalent_sine(run)
+    return sine.condition if sine.is_sine and not run.current_changes else None
+
+
 def extreme_strokes(motion: Excitation) -> list[Condition]:
     """Return the slowest, fastest, shortest and longest strokes of a record as half cycles of sines.
 

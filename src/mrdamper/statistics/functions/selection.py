@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mrdamper.data import Condition, Floats, current_levels, same_condition, same_motion
+from mrdamper.data import Condition, Floats, level_groups, same_condition, same_motion
 from mrdamper.statistics.functions.forms import Form, ParameterFunction
 from mrdamper.statistics.functions.motion_hull import MotionHull
 
@@ -73,11 +73,10 @@ def fold_groups(conditions: Sequence[Condition]) -> dict[str, list[list[int]]]:
     """Group the indices of conditions omitted together, by kind of fold: a condition, an inner current, a motion.
 
     A form is selected for interpolation: a fold without the lowest or the highest current would need an extrapolation
-    that two remaining levels do not support.
+    that two remaining levels do not support. Dampers are scored on these, too (`study.cross_validation`).
     """
     groups = {"condition": same_condition(conditions)}
-    levels = np.array(current_levels([abs(c.current_A) for c in conditions]))
-    currents = [np.flatnonzero(levels == level).tolist() for level in np.unique(levels)]
+    currents = [*level_groups([c.current_A for c in conditions]).values()]
     motions = same_motion(conditions, _MOTIONS)
     if len(currents) > 2:
         groups["current"] = currents[1:-1]
@@ -92,7 +91,7 @@ def supported(form: Form, conditions: Sequence[Condition]) -> bool:
     Two levels determine a straight line: a function of current has a parameter fewer than there are levels, but at
     least two if there are several.
     """
-    levels = len(set(current_levels([abs(c.current_A) for c in conditions])))
+    levels = len(level_groups([c.current_A for c in conditions]))
     over_current = 1 if levels < 2 else max(levels - 1, 2)
     return form.current_terms <= over_current and form.motion_terms <= max(
         len(same_motion(conditions, _MOTIONS)) - 2, 0
@@ -105,7 +104,7 @@ def broken_law(function: ParameterFunction, conditions: Sequence[Condition], uni
     It is of a parameter that must not be negative: a yield force [N], a viscous damping. A parameter in N is a yield
     force and may not fall where a straight line over the current does not. Empty if it violates none.
     """
-    tested = np.unique(current_levels([abs(c.current_A) for c in conditions]))
+    tested = np.array([*level_groups([c.current_A for c in conditions])])
     currents = np.unique(np.concatenate([np.linspace(0.0, BEYOND * float(tested[-1]), 61), tested]))
     motions = MotionHull.of(conditions).corners
     values = np.array([np.broadcast_to(function(currents, *motion), currents.shape) for motion in motions])
