@@ -10,6 +10,7 @@ import pytest
 sys.path.insert(0, str(Folder(__file__).parents[2]))
 
 from benchmarks.virtual_dampers import DAMPERS, identified
+from mrdamper.dampers.run_residuals import RunResiduals
 from mrdamper.physics.motion import Path
 from mrdamper.physics.motion.lag import leaking_load
 from mrdamper.physics.motion.measured import smooth, whole_clock
@@ -39,6 +40,16 @@ def test_an_unseen_record_is_predicted_to_the_noise_and_its_own_are_no_extrapola
     assert all(score_run(damper, run).extrapolation == () for run in virtual.runs())
     far = replace(virtual, current=2 * virtual.current).unseen()
     assert "current" in score_run(damper, far).extrapolation
+
+
+def test_a_record_that_is_no_sine_has_no_frequency_though_its_damper_was_identified_from_such(switched):
+    virtual, made = switched
+    damper, run = made.choice.fit.damper, virtual.runs()[0]
+    assert damper.envelope.any_motion
+    residuals = RunResiduals.of(damper, run)
+    assert not damper.predict(run).is_sine
+    assert residuals.stretches[0].frequency is None
+    assert np.ptp(residuals.stretches[0].time) > 0.9 * np.ptp(run.time)
 
 
 def test_parameters_of_another_kind_of_damper_are_found_without_tuning():

@@ -25,7 +25,7 @@ from mrdamper.data.strict_text import STRICT
 from mrdamper.errors import InputError, validate_arguments
 from mrdamper.models.base import Model
 from mrdamper.physics.motion.excitation import Excitation
-from mrdamper.physics.motion.sines import centred_motion, equivalent_sine
+from mrdamper.physics.motion.sines import centred_motion, equivalent_sine, sine_condition
 from mrdamper.physics.simulation import ForceLaw, Response, simulate, steady_loop
 from mrdamper.statistics.functions.forms import ParameterFunction
 from mrdamper.statistics.functions.motion_hull import MotionHull
@@ -253,9 +253,9 @@ class Damper(Displayable):
             run, motion = Run("excitation", at.time, at.displacement, np.zeros(len(at)), at.current), at
         else:
             run, motion = at, centred_motion(at)
-        sine = equivalent_sine(run)
-        if sine.is_sine and not run.current_changes:
-            flags = self.envelope.flags(sine.condition)
+        condition = equivalent_sine(run).condition
+        if is_sine := sine_condition(run) is not None:
+            flags = self.envelope.flags(condition)
         else:
             flags = (
                 *(beyond.quantity for beyond in self.envelope.outside(motion)),
@@ -266,7 +266,7 @@ class Damper(Displayable):
             and samples_in_yield_displacement(motion, self.yield_length) < _MIN_YIELD_SAMPLES
         ):
             flags = (*flags, COARSE)
-        prediction = Prediction(motion, np.zeros(len(motion)), sine.condition, flags)
+        prediction = Prediction(motion, np.zeros(len(motion)), condition, flags, is_sine=is_sine)
         return replace(prediction, force=self.force_for(prediction))
 
     def force_for(self, prediction: Prediction) -> Floats:

@@ -37,6 +37,8 @@ class Prediction(Displayable):
         Quantities outside the tested envelope; empty inside.
     steady : bool
         One closed loop of the steady response, not a motion from rest.
+    is_sine : bool
+        Whether the motion is the sine of the condition, at one current.
 
     Examples
     --------
@@ -54,6 +56,7 @@ class Prediction(Displayable):
     condition: Condition
     extrapolation: tuple[str, ...]
     steady: bool = False
+    is_sine: bool = True
 
     def corrected(self, gain: float, offset: float) -> Prediction:
         """Return the prediction with another gain and offset [N] of the force."""
@@ -62,11 +65,6 @@ class Prediction(Displayable):
     def distance(self, damper: DamperLike) -> Distance:
         """Distance from the tests of the damper that the prediction is of."""
         return distance_from_tests(damper, self.condition, self.motion.current)
-
-    @property
-    def is_sine(self) -> bool:
-        """True where the motion is the sine of the condition."""
-        return NOT_A_SINE not in self.extrapolation
 
     @property
     def headline(self) -> str:
