@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,6 +46,7 @@ _MOTIONS = (  # dimension and name of a column, relative difference of two tests
     ("frequency", re.compile(r"(?i)^(?:f\b|freq|frec|fréq|част|频率|周波数|częst)"), 0.15, "Hz", 1.0),
     ("length", re.compile(r"(?i)ampl|^x_?0$|^(?:stroke|hub|course|carrera|corsa)$|振幅|행정|行程"), 0.5, "mm", 1e3),
 )
+_Tests = Sequence[tuple[Path, Record]]
 _REMARKS = frozenset((*words("notes"), *words("remarks")))
 _STAMP = re.compile(  # 20190603_140512, 2019-06-03T14:05:12
     r"(?<![0-9])20[0-9]{2}-?[01][0-9]-?[0-3][0-9][T_ -](?P<hour>[0-2][0-9])[:-]?(?P<minute>[0-5][0-9])"
@@ -79,33 +80,42 @@ def results_of(path: Path, form: FileForm | None = None) -> Results | None:
     return several if len(sheets) > 1 else first
 
 
-def currents_beside(
-    path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]
-) -> list[tuple[float, str]] | None:
-    """Return the current [A] of every test and where it stands, by a table of results or a legend: I1 = 0.3 A.
+def currents_beside(path: Path, results: Results | None, tests: _Tests) -> list[tuple[float, str]] | None:
+    """Return the current [A] of every test and where it stands, by the first statement of a file that has each of them.
 
-    None unless one of them names every test; a legend's codes stand in the names of files, between separators.
+    The statements are those of its table of results, of a scheme of names and of a legend. None if there is none.
     """
     clocks = [(record.time, record.lines) for _, record in tests]
-    timed = results.rows_in_range(clocks) if results else {}
-    if results and not timed and results.on_clock(clocks) and len({file for file, _ in tests}) == 1 < len(tests):
+    one_record = len({file for file, _ in tests}) == 1 < len(tests)
+    if results and one_record and results.on_clock(clocks) and not results.rows_in_range(clocks):
         return None
-    by_test = {i: results.current[row] for i, (row, _) in timed.items()} if results else {}
-    by_test = by_test or (results.by_test(_called(tests)) if results else {})
-    folders = [(file.parent.name,) for file, _ in tests]
-    if results and len({*folders}) == len(tests):
-        by_test = by_test or results.by_test(folders, by_number=False)
-    by_test = by_test or (results.by_folder([folder for (folder,) in folders], _called(tests)) if results else {})
-    if results and len(by_test) == len(tests):
-        currents = [(tests[i][1], current) for i, current in by_test.items()]
-        if results.of_supply and not forces_grow(currents, repeated=True):
-            return None
-        return [(by_test[i], f"{path.name}, {results.title}") for i in range(len(tests))]
+    stated = next((of for of in _by_rows(results, tests) if len(of) == len(tests)), None) if results else None
+    if results and stated is not None:
+        grow = results.of_supply and forces_grow(
+            [(tests[i][1], current) for i, current in stated.items()], repeated=True
+        )
+        titled = [(stated[i], f"{path.name}, {results.title}") for i in range(len(tests))]
+        return titled if grow or not results.of_supply else None
     lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
-    rows = (
-        zip(results.cells, results.current, strict=True) if results and not results.of_supply else ()
-    )  # Level, Current (A): L1, 0.35
-    lines += [f"{cells[1]}: {value:g} A" for cells, value in rows if len(cells) > 1]
+    rows = zip(results.cells, results.current, strict=True) if results and not results.of_supply else ()
+    lines += [f"{cells[1]}: {value:g} A" for cells, value in rows if len(cells) > 1]  # Level, Current (A): L1, 0.35
+    titled = _by_scheme(lines, results, tests) or _by_legend(lines, tests)
+    return [(current, f"{path.name}, {title}") for current, title in titled] or None
+
+
+def _by_rows(results: Results, tests: _Tests) -> Iterator[Mapping[int, float]]:
+    """Yield the current [A] of tests, by their place, by each way in which the rows of a table may name them."""
+    called, folders = _called(tests), [file.parent.name for file, _ in tests]
+    ranges = results.rows_in_range([(record.time, record.lines) for _, record in tests])
+    yield {i: results.current[row] for i, (row, _) in ranges.items()}
+    yield results.by_test(called)
+    if len({*folders}) == len(tests):
+        yield results.by_test([(folder,) for folder in folders], by_number=False)
+    yield results.by_folder(folders, called)
+
+
+def _by_legend(lines: Sequence[str], tests: _Tests) -> list[tuple[float, str]]:
+    """Return the current [A] and the code of every test, by a legend of codes that stand in names: I1 = 0.3 A."""
     files = [{file.name.casefold(), file.stem.casefold()} for file, _ in tests]
     called = set().union(*files)
     stated, ratings = set(), False
@@ -117,21 +127,17 @@ def currents_beside(
         stated |= {*legends} if not (rating or ratings) else set()
         if line.strip() and not legends:  # a heading: Fuses
             ratings = rating
-    if by_scheme := _by_scheme(lines, results, [file for file, _ in tests]):
-        return [(current, f"{path.name}, the names of files") for current in by_scheme]
     names_of = [f"{file.stem} {record.id}".casefold() for file, record in tests]
     stems = [re.sub(r"(?<=[A-Za-z])0+(?=[0-9])", "", name) for name in names_of]
     words = [[*re.split(r"[^0-9A-Za-z]+", s), *_DECIMAL_CODE.findall(s.replace(",", "."))] for s in stems]
     codes = _with_scale(dict(stated), {word for own in words for word in own})
     if len(codes) < 2 or len(codes) < len(stated):
-        return None
+        return []
     own = [[code for code in codes if code in {*parts} | names] for parts, names in zip(words, files, strict=True)]
-    if any(len(of_test) != 1 for of_test in own):
-        return None
-    return [(codes[code], f"{path.name}, {code.upper()}") for (code,) in own]
+    return [(codes[of[0]], of[0].upper()) for of in own] if all(len(of) == 1 for of in own) else []
 
 
-def other_motions(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> InputError | None:
+def other_motions(path: Path, results: Results | None, tests: _Tests) -> InputError | None:
     """Return the refusal of a plan of which a test moves at another frequency, or by another amplitude, than its row.
 
     Amplitudes, which may be strokes peak to peak, are compared with each other.
@@ -169,7 +175,7 @@ def _motion(record: Record) -> dict[str, float]:
     return {"Hz": 1 / strokes.period, "mm": float(np.median(strokes.lengths)) / 2}
 
 
-def discarded_tests(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> dict[int, InputError]:
+def discarded_tests(path: Path, results: Results | None, tests: _Tests) -> dict[int, InputError]:
     """Return the refusal of each test that a remark in a plan calls invalid, aborted, repeated or a warm-up."""
     rows = [[*zip(results.keys, cells, strict=True)] for cells in results.cells] if results else []
     texts = [[f"{key}: {cell}" for key, cell in row if _discards(key, cell)] for row in rows]
@@ -209,20 +215,20 @@ def remarks_of(path: Path) -> Results | None:
     return None
 
 
-def named_tests(results: Results | None, tests: Sequence[tuple[Path, Record]]) -> list[int]:
+def named_tests(results: Results | None, tests: _Tests) -> list[int]:
     """Return the places of the tests that a table of results names, by more than a number."""
     cells = {cell.casefold() for row in (results.cells if results else ()) for cell in row if not cell.isdigit()}
     return [i for i, names in enumerate(_called(tests)) if (cells - {""}) & {name.casefold() for name in names}]
 
 
-def misfit_of_plan(path: Path, results: Results | None, tests: Sequence[tuple[Path, Record]]) -> Finding | None:
+def misfit_of_plan(path: Path, results: Results | None, tests: _Tests) -> Finding | None:
     """Return the finding that a plan, which names most tests without a current, has one twice or lacks others."""
     text = results.misfit(_called(tests)) if results else ""
     problem = printable(f"{NO_CHANNEL}missing: {path.name} {text}: if so, correct the plan")
     return Finding("W_COLUMN", problem) if text else None
 
 
-def currents_listed(path: Path, tests: Sequence[tuple[Path, Record]]) -> list[tuple[float, str]] | None:
+def currents_listed(path: Path, tests: _Tests) -> list[tuple[float, str]] | None:
     """Return the current [A] of every test and where it stands, by the only list of currents in a text: 0, 0.5 and 1 A.
 
     None unless the names of the tests, or of those of each file, count as many, alike in motion, and their forces grow
@@ -259,13 +265,13 @@ def _with_scale(codes: dict[str, float], words: Collection[str]) -> dict[str, fl
     return {**more, **codes}
 
 
-def _by_scheme(lines: Sequence[str], results: Results | None, files: Sequence[Path]) -> list[float]:
-    """Return the current [A] of each file by a scheme of their names, or by the number in it and a table of results.
+def _by_scheme(lines: Sequence[str], results: Results | None, tests: _Tests) -> list[tuple[float, str]]:
+    """Return the current [A] of each test by a scheme of names of files, or the number in it and a table of results.
 
     Thus <coil current in A>, or <duty %> with a table of the current by the duty; empty unless all files have one.
     What a letter or word of a name stands for, a line of its own may tell: MRD_iiii_ff.csv, iiii: coil current in mA.
     """
-    stated: set[tuple[float, ...]] = set()
+    files, stated = [file for file, _ in tests], set[tuple[float, ...]]()
     meant = {m[1]: f"<{m[2]}>" for m in map(_PLACE.match, lines) if m}
     names = [name for line in lines for name in re.findall(r"\w+_[\w.]+", line) if meant]
     lines = [*lines, *(re.sub("[^\\W\\d_]+", lambda m: meant.get(m[0], m[0]), name) for name in names)]
@@ -282,7 +288,7 @@ def _by_scheme(lines: Sequence[str], results: Results | None, files: Sequence[Pa
                 by_number = {number: header.factor * number for number in numbers}
             if len(numbers) == len(files) and {*numbers} <= {*by_number}:
                 stated.add(tuple(by_number[number] for number in numbers))
-    return [*stated.pop()] if len(stated) == 1 else []
+    return [(current, "the names of files") for current in stated.pop()] if len(stated) == 1 else []
 
 
 def _meant(key: str, files: Collection[str]) -> list[str]:
@@ -295,14 +301,14 @@ def _meant(key: str, files: Collection[str]) -> list[str]:
     return [f"{code[1].casefold()}{number}" for number in range(int(code[2]), int(code[3] or code[2]) + 1)]
 
 
-def within_ranges(tests: Sequence[tuple[Path, Record]], results: Results | None) -> list[tuple[Path, Record]]:
+def within_ranges(tests: _Tests, results: Results | None) -> list[tuple[Path, Record]]:
     """Return the tests that have a row in a table of results, between the starts and ends it states, if it does."""
     rows = results.rows_in_range([(record.time, record.lines) for _, record in tests]) if results else {}
     parts = [(file, part_of_record(record, rows[i][1])) for i, (file, record) in enumerate(tests) if i in rows]
     return parts or [*tests]
 
 
-def _called(tests: Sequence[tuple[Path, Record]]) -> list[tuple[str, ...]]:
+def _called(tests: _Tests) -> list[tuple[str, ...]]:
     """Names of each test: its own, of its file, its own without that, of its block, and when it was recorded."""
     stems = [re.sub(r"[^\w.+=-]+", "_", file.stem) for file, _ in tests]
     blocks = [record.provenance.get("block", "") for _, record in tests]
