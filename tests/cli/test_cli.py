@@ -97,8 +97,7 @@ def test_predict_along_a_motion_from_a_file(model, tmp_path):
     motion.write_text("time_s,displacement_m\n" + "\n".join(lines) + "\n")
     done = mrdamper("predict", model, "--motion", motion, "--current", 0.5, "--json")
     assert done.returncode == 0, done.stderr
-    rows = json.loads(done.stdout)
-    assert len(rows) == 801
+    assert len(json.loads(done.stdout)["samples"]) == 801
     refused = mrdamper("predict", model, "--motion", motion)
     assert refused.returncode == 2
     assert "give --current A" in refused.stderr
@@ -108,7 +107,28 @@ def test_extrapolation_is_warned_of_and_flagged(model):
     done = mrdamper("predict", model, "--current", 2, "--frequency", 2, "--amplitude", 10, "--json")
     assert done.returncode == 0
     assert "warning: current 2 A lies above the tested range (" in done.stderr
-    assert json.loads(done.stdout)[0]["extrapolation"] == "current"
+    told = json.loads(done.stdout)
+    assert told["samples"][0]["extrapolation"] == "current"
+    assert told["peak_force_N"]["value"] > 0
+    assert told["peak_force_N"]["low"] is None  # nothing is known of this model's errors
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "remedy"),
+    [("--frequency", "-1", "give a positive number"), ("--amplitude", "0", "give a positive number"),
+     ("--frequency", "nan", "give a positive number"), ("--current", "-1", "give zero or more")],
+)  # fmt: skip
+def test_a_condition_that_no_test_has_is_refused_with_a_remedy_that_works(model, option, value, remedy):
+    given = {"--current": "0.5", "--frequency": "2", "--amplitude": "10"} | {option: value}
+    refused = mrdamper("predict", model, *(word for pair in given.items() for word in pair))
+    assert refused.returncode == 2
+    assert f"{option} {value}; {remedy}" in refused.stderr
+
+
+def test_a_forgotten_prefix_of_a_unit_is_suggested(model):
+    done = mrdamper("predict", model, "--current", 500, "--frequency", 2, "--amplitude", 0.01)
+    assert "500 mA are 0.5 A" in done.stderr
+    assert "0.01 m are 10 mm" in done.stderr
 
 
 def test_a_gap_in_the_motion_and_coarse_sampling_are_said(model, tmp_path):
@@ -185,7 +205,7 @@ def test_bad_input_is_one_line_and_exit_two(model, tmp_path):
         (("identify", "--gas", "1.5,150"), "write --gas P,V,A"),
         (("predict", model), "give --current A --frequency Hz --amplitude mm"),
         (("predict", tmp_path / "newer.json", "--current", 1), "update mrdamper"),
-        (("predict", model, "--current", 1, "--frequency", 0, "--amplitude", 10), "frequency_Hz is 0"),
+        (("predict", model, "--current", 1, "--frequency", 0, "--amplitude", 10), "--frequency 0; give a positive"),
         (("predict", model, "--motion", tmp_path / "none.csv"), "no such file"),
         (("validate", model, "--rig", "utfms"), "did you mean utfsm"),
         (("validate", model, "--split", "test"), "known: train, validate"),

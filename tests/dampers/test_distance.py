@@ -67,7 +67,10 @@ def test_where_only_ranges_are_known_no_distance_is():
         ),
         ((0.5, 1.0, 0.009), ["velocity 0.0565 m/s lies below the tested range (0.0628 to 0.126 m/s) by 10 %"]),
         ((6.0, 1.0, 0.02), ["current 6 A lies above the tested range (0 to 2 A), 3 times the largest"]),
-        ((600.0, 1.0, 0.02), ["current 600 A lies above the tested range (0 to 2 A), 300 times the largest"]),
+        (
+            (600.0, 1.0, 0.02),
+            ["current 600 A lies above the tested range (0 to 2 A), 300 times the largest; 600 mA are 0.6 A"],
+        ),
     ],
 )
 def test_a_quantity_outside_is_stated_with_its_side_and_by_how_much(condition, sentences):

@@ -164,6 +164,10 @@ def test_the_command_writes_the_band(damper, tmp_path):
     assert got.exit_code == 0
     head = (tmp_path / "a.csv").read_text().splitlines()[0].split(",")
     assert {"force_N", "force_low_N", "force_high_N"} <= set(head)
+    got = runner.invoke(application(), ["predict", str(path), *ask, "--json", "--out", str(tmp_path / "a.json")])
+    peak = json.loads((tmp_path / "a.json").read_text())["peak_force_N"]
+    assert peak["low"] < peak["value"] < peak["high"]
+    assert f"{peak['value']:.4g} N, 90 % prediction interval {peak['low']:.4g} to {peak['high']:.4g} N" in got.stderr
     save_model(joint_damper(), path)
     got = runner.invoke(application(), ["predict", str(path), *ask, "--out", str(tmp_path / "b.csv")])
     assert "force_low_N" not in (tmp_path / "b.csv").read_text()

@@ -22,10 +22,14 @@ Rows = Sequence[Mapping[str, Any]]
 
 def put(rows: Rows, out: Path | None, as_json: bool, as_csv: Callable[[Rows], str]) -> None:
     """Write rows to standard output or, atomically, to a file."""
+    put_text(json.dumps(json_rows(rows), indent=1) + "\n" if as_json else as_csv(rows), out)
+
+
+def json_rows(rows: Rows) -> list[dict[str, Any]]:
+    """Return rows for JSON, which has no number that is not finite."""
     from mrdamper.data.encoding import finite
 
-    plain = [{k: finite(v) if isinstance(v, float) else v for k, v in row.items()} for row in rows]
-    put_text(json.dumps(plain, indent=1) + "\n" if as_json else as_csv(rows), out)
+    return [{k: finite(v) if isinstance(v, float) else v for k, v in row.items()} for row in rows]
 
 
 def put_text(text: str, out: Path | None) -> None:

@@ -23,6 +23,7 @@ _SUM_WEIGHT = 10.0  # weight of the sum of shares, which is one, against distanc
 _UNITS = {"current": "A", "frequency": "Hz", "velocity": "m/s"}
 SAME_CURRENT = 1e-3  # A; a current that varies less is one current
 _LOGARITHM_FLOOR = 1e-12  # frequency [Hz] and amplitude [m] that replace zero in a logarithm
+_SLIP = 20.0  # a quantity so many times outside the tests may have been given in another unit
 
 
 class Beyond(NamedTuple):
@@ -44,8 +45,17 @@ class Beyond(NamedTuple):
         by = f" by {100 * share:.0f} %" if share < 1 else f", {times:g} times the largest" if high else ""
         return (
             f"{self.quantity} {scale * self.value:.3g} {unit} lies {side} the tested range "
-            f"({scale * low:.3g} to {scale * high:.3g} {unit}){by}"
+            f"({scale * low:.3g} to {scale * high:.3g} {unit}){by}{self._other_unit()}"
         )
+
+    def _other_unit(self) -> str:
+        """Name the unit in which a current or an amplitude would be a tested one, where milli- was forgotten."""
+        (low, high), value = self.tested, self.value
+        if self.quantity == "current" and value > _SLIP * high and low <= 1e-3 * value:
+            return f"; {value:g} mA are {1e-3 * value:g} A"
+        if self.quantity == "amplitude" and low > _SLIP * value and 1e3 * value <= high:
+            return f"; {1e3 * value:g} m are {1e6 * value:g} mm"
+        return ""
 
 
 @dataclass(frozen=True)

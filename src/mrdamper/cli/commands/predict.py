@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from mrdamper.cli.output import put, put_figure
+from mrdamper.cli.output import json_rows, put_figure, put_text
 from mrdamper.errors import ConditionError, InputError
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def predict(
     level: float = typer.Option(0.9, help="Coverage of the prediction interval."),
     out: Path | None = typer.Option(None, help="CSV to write; default: standard output."),
     plot: Path | None = typer.Option(None, help="Figure of the force to write (.png, .svg or .pdf)."),
-    as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV."),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON instead of CSV, with peak force, energy, damping."),
 ) -> None:
     """Predict the force at a test condition or along a motion.
 
@@ -48,15 +49,15 @@ def predict(
     """
     from mrdamper.dampers.bands import band, no_band, scope
     from mrdamper.data.atomic import require_writable
-    from mrdamper.data.encoding import csv_text
+    from mrdamper.data.encoding import csv_text, finite
     from mrdamper.identification.intervals import student
     from mrdamper.report.tables import prediction_rows
 
-    for name, value in (("--current", current), ("--frequency", frequency), ("--amplitude", amplitude)):
-        if value is not None and not 0 <= value < math.inf:
-            raise ConditionError(
-                f"{name} {value:g}", remedy="give zero or more; the force depends on the magnitude only"
-            )
+    if current is not None and not 0 <= current < math.inf:
+        raise ConditionError(f"--current {current:g}", remedy="give zero or more; the sign does not matter")
+    for name, value in (("--frequency", frequency), ("--amplitude", amplitude)):
+        if value is not None and not 0 < value < math.inf:
+            raise ConditionError(f"{name} {value:g}", remedy="give a positive number")
     student(level, 1.0)  # refuses an invalid level
     require_writable(out)
     require_writable(plot)
@@ -69,14 +70,20 @@ def predict(
     interval = band(damper, prediction, level)
     if check_run:
         prediction, interval = _session_known(damper, prediction, check_run, data, level)
+    summary = _summary(prediction, interval)
     typer.echo(
-        _said(prediction, interval, level, scope(damper, level)) if interval else f"note: {no_band(damper)}", err=True
+        _in_words(summary, interval, level, scope(damper, level)) if interval else f"note: {no_band(damper)}", err=True
     )
     if plot is not None:
         from mrdamper.report.plots.loops import predicted_force
 
         put_figure(predicted_force(prediction, interval, level), plot)
-    put(prediction_rows(prediction, interval), out, as_json, csv_text)
+    rows = prediction_rows(prediction, interval)
+    if not as_json:
+        put_text(csv_text(rows), out)
+        return
+    numbers = {name: dict(zip(("value", "low", "high"), map(finite, of), strict=True)) for name, of in summary.items()}
+    put_text(json.dumps({**numbers, "level": level, "samples": json_rows(rows)}, indent=1) + "\n", out)
 
 
 def _load(model: Path, coil_lag: float | None) -> Damper:
@@ -131,32 +138,42 @@ def _session_known(
     return prediction.corrected(expected.gain, expected.offset), session_band(expected, damper, prediction, level)
 
 
-def _said(prediction: Prediction, interval: Band, level: float, where: str) -> str:
-    """Describe peak force, energy and damping with their intervals."""
+def _summary(prediction: Prediction, interval: Band | None) -> dict[str, tuple[float, float, float]]:
+    """Peak force, energy per cycle and equivalent damping, each with the ends of its interval, or NaN."""
     from mrdamper.statistics.metrics import dissipated_power, peak_force
 
-    parts = ", ".join(
-        f"{name} {float((part**2).mean() ** 0.5):.3g} N"
-        for name, part in (("parameters", interval.parameter), ("session", interval.session), ("model", interval.model))
-        if part.any()  # without three known sessions the variation between sessions is unknown
-    )
     motion, c = prediction.motion, prediction.condition
     power = dissipated_power(prediction.force, motion.velocity, motion.time)
     energy = power / c.frequency_Hz if c.frequency_Hz > 0 else math.nan  # of a cycle
     # Of the linear damper with the same dissipation on this sine: C = E/(π ω X²).
     damping = 2 * power / c.peak_velocity**2 if c.peak_velocity > 0 else math.nan
-    low, high = (1 + share for share in interval.energy)
+    low, high = (1 + share for share in interval.energy) if interval else (math.nan, math.nan)
+    return {
+        "peak_force_N": (peak_force(prediction.force), *(interval.peak if interval else (math.nan, math.nan))),
+        "energy_per_cycle_J": (energy, energy * low, energy * high),
+        "equivalent_damping_N_s_per_m": (damping, damping * low, damping * high),
+    }
+
+
+def _in_words(summary: dict[str, tuple[float, float, float]], interval: Band, level: float, where: str) -> str:
+    """Describe peak force, energy and damping with their intervals."""
+    parts = ", ".join(
+        f"{name} {float((part**2).mean() ** 0.5):.3g} N"
+        for name, part in (("parameters", interval.parameter), ("session", interval.session), ("model", interval.model))
+        if part.any()  # without three known sessions the variation between sessions is unknown
+    )
     corrected = ""
     if interval.session.any():
         least, most = interval.known_session
         corrected = f"; with gain and offset of the session corrected {least:.4g} to {most:.4g} N"
+    peak, energy, damping = summary.values()
     return "\n".join(
         (
-            f"peak force (half the peak-to-peak force) {peak_force(prediction.force):.4g} N, "
-            f"{100 * level:g} % prediction interval {interval.peak[0]:.4g} to {interval.peak[1]:.4g} N "
+            f"peak force (half the peak-to-peak force) {peak[0]:.4g} N, "
+            f"{100 * level:g} % prediction interval {peak[1]:.4g} to {peak[2]:.4g} N "
             f"{where}{corrected}",
-            f"dissipated energy {energy:.4g} J per cycle ({energy * low:.4g} to {energy * high:.4g})",
-            f"equivalent damping {damping:.4g} N s/m ({damping * low:.4g} to {damping * high:.4g})",
+            f"dissipated energy {energy[0]:.4g} J per cycle ({energy[1]:.4g} to {energy[2]:.4g})",
+            f"equivalent damping {damping[0]:.4g} N s/m ({damping[1]:.4g} to {damping[2]:.4g})",
             f"standard deviation of the force: {parts}",
         )
     )
