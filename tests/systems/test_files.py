@@ -91,8 +91,8 @@ def test_a_report_with_controllers_side_by_side(tmp_path, monkeypatch):
     done = CliRunner().invoke(
         application(),
         ["simulate", str(tmp_path / "frame.toml"), "--input", str(tmp_path / "quake.csv"), "--damper",
-         str(tmp_path / "model.json"), "--control", "skyhook", "--compare", "sh-add:crossover_Hz=3", "--out",
-         str(tmp_path / "out"), "--json"],
+         str(tmp_path / "model.json"), "--control", "skyhook", "--compare", "sh-add:crossover_Hz=3",
+         "--compare", "skyhook", "--out", str(tmp_path / "out"), "--json"],
     )  # fmt: skip
     assert done.exit_code == 0, done.output
     printed = json.loads(done.stdout)
@@ -107,8 +107,20 @@ def test_a_report_with_controllers_side_by_side(tmp_path, monkeypatch):
     with (tmp_path / "out/figures/spectra.csv").open(encoding="utf-8") as file:
         loops = Counter(row["y_is"] for row in csv.DictReader(file))["force (N)"]
     assert 300 < loops <= 6 * 300 < len(histories)  # those of all laws together
+    peak = float(table["floor2.peak_acceleration_m_s2"]["skyhook, on and off"])
+    assert peak == printed["peak_acceleration_m_s2"][1]  # the law simulated is the law compared
     best = min((float(v), k) for k, v in table["cost_m_s2"].items() if k != "measure")
     assert best[1] == "optimum with the whole record known"
+
+
+def test_the_constant_current_and_the_comparison_are_printed(tmp_path):
+    save_model(joint_damper(), tmp_path / "model.json")
+    ask = ["simulate", "quarter-car", "--input", "bump", "--damper", str(tmp_path / "model.json")]
+    assert "passive, constant current 0 A\n" in CliRunner().invoke(application(), ask).output
+    given = [*ask, "--current", "0.3", "--compare", "skyhook-continuous", "--out", str(tmp_path / "out")]
+    printed = CliRunner().invoke(application(), given).output
+    assert "passive, constant current 0.3 A\n" in printed
+    assert re.search(r"no current +0 %\n.*skyhook, continuous +-?\d+ %\n.*optimum.* 100 %\n", printed, re.DOTALL)
 
 
 def test_options_that_contradict_each_other(tmp_path):

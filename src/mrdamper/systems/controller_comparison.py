@@ -12,8 +12,7 @@ from mrdamper.systems.controllers.preview import NonCausalOptimum
 from mrdamper.systems.inputs import Input
 from mrdamper.systems.measures import cost
 from mrdamper.systems.result import Simulation
-from mrdamper.systems.simulate import SystemLoop, simulate_system
-from mrdamper.systems.structure import System
+from mrdamper.systems.simulate import SystemLoop
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,28 +29,27 @@ class ControllerComparison:
 
 
 def compare_controllers(
-    system: System,
+    done: Simulation,
     source: Input,
     dampers: Mapping[str, Damper],
     controllers: Sequence[Controller],
-    step: float | None = None,
     highest: float | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> ControllerComparison:
-    """Run controllers at one step, at which the first one has converged.
+    """Run controllers at the step of a simulation, which stands for its own controller.
 
-    `system`, `source`, `dampers`, `step`, `highest`: as `simulate_system`; `controllers`: compared with no current, the
-    highest current and the non-causal optimum; `progress`: called with the step and the share done, 0...1.
+    `source`, `dampers`, `highest`: those of `simulate_system`; `controllers`: compared with no current, the highest
+    current and the non-causal optimum; `progress`: called with the step and the share done, 0...1.
     """
     if highest is None:
         highest = max(damper.envelope.current_A[1] for damper in dampers.values())
-    first = simulate_system(system, source, dampers, Passive(), step, highest)
-    runs = {"no current": first}
-    between = {f"{highest:.3g} A": Passive(highest), **{_title(c): c for c in controllers}}
+    between = {"no current": Passive(), f"{highest:.3g} A": Passive(highest), **{_title(c): c for c in controllers}}
     several = {**between, NonCausalOptimum.title: NonCausalOptimum()}
+    runs = {}
     for number, (title, controller) in enumerate(several.items()):
         progress(title, number / len(several))
-        runs[title] = SystemLoop(system, source, dampers, controller, highest).run(first.step)
+        same = controller == done.controller
+        runs[title] = done if same else SystemLoop(done.system, source, dampers, controller, highest).run(done.step)
     return ControllerComparison(runs)
 
 

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from mrdamper.cli.output import parse_named, shortened, warn
+from mrdamper.cli.output import aligned, parse_named, shortened, warn
 from mrdamper.cli.progress import progress_soon
 from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
+    from mrdamper.systems.controller_comparison import ControllerComparison
     from mrdamper.systems.controllers import Controller
     from mrdamper.systems.monte_carlo import Bands
     from mrdamper.systems.result import Simulation
@@ -70,13 +71,13 @@ def simulate(
     drawn = None if draws is None else draw(dampers, draws, seed)
     with progress_soon(f"{loaded.system.title}, time step halved until peaks converge") as tell:
         done = simulate_system(*given, controller, step, highest)
-        bands, paths = None, []
+        bands, compared, paths = None, None, []
         if drawn is not None:
             bands = monte_carlo(SystemLoop(*given, controller, highest, free=True), drawn, done, tell)
         if out is not None:
             from mrdamper.report.simulation import write_simulation
 
-            compared = compare_controllers(*given, others, done.step, highest, tell) if others else None
+            compared = compare_controllers(done, *given[1:], others, highest, tell) if others else None
             tell("writing", 1.0)
             paths = write_simulation(done, out, compared, bands)
     warn(shortened([f"{path}" for path in paths], 2, verbose))
@@ -84,6 +85,7 @@ def simulate(
         print(json.dumps(_figures(done, dampers) | _banded(bands), indent=1))
         return
     _print_peaks(done)
+    _print_comparison(compared)
     _print_warnings(done)
     _print_bands(done, bands, dampers)
 
@@ -226,8 +228,10 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
 
 
 def _print_peaks(done: Simulation) -> None:
-    peaks = done.peaks
-    typer.echo(f"{done.system.title}, {type(done.controller).title}")
+    from mrdamper.systems.controllers.passive import Passive
+
+    peaks, law = done.peaks, done.controller
+    typer.echo(f"{done.system.title}, {type(law).title}{f' {law.current_A:.3g} A' if isinstance(law, Passive) else ''}")
     for i, name in enumerate(done.system.coordinates):
         typer.echo(
             f"  {name:12} x {1e3 * peaks['displacement_m'][i]:9.3f} mm   a {peaks['acceleration_m_s2'][i]:8.3f} m/s²"
@@ -240,6 +244,14 @@ def _print_peaks(done: Simulation) -> None:
         f"step {1e3 * done.step:.3g} ms; the last halving changed a peak value by {100 * done.halving:.2g} %; "
         f"relative error of the energy balance {done.energy_gap:.1g}"
     )
+
+
+def _print_comparison(compared: ControllerComparison | None) -> None:
+    if compared is None:
+        return
+    typer.echo("improvement of the mean square from no current (0 %) to the non-causal optimum (100 %):")
+    rows = [(f"  {title}", f"{100 * compared.share(title):.0f} %") for title in compared.runs]
+    typer.echo("\n".join(aligned(rows)))
 
 
 def _print_warnings(done: Simulation) -> None:
