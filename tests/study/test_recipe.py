@@ -24,7 +24,7 @@ from mrdamper.paper.functions import fit_paper_functions
 from mrdamper.paper.options import PaperOptions
 from mrdamper.paper.recipes import fit_chosen_functions, one_per_current
 from mrdamper.physics.gas_spring import GasSpring
-from mrdamper.physics.motion import measured_motion, sine
+from mrdamper.physics.motion import measured_motion, sine, sines
 from mrdamper.statistics.metrics import Scores
 from mrdamper.study import cross_validation
 from mrdamper.study import recipe as recipes
@@ -193,24 +193,26 @@ def test_a_stretch_has_a_dozen_cycles_and_a_lead_in_of_one_and_a_half(seconds, c
     run = Run("made", time, 0.01 * np.sin(2 * np.pi * time) + 1e-5, np.cos(2 * np.pi * time), 1.0)
     changing = replace(run, current=np.where(time < 3, 0.5, 1.0))
     with pytest.MonkeyPatch.context() as patch:
+
+        def equivalent(condition, is_sine=False):
+            for module in (cross_validation, sines):
+                patch.setattr(
+                    module, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=is_sine)
+                )
+
         condition = Condition(1.0, 1.0, 0.01)
-        patch.setattr(
-            cross_validation, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=False)
-        )
+        equivalent(condition)
         parts = stretches(run)
         assert len(parts) == count
         assert count == 1 or [len(p.time) for p in parts[1:-1]] == pytest.approx([1350] * (count - 2), abs=200)
         for part in parts[1:]:
             assert part.window[0] - part.time[0] == pytest.approx(1.5)
-        slow = Condition(1.0, 0.5, 0.01)
-        patch.setattr(cross_validation, "equivalent_sine", lambda run: SimpleNamespace(condition=slow, is_sine=False))
+        equivalent(Condition(1.0, 0.5, 0.01))
         assert len(stretches(run)) == max(1, count // 2)
         assert all(p.window[0] - p.time[0] == pytest.approx(3.0) for p in stretches(run)[1:])
         assert len(stretches(replace(run, window=(10.0, seconds - 0.01)))) == max(1, int((seconds - 10) / 24))
         # A sine whose current changes is cut too, a sine at one current stays whole.
-        patch.setattr(
-            cross_validation, "equivalent_sine", lambda run: SimpleNamespace(condition=condition, is_sine=True)
-        )
+        equivalent(condition, is_sine=True)
         assert (len(stretches(run)), len(stretches(changing))) == (1, count)
 
 

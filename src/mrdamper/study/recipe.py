@@ -37,6 +37,7 @@ from mrdamper.study.validation import Validation, validate
 
 Progress = Callable[[str, float], None]
 
+STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the usual reference
 _GLOBAL_FIT, _CURRENT_LAWS = "global fit", "current laws"  # procedures in words
 WHOLE_DAMPER = ("tanh", MODEL)  # models with one set of parameters for every current, which a study compares
 
@@ -325,6 +326,7 @@ def catalogue(method: StudyMethod | None = None) -> Mapping[str, Recipe]:
     """
     all_recipes = [whole_damper(n) if cls.current_levels else modified(n) for n, cls in all_models().items()]
     all_recipes += [jointly(name) for name in _closed_shapes()]
+    all_recipes += [current_only(name) for name in STUDIED]
     methods = {name: cls() for name, cls in study_methods().items()} | ({method.name: method} if method else {})
     all_recipes += [recipe for one in methods.values() for recipe in one.compared()]
     all_recipes += [conditioned(cls) for cls in all_published().values()]

@@ -33,6 +33,7 @@ from mrdamper.study.cross_validation import NO_CURRENT
 from mrdamper.study.dissipation import gains_energy
 from mrdamper.study.parallel import IN_PROCESS, Processes
 from mrdamper.study.recipe import (
+    STUDIED,
     WHOLE_DAMPER,
     Progress,
     Recipe,
@@ -51,7 +52,6 @@ from mrdamper.study.validation import RunScore, Validation, validate
 
 CONDITION = "condition"  # kind of fold: the runs of one condition, a stretch of another record
 AWAY = ("current", "fastest motions")  # kinds that determine the growth of errors away from the tests
-STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the usual reference
 
 
 def headline_of(rig: str, result: RecipeResult) -> str:

@@ -13,8 +13,7 @@ from pydantic import BaseModel, Field
 from mrdamper.data.encoding import csv_text, finite
 from mrdamper.report.comparison import summary_rows
 from mrdamper.study.comparison import Comparison
-from mrdamper.study.recipe import WHOLE_DAMPER, RecipeResult, recipes
-from mrdamper.study.workflow import STUDIED
+from mrdamper.study.recipe import STUDIED, WHOLE_DAMPER, RecipeResult, recipes
 from mrdamper.web.curves import measured_cycle, measured_window, predicted_on_run
 from mrdamper.web.responses import archive, download, frame
 from mrdamper.web.rig_table import screen_condition
