@@ -207,6 +207,14 @@ def test_many_columns_together_are_no_way_around_the_bound(tmp_path, monkeypatch
     assert error.value.code == "E_ARCHIVE_RATIO"
 
 
+def test_a_further_channel_does_not_replace_a_channel(tmp_path):
+    time = np.arange(0.0, 4.0, 0.01)
+    run = Run("a", time, np.sin(time), np.cos(time), 0.5, further={"force_N": 2 * np.cos(time)})
+    with pytest.raises(OutputError, match="called force_N"):
+        save_dataset(Dataset((run,)), tmp_path / "ds")
+    assert not (tmp_path / "ds").exists()
+
+
 def test_lists_and_text_in_further_columns_are_not_unpacked(tmp_path):
     (tmp_path / "runs.csv").write_text("run_id,current_A\na,0\n")
     t = np.arange(4.0)

@@ -1,13 +1,17 @@
 """Temperature, pressure and second sensors stay with the run; a corrected force keeps the raw one beside it."""
 
+import json
+
 import numpy as np
 import pytest
+import scipy.io
 from support.rig_files import AMPLITUDE, FREQUENCY, channels, rows, text, write
 
 from mrdamper.data import Run
 from mrdamper.errors import RunError
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 from mrdamper.rig_files.profile import parse_profile, profile_text
+from mrdamper.rig_files.profile_template import profile_template
 from mrdamper.rig_files.rig_import import read_run, to_dataset
 
 HEADER = "time [s],disp [mm],force [N],oil temperature [°C],gas pressure [bar],LVDT 2 [in],body temp [°F]"
@@ -34,6 +38,48 @@ def test_further_channels_are_kept_in_si_and_summarised(path, tmp_path):
     assert load_dataset(tmp_path / "again").runs[0].notes == run.notes
     part = run.part(10, 50)
     assert all(values.size == 40 for values in part.further.values())
+
+
+EQUAL = ("time [s]", "Position [mm]", "Force [N]", "Force [N]", "Position [mm]", "temperature [°C]", "temperature [°C]")
+FACTORS = {"displacement": 1e-3, "force": 1.0, "temperature": 1.0}
+
+
+def equal_headings(tmp_path, suffix):
+    """Return a file whose headings repeat, and its numbers by column."""
+    plain = rows()
+    more = [0.7 * plain[:, 2], 0.6 * plain[:, 1], 20 + plain[:, 0], 40 + plain[:, 0]]
+    table = np.column_stack([plain, *more])
+    if suffix == "csv":
+        return write(tmp_path, "a_1A.csv", text(table, (",".join(EQUAL),))), table
+    path = tmp_path / f"a_1A.{suffix}"
+    if suffix == "xlsx":
+        book = pytest.importorskip("openpyxl").Workbook()
+        for row in (EQUAL, *table.tolist()):
+            book.active.append(row)
+        book.save(path)
+    elif suffix == "json":
+        path.write_text(json.dumps({"names": EQUAL, "data": table.tolist()}), encoding="utf-8")
+    else:
+        scipy.io.savemat(path, {"data": table, "names": np.array(EQUAL, dtype=object)})
+    return path, table
+
+
+@pytest.mark.parametrize("suffix", ["csv", "xlsx", "json", "mat"])
+@pytest.mark.parametrize("numbers", [(2, 3, 6), (2, 4, 7), (5, 3, 7), (5, 4, 6)])
+def test_a_column_given_by_its_number_is_that_column_in_the_dataset(numbers, suffix, tmp_path):
+    path, table = equal_headings(tmp_path, suffix)
+    columns = dict(zip(FACTORS, numbers, strict=True))
+    channels = "".join(f"[channels.{role}]\ncolumn = {number}\n" for role, number in columns.items())
+    profile = parse_profile(f"[channels.time]\ncolumn = 1\n{channels}")
+    written, _ = profile_template([path], profile)
+    for own in (profile, parse_profile(written)):
+        folder = tmp_path / f"ds{len(list(tmp_path.iterdir()))}"
+        save_dataset(to_dataset([read_run(path, own)]), folder)
+        run = load_dataset(folder).runs[0]
+        stored = {"displacement": run.displacement, "force": run.force, "temperature": run.further["temperature_C"]}
+        for role, number in columns.items():
+            np.testing.assert_allclose(stored[role], FACTORS[role] * table[:, number - 1], atol=1e-5, err_msg=role)
+        assert len(run.further) == 4, "the other sensor of each kind stays, under a name of its own"
 
 
 def test_a_temperature_of_another_length_is_left_out_and_named(tmp_path):

@@ -307,6 +307,9 @@ def _samples(dataset: Dataset) -> Iterator[pl.DataFrame]:
             channels["current_A"] = run.current
         if run.velocity is not None:
             channels["velocity_m_s"] = run.velocity
+        if taken := {*run.further} & {"run_id", *REQUIRED, *OPTIONAL}:
+            problem = f"a further channel is called {min(taken)}, as a channel of every run is"
+            raise OutputError(problem, where=f"run {run.id}", remedy="rename it")
         channels |= run.further
         for start in range(0, run.time.size, _SAMPLES_PER_CHUNK):
             inside = slice(start, start + _SAMPLES_PER_CHUNK)

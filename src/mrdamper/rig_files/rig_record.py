@@ -23,7 +23,7 @@ from mrdamper.rig_files.coil_current import (
     current_of,
     without_gaps,
 )
-from mrdamper.rig_files.column_names import Unit, role_of, words
+from mrdamper.rig_files.column_names import DIMENSION, Unit, role_of, words
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, noted_columns, rate_of
 from mrdamper.rig_files.conditions import stated_motion, stated_quantities
 from mrdamper.rig_files.mapping.clocks import past_midnight, refuse_two_rates
@@ -37,6 +37,7 @@ from mrdamper.rig_files.sequences import stretches_of_session
 from mrdamper.rig_files.text.tokens import MONTHS
 
 _KEPT = {**FURTHER, "length": "m", "force": "N"}
+_RAW_FORCE = "force_raw_N"
 _SCALES = words("scale")
 _SCALE_CELL = re.compile(r"([+-]?[0-9]+(?:[.,][0-9]+)?)(?:\s*[A-Za-zµ]+/(?:digit|bit|count|cnt|lsb|inc)s?)?")
 _SAMPLE = 10_000  # samples looked at
@@ -110,7 +111,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         if its_lines is not None and len(its_lines) != stretch.stop - stretch.start:
             others = {}  # delays were subtracted: the samples are no longer those of the file
         if profile.correction is not None:
-            others["force_raw_N"] = part["force"]
+            others[_RAW_FORCE] = part["force"]
             part["force"], remarks["force_correction"] = corrected_force(part, profile.correction)
         noticed = findings
         if "current" in part:
@@ -238,15 +239,21 @@ def _curvature(time: Floats, displacement: Floats) -> Floats:
 
 
 def _further(table: RawTable, assigned: dict[str, Assigned], size: int) -> dict[str, Floats]:
-    """Second sensors of a kind, in SI, by their name and unit: kept, never identified from."""
+    """Second sensors of a kind, in SI, by their name and unit: kept, never identified from.
+
+    One that would be called as a channel or another sensor is has the number of its column in its name.
+    """
     used = {entry.column for entry in assigned.values()}
+    taken = {_RAW_FORCE, *(f"{role}_{_KEPT[DIMENSION[role]]}" for role in assigned if DIMENSION[role] in _KEPT)}
     wanted: dict[str, tuple[int, Unit]] = {}
     for column, header in enumerate(table.headers):
         unit_of = header.known
         if column in used or unit_of is None or unit_of.dimension not in _KEPT or len(wanted) >= _MOST_FURTHER:
             continue
         bare = re.sub(r"[^A-Za-z0-9]+", "_", header.name).strip("_")[:40].lower() or "column"
-        wanted.setdefault(f"{bare}_{_KEPT[unit_of.dimension]}", (column, unit_of))
+        si = _KEPT[unit_of.dimension]
+        name = f"{bare}_{si}" if f"{bare}_{si}" not in {*taken, *wanted} else f"{bare}_column_{column + 1}_{si}"
+        wanted[name] = (column, unit_of)
     columns = [column for column, _ in wanted.values()]
     values = table.try_read(*columns) if columns else {}
     if values is None:  # one of them cannot be read
