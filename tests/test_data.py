@@ -67,6 +67,13 @@ def test_dataset_refuses_twins_and_offers_near_names():
         Dataset(())
 
 
+def test_a_run_of_a_dataset_is_found_by_id_and_by_position():
+    dataset = Dataset((run(id="a"), run(id="b")))
+    assert (dataset["b"], dataset[1], dataset[-2]) == (dataset.runs[1], dataset.runs[1], dataset.runs[0])
+    with pytest.raises(UnknownNameError, match="no run at position 2; there are 2, from 0"):
+        _ = dataset[2]
+
+
 def test_conditions_agree_to_three_per_cent():
     a, b, c = Condition(0.5, 1.0, 0.01), Condition(0.5, 1.02, 0.0102), Condition(0.5, 1.2, 0.01)
     assert same_condition([a, b, c]) == [[0, 1], [2]]

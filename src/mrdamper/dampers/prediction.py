@@ -58,6 +58,16 @@ class Prediction(Displayable):
     steady: bool = False
     is_sine: bool = True
 
+    @property
+    def time(self) -> Floats:
+        """(N,) of the motion [s]."""
+        return self.motion.time
+
+    @property
+    def displacement(self) -> Floats:
+        """(N,) of the motion [m]."""
+        return self.motion.displacement
+
     def corrected(self, gain: float, offset: float) -> Prediction:
         """Return the prediction with another gain and offset [N] of the force."""
         return replace(self, force=gain * self.force + offset)

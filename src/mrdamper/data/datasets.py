@@ -86,7 +86,12 @@ class Dataset(Displayable):
         return len(self.runs)
 
     @validate_arguments()
-    def __getitem__(self, run_id: str) -> Run:
+    def __getitem__(self, run_id: str | int) -> Run:
+        """Return the run of an id, or at a position."""
+        if isinstance(run_id, int):
+            if not -len(self) <= run_id < len(self):
+                raise UnknownNameError(f"no run at position {run_id}", remedy=f"there are {len(self)}, from 0")
+            return self.runs[run_id]
         for run in self.runs:
             if run.id == run_id:
                 return run
