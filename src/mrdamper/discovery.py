@@ -176,6 +176,16 @@ class Registry(Generic[T]):
         self._types.pop(cls.name, None)  # type: ignore[attr-defined]
         self._add(cls, cls.__module__, is_own=True)
 
+    def lacking(self, cls: type) -> list[str]:
+        """Name the class variables that every class of the group has and this one has not."""
+        stated = inspect.get_annotations(self.base)
+        return [name for name, kind in stated.items() if str(kind).startswith("ClassVar") and not hasattr(cls, name)]
+
+    @property
+    def of_main_script(self) -> bool:
+        """True if a class stands in the main script or a notebook, which other processes do not import."""
+        return any(cls.__module__ == "__main__" for cls in self._types.values())
+
     def _classes(self, target: tuple[ModuleType, ...] | type) -> Iterator[type[T]]:
         if isinstance(target, type):
             yield target
@@ -189,6 +199,8 @@ class Registry(Generic[T]):
         problem = ""
         if not issubclass(cls, self.base) or inspect.isabstract(cls) or not isinstance(name, str):
             problem = f"{target} is not a complete subclass of {self.base.__module__}.{self.base.__qualname__}"
+        elif lacking := self.lacking(cls):
+            problem = f"{target} lacks {', '.join(lacking)}"
         elif name in self._types:
             problem = f"the {self.kind} {name!r} exists already in {parts[name].package}"
         part = ExtensionPart(self.group, str(name), package, target, own=is_own)
@@ -242,6 +254,7 @@ def register(cls: type[T]) -> type[T]:
     ... @dataclass(frozen=True)
     ... class Renamed(Bingham):
     ...     name: ClassVar[str] = "renamed"
+    ...     title: ClassVar[str] = "renamed Bingham"
     >>> model_type("renamed").__name__
     'Renamed'
     """
@@ -252,8 +265,16 @@ def register(cls: type[T]) -> type[T]:
             remedy="give a complete subclass of Model, Method, Exporter, Controller, Input or Reader with a name",
             code="E_ARGUMENT",
         )
+    if lacking := registry.lacking(cls):
+        problem = f"{cls.__name__} lacks {', '.join(lacking)}"
+        raise InputError(problem, remedy="define it in the class", code="E_ARGUMENT")
     registry.register(cls)
     return cls
+
+
+def in_main_script() -> bool:
+    """Tell if the main script or a notebook has registered a class: other processes do not import it."""
+    return any(registry.of_main_script for registry in _registries.values())
 
 
 def modules_with(group: str, hook: str) -> tuple[tuple[ExtensionPart, ModuleType], ...]:

@@ -3,11 +3,12 @@ import json
 import pytest
 
 from mrdamper.dampers.envelope import Envelope
+from mrdamper.dampers.joint import damper_of
 from mrdamper.dampers.model_file import dump_model, load_model, parse_model, save_model
 from mrdamper.dampers.modified import ModifiedModel
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition
-from mrdamper.errors import ModelFileError, OutputError
+from mrdamper.errors import InputError, ModelFileError, OutputError
 from mrdamper.models.bingham import Bingham
 from mrdamper.statistics.functions.forms import ParameterFunction
 
@@ -144,3 +145,8 @@ def test_what_only_looks_like_a_model_is_refused(damper, path, value, said):
     change(document, path, value)
     with pytest.raises(ModelFileError, match=said):
         parse_model(json.dumps(document))
+
+
+def test_a_damper_without_tests_is_not_saved():
+    with pytest.raises(InputError, match="a damper without tested ranges; save one that compare or a study identified"):
+        dump_model(damper_of(Bingham(c=1000.0, fy=300.0)))

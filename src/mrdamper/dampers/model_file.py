@@ -29,6 +29,7 @@ from mrdamper.models import model_parts
 
 FORMAT = "mrdamper-model"
 _PACKAGE = "package of the model"  # key of the provenance
+_SCRIPT = "class of a script"  # that provides the model
 MAJOR, MINOR = 1, 6
 _MAX_FILE_BYTES = 64_000_000  # bytes of a file
 _KIND = "a model.json written by mrdamper"
@@ -165,8 +166,10 @@ def save_model(damper: Damper, path: str | Path) -> None:
 
 
 def dump_model(damper: Damper) -> str:
-    """Return the JSON document of a damper."""
+    """Return the JSON document of a damper; raises `InputError` if it was made without tests."""
     require(damper, Damper, "a damper")
+    if not damper.envelope.tested:
+        raise InputError("a damper without tested ranges", remedy="save one that compare or a study identified")
     document = _Document(
         format=FORMAT,
         version=f"{MAJOR}.{MINOR}",
@@ -248,16 +251,20 @@ def parse_model(text: str, where: str = "model") -> Damper:
         damper = kind.from_saved(saved, envelope=envelope, **shared)
         return _with_uncertainty(damper, document.covariance, where) if document.covariance else damper
     except InputError as error:
-        package = document.provenance.get(_PACKAGE)
+        package, script = (document.provenance.get(key) for key in (_PACKAGE, _SCRIPT))
         remedy = f"install the package that the file names: {package!r:.80}" if package else error.remedy
+        if script:
+            remedy = f"register {script!r:.80} before the file is loaded; commands know classes of installed packages"
         raise ModelFileError(error.found, where=where, remedy=remedy) from error
 
 
 def _outside_package(damper: Damper) -> dict[str, str]:
-    """Name the installed package that provides the model of a damper, where it is not mrdamper."""
-    name = getattr(damper.to_saved(), "model", None)
-    parts = {part.name: part for part in model_parts()}
-    return {_PACKAGE: parts[name].package} if name in parts and not parts[name].own else {}
+    """Name the installed package, or the class of a script, that provides the model of a damper if not mrdamper."""
+    name = getattr(damper.to_saved(), "model", "")
+    part = {part.name: part for part in model_parts()}.get(name)
+    if part is None or part.target.startswith("mrdamper."):
+        return {}
+    return {_SCRIPT: part.target} if part.own else {_PACKAGE: part.package}
 
 
 def _checked(schema: Any, raw: dict[str, Any], prefix: str, where: str) -> Any:

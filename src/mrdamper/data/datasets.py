@@ -10,7 +10,7 @@ import numpy as np
 
 from mrdamper.data.displayable import Displayable
 from mrdamper.data.runs import Run, Split
-from mrdamper.errors import RunError, UnknownNameError, check_fields, validate_arguments
+from mrdamper.errors import RunError, UnknownNameError, check_fields, shown, validate_arguments
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,7 +90,7 @@ class Dataset(Displayable):
         """Return the run of an id, or at a position."""
         if isinstance(run_id, int):
             if not -len(self) <= run_id < len(self):
-                raise UnknownNameError(f"no run at position {run_id}", remedy=f"there are {len(self)}, from 0")
+                raise UnknownNameError(f"no run at position {shown(run_id)}", remedy=f"there are {len(self)}, from 0")
             return self.runs[run_id]
         for run in self.runs:
             if run.id == run_id:

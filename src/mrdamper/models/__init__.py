@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from mrdamper.data.parameters import param
 from mrdamper.discovery import Registry
 from mrdamper.models.base import Model, Scale, SearchAxis
 
-__all__ = ["Model", "Scale", "SearchAxis", "all_models", "model_parts", "model_type"]
+__all__ = ["Model", "Scale", "SearchAxis", "all_models", "model_parts", "model_type", "param"]
 
 
 _registry = Registry("mrdamper.models", Model, "model")

@@ -33,6 +33,8 @@ GENERAL_FORMS = (
     "quadratic-current-speed",
     "plane",
 )
+_SMALLEST, _LARGEST = 1e-4, 2.0  # of a searched length or velocity, over that of the motion
+_STARTS = 100  # of a search over all parameters
 YIELD_DISPLACEMENTS = np.geomspace(1e-4, 2.0, 14)  # over the amplitude: where the search of one starts
 
 
@@ -121,8 +123,8 @@ class Model(ABC):
 
     name: ClassVar[str]
     title: ClassVar[str]
-    equation: ClassVar[str]
-    source: ClassVar[str]
+    equation: ClassVar[str] = ""  # LaTeX
+    source: ClassVar[str] = ""  # publication
     coordinates: ClassVar[Mapping[str, tuple[str, str, str]]] = {}  # coordinates of `build`: symbol, relation, unit
     integrated: ClassVar[bool] = False  # the state is integrated, which takes a hundred times longer
     # Linear parameter whose column is the state, if the search changes no other column; None: no such parameter.
@@ -176,8 +178,13 @@ class Model(ABC):
 
     @classmethod
     def search_axes(cls, scale: Scale, free: Sequence[str]) -> tuple[SearchAxis, ...]:
-        """Search coordinates of the `free` nonlinear parameters, their boxes and starts by the sizes of the data."""
-        return ()
+        """Search coordinates of the `free` nonlinear parameters, their boxes and starts by the sizes of the data.
+
+        Unless a model states others: between finite bounds, and lengths and velocities between a ten-thousandth and
+        twice the size of the motion. Raises `ParameterError` if a parameter has neither.
+        """
+        infos = [info for info in cls.parameters() if info.name in free and not info.linear]
+        return tuple(_axis(info, scale, _STARTS ** (1 / len(infos))) for info in infos)
 
     @classmethod
     def within(cls, axes: tuple[SearchAxis, ...], fixed: Mapping[str, float]) -> tuple[SearchAxis, ...]:
@@ -218,6 +225,19 @@ class Model(ABC):
     def values(self) -> dict[str, float]:
         """Parameter values by name."""
         return {info.name: getattr(self, info.name) for info in self.parameters()}
+
+
+def _axis(info: ParameterInfo, scale: Scale, starts: float) -> SearchAxis:
+    """Return the search coordinate of a parameter by its bounds and unit, with about so many start points."""
+    low, high = info.bounds
+    if (size := {"m": scale.amplitude, "m/s": scale.speed}.get(info.unit)) is not None:
+        low, high = max(low, _SMALLEST * size), min(high, _LARGEST * size)
+    if not -math.inf < low < high < math.inf:
+        remedy = "mark it linear=True, give it finite bounds, or define search_axes"
+        raise ParameterError(f"{info.name} has no limits for a search", where=info.meaning, remedy=remedy)
+    log = low > 0 and (info.scale == "log" or size is not None)
+    grid = (np.geomspace if log else np.linspace)(low, high, max(3, round(starts)) + 2)[1:-1]
+    return SearchAxis(info.name, low, high, tuple(grid.tolist()), log)
 
 
 def _limited(value: Any, low: float, high: float) -> Any:

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from mrdamper.data import Run, index_at
+from mrdamper.discovery import in_main_script
 from mrdamper.errors import InputError
 from mrdamper.identification import Identification, Method, Problem, conclude
 from mrdamper.identification.basis import Basis
@@ -73,8 +74,8 @@ IN_PROCESS = Processes()
 
 @contextmanager
 def several(count: int) -> Generator[Processes]:
-    """Start `count` processes, this one included, for the length of a block."""
-    if count < 2:
+    """Start `count` processes, this one included, for the length of a block; none if they lack a class of a script."""
+    if count < 2 or in_main_script():
         yield IN_PROCESS
         return
     with processes(count - 1) as pool:

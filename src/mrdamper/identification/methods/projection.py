@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.data import Floats, index_at
-from mrdamper.errors import IdentificationError
+from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.identification.elimination import Elimination
 from mrdamper.identification.problem import DELAY, DELAY_LIMIT, Method, Problem, Solution
@@ -113,6 +113,11 @@ def search_axes(problem: Problem) -> tuple[SearchAxis, ...]:
     """Search coordinates, with start values from the data."""
     scale = Scale.of(problem.seen, problem.force, problem.analysis.condition.amplitude_m)
     axes = problem.model_type.search_axes(scale, problem.free)
+    searched = {axis.name for axis in axes}
+    if linear := [info.name for info in problem.model_type.parameters() if info.linear and info.name in searched]:
+        remedy = "let search_axes return those of nonlinear parameters"
+        where = problem.model_type.title
+        raise ParameterError(f"search axes of linear parameters: {', '.join(linear)}", where=where, remedy=remedy)
     axes = problem.model_type.within(axes, problem.fixed)
     if problem.with_delay:
         axes = (*axes, SearchAxis(DELAY, -DELAY_LIMIT, DELAY_LIMIT, (0.0,)))
