@@ -1254,9 +1254,48 @@ def test_a_plan_of_the_ranges_of_one_record_gives_each_test_the_current_of_its_r
     result = import_files([tmp_path])
     assert list(by_id(result).values()) == [0.5, 0.0, 1.0, 0.25]
     assert result.left_out == (("session_3",) if warm_up else ())
+    assert result.reasons.get("session_3", "") == "in no range of protocol.csv" * warm_up
     lines = [line.replace(f"{n},", f"{n},9", 1) for n, line in enumerate(lines, 1)]  # ranges that are not there
     (tmp_path / "protocol.csv").write_text("".join([f"No.,{heads},current [A]\n", *lines]))
     assert not import_files([tmp_path]).records
+
+
+@pytest.mark.parametrize(
+    ("plan", "text", "heads", "sizes"),
+    [
+        (
+            "plan.csv",
+            "File,Start row,End row,Current (A)\nrun_1.csv,1,500,0.25\nrun_2.csv,1,800,0.5\n",
+            HEAD,
+            [500, 800],
+        ),
+        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,1,4,0.5\n", HEAD, [401, 600]),
+        ("plan.csv", "Test,Start (s),End (s)\n1,1,3\n2,1,4\n", "# coil current: {} A\n" + HEAD, [401, 600]),
+        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,11,13,0.5\n", HEAD, [800, 800]),
+        ("tests.csv", "file,current_A,start_s,end_s\nrun_1.csv,0.25,1,3\nrun_2.csv,0.5,1,4\n", HEAD, [401, 600]),
+    ],
+)
+def test_each_test_is_cut_to_its_start_and_end_in_a_plan_if_they_are_on_its_own_clock(
+    tmp_path, plan, text, heads, sizes
+):
+    write_tests(tmp_path, (0.25, 0.5), heads=heads)
+    (tmp_path / plan).write_text(text)
+    records = import_files([tmp_path]).records
+    assert [record.time.size for record in records] == sizes
+    assert all("W_CUT" in {f.code for f in r.findings} for r in records if r.time.size < T.size or sizes[0] == T.size)
+
+
+@pytest.mark.parametrize("line", ["Vertical Units,V", "# Amplitude,V", "Unit: V", "# V"])
+def test_a_unit_of_a_profile_against_volts_above_the_numbers_is_refused_without_a_scale(tmp_path, line):
+    text = "[channels.{}]\ncolumn = 1\nunit = '{}'\nfile = '{{run}}_{}.csv'\n"
+    of = (("displacement", "mm", "CH1", X / 5, 5.0), ("force", "N", "CH2", force(0.5) / 300, 300.0))
+    for _, _, name, values, _ in of:
+        (tmp_path / f"t_0.5A_{name}.csv").write_text(f"{line}\n{rows(values)}")
+    profile = "[file]\nsample_rate_Hz = 200\n" + "".join(text.format(r, u, n) for r, u, n, *_ in of)
+    assert {r.error.code for r in import_files([tmp_path], parse_profile(profile)).refusals} == {"E_UNITS_DIMENSION"}
+    for _, unit, *_, scale in of:
+        profile = profile.replace(f"unit = '{unit}'", f"unit = '{unit}'\nscale = {scale}")
+    assert currents(import_files([tmp_path], parse_profile(profile)).records) == [0.5]
 
 
 def test_a_step_without_a_current_is_a_pause_only_where_the_record_rests(tmp_path):

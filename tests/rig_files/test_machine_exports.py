@@ -240,8 +240,9 @@ def test_functions_of_a_vibration_analyser_are_channels_whose_unit_is_asked_for_
     expect(tmp_path, 0.6, profile='[channels.displacement]\nunit = "mm"\n')
 
 
-def test_a_row_of_units_may_end_with_the_start_and_the_step_of_the_samples(tmp_path):
-    body = "".join(f"{i},{x / 5:.6f},{f / 300:.6f},,,\n" for i, (x, f) in enumerate(zip(X, force(0.6), strict=True)))
+@pytest.mark.parametrize("end", [",,,", ",,"])
+def test_a_row_of_units_may_end_with_the_start_and_the_step_of_the_samples(tmp_path, end):
+    body = "".join(f"{i},{x / 5:.6f},{f / 300:.6f}{end}\n" for i, (x, f) in enumerate(zip(X, force(0.6), strict=True)))
     head = "X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-5.0e-01,4.0e-03,\n"
     (tmp_path / "scope 0.6A.csv").write_text(head + body)
     (tmp_path / "readme.txt").write_text("CH1: displacement 5 mm/V\nCH2: force 300 N/V\n")

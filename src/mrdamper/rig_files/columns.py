@@ -351,12 +351,24 @@ def _convert(
         remedy = f"set [channels.{role}] sign = -1 in a profile, or sign = 1 if it counts extension positive"
         raise _refusal(ColumnError, table, problem, remedy, "E_SIGN_CONVENTION")
     if role in SIGNED and channel.scale is None:
+        _refuse_volts_beside(table, role, profile)
         _refuse_factor(table, role, unit)
     si = parse_unit(unit) or Unit("", 1.0)
     sign = sign or 1
     shift = 0.0 if channel.integrate else sign * (si.factor * channel.offset + si.offset)
     factor = sign * (channel.scale or 1.0) * si.factor
     return Assigned(column, header.name, unit, factor, shift + 0.0, 1e-3 * channel.delay_ms, sign)
+
+
+def _refuse_volts_beside(table: RawTable, role: str, profile: Profile) -> None:
+    """Refuse a unit that only the profile states where a line beside the columns has cells in volts: Y units, V."""
+    cells = {line: [cell.strip(' []()#"') for cell in re.split(r"[,;:=|\t]", line)] for line in table.lines}
+    units = {line: [split_name("", cell).dimension for cell in of if is_unit(cell)] for line, of in cells.items()}
+    line = next((line for line, of in units.items() if {*of} == {"voltage"}), "")
+    if line and (profile.file.names or profile.channel(role).unit) and not table.columns(dimension="voltage"):
+        problem = f"the line {line.strip()[:80]!r} is in volts, and the {role} in the unit of the profile"
+        remedy = f"give the calibration: [channels.{role}] unit and scale (unit per V) in a profile, 1 if it is applied"
+        raise _refusal(UnitError, table, problem, remedy, "E_UNITS_DIMENSION")
 
 
 def _refuse_factor(table: RawTable, role: str, unit: str) -> None:

@@ -26,6 +26,7 @@ from mrdamper.rig_files.mapping.description import SHORT_TEXTS, is_description, 
 from mrdamper.rig_files.mapping.plans import (
     currents_beside,
     currents_listed,
+    cut_to_windows,
     discarded_tests,
     misfit_of_plan,
     named_tests,
@@ -172,7 +173,8 @@ def import_files(
         left_out += [] if refusals is intake.notes else dict.fromkeys(Path(note.file) for note in intake.notes)
         left_out += intake.omitted
         names = tuple(path.name for path in left_out)
-        reasons = {Path(note.file).name: intake.reason(note) for note in intake.notes}
+        reasons = {path.name: why for path, why in intake.omitted.items() if why}
+        reasons |= {Path(note.file).name: intake.reason(note) for note in intake.notes}
         return ImportResult(with_unique_ids(_with_folders(intake.tests())), named, names, reasons)
 
 
@@ -188,7 +190,7 @@ class _Intake:
         self.unchecked: list[tuple[Path, Record]] = []  # every test, also those refused
         self.refusals: list[Refusal] = []
         self.notes: list[Refusal] = []  # texts of a folder that hold no table
-        self.omitted: list[Path] = []  # tests that the profile leaves out, files of those that repeat another
+        self.omitted: dict[Path, str] = {}  # tests that the profile leaves out, files of those that repeat another: why
         self.met: list[tuple[Path, str]] = []
         self._given: set[Path] = set()
         self._shares: dict[Path, tuple[str, Profile]] = {}  # files of some channels each, by the profile
@@ -240,7 +242,7 @@ class _Intake:
     def _check(self, path: Path, record: Record, *, several: bool) -> None:
         """Check a test that the profile does not leave out: only here, as plans count those that it does."""
         if self._profile.leaves_out(*path.parts, record.id):
-            self.omitted.append(Path(record.id))
+            self.omitted[Path(record.id)] = "left out by the profile"
             return
         self.unchecked.append((path, record))
         checked, problems = record, list[InputError]()
@@ -283,9 +285,12 @@ class _Intake:
                 self._drop_refusals({path})
         for path in [path for path, of in whence.items() if of.startswith(WITHIN)]:
             self._compare(path, results_of(path, self._profile.file))
+        if self._table and (windows := remarks_of(self._table.path)):
+            tests = self.tests()
+            self._cut(self._table.path, windows, [tests[i] for i in named_tests(windows, tests)])
         tests = self.tests()
         again = repeated([record for _, record in tests])
-        self.omitted += [path for i, (path, _) in enumerate(tests) if i in again]
+        self.omitted |= {path: "the same samples as another" for i, (path, _) in enumerate(tests) if i in again}
         self._found = [test for i, test in enumerate(tests) if i not in again]
         self._refuse(contradictions([record for _, record in self.tests()]))
         tests = self.tests()
@@ -339,7 +344,17 @@ class _Intake:
                         (p, replace(r, doubt=error) if r.id == record.id else r) for p, r in self.unchecked
                     ]
         self._refuse({tests[i][0]: error for i, error in refused.items()})
+        if path != self._plan:
+            self._cut(path, remarks, [test for i, test in enumerate(own) if i not in refused])
         return bool(stated) and other is None
+
+    def _cut(self, path: Path, results: Results | None, tests: _Tests) -> None:
+        """Check tests again that a plan gives a start and an end, cut to these."""
+        whole = [next(of for of in self.unchecked if (of[0], of[1].id) == (p, r.id)) for p, r in tests]
+        for i, part in cut_to_windows(path, results, whole).items():
+            self.unchecked.remove(whole[i])
+            self._found = [of for of in self._found if (of[0], of[1].id) != (whole[i][0], part.id)]
+            self._check(whole[i][0], part, several=True)
 
     def _join_channels(self, others: list[Path], texts: Sequence[Path]) -> set[Path]:
         """Join channels of several files, and currents that other files state; the files that were used."""
@@ -422,8 +437,11 @@ class _Intake:
         self._pending = [test for test in self._pending if not rests(test[1])]  # a reading of zero
         self.met += [(file, record.id) for file, record in every]
         ids = {record.id for _, record in (*tests, *self._pending)}
-        self.omitted += [Path(record.id) for _, record in every if record.id not in ids]  # in no row's range
+        why = f"in no range of {path.name}" if results and results.ranges[1] else "it rests"
+        self.omitted |= {Path(record.id): why for _, record in every if record.id not in ids}
+        windows = cut_to_windows(path, results, tests)
         for i, ((file, record), (current, whence)) in enumerate(zip(tests, stated, strict=True)):
+            record = windows.get(i, record)
             with contextlib.suppress(InputError):  # its doubt stays
                 note = f"its current is the {current:g} A of {whence}"
                 record = with_stated_current(record, current, whence, file.name, note)

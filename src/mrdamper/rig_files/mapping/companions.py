@@ -65,7 +65,7 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
                 return None
             table, alone = completed(with_notes(tables[0], path, profile)), len(tables[0].names) == 1
             stated = [role for role, channel in profile.channels.items() if channel.file]
-            assigned = partly_assigned(table, profile, ["time", *stated] if run and not alone else ())
+            assigned = partly_assigned(table, profile, [*["time"] * (not alone), *stated] if run else ())
             raw = table.read([entry.column for entry in assigned.values()])
             channels = {role: rescale(raw.values[e.column], e.factor, e.offset) for role, e in assigned.items()}
             current = None if alone else current_of(table, profile, path, channels.get("current"), slice(None))[0]

@@ -42,6 +42,7 @@ _DISCARDED, _DISCARDED_FLAG, _NOT_DISCARDED = (
     re.compile("(?i)" + "|".join(words(of))) for of in ("discarded", "discarded_flag", "not_discarded")
 )
 _REST = 0.1  # of the largest motion: less is that of no test
+_SLACK = 0.01  # of a record, by which a start or an end is rounded
 _MOTIONS = (  # dimension and name of a column, relative difference of two tests, unit of messages and its number per SI
     ("frequency", re.compile(r"(?i)^(?:f\b|freq|frec|fréq|част|频率|周波数|częst)"), 0.15, "Hz", 1.0),
     ("length", re.compile(r"(?i)ampl|^x_?0$|^(?:stroke|hub|course|carrera|corsa)$|振幅|행정|行程"), 0.5, "mm", 1e3),
@@ -209,10 +210,37 @@ def remarks_of(path: Path) -> Results | None:
     lines = lines or ask_tables(path, lambda tables: [line for t in tables[:20] for line in lines_of(t)], [])
     for heads, rows in rows_below_heads(lines):
         flags = (_DISCARDED_FLAG.search(f"{head}: {answer}") for head in heads for answer in ("yes", "no"))
-        if any(flags) or not _REMARKS.isdisjoint(word for head in heads for word in words_of(head.casefold())):
-            cells = tuple((str(n), *row) for n, row in enumerate(rows, 1))
-            return Results((0.0,) * len(cells), cells, "", ("", *heads))
+        remarks = any(flags) or not _REMARKS.isdisjoint(word for head in heads for word in words_of(head.casefold()))
+        cells = tuple((str(n), *row) for n, row in enumerate(rows, 1))
+        table = Results((0.0,) * len(cells), cells, "", ("", *heads))
+        if remarks or table.ranges[1]:
+            return table
     return None
+
+
+def cut_to_windows(path: Path, results: Results | None, tests: _Tests) -> dict[int, Record]:
+    """Return the tests of which a plan states a start and an end on each one's own clock or rows, cut to that.
+
+    Those of another clock, which some of them do not have, stay whole, with a finding.
+    """
+    by_rows, windows = results.ranges if results and within_ranges(tests, results) == [*tests] else (False, [])
+    numbered = replace(results, current=tuple(map(float, range(len(windows)))), of_supply=False) if results else None
+    rows = [int(row) for row, _ in currents_beside(path, numbered, tests) or ()] if windows else []
+    inside = dict[int, slice]()
+    for i, (row, (_, record)) in enumerate(zip(rows, tests, strict=False)):
+        clock = np.arange(1, record.time.size + 1) if by_rows else record.time
+        if by_rows and record.lines is not None and min(begin for begin, _ in windows) >= record.lines[0]:
+            clock = record.lines
+        (begin, end), slack = windows[row], _SLACK * (clock[-1] - clock[0])
+        if clock[0] - slack <= begin < end <= clock[-1] + slack:
+            inside[i] = slice(int(np.searchsorted(clock, begin)), int(np.searchsorted(clock, end, side="right")))
+    if len(inside) < len(rows):
+        text = printable(f"starts and ends in {path.name} are not all on the clocks of the tests, and are not used")
+        note = Finding("W_CUT", text)
+        return {i: tests[i][1].noticed(note) for i in range(len(rows))}
+    note = Finding("W_CUT", printable(f"cut to its start and end in {path.name}"))
+    parts = {i: part_of_record(tests[i][1], s) for i, s in inside.items()}
+    return {i: part.noticed(note) for i, part in parts.items() if part.time.size < tests[i][1].time.size}
 
 
 def named_tests(results: Results | None, tests: _Tests) -> list[int]:

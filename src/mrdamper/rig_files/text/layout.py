@@ -380,6 +380,7 @@ def _first_row(content: Sequence[tuple[int, str]], above: int, separator: str, s
     trailing = width > 1 and separator != SPACES and not cells[-1] and not any(r[-1] for r in rows if len(r) == width)
     if trailing:
         over = (cells_of(line, separator) for i, line in (*before, *content) if i < first)
+        over = (cells[:-1] if len(cells) == width + 1 and not cells[-1] else cells for cells in over)
         header = [cells for cells in over if len(cells) in (width, width - 1)]
         trailing = not header or len(header[-1]) == width - 1 or not header[-1][-1]
     return first, width - trailing, trailing
