@@ -75,6 +75,7 @@ def test_what_a_name_stands_for(name, role):
         ("kN", "force", 1e3), ("lbf", "force", 4.4482216152605), ("daN", "force", 10), ("mm", "length", 1e-3),
         ("in", "length", 0.0254), ("µs", "time", 1e-6), ("Sec", "time", 1), ("min", "time", 60),
         ("m/s²", "acceleration", 1), ("m_s2", "acceleration", 1), ("mm/s", "velocity", 1e-3), ("m s-1", "velocity", 1),
+        ("deg_C", "temperature", 1), ("degrees C", "temperature", 1), ("میلی\u200cمتر", "length", 1e-3),
         ("mA", "current", 1e-3), ("kilonewton", "force", 1e3), ("mile", "length", 1609.344),
     ],
 )  # fmt: skip

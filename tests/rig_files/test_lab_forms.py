@@ -1433,3 +1433,94 @@ def test_a_current_that_heat_lowers_does_not_excuse_a_force_that_fades(tmp_path)
     (tmp_path / "run_1.csv").write_text(heads + rows(T, X, fading * force(1.0, 1), current))
     (record,) = import_files([tmp_path]).records
     assert "W_UNSTEADY" in {finding.code for finding in record.findings}
+
+
+NS = [f"{1_600_000_000_000_000_000 + round(1e9 * t)}" for t in T]
+FILES_OF_CHANNELS = {  # text beside the folders of the tests, and files of each: what is above the rows, the rows
+    "columns by their numbers": (
+        "- `Tn_disp.out`: column 1 time (sec), column 2 damper displacement (mm)\n"
+        "- `Tn_force.out`: column 1 time (sec), column 2 damper force (kN)\n\n| Test | Current (A) |\n|---|---|\n"
+        "| T1 | 0.25 |\n| T2 | 0.5 |\n",
+        {
+            "exp/T{n}_disp.out": lambda f: rows(T, X, separator=" "),
+            "exp/T{n}_force.out": lambda f: rows(T, f / 1e3, separator=" "),
+        },
+    ),
+    "topics of a table": (
+        "| topic | type | unit |\n|---|---|---|\n| /rig/lvdt | Stamped, piston displacement | mm |\n"
+        "| /rig/cell | Stamped, force | N |\n| /rig/coil_current | Stamped, coil current | A |\n",
+        {
+            "bag_{n}/_slash_rig_slash_lvdt.csv": lambda f: topic("field.data", X),
+            "bag_{n}/_slash_rig_slash_cell.csv": lambda f: topic("field.data", f),
+            "bag_{n}/_slash_rig_slash_coil_current.csv": lambda f: topic("field.data", np.full(T.size, amperes(f))),
+        },
+    ),
+    "columns by the ends of their names": (
+        "joints: position0 [m] of the piston\nwrench: the damper force is force.z [N] of the sensor; x is parasitic\n"
+        "coil_current: data = measured coil current [A]\n",
+        {
+            "run_{n}/joints.csv": lambda f: topic("field.position0", X / 1e3),
+            "run_{n}/wrench.csv": lambda f: topic("field.wrench.force.x,field.wrench.force.z", 0 * X, f),
+            "run_{n}/coil_current.csv": lambda f: topic("field.data", np.full(T.size, amperes(f))),
+        },
+    ),
+    "scales by the numbers of channels": (
+        "Calibration:\n  CH1 LVDT      displacement   5 mm/V\n  CH2 Cell  force     250 N/V\n  CH3 LEM  coil current  1 A/V\n",
+        {
+            "T{n}/CH1_LVDT.asc": lambda f: volts(1, "LVDT", X / 5),
+            "T{n}/CH2_Cell.asc": lambda f: volts(2, "Load Cell", f / 250),
+            "T{n}/CH3_LEM.asc": lambda f: volts(3, "LEM", np.full(T.size, amperes(f))),
+        },
+    ),
+    "names of files alone": (
+        "",
+        {
+            "run{n}_{i}A_disp_mm.txt": lambda f: f"Sample rate: 200 Hz\n{rows(X)}",
+            "run{n}_{i}A_force_N.txt": lambda f: f"Sample rate: 200 Hz\n{rows(f)}",
+        },
+    ),
+}  # fmt: skip
+
+
+def topic(names, *values):
+    lines = (",".join([stamp, *(f"{v:.6f}" for v in row)]) for stamp, *row in zip(NS, *values, strict=True))
+    return "\n".join([f"%time,{names}", *lines, ""])
+
+
+def volts(number, name, values):
+    return f"; Channel {number}: {name}\n; Unit: V\n; Sample rate: 200 Hz\n{rows(values)}"
+
+
+def amperes(load: np.ndarray) -> float:
+    return 0.25 if np.max(load) < 500 else 0.5
+
+
+@pytest.mark.parametrize("form", FILES_OF_CHANNELS)
+def test_a_file_for_each_channel_is_named_by_a_text_or_by_its_own_name(tmp_path, form):
+    text, files = FILES_OF_CHANNELS[form]
+    (tmp_path / "README.md").write_text(f"Tests of a damper.\n\n{text}")
+    for n, current in enumerate((0.25, 0.5), 1):
+        for name, content in files.items():
+            path = tmp_path / name.format(n=n, i=current)
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(content(force(current, n)))
+    result = import_files([tmp_path])
+    assert currents(result.records) == [0.25, 0.5], result.refusals
+    for record, current in zip(result.records, (0.25, 0.5), strict=True):
+        assert np.ptp(record.force) == pytest.approx(np.ptp(force(current)), rel=0.02)
+        assert np.ptp(record.displacement) == pytest.approx(0.02, rel=0.01)
+
+
+def test_rows_of_one_key_below_the_names_are_units_or_none_of_the_names(tmp_path):
+    heads = "time,x,F\n,Type: double,Type: double\n,Unit: mm,Unit: N\n,Block Path: rig/in:1,Block Path: rig/in:2\n"
+    (tmp_path / "a_0.5A.csv").write_text(heads + rows(T, X, force(0.5)))
+    (record,) = import_files([tmp_path]).records
+    assert record.provenance["columns"] == "time = time in s, displacement = x in mm, force = F in N"
+
+
+def test_names_and_units_in_persian_and_a_rate_in_russian_are_read(tmp_path):
+    (tmp_path / "a_0.5A.csv").write_text("زمان (ثانیه),جابجایی (میلی\u200cمتر),نیرو (نیوتن)\n" + rows(T, X, force(0.5)))
+    (tmp_path / "b_0.25A.txt").write_text(
+        "Частота опроса, Гц: 200\n\nПеремещение, мм\tУсилие, Н\n" + rows(X, force(0.25), separator="\t")
+    )
+    assert currents(import_files([tmp_path]).records) == [0.25, 0.5]

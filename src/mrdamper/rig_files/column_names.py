@@ -20,6 +20,7 @@ TABLES: Mapping[str, Any] = tomllib.loads(files("mrdamper.rig_files").joinpath("
 KEYS: Mapping[str, Sequence[str]] = TABLES["keys"]
 UNIT_KEYS = frozenset(KEYS["unit"])
 _LETTERS = str.maketrans("łøıđß", "loids")
+_INVISIBLE = dict.fromkeys(map(ord, "\u200b\u200c\u200d\u200e\u200f\ufeff"))  # between or beside letters
 _FEWEST_LETTERS = 4  # of a word that is known without its accents: cas is another word than čas
 
 
@@ -98,10 +99,11 @@ def _from_table(text: str) -> Unit | None:
 
 def _normal(text: str) -> str:
     """One writing for the many of m/s²: m/s^2, m s-2, m_s2, m/s**2, m·s⁻²."""
-    text = " ".join(text.strip().rstrip(".").split())
+    text = " ".join(text.translate(_INVISIBLE).strip().rstrip(".").split())
     for old, new in (("µ", "u"), ("μ", "u"), ("²", "2"), ("³", "3"), ("⁻¹", "-1"), ("⁻", "-"), ("**", "^"), ("º", "°")):
         text = text.replace(old, new)
     text = text.replace("^", "").replace("_per_", "/").replace(" per ", "/").replace("° ", "°")
+    text = re.sub("(?i)^deg(?:rees?)?[ _]?([CF])$", r"deg\1", text)
     if "/" not in text:
         text = re.sub(r"^([A-Za-z]{1,2})[ ·⋅*.]?s-([12])$", lambda m: f"{m[1]}/s{m[2].replace('1', '')}", text)
         text = re.sub(r"^([a-z]{1,2})_s([2]?)$", r"\1/s\2", text)
@@ -197,7 +199,7 @@ def split_name(header: str, unit: str = "") -> Header:
     """Name and unit of a column whose header may hold both: `force_N`, `Force [kN]`, `Kraft in kN`."""
     if len(header) > _LONGEST_NAME:
         return Header(header, unit)
-    text = _DEVICE.sub("", unicodedata.normalize("NFKC", header).strip())
+    text = _DEVICE.sub("", unicodedata.normalize("NFKC", header).translate(_INVISIBLE).strip())
     if unit:
         match = _BRACKETED.match(text)
         return Header(match["name"] if match and (parse_unit(match["unit"]) or ":" in match["unit"]) else text, unit)

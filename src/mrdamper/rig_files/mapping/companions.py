@@ -28,6 +28,7 @@ from mrdamper.rig_files.record import REQUIRED, Finding, Record
 from mrdamper.rig_files.rig_record import records_of
 
 _FEWEST_ROWS = 50  # of a record
+_CHANNEL = re.compile("(?i)ch(?:annel|an)?[0-9]{1,2}")  # number of a channel in the name of a file
 _SAME_START = 0.02  # of a record: clocks of two loggers that are one
 
 
@@ -64,6 +65,7 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
             if len(tables) != 1:
                 return None
             table, alone = completed(with_notes(tables[0], path, profile)), len(tables[0].names) == 1
+            called = {w.casefold() for name in tables[0].names * alone for w in words_of(name) if w.isalpha()}
             stated = [role for role, channel in profile.channels.items() if channel.file]
             assigned = partly_assigned(table, profile, [*["time"] * (not alone), *stated] if run else ())
             raw = table.read([entry.column for entry in assigned.values()])
@@ -83,6 +85,7 @@ def part_of(path: Path, profile: Profile, run: str = "") -> Part | None:
     if not channels or not (alone or timed):
         return part_of(path, other_logger, run) if run and other_logger != profile else None
     words = [word for word in words_of(split_name(path.stem).name) if role_of(word) not in assigned]
+    words = [word for word in words if word.casefold() not in called and not _CHANNEL.fullmatch(word)]
     test = path.with_name(run or path.name) if run or not alone else path.parent / "_".join(words)
     remarks = list(table.remarks) if alone else [] if current is None else [f"current: {current!r} A"]
     columns = ", ".join(f"{role} = {e.name} in {e.unit}" for role, e in assigned.items())

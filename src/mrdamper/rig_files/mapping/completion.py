@@ -88,6 +88,8 @@ _CHANNEL_IS = re.compile(
     r"(?P<what>(?:(?!, )[^;|\t]){2,60})"
 )
 _FILE_IS = re.compile(r"\W*(?P<part>[A-Za-z][0-9A-Za-z]{0,20})\s*[:=]\s*(?P<what>[^\W\d_](?:(?!, )[^;|\t]){2,60})")
+_OF_FILE = re.compile(r"[\s>*|`\"-]*(?P<name>[/\w.#<>-]{1,60}?)[`\"]?\s*[:=|]\s*(?P<rest>\S.*)")
+_COLUMN_IS = re.compile(rf"(?i)(?<!\w){_NUMBERS}\s?(?P<number>[0-9]{{1,3}})[\s:=]+(?P<what>(?:(?!, )[^;|\t])+)")
 _FULL_SCALE = re.compile(  # sections of a header: Name=Stroke, FullScale=75, Unit=mm
     r"(?im)^name *= *(?P<name>[^=\n]{1,60})\n(?:[^=\n]*=[^\n]*\n){0,4}?full[ _]?scale *= *(?P<full>[0-9.]{1,12})\n"
     r"(?:[^=\n]*=[^\n]*\n){0,4}?unit *= *(?P<unit>\S{1,12})$"
@@ -103,7 +105,7 @@ def completed(table: RawTable) -> RawTable:
     if table.names == ("",):  # a channel a file: force_N.txt
         header = split_name(Path(table.source.name).stem)
         table = table.named({0: header}) if header.role else table
-    table = _with_numbered_channels(_without_shared_path(table))
+    table = _with_numbered_channels(_with_lines_of_file(_without_shared_path(table)))
     if not any(table.names):
         return table
     table = _with_explained_names(table)
@@ -262,6 +264,38 @@ def _with_numbered_channels(table: RawTable) -> RawTable:
         return table
     names = tuple(next(iter(what), name) for name, what in zip(table.names, meant, strict=True))
     return replace(table, names=names)
+
+
+def said_of_file(line: str, name: str) -> str:
+    """Return what a line states of files of a name, behind that: Tn_disp.out: column 2 = x (mm); /rig/lvdt | x | mm."""
+    match = _OF_FILE.match(line[:LONGEST_LINE])
+    return match["rest"] if match and _name_key(match["name"]) == _name_key(name) else ""
+
+
+def _name_key(name: str) -> list[str]:
+    """Return the words of a file's name, or of a topic's, with one sign for all numbers."""
+    bare = re.sub(r"(?i)[0-9]+|#+|<[^<>]*>", "n", re.sub(r"\.[A-Za-z]\w{0,4}$", "", name))
+    return [word.casefold() for word in re.split(r"[\W_]+", bare) if word not in ("", "slash")]
+
+
+def _with_lines_of_file(table: RawTable) -> RawTable:
+    """Names and units of columns that a line states of the files of such a name: of numbered, of named, of the only."""
+    rests = {rest for line in table.lines if (rest := said_of_file(line, table.source.name))}
+    rest = rests.pop() if len(rests) == 1 else ""
+    stated = {int(m["number"]) - 1: item_of(m["what"]) for m in _COLUMN_IS.finditer(rest)}
+    stated = {} if any(table.names) else stated
+    for i, name in enumerate(table.names if rest else ()):
+        parts = name.split(".")
+        tails = "|".join(re.escape(".".join(parts[n:])) for n in range(len(parts)) if name)
+        match = re.search(rf"(?<![\w.])(?:{tails})(?:(?P<unit>\s*[\[(][^\[\]()]+[\])])|\s*=\s*(?P<what>[^,;]+))", rest)
+        if match and name:
+            stated[i] = split_name(f"{name}{match['unit']}") if match["unit"] else item_of(match["what"])
+    data = [i for i, name in enumerate(table.names) if name.rpartition(".")[2] == "data"]
+    cells = [cell.strip() for cell in re.split(r"[,;|\t]", rest)]
+    what, units = [cell for cell in cells if role_of(cell)], [cell for cell in cells if is_unit(cell)]
+    if not stated and len(data) == len(what) == len(units) == 1:
+        stated = {data[0]: Header(what[0], units[0])}
+    return table.named(stated) if any(header.unit for header in stated.values()) else table
 
 
 def _with_name_by_file(table: RawTable) -> RawTable:

@@ -30,7 +30,7 @@ from mrdamper.rig_files.column_names import (
 )
 from mrdamper.rig_files.columns import units_in
 from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines
-from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, states_si, states_volts
+from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, said_of_file, states_si, states_volts
 from mrdamper.rig_files.mapping.results import numbered_tests
 from mrdamper.rig_files.mapping.scales import (
     NUMBER_IS,
@@ -118,7 +118,11 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     counted = {line: {match["name"].casefold() for match in NUMBER_IS.finditer(line)} for line in lines}
     stated = [
         (lacking and _of_channels(line))
-        or (line if states_sign(line) or names & counted[line] or units_in(line) else "")
+        or (
+            line
+            if states_sign(line) or names & counted[line] or units_in(line) or said_of_file(line, path.name)
+            else ""
+        )
         for line in lines
     ]
     force = profile.channel("force")

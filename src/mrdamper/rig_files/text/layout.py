@@ -10,7 +10,7 @@ import csv
 import re
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, islice
 from string import ascii_uppercase
@@ -24,12 +24,16 @@ from mrdamper.rig_files.text.tokens import FORTRAN, MISSING, looks_numeric, stam
 Kind = Literal["number", "stamp", "text"]
 SPACES = " "  # stands for any run of spaces
 X_VALUE = "X_Value"  # the clock of LabVIEW, whose cells may be empty
+_SIMULINK = "Block Path: "  # of signals exported by Simulink, whose time is in seconds
 _SEPARATORS = (";", "\t", ",", "|", SPACES)
 _COMMENT = re.compile(  # a sheet's errors are cells, and so is what semicolons separate
     r"^\s*(?:(?:#(?!N/A|REF!|VALUE!|DIV/0|NAME\?|NULL!|NUM!)|%|//)+|;(?=\s+[^\W\d_]{4}[^;]*$))"
 )
 _KEY_AND_VALUE = re.compile(  # Samples: 4850, Unit: V
     rf"(?i)[^:=]*[^\W\d_][^:=]*[:=]\s*[-+0-9.,]+\W*[^\W\d_]*|(?:{'|'.join(UNIT_KEYS)})\s*[:=].*"
+)
+_UNIT_OF_ALL = re.compile(  # ; Unit: V, above the only column
+    rf"(?i)[\s#%;\"]*(?:(?:y|vertical|channel|signal|data)[ _-]*)?(?:{'|'.join(UNIT_KEYS)})\"?\s*[:=,;\t]\s*\"?([^\s\",;]+)[\s\",;]*$"
 )
 _LISTING = re.compile(
     r"^\s*(?:columns?|channels?|fields?|spalten|kanäle|colonnes|header|names)\s*[:=]\s*", re.IGNORECASE
@@ -106,6 +110,8 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     decimal = form.decimal or next(stated, None) or _decimal(rows, source, first)
     if _counts(row[0] for row in rows):
         lines = [*_with_name_of_numbers(lines[:first], separator, width), *lines[first:]]
+    seconds = any(_SIMULINK in line for line in lines[:first])
+    lines = [*_without_keys(lines[:first], separator), *lines[first:]]
     header, unit_row = _header_lines(lines, first, separator, width, source, form)
     if header is not None and not is_comment(lines[header]):
         split_strictly(lines[header], separator, source, header + 1)
@@ -118,11 +124,14 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         raise _mismatch(source, separator, len(names), width, first, lines)
     units = _cells(lines[unit_row], separator, width) if unit_row is not None else ("",) * width
     units = ("" if units[0].casefold() in _UNIT_KEYS else units[0], *units[1:])
+    alone = [match[1] for line in lines[:first] if width == 1 and (match := _UNIT_OF_ALL.match(line))]
+    units = tuple(alone) if len(alone) == 1 and is_unit(alone[0]) and not any(units) else units
     columns = [[row[i] for row in rows if len(row) > i] for i in range(width)]
     names = tuple("" if n == X_VALUE and not any(c) else n for n, c in zip(names, columns, strict=True))
     written = rows if as_written is lines else _rows(as_written[first:], separator, width, trailing)
     behind = tuple(_unit_behind([row[i] for row in written if len(row) > i]) for i in range(width))
-    units = tuple(own or its for own, its in zip(behind, units, strict=True))
+    clocks = ("s" if seconds and name == "time" else "" for name in names)
+    units = tuple(own or its or clock for own, its, clock in zip(behind, units, clocks, strict=True))
     kinds: tuple[Kind, ...] = tuple(
         "number" if unit else _kind(column) for column, unit in zip(columns, behind, strict=True)
     )
@@ -163,6 +172,24 @@ def _with_name_of_numbers(above: Sequence[str], separator: str, width: int) -> l
     if len(named) != 1 or len(cells_of(above[named[0]], separator)) != width - 1:
         return list(above)
     return [f'""{separator}{line}' if i == named[0] else line for i, line in enumerate(above)]
+
+
+def _without_keys(above: Sequence[str], separator: str) -> Iterator[str]:
+    """Yield lines above the rows, without a key that all cells of one have: units of Unit: mm, Unit: N, none of a path.
+
+    A line of other properties is no heading.
+    """
+    for line in above:
+        pairs = [cell.strip('"').partition(": ") for cell in cells_of(line, separator)]
+        keys = {key.strip().casefold() for key, mark, _ in pairs if key or mark}
+        if (
+            len(keys) == 1
+            and sum(mark != "" for _, mark, _ in pairs) > 1
+            and all(mark or not key for key, mark, _ in pairs)
+        ):
+            yield separator.join(cell for *_, cell in pairs) if keys <= _UNIT_KEYS else ""
+        else:
+            yield line
 
 
 def _names_and_titles(
@@ -459,12 +486,12 @@ def _header_lines(
     marked = [i for i in filled if is_comment(lines[i])]
     numbers = {int(match["number"]) for line in lines[:first] if (match := LISTED.match(line))}
     listed = width > 1 and numbers == set(range(1, width + 1))  # lines name the columns by their numbers
-    plain = [] if listed else [i for i in filled if i not in marked]
+    valued = [i for i in filled if width == 1 and _KEY_AND_VALUE.fullmatch(cells.get(i, ("",))[0])]
+    plain = [] if listed else [i for i in filled if i not in (*marked, *valued)]
     keyed = _keyed_lines({i: cells[i] for i in plain if i in cells}, roles)
     if keyed:
         return keyed
-    named = [i for i in marked if width > 1 or not _KEY_AND_VALUE.fullmatch(cells.get(i, ("",))[0])]
-    for candidates in (plain, named):
+    for candidates in (plain, [i for i in marked if i not in valued]):
         fitting = [i for i in candidates if i in cells][-2 if width == 1 else 0 :]
         entered = [i for i in fitting if any(map(_ENTRY.fullmatch, cells[i]))]  # not "Date","2022/07/05"
         entered = [i for i in entered if looks_numeric(cells[i][0]) or _ENTRY.fullmatch(cells[i][0])]
@@ -472,8 +499,8 @@ def _header_lines(
         if not fitting:
             continue
         telling = [i for i in fitting if roles[i] >= _TELLING]
-        valued = [i for i in fitting if roles[i] == 1 and sum(cell[:1].isdigit() for cell in cells[i]) > 1]
-        fitting = [i for i in fitting if not telling or i not in valued]  # but Current (A), , 0, 0.5
+        entries = [i for i in fitting if roles[i] == 1 and sum(cell[:1].isdigit() for cell in cells[i]) > 1]
+        fitting = [i for i in fitting if not telling or i not in entries]  # but Current (A), , 0, 0.5
         last = fitting[-1]
         if candidates is plain and last != plain[-1] and _names_columns(lines[plain[-1]], separator):
             break
