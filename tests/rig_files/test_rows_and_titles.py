@@ -222,3 +222,47 @@ def test_the_name_of_a_sheet_states_the_current_of_each_of_its_tables(tmp_path):
     book.save(tmp_path / "a.xlsx")
     result = import_files([tmp_path / "a.xlsx"])
     assert [float(np.mean(record.current)) for record in result.records] == [0.0, 0.0, 0.5, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("top", "heads", "conditions", "labels"),
+    [
+        ("", ["Disp_{} (mm)", "Force_{} (N)"], ["1Hz", "2Hz", "3Hz"], ["1hz", "2hz", "3hz"]),
+        ("", ["Disp_{} (mm)", "Force_{} (N)"], ["0.5A_1Hz", "0.5A_2Hz", "0.5A_3Hz"], None),
+        ("", ["Disp Run{} (mm)", "Force Run{} (N)"], "123", ["run1", "run2", "run3"]),
+        ("", ["x{} (mm)", "F{} (N)"], "123", ["1", "2", "3"]),
+        (",FL,FL,FR,FR,RL,RL\n", ["Disp (mm)", "Force (N)"], ["", "", ""], ["FL", "FR", "RL"]),
+        (
+            ",Test 4,Test 4,Test 5,Test 5,Test 6,Test 6\n",
+            ["Disp (mm)", "Force (N)"],
+            "   ",
+            ["Test_4", "Test_5", "Test_6"],
+        ),
+    ],
+)
+def test_pairs_of_columns_whose_names_state_motion_number_or_corner_are_tests(tmp_path, top, heads, conditions, labels):
+    rates = (0.7, 1.0, 1.4)
+    motions = [2 * np.pi * rate * T for rate in rates]
+    pairs = [of for p in motions for of in (10 * np.sin(p), 300 * np.cos(p) + 90 * np.tanh(50 * np.cos(p)))]
+    names = ["Time (s)", *(head.format(c) for c in conditions for head in heads)]
+    body = rows(T, *pairs).replace(";", ",")
+    (tmp_path / "run_0.5A.csv").write_text(top + ",".join(names) + "\n" + body)
+    result = import_files([tmp_path])
+    assert not result.refusals, result.refusals[0].error
+    assert labels is None or [r.id for r in result.records] == [f"run_0.5A_{label}" for label in labels]
+    assert [r.current[0] for r in result.records] == [0.5] * 3
+    for record, rate in zip(result.records, rates, strict=True):
+        np.testing.assert_allclose(record.displacement, 0.01 * np.sin(2 * np.pi * rate * T), atol=1e-6)
+        assert record.provenance.get("specimen") == (record.id[-2:] if "FL" in top else None)
+
+
+@pytest.mark.parametrize("marks", [("1", "2"), ("upper", "lower"), ("1Hz", "2Hz")])
+def test_two_sensors_of_a_motion_are_two_tests_only_where_a_profile_splits_them(tmp_path, marks):
+    names = ["Time (s)", *(name.format(mark) for mark in marks for name in ("Disp_{} (mm)", "Force_{} (N)"))]
+    pairs = (X, force(0.5), X + 0.02 * np.sin(99 * T), force(0.5) * 1.01)
+    (tmp_path / "run_0.5A.csv").write_text(";".join(names) + "\n" + rows(T, *pairs))
+    result = import_files([tmp_path])
+    assert {refusal.error.code for refusal in result.refusals} == {"E_AMBIGUOUS"}
+    assert all('[file] blocks = "split"' in refusal.error.remedy for refusal in result.refusals)
+    (tmp_path / "rig.toml").write_text('[file]\nblocks = "split"\n')
+    assert len(import_files([tmp_path / "run_0.5A.csv"], tmp_path / "rig.toml").records) == 2

@@ -315,8 +315,13 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
 
 def _ambiguous(table: RawTable, role: str, names: Sequence[str]) -> RigFileError:
     shown = " and ".join(repr(name) for name in names[:3])
-    remedy = f'set [channels.{role}] column = "..." in a profile'
+    remedy = f'set [channels.{role}] column = "..."{_or_split(table)} in a profile'
     return table.source.refuse("E_AMBIGUOUS", f"{shown} may both be the {role}", remedy, line=table.line)
+
+
+def _or_split(table: RawTable) -> str:
+    pairs = len(table.columns("displacement")) == len(table.columns("force")) > 1
+    return ', or [file] blocks = "split" if each displacement has its force and is a test,' if pairs else ""
 
 
 def sign_of(table: RawTable, profile: Profile, role: str) -> int | None:
@@ -456,7 +461,7 @@ def _refuse_two_values(table: RawTable, role: str, column: int, profile: Profile
         return
     if same := _differing(table, column):
         problem = f"{len(same)} columns are called {table.headers[column].name!r} and differ"
-        remedy = "rename one, or set its number: column = 2 in a profile"
+        remedy = f"rename one, or set its number: column = 2{_or_split(table)} in a profile"
         raise table.source.refuse("E_DUPLICATE_COLUMN", problem, remedy, line=table.line, column=same[1] + 1)
 
 

@@ -36,6 +36,7 @@ _IN_NAME = re.compile(
 _BEHIND_DIGITS = re.compile(r"(?<![0-9])([0-9]|1[0-4])_([0-9]+)[ _]?A(?![A-Za-z0-9])")  # MRD-7_0A: 0 or 7.0 A
 _BEFORE = re.compile("([A-Za-z]+)[-_ =]?$")  # letters before a label
 _LEVELS, _RUNS = words("current_level"), words("run")
+CORNERS = words("corner")  # of a vehicle, each with a damper of its own
 _BEHIND_LABEL = re.compile(  # MRD-7_0.5A: no decimal is written so
     r"(?<![0-9])[0-9]+_[0-9]+(?:[.,xp][0-9]+[ _]?m?|[ _]?m)A(?![A-Za-z0-9])"
 )
@@ -199,6 +200,22 @@ def motions_in(text: str, unit: str) -> set[float]:
         float(re.sub("[,xp]", ".", number.lower())) * (1e-3 if milli else 1.0)
         for number, milli in _MOTIONS[unit].findall(text)
     }
+
+
+def names_test(title: str) -> bool:
+    """Tell if a title is that of a corner of a vehicle, of a motion, or of a numbered test."""
+    return title.casefold() in CORNERS or states_motion(title) or numbers_test(title)
+
+
+def states_motion(title: str) -> bool:
+    """Tell if a title states a frequency or an amplitude."""
+    return bool(motions_in(title, "Hz") or motions_in(title, "mm"))
+
+
+def numbers_test(title: str) -> bool:
+    """Tell if a title is a word for a test and its number: Test 1, run_02."""
+    match = re.fullmatch(r"([^\W\d_]+)[\W_]*[0-9]+", title.strip())
+    return match is not None and match[1].casefold() in _RUNS
 
 
 def without_currents(text: str) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache, lru_cache, partial
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from mrdamper.data.arrays import odd_steps
 from mrdamper.errors import InputError
 from mrdamper.rig_files.column_names import DIMENSION, RATING, UNIT_KEYS, is_unit, role_of, split_name, words, words_of
 from mrdamper.rig_files.columns import column_called
-from mrdamper.rig_files.conditions import currents_in
+from mrdamper.rig_files.conditions import CORNERS, currents_in, numbers_test, states_motion
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable, Words
 from mrdamper.rig_files.record import OPTIONAL, REQUIRED
@@ -28,6 +28,9 @@ _RUN_WORDS = words("run")
 _VALUE, _CHANNEL, _UNIT, _NUMBER = words("value"), words("channel"), UNIT_KEYS, words("run_number")
 _MOST_CHANNELS = 60
 _FEWEST_SAMPLES = 50  # of channels whose names say nothing
+_PAIR = ("displacement", "force")
+_ONE_MOTION, _TWO_SENSORS = 0.02, 0.25  # relative RMS difference of two columns that hold the same
+_Groups = dict[str, dict[str, int]]  # columns by channel, by group
 
 
 def tests_of(table: RawTable, form: FileForm) -> list[RawTable]:
@@ -153,10 +156,10 @@ def _title_cells(line: str) -> list[str]:
 def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
     """Return groups of columns beside each other, each a test; empty if the table has none.
 
-    A group has its own displacement and force. What tells a test from a second sensor is a
-    time of its own, or a title that states a current.
+    A group has its own displacement and force. What tells a test from a second sensor is a time of its own, a title
+    that states a current, or names as `_name_tests` knows them.
     """
-    members = _members(table)
+    members = _members(table, by_order=form.blocks == "split")
     if len(members) < 2:
         return []
     own_time = all("time" in roles for roles in members.values())
@@ -173,12 +176,36 @@ def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
                 titles |= dict(zip(places, own, strict=True))
                 break
     stated = all(currents_in(title) for title in titles.values())
-    if not (own_time or stated or form.blocks == "split"):
+    if not (own_time or stated or form.blocks == "split" or _name_tests(table, members, titles)):
         return []
     grouped = {i for roles in members.values() for i in roles.values()}
     alone = [columns[0] for role in ("time", "current") if len(columns := table.columns(role)) == 1]
     shared = [column for column in alone if column not in grouped]  # belong to every group
     return _beside(table, [(titles[key], roles, [*roles.values(), *shared]) for key, roles in members.items()])
+
+
+def _name_tests(table: RawTable, members: _Groups, titles: Mapping[str, str]) -> bool:
+    """Tell if groups are named after corners of a vehicle, after motions, or by numbers of tests, and are no sensors.
+
+    Two sensors of one test have nearly the same motion and force, two numbered tests have not.
+    """
+    headings = {(*table.names[i : i + 1], *table.over[i : i + 1]) for i in map(min, map(dict.values, members.values()))}
+    if {*map(str.casefold, titles.values())} <= CORNERS:
+        return True
+    motions = all(map(states_motion, titles.values()))
+    if len(headings) == 1 or not (motions or all(title.isdigit() or numbers_test(title) for title in titles.values())):
+        return False
+    values = table.peek(*(roles[role] for roles in members.values() for role in _PAIR))
+    return values is not None and not any(
+        all(_alike(values[one[role]], values[other[role]], _ONE_MOTION if motions else _TWO_SENSORS) for role in _PAIR)
+        for one, other in combinations(members.values(), 2)
+    )
+
+
+def _alike(one: np.ndarray, other: np.ndarray, limit: float) -> bool:
+    difference = one - other
+    there = np.isfinite(difference)
+    return bool(np.std(difference[there]) <= limit * max(np.std(one[there]), np.std(other[there])))
 
 
 def _shared_motion(table: RawTable) -> list[RawTable]:
@@ -204,27 +231,38 @@ def _beside(table: RawTable, tests: Sequence[tuple[str, dict[str, int], list[int
     ]
 
 
-def _members(table: RawTable) -> dict[str, dict[str, int]]:
-    """By group its columns by channel, where displacement and force come as often as each other."""
-    by_role: dict[str, list[tuple[int, str]]] = {}
+def _members(table: RawTable, *, by_order: bool) -> _Groups:
+    """By group its columns by channel, where displacement and force come as often as each other.
+
+    Columns of one name, and where a profile wants it those whose names do not pair them, are paired by their order.
+    """
+    by_role: dict[str, list[int]] = {}
     for i, header in enumerate(table.headers):
         role = header.channel
         if role is not None and header.dimension in (None, DIMENSION[role]):
-            by_role.setdefault(role, []).append((i, _key(header.name, role)))
-    moved, loads = by_role.get("displacement", []), by_role.get("force", [])
-    if len(moved) < 2 or len(moved) != len(loads):
+            by_role.setdefault(role, []).append(i)
+    keys = {role: _keys(table, columns, role) for role, columns in by_role.items()}
+    count = len(keys.get("displacement", ()))
+    if count < 2 or count != len(keys.get("force", ())):
         return {}
+    by_order &= {*keys["displacement"]} != {*keys["force"]}
     members: dict[str, dict[str, int]] = {}
     for role, columns in by_role.items():
-        keys = [key for _, key in columns]
-        if len(columns) == len(moved) and len(set(keys)) == 1:  # of one name: told apart by their order
-            columns = [(i, f"{n}") for n, (i, _) in enumerate(columns, 1)]
-        elif len(set(keys)) < len(keys):
-            continue
-        for i, key in columns:
+        own = keys[role]
+        if len(columns) == count and (len({*own}) == 1 or by_order):
+            own = [f"{n}" for n in range(1, count + 1)]
+        for key, i in zip(own, columns, strict=True) if len({*own}) == len(own) else ():
             members.setdefault(key, {})[role] = i
-    members = {key: roles for key, roles in members.items() if {"displacement", "force"} <= set(roles)}
-    return members if len(members) == len(moved) else {}
+    members = {key: roles for key, roles in members.items() if {*_PAIR} <= {*roles}}
+    return members if len(members) == count else {}
+
+
+def _keys(table: RawTable, columns: Sequence[int], role: str) -> list[str]:
+    """Return the parts of names beside their channel, with the currents in titles where only these tell them apart."""
+    keys = [_key(table.headers[i].name, role) for i in columns]
+    stated = [currents_in(table.over[i]) for i in columns] if table.over and len({*keys}) < len(keys) else ()
+    both = [f"{key} {current}" for key, current in zip(keys, stated, strict=False) if current]
+    return both if len({*both}) == len(keys) else keys
 
 
 def _key(name: str, role: str) -> str:

@@ -25,7 +25,7 @@ from mrdamper.rig_files.coil_current import (
 )
 from mrdamper.rig_files.column_names import DIMENSION, Unit, role_of, words
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, noted_columns, rate_of
-from mrdamper.rig_files.conditions import stated_motion, stated_quantities
+from mrdamper.rig_files.conditions import CORNERS, stated_motion, stated_quantities
 from mrdamper.rig_files.mapping.clocks import past_midnight, refuse_two_rates
 from mrdamper.rig_files.mapping.proposals import integral
 from mrdamper.rig_files.parts import stretches_of_time
@@ -313,6 +313,7 @@ def _remarks(table: RawTable, profile: Profile, assigned: dict[str, Assigned]) -
         f"{role} = {table.names[e.column] or f'column {e.column + 1}'} in {e.unit}" for role, e in assigned.items()
     ]
     remarks = {"columns": ", ".join(taken)} | ({"session": session[0]} if len(session) == 1 else {})
+    remarks |= {"specimen": table.label} if table.label.casefold() in CORNERS else {}
     if ignored:
         remarks["ignored_columns"] = listed(ignored, 20)
     return {

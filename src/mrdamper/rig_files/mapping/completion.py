@@ -27,7 +27,7 @@ from mrdamper.rig_files.column_names import (
     words,
     words_of,
 )
-from mrdamper.rig_files.conditions import LONGEST_LINE, currents_in, named_after_currents, without_currents
+from mrdamper.rig_files.conditions import LONGEST_LINE, currents_in, named_after_currents, names_test, without_currents
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
 from mrdamper.rig_files.mapping.scales import (
     SCALE,
@@ -196,7 +196,8 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
             roles = {split_name(cell).role for cell in cells} - {None}
             forces = [cells[i - 1] for i in table.columns("force") if i]  # beside a comment on the motion
             forces = forces if len(forces) > 1 else stated
-            if (key and len(roles) > 1) or (forces and all(map(currents_in, forces))):
+            tests = all(map(currents_in, forces)) or all(map(names_test, forces))
+            if (key and len(roles) > 1) or (forces and tests):
                 names = [*table.names]
                 for i, cell in enumerate(cells, 1):
                     names[i] = names[i] or (names[i - 1] if cell and cells[i - 2] else "")  # merged over the currents
