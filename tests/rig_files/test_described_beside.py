@@ -155,6 +155,29 @@ def test_a_plan_names_blocks_by_a_line_above_each(tmp_path):
     assert ",DAQ_02, 1 Hz, 12 mm" in tests_table.tests_text(result.records).replace('"', "")
 
 
+@pytest.mark.parametrize(
+    ("heads", "plan"),
+    [
+        (("Test: 2", "Test: 3", "Test: 5"), "Test,Current (A)\n1,0.5\n2,0\n3,0.2\n4,0.7\n5,0.9\n"),
+        (("Test no. 3", "Test no. 2", "Test no. 1"), "Test,Current (A)\n1,0.9\n2,0.2\n3,0\n"),
+        (("Operator: Tim\nTest: T3", "Operator: Ann\nTest: T1", "Operator: Bo\nTest: T2"),
+         "Test,Current (A)\nT1,0.2\nT2,0.9\nT3,0\n"),
+        (("Operator: Tim\nBlock: C", "Operator: Ann\nBlock: A", "Operator: Bo\nBlock: B"),
+         "Block,Current (A)\nA,0.2\nB,0.9\nC,0\n"),
+        (("File: m03.dat", "File: m01.dat", "File: m02.dat"), "File,Current (A)\nm01,0.2\nm02,0.9\nm03,0\n"),
+    ],
+)  # fmt: skip
+def test_names_and_numbers_above_blocks_are_surer_than_their_place(tmp_path, heads, plan):
+    blocks = zip(heads, (0.0, 0.2, 0.9), strict=True)
+    rows = [(head, zip(T, X, force(amperes), strict=True)) for head, amperes in blocks]
+    texts = (f"{head}\n{UNITS}" + "".join(f"{t:.3f},{x:.5f},{f:.4f}\n" for t, x, f in of) for head, of in rows)
+    (tmp_path / "all.csv").write_text("\n".join(texts))
+    (tmp_path / "plan.csv").write_text(plan)
+    result = import_files([tmp_path])
+    assert not [str(refusal.error) for refusal in result.refusals]
+    assert [float(np.mean(record.current)) for record in result.records] == pytest.approx([0.0, 0.2, 0.9])
+
+
 def test_a_remark_in_brackets_behind_a_legend_may_have_a_comma(tmp_path):
     write(tmp_path, UNITS)
     (tmp_path / "README.txt").write_text("Codes: m07 = 0.2 A, m08 = 0.9 A, m09 = 0 A (coil current, held constant)\n")

@@ -10,7 +10,7 @@ import re
 import shutil
 import tarfile
 import zipfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import IO
@@ -73,10 +73,12 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
             CombinedError.raise_from(problems)
         digest = digest_of(path)
     records = joined(records, profile, tables)
-    names = names_of_blocks(tables) if all(table.label.startswith("block") for table in tables) else []
-    if names and len(names) == len(records):
-        named = zip(records, names, strict=True)
-        records = [replace(r, provenance={**r.provenance, "block": as_data(name)}) for r, name in named]
+    endings: Sequence[object] = numbers if len(records) == len(numbers) else range(1, len(records) + 1)
+    if len(tables) == len(records) and all(table.label.startswith("block") for table in tables):
+        names, every = names_of_blocks(tables)
+        endings = names or endings
+        named = zip(records, every, strict=False)
+        records = [replace(r, provenance={**r.provenance, "block": as_data(name)}) for r, name in named] or records
     remarks = {"file": as_data(path.name), "sha256": digest}
     if profile != Profile():
         remarks["profile_sha256"] = profile_hash(profile)
@@ -85,8 +87,7 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
         finding = Finding("W_TABLE", f"tables of filtered or computed values are left out: {', '.join(computed)}")
         records[0] = records[0].noticed(finding)
     if len({record.id for record in records}) < len(records) or len(records) == len(numbers) < count:
-        numbers = numbers if len(records) == len(numbers) else range(1, len(records) + 1)
-        records = [replace(record, id=f"{record.id}_{n}") for n, record in zip(numbers, records, strict=True)]
+        records = [replace(record, id=f"{record.id}_{end}") for end, record in zip(endings, records, strict=True)]
     named = []
     for record in records:
         try:

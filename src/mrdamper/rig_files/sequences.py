@@ -13,6 +13,7 @@ import numpy as np
 from mrdamper.data import Floats, held_current
 from mrdamper.errors import ColumnError
 from mrdamper.rig_files.coil_current import as_data, constant
+from mrdamper.rig_files.column_names import words, words_of
 from mrdamper.rig_files.conditions import currents_in, motions_in
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.quality.view import find_strokes, runs_of
@@ -25,6 +26,8 @@ _NUMBERED = re.compile(
 _BLOCK_NAME = re.compile(  # Data Acquisition: DAQ_02; no date
     r"[\s#%]*([^\W\d_][^:=\t;]{1,40}?)\s*[:=]\s*\"?(?![0-9]+[:/.-][0-9])([^\t;,\"]*[^\W\d_][^\t;,\"]*)"
 )
+_BLOCK_NUMBER = re.compile(r"[\s#%]*([^\W\d_][^\d:=\t;]{1,40}?)[\W_]*([0-9]+)\W*")  # Test no. 4
+_RUN, _RUN_NUMBER = words("run"), words("run_number")
 _MOST_STEPS = 3.0  # between the last sample of a file and the first of the next
 MOST_TESTS = 500  # of a record: more is a cut at noise
 _BLOCK_S = 0.1  # [s] in which a motion at rest stays within a share of its range
@@ -62,14 +65,25 @@ def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> l
     return [test for chain in chains for test in (_tests_of(chain) if len(chain) > 1 else chain)]
 
 
-def names_of_blocks(tables: Sequence[RawTable]) -> list[str]:
-    """Return the name of every block of a file, by the first key above them that names each otherwise; none if none."""
-    stated = [{m[1]: m[2] for line in table.remarks if (m := _BLOCK_NAME.match(line))} for table in tables]
-    for key in stated[0] if len(stated) > 1 else ():
-        names = [of.get(key, "").strip() for of in stated]
-        if "" not in names and len({*names}) == len(names):
-            return names
-    return []
+def names_of_blocks(tables: Sequence[RawTable]) -> tuple[list[str], list[str]]:
+    """Return the names of a file's blocks by a word for a test, and by all keys above them that name each otherwise."""
+    stated = [dict(filter(None, map(_name_in, table.remarks))) for table in tables]
+    keys = [key for key in stated[0] if len({of.get(key, "") for of in stated} - {""}) == len(stated) > 1]
+    of_run = next((key for key in keys if _means_run(key)), None)
+    names = [re.sub(r"[^\w.+=-]+", "_", of[of_run]) for of in stated] if of_run else []
+    return names, ["; ".join(of[key] for key in keys) for of in stated] if keys else []
+
+
+def _name_in(line: str) -> tuple[str, str] | None:
+    """Return key and value of a line that may name a block, by a number only behind a word for a test."""
+    match, number = _BLOCK_NAME.match(line), _BLOCK_NUMBER.fullmatch(line)
+    match = number if number and _means_run(number[1]) else match
+    return (match[1], match[2].strip()) if match else None
+
+
+def _means_run(key: str) -> bool:
+    own = {*words_of(key.casefold())}
+    return bool(own & _RUN) and own <= _RUN | _RUN_NUMBER
 
 
 def goes_on(records: Sequence[Record]) -> bool:

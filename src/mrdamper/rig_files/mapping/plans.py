@@ -339,10 +339,10 @@ def within_ranges(tests: _Tests, results: Results | None) -> list[tuple[Path, Re
 def _called(tests: _Tests) -> list[tuple[str, ...]]:
     """Names of each test: its own, of its file, its own without that, of its block, and when it was recorded."""
     stems = [re.sub(r"[^\w.+=-]+", "_", file.stem) for file, _ in tests]
-    blocks = [record.provenance.get("block", "") for _, record in tests]
+    blocks = [record.provenance.get("block", "").split("; ") for _, record in tests]
     return [
-        (record.id, file.name, file.stem, record.id.removeprefix(stem).lstrip("_"), block, *_clocks(record, file))
-        for (file, record), stem, block in zip(tests, stems, blocks, strict=True)
+        (record.id, file.name, file.stem, record.id.removeprefix(stem).lstrip("_"), *names, *_clocks(record, file))
+        for (file, record), stem, names in zip(tests, stems, blocks, strict=True)
     ]
 
 

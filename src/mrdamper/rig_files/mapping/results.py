@@ -64,11 +64,12 @@ class Results:
         names = [_names(texts) for texts in tests]
         one_of_several = len(tests) == 1 < len(self.current)  # a number in its name alone may count anything
         by_number = by_number and self.counts_tests and not one_of_several
+        columns = self._columns_of_names(len(tests))
         for exact in (True,) if not by_number else (True, False):
-            matches = [
-                match for column in self._columns_of_names(len(tests)) if (match := _match(column, names, exact))
-            ]
-            currents = [{i: self.current[row] for i, row in match.items()} for match in matches]
+            matches = [(column, match) for column in columns if (match := _match(column, names, exact))]
+            if exact and any(not all(map(NUMBER.fullmatch, column)) for column, _ in matches):  # surer than the row
+                matches = [pair for pair in matches if pair[0] != next(zip(*self.cells, strict=True))]
+            currents = [{i: self.current[row] for i, row in match.items()} for _, match in matches]
             if currents and all(other == currents[0] for other in currents):
                 return currents[0]
             if currents:
