@@ -178,6 +178,42 @@ def test_names_and_numbers_above_blocks_are_surer_than_their_place(tmp_path, hea
     assert [float(np.mean(record.current)) for record in result.records] == pytest.approx([0.0, 0.2, 0.9])
 
 
+@pytest.mark.parametrize(
+    ("folders", "plan"),
+    [
+        (("day1", "day2"), "Day,Test,Current (A)\n1,1,0\n1,2,0.2\n2,1,0.9\n2,2,0.5\n"),
+        (("2023-03-14", "2023-03-16"),
+         "Datum;Číslo měření;Proud [A]\n16.3.2023;1;0,9\n16.3.2023;2;0,5\n14.3.2023;1;0\n14.3.2023;2;0,2\n"),
+        (("a", "b"), "File,Current (A)\nb/test_02.csv,0.5\nb/test_01.csv,0.9\na/test_02.csv,0.2\na/test_01.csv,0\n"),
+        (("a", "b"), "No,Where,Current (A)\n1,b\\test_01,0.9\n2,b\\test_02,0.5\n3,a\\test_01,0\n4,a\\test_02,0.2\n"),
+    ],
+)  # fmt: skip
+def test_a_plan_numbered_per_day_or_with_paths_gives_the_currents_of_files_in_folders(tmp_path, folders, plan):
+    currents = iter((0.0, 0.2, 0.9, 0.5))
+    for folder in folders:
+        (tmp_path / folder).mkdir()
+        for number in (1, 2):
+            rows = zip(T, X, force(next(currents)), strict=True)
+            text = UNITS + "".join(f"{t:.3f},{x:.5f},{f:.4f}\n" for t, x, f in rows)
+            (tmp_path / folder / f"test_0{number}.csv").write_text(text)
+    (tmp_path / "plan.csv").write_text(plan)
+    result = import_files([tmp_path])
+    assert not [str(refusal.error) for refusal in result.refusals]
+    assert [float(np.mean(record.current)) for record in result.records] == pytest.approx([0.0, 0.2, 0.9, 0.5])
+
+
+@pytest.mark.parametrize("names", ["m0{}_{}A", "m0{}"])
+def test_a_list_of_the_laboratory_with_numbers_only_is_a_plan_also_as_tests_csv(tmp_path, names):
+    for number, amperes in enumerate((0.0, 0.5, 1.0), 1):
+        rows = zip(T, X, force(amperes), strict=True)
+        text = UNITS + "".join(f"{t:.3f},{x:.5f},{f:.4f}\n" for t, x, f in rows)
+        (tmp_path / f"{names.format(number, amperes)}.csv").write_text(text)
+    (tmp_path / "tests.csv").write_text("Test,Current (A),Valid\n1,0,yes\n2,0.5,no\n3,1,yes\n")
+    result = import_files([tmp_path])
+    assert [float(record.current[0]) for record in result.records] == [0.0, 1.0]
+    assert [refusal.error.code for refusal in result.refusals] == ["E_DISCARDED"]
+
+
 def test_a_remark_in_brackets_behind_a_legend_may_have_a_comma(tmp_path):
     write(tmp_path, UNITS)
     (tmp_path / "README.txt").write_text("Codes: m07 = 0.2 A, m08 = 0.9 A, m09 = 0 A (coil current, held constant)\n")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from datetime import date
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -24,6 +25,7 @@ from mrdamper.rig_files.column_names import (
     split_name,
     words,
 )
+from mrdamper.rig_files.text.tokens import MONTHS
 
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
 _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it
@@ -111,6 +113,14 @@ _BARE_STEP = re.compile(
     r"(?i)d_?t|delta_?t|(?:sampl(?:e|ing)|time|wf|x)[ _]?(?:delta|step|inc(?:r(?:ement)?)?|interval)|delta_?x"
 )
 _START = re.compile(r"(?i)[tx]_?0|(?:start|x)[ _]?time|wf_start_offset|x_?start")
+_DAYS = tuple(  # the surest form first: 2024-05-31, 31/5/2024, 31 May 2024 and May 31, 2024
+    re.compile(rf"(?<!\d){form}(?!\d)")
+    for form in (
+        r"(?:19|20)\d\d(?P<mark>[-./])\d{1,2}(?P=mark)\d{1,2}",
+        r"\d{1,2}(?P<mark>[-./])\d{1,2}(?P=mark)(?:19|20)\d\d",
+        r"(?<!\w)(?P<mark>)(?:\d{1,2}[. -]+[^\W\d_]{3,9}|[^\W\d_]{3,9}[. ]+\d{1,2})[., -]+(?:19|20)\d\d",
+    )
+)
 _WHICH = r"(?i)(?:test|excitation|motion|sine|drive|nominal|set|soll|prüf|anregungs|signal)?[ _-]*"
 _FREQUENCY_KEY = re.compile(_WHICH + r"(?:frequency|freq|frequenz|fréquence|frecuencia|frequenza|频率|周波数)")
 _AMPLITUDE_KEY = re.compile(_WHICH + r"(?:amplitude|ampl|amplitud|ampiezza|stroke|hub|course|振幅)")
@@ -409,3 +419,22 @@ def _value(number: str, decimal: str | None) -> float | None:
 def contradicts(one: float, other: float) -> bool:
     """Tell if a nominal and a measured current [A] contradict; a dash before a number may be a sign or none."""
     return abs(abs(one) - abs(other)) > _AGREE_A + _AGREE * min(abs(one), abs(other))
+
+
+def day_in(text: str) -> tuple[str, str] | None:
+    """Return a day as ISO 8601 ("?" and the text where day and month may be exchanged) and as written."""
+    match = next(filter(None, (form.search(text) for form in _DAYS)), None)
+    if match is None:
+        return None
+    parts = re.split(r"[-./, ]+", match[0].casefold())
+    numbers = [MONTHS.get(part[:3], 0) if part.isalpha() else int(part) for part in parts]
+    year_first = len(parts[0]) == 4 and parts[0].isdigit()
+    year, month, day = numbers if year_first else reversed(numbers)
+    if not year_first and match["mark"] in ("-", "/") and day != month and max(day, month) <= 12:
+        return f"?{match[0]}", match[0]
+    if parts[0].isalpha() or (not year_first and match["mark"] and month > 12):
+        day, month = month, day
+    try:
+        return date(year, month, day).isoformat(), match[0]
+    except ValueError:
+        return None

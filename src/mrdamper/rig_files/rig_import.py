@@ -152,10 +152,11 @@ def import_files(
     with unpacked(several) as given:
         folders = dict.fromkeys(path if path.is_dir() else path.parent for path in given)
         beside = [folder / TESTS for folder in folders if (folder / TESTS).is_file()]
-        lists = [path for path in beside if not names_tests(path)]  # a laboratory's own, under the same name
+        files, left_out = files_in(given)
+        stems = [path.stem for path in files]
+        lists = [path for path in beside if not names_tests(path, stems)]  # a laboratory's own, under the same name
         tests = next((path for path in beside if path not in lists), None) if tests is None else tests
         table = tests if tests is None or isinstance(tests, TestsTable) else load_tests(tests)
-        files, left_out = files_in(given)
         texts = [*lists, *(path for path in left_out if path.suffix.lower() in SHORT_TEXTS)]
         left_out += [*lists, *(path for path in files if profile.leaves_out(*path.parts))]
         files, texts = ([path for path in of if not profile.leaves_out(*path.parts)] for of in (files, texts))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from datetime import date
 from datetime import time as clock
 from pathlib import Path
 
@@ -25,7 +24,7 @@ from mrdamper.rig_files.coil_current import (
 )
 from mrdamper.rig_files.column_names import DIMENSION, Unit, role_of, words
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, noted_columns, rate_of
-from mrdamper.rig_files.conditions import CORNERS, stated_motion, stated_quantities
+from mrdamper.rig_files.conditions import CORNERS, day_in, stated_motion, stated_quantities
 from mrdamper.rig_files.mapping.clocks import past_midnight, refuse_two_rates
 from mrdamper.rig_files.mapping.proposals import integral
 from mrdamper.rig_files.parts import stretches_of_time
@@ -34,7 +33,6 @@ from mrdamper.rig_files.readers import suffixes
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import FURTHER, OPTIONAL, Finding, Record
 from mrdamper.rig_files.sequences import stretches_of_session
-from mrdamper.rig_files.text.tokens import MONTHS
 
 _KEPT = {**FURTHER, "length": "m", "force": "N"}
 _RAW_FORCE = "force_raw_N"
@@ -46,14 +44,6 @@ _MOST_FURTHER = 12  # channels
 _LENIENT = ("acceleration", "voltage", "temperature", "pressure")  # a damaged cell there costs the channel, not the run
 _DATES, _TIMES = words("date_line"), words("time_of_day")
 _KEYED = re.compile(r"^[\W_]*(?P<key>[^\W\d_][\w ./-]{0,40}?)[\"' ]*[:=;,\t]+[\"' ]*(?P<value>\S.{0,60})")
-_DAYS = tuple(  # the surest form first: 2024-05-31, 31/5/2024, 31 May 2024 and May 31, 2024
-    re.compile(rf"(?<!\d){form}(?!\d)")
-    for form in (
-        r"(?:19|20)\d\d(?P<mark>[-./])\d{1,2}(?P=mark)\d{1,2}",
-        r"\d{1,2}(?P<mark>[-./])\d{1,2}(?P=mark)(?:19|20)\d\d",
-        r"(?<!\w)(?P<mark>)(?:\d{1,2}[. -]+[^\W\d_]{3,9}|[^\W\d_]{3,9}[. ]+\d{1,2})[., -]+(?:19|20)\d\d",
-    )
-)
 _TIME = re.compile(
     r"(?i)(?<![\d:])(?P<hour>\d{1,2}):(?P<minute>\d\d)(?::(?P<second>\d\d))?(?:[.,]\d+)?\s*(?P<half>[ap]m)?"
 )
@@ -346,7 +336,7 @@ def recording_time(lines: Iterable[str]) -> dict[str, str]:
         if keyed is None:
             continue
         key, value = " ".join(keyed["key"].casefold().split()), keyed["value"]
-        if key in _DATES and (day := _day_in(value)):
+        if key in _DATES and (day := day_in(value)):
             days[day[0]] = day[1]
         if key in _DATES or key in _TIMES:
             times |= dict.fromkeys(filter(None, [_time_in(value)]))
@@ -356,25 +346,6 @@ def recording_time(lines: Iterable[str]) -> dict[str, str]:
     if not iso[0].isdigit():
         return {"session": written}
     return {"recorded_at": f"{iso}T{next(iter(times))}" if len(times) == 1 else iso}
-
-
-def _day_in(text: str) -> tuple[str, str] | None:
-    """Return a day as ISO 8601 ("?" and the text where day and month may be exchanged) and as written."""
-    match = next(filter(None, (form.search(text) for form in _DAYS)), None)
-    if match is None:
-        return None
-    parts = re.split(r"[-./, ]+", match[0].casefold())
-    numbers = [MONTHS.get(part[:3], 0) if part.isalpha() else int(part) for part in parts]
-    year_first = len(parts[0]) == 4 and parts[0].isdigit()
-    year, month, day = numbers if year_first else reversed(numbers)
-    if not year_first and match["mark"] in ("-", "/") and day != month and max(day, month) <= 12:
-        return f"?{match[0]}", match[0]
-    if parts[0].isalpha() or (not year_first and match["mark"] and month > 12):
-        day, month = month, day
-    try:
-        return date(year, month, day).isoformat(), match[0]
-    except ValueError:
-        return None
 
 
 def _time_in(text: str) -> str | None:

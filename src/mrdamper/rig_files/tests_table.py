@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
 from statistics import median
@@ -107,13 +107,19 @@ def _is_file(name: str, path: Path) -> bool:
     return normalised.parts[-len(parts) :] == parts or (len(parts) == 1 and normalised.stem == parts[0])
 
 
-def names_tests(path: Path) -> bool:
-    """Tell if a table names files, runs or splits, or cannot be read; a laboratory's own list may have none of them."""
+def names_tests(path: Path, files: Collection[str]) -> bool:
+    """Tell if a table names files, runs or splits, or cannot be read; a laboratory's own list may have none of them.
+
+    Nor does one whose only names are numbers, of which not all are stems of files.
+    """
     try:
-        keys = {_key(name.strip()) for name in _cells(path)[0][1]}
+        (_, names), *rows = _cells(path)
     except TestsTableError:
         return True
-    return len(keys) < 2 or bool(keys & {"file", "run", "split"})
+    keys = [_key(name.strip()) for name in names]
+    runs = {cells[keys.index("run")].strip() for _, cells in rows if "run" in keys and len(cells) > keys.index("run")}
+    numbers = "file" not in keys and bool(runs) and all(map(str.isdecimal, runs)) and not runs <= {*files}
+    return len({*keys}) < 2 or (bool({*keys} & {"file", "run", "split"}) and not numbers)
 
 
 def load_tests(path: str | Path) -> TestsTable:

@@ -337,13 +337,14 @@ def within_ranges(tests: _Tests, results: Results | None) -> list[tuple[Path, Re
 
 
 def _called(tests: _Tests) -> list[tuple[str, ...]]:
-    """Names of each test: its own, of its file, its own without that, of its block, and when it was recorded."""
-    stems = [re.sub(r"[^\w.+=-]+", "_", file.stem) for file, _ in tests]
-    blocks = [record.provenance.get("block", "").split("; ") for _, record in tests]
-    return [
-        (record.id, file.name, file.stem, record.id.removeprefix(stem).lstrip("_"), *names, *_clocks(record, file))
-        for (file, record), stem, names in zip(tests, stems, blocks, strict=True)
-    ]
+    """Names of each test: its own, of its file, its own without that, of its block, with its folders, and its times."""
+    names = []
+    for file, record in tests:
+        stem = re.sub(r"[^\w.+=-]+", "_", file.stem)
+        own, blocks = record.id.removeprefix(stem).lstrip("_"), record.provenance.get("block", "").split("; ")
+        paths = ["\\".join((*file.parts[-n:-1], name)) for n in (2, 3, 4) for name in (file.name, file.stem)]
+        names.append((record.id, file.name, file.stem, own, *blocks, *paths, *_clocks(record, file)))
+    return names
 
 
 def _clocks(record: Record, file: Path) -> set[str]:

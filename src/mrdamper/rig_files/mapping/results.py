@@ -13,7 +13,7 @@ import numpy as np
 from mrdamper.data import Floats
 from mrdamper.errors import listed
 from mrdamper.rig_files.column_names import COIL, headers_of, holds, names_condition, split_name, words, words_of
-from mrdamper.rig_files.conditions import contradicts, currents_in, names_only_currents, quantity_in_cell
+from mrdamper.rig_files.conditions import contradicts, currents_in, day_in, names_only_currents, quantity_in_cell
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.text.layout import cells_of, is_units
@@ -38,7 +38,9 @@ _STARTS, _ENDS, _ROWS = words("start"), words("end"), words("row")
 _COUNTED = words("run") | words("run_number") | words("table_file")  # what the number in a test's name may be
 _NUMBERED = _COUNTED | {"step", "schritt", "#"}
 _OWN_KEYS = {"id", "nr", "nr.", "no", "no.", "#", "key", "index", "pk"}  # each table has its own
-_QUANTITY = re.compile(r"(?<![A-Za-z0-9])[0-9]+(?:[.,_][0-9]+)?[ _]?(?:m?A|m?Hz|mm)(?![A-Za-z])")  # no number of a test
+_CONDITION = re.compile(  # no number of a test: 0.5A, 0_5A, and of 01_0A the second
+    r"(?<![A-Za-z0-9])(?:(?:0|[1-9][0-9]*)[.,_])?[0-9]+[ _]?(?:m?A|m?Hz|mm)(?![A-Za-z])"
+)
 _SPECIMEN = re.compile(
     r"(?i)^(?:specimen|probe|prüfkörper|test|versuch|run|sample|essai|éprouvette|ensayo|no|nr)\b[\s.:#]*"
 )
@@ -114,14 +116,19 @@ class Results:
         return tables[0] if len(tables) == 1 else None
 
     def by_folder(self, folders: Sequence[str], tests: Sequence[Iterable[str]]) -> dict[int, float]:
-        """Return the current [A] of each test by its number, where one column names its folder and another itself."""
-        for column in list(zip(*self.cells, strict=True))[1:]:
-            keys, currents = [_key(cell) for cell in column], dict[int, float]()
-            for folder in dict.fromkeys(folders) if {*map(_key, folders)} <= {*keys} else ():
-                rows = [row for row, key in enumerate(keys) if key == _key(folder)]
-                current, cells = (tuple(of[row] for row in rows) for of in (self.current, self.cells))
+        """Return the current [A] of each test by its number, where one column names its folder and another itself.
+
+        A column Day with 1 names the folder day1, and one with 14.3.2023 the folder 2023-03-14.
+        """
+        for key, column in list(zip(self.keys, zip(*self.cells, strict=True), strict=True))[1:]:
+            cells, currents = [_day_names(cell) | _day_names(f"{key} {cell}") for cell in column], dict[int, float]()
+            for folder in dict.fromkeys(folders):
+                rows = [row for row, names in enumerate(cells) if names & _day_names(folder)]
+                current, its_cells = (tuple(of[row] for row in rows) for of in (self.current, self.cells))
                 own = [i for i, its in enumerate(folders) if its == folder]
-                by_test = replace(self, current=current, cells=cells).by_test([tests[i] for i in own])
+                by_test = (
+                    replace(self, current=current, cells=its_cells).by_test([tests[i] for i in own]) if rows else {}
+                )
                 currents |= {own[i]: value for i, value in by_test.items()}
             if len(currents) == len(tests):
                 return currents
@@ -425,17 +432,26 @@ def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:
         for part in (bare, *re.split(r"[:=;,\t/]", bare)):
             part = part.strip().strip('"').strip()
             whole |= {_key(part), _key(_SPECIMEN.sub("", part))} - {""}
-        tail = re.search(r"([0-9]+)\D*$", _QUANTITY.sub("", _SPECIMEN.sub("", bare))) if len(bare) < 60 else None
+        short = len(bare) < 60 and "\\" not in bare  # no path
+        tail = re.search(r"([0-9]+)\D*$", _CONDITION.sub("", _SPECIMEN.sub("", bare))) if short else None
         if tail:
             numbers.add(str(int(tail[1])))
     return whole, numbers
 
 
 def _key(text: str) -> str:
-    """Return a name as it is compared: no case, spaces, or leading zeros of a plain number."""
+    """Return a name as it is compared: no case, spaces, leading zeros of a plain number; of a path its last parts."""
+    text = text.removeprefix("./").replace("/", "\\")
     text = re.sub(r"\.(csv|txt|dat|asc|tra|mat|xlsx?|h5|tdms|json|parquet)$", "", text.casefold().strip())
     text = re.sub(r"(?<=[0-9])\.0+$", "", re.sub(r"[\s_]+", " ", text))
     return str(int(text)) if text.isascii() and text.isdigit() else text
+
+
+def _day_names(text: str) -> set[str]:
+    """Return a name of a folder as it is compared: without marks and leading zeros, and as a date where it is one."""
+    day = day_in(text)
+    plain = re.sub(r"(?<![0-9])0+(?=[0-9])", "", re.sub(r"[\W_]+", "", text.casefold()))
+    return {_key(text), plain, day[0].replace("-", "") if day else ""} - {""}
 
 
 def _match(column: Sequence[str], names: Sequence[tuple[set[str], set[str]]], exact: bool) -> dict[int, int] | None:
