@@ -214,6 +214,34 @@ def test_a_list_of_the_laboratory_with_numbers_only_is_a_plan_also_as_tests_csv(
     assert [refusal.error.code for refusal in result.refusals] == ["E_DISCARDED"]
 
 
+@pytest.mark.parametrize(
+    ("files", "beside", "text", "specimens"),
+    [
+        ("档位{level}_{f}Hz", "驱动器设定表.csv", "档位,占空比(%),电流(A)\n0,0,0\n1,12,0.2\n2,25,0.9\n", None),
+        ("Stufe {level}/{f}Hz", "stufen.csv", "Stufe;Strom [A]\n0;0\n1;0,2\n2;0,9\n", None),
+        ("{f}Hz_duty{level}0", "driver.csv", "Duty (%),Current (A)\n0,0\n10,0.2\n20,0.9\n", None),
+        ("SN{f}_I{amperes}_F1", "README.txt", "파일 이름: SN(시리얼 번호)_I(전류, A)_F(주파수, Hz)\n", ["1", "2"]),
+        ("t{f}{level}", "plan.csv",
+         "Test,Damper,Current (A)\n10,D1,0\n11,D1,0.2\n12,D1,0.9\n20,D2,0\n21,D2,0.2\n22,D2,0.9\n", ["D1", "D2"]),
+        ("{f}_{amperes}A", "list.csv", "File,Serial no.,Day\n1_0.0A,D1,x\n1_0.2A,D1,x\n1_0.9A,D1,x\n"
+         "2_0.0A,D2,x\n2_0.2A,D2,x\n2_0.9A,D2,x\n", ["D1", "D2"]),
+    ],
+)  # fmt: skip
+def test_levels_schemes_and_plans_state_the_currents_and_specimens_of_names(tmp_path, files, beside, text, specimens):
+    for f in (1, 2):
+        for level, amperes in enumerate((0.0, 0.2, 0.9)):
+            path = tmp_path / f"{files.format(f=f, level=level, amperes=amperes)}.csv"
+            path.parent.mkdir(exist_ok=True)
+            rows = zip(T, X, force(amperes) * (1 + 0.1 * f), strict=True)
+            path.write_text(UNITS + "".join(f"{t:.3f},{x:.5f},{f:.4f}\n" for t, x, f in rows))
+    (tmp_path / beside).write_text(text)
+    result = import_files([tmp_path])
+    assert not [str(refusal.error) for refusal in result.refusals]
+    by_force = sorted(result.records, key=lambda record: np.ptp(record.force))
+    assert [float(record.current[0]) for record in by_force] == pytest.approx([0.0, 0.0, 0.2, 0.2, 0.9, 0.9])
+    assert [record.provenance.get("specimen") for record in by_force] == [*(specimens or [None] * 2)] * 3
+
+
 def test_a_remark_in_brackets_behind_a_legend_may_have_a_comma(tmp_path):
     write(tmp_path, UNITS)
     (tmp_path / "README.txt").write_text("Codes: m07 = 0.2 A, m08 = 0.9 A, m09 = 0 A (coil current, held constant)\n")

@@ -34,6 +34,7 @@ from mrdamper.rig_files.mapping.plans import (
     remarks_of,
     rests,
     results_of,
+    specimens_of,
     tests_by,
     within_ranges,
 )
@@ -277,7 +278,8 @@ class _Intake:
         self._refuse_names_without_point()
         whence = {file: record.provenance.get("current_from", "") for file, record in self._found}
         notes = [Path(note.file) for note in self.notes]
-        unused = [path for path in (*others, *notes, *texts) if path not in used - {self._plan}]
+        plan = [self._plan] if self._plan else []
+        unused = [path for path in dict.fromkeys((*others, *notes, *texts, *plan)) if path not in used - {*plan}]
         for path in [path for path in unused if self._found or path.stat().st_size <= _LARGEST_LIST]:
             if self._compare(path, self._results(path)):
                 self._drop_refusals({path})
@@ -326,6 +328,11 @@ class _Intake:
         if currents_beside(path, remarks, own) is None:  # of some tests, by their names
             tests = [tests[i] for i in named_tests(remarks, own)]
             own = [test for _, test in tests]
+        specimens = dict(zip((id(record) for _, record in own), specimens_of(path, remarks, own), strict=False))
+        notes = [{"specimen": as_data(specimens[id(r)])} if id(r) in specimens else {} for _, r in self._found]
+        pairs = zip(self._found, notes, strict=True)
+        self._found = [(p, replace(r, provenance={**note, **r.provenance})) for (p, r), note in pairs]
+        own = [self.tests()[i] for i, _ in tests]
         stated, other = currents_beside(path, results, own), other_motions(path, results, own)
         refused = discarded_tests(path, remarks, own)
         if other is not None:

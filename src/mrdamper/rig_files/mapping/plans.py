@@ -13,7 +13,7 @@ import numpy as np
 
 from mrdamper.errors import InputError, QualityError, listed, printable
 from mrdamper.rig_files.coil_current import NO_CHANNEL
-from mrdamper.rig_files.column_names import RATING, names_condition, role_of, split_name, words, words_of
+from mrdamper.rig_files.column_names import RATING, Header, names_condition, role_of, split_name, words, words_of
 from mrdamper.rig_files.conditions import amperes, series_in
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.mapping.comparisons import forces_grow
@@ -33,6 +33,7 @@ _LEGEND = re.compile(  # I1 = 0.3 A, cur0.8 = coil current 0.8 A (as set)
 )
 _DECIMAL_CODE = re.compile(r"(?<![a-z])[a-z]{1,6}[0-9]+\.[0-9]+(?![0-9])")
 _SCHEME = re.compile(r"[\w.,+=-]*(?:<[^<>]{1,60}>[\w.,+=-]*)+")  # MRD_A<amplitude in mm>_I<coil current in A>.csv
+_ATTACHED, _JOINED = re.compile(r"(?<=\w)[(\[{]([^()\[\]{}<>]{1,60})[)\]}]"), re.compile(r"\w[(\[{][^_]*[)\]}]_")
 _PLACE = re.compile(
     r"[\s*`-]*([^\W\d_]{1,12})`?(?:\s*[=:]|\s+[-–]\s|\s{2,})\s*([^\s<>][^<>]{0,58}[^\s<>])\s*$"
 )  # in a name
@@ -49,6 +50,7 @@ _MOTIONS = (  # dimension and name of a column, relative difference of two tests
 )
 _Tests = Sequence[tuple[Path, Record]]
 _REMARKS = frozenset((*words("notes"), *words("remarks")))
+_SPECIMEN, _RUN_NUMBER = words("specimen"), words("run_number")
 _STAMP = re.compile(  # 20190603_140512, 2019-06-03T14:05:12
     r"(?<![0-9])20[0-9]{2}-?[01][0-9]-?[0-3][0-9][T_ -](?P<hour>[0-2][0-9])[:-]?(?P<minute>[0-5][0-9])"
     r"[:-]?(?P<second>[0-5][0-9])(?![0-9])"
@@ -113,6 +115,7 @@ def _by_rows(results: Results, tests: _Tests) -> Iterator[Mapping[int, float]]:
     if len({*folders}) == len(tests):
         yield results.by_test([(folder,) for folder in folders], by_number=False)
     yield results.by_folder(folders, called)
+    yield results.by_level(called)
 
 
 def _by_legend(lines: Sequence[str], tests: _Tests) -> list[tuple[float, str]]:
@@ -150,9 +153,9 @@ def other_motions(path: Path, results: Results | None, tests: _Tests) -> InputEr
         cells = [row[columns[0]].replace(",", ".") for row in results.cells] if results and len(columns) == 1 else []
         if results is None or not cells or not all(map(NUMBER.fullmatch, cells)):
             continue
-        values = tuple(headers[columns[0]].factor * float(cell) for cell in cells)
-        rows = currents_beside(path, replace(results, current=values, of_supply=False), tests) or ()
-        pairs = [(record, stated, _motion(record)[unit]) for (stated, _), (_, record) in zip(rows, tests, strict=False)]
+        values = [headers[columns[0]].factor * float(cell) for cell in cells]
+        rows = rows_beside(path, results, tests)
+        pairs = [(r, values[row], _motion(r)[unit]) for row, (_, r) in zip(rows, tests, strict=False)]
         pairs = [pair for pair in pairs if pair[1] > 0 and pair[2] > 0]
         if unit == "mm" and len({stated for _, stated, _ in pairs}) < 2:
             continue  # may be the damper's stroke, or a tolerance
@@ -176,6 +179,31 @@ def _motion(record: Record) -> dict[str, float]:
     return {"Hz": 1 / strokes.period, "mm": float(np.median(strokes.lengths)) / 2}
 
 
+def rows_beside(path: Path, results: Results | None, tests: _Tests) -> list[int]:
+    """Return the row of each test in a table of results; empty unless every test has one."""
+    if results is None:
+        return []
+    numbers = tuple(map(float, range(len(results.cells))))
+    stated = currents_beside(path, replace(results, current=numbers, of_supply=False), tests) or ()
+    return [int(row) for row, _ in stated] if {row for row, _ in stated} <= {*numbers} else []
+
+
+def specimens_of(path: Path, results: Results | None, tests: _Tests) -> list[str]:
+    """Return the specimen of each test by the column of a plan, or by a scheme of names; empty unless each has one."""
+    rows = rows_beside(path, results, tests)
+    heads = enumerate(results.keys if results else ())
+    stated = [[results.cells[row][i] for row in rows] for i, key in heads if results and _names_specimen(key)]
+    lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
+    stated += [texts for header, texts in _fields(lines, tests) if _names_specimen(header.name)]
+    stated = [texts for texts in stated if texts and all(texts) and (len({*texts}) < len(texts) or len(texts) == 1)]
+    return stated[0] if len(stated) == 1 else []
+
+
+def _names_specimen(key: str) -> bool:
+    own = {*words_of(split_name(key).name.casefold())}
+    return bool(own & _SPECIMEN) and own <= _SPECIMEN | _RUN_NUMBER
+
+
 def discarded_tests(path: Path, results: Results | None, tests: _Tests) -> dict[int, InputError]:
     """Return the refusal of each test that a remark in a plan calls invalid, aborted, repeated or a warm-up."""
     rows = [[*zip(results.keys, cells, strict=True)] for cells in results.cells] if results else []
@@ -183,16 +211,15 @@ def discarded_tests(path: Path, results: Results | None, tests: _Tests) -> dict[
     remarks = [next(iter(of), "") for of in texts]
     if results is None or results.of_supply or not any(remarks) or all(remarks):  # of all tests it is of none
         return {}
-    numbered = replace(results, current=tuple(float(i) if remark else 0.0 for i, remark in enumerate(remarks, 1)))
     refused: dict[int, InputError] = {}
     files = [file for file, _ in tests]
     parts = [file.parts if files.count(file) == 1 else (*file.parts, record.id) for file, record in tests]
-    for i, (row, _) in enumerate(currents_beside(path, numbered, tests) or ()):
-        if row:
+    for i, row in enumerate(rows_beside(path, results, tests)):
+        if remarks[row]:
             file, own = files[i], parts[i]
             alone = (n for n in range(1, len(own)) if sum(part[-n:] == own[-n:] for part in parts) == 1)
             name = json.dumps("/".join(own[-next(alone) :]), ensure_ascii=False)
-            problem = f"{path.name} has the remark {remarks[int(row) - 1][:80]!r} on this test"
+            problem = f"{path.name} has the remark {remarks[row][:80]!r} on this test"
             remedy = f"set [file] leave_out = [{name}] in a profile, or correct the remark if the test is valid"
             refused[i] = QualityError(printable(problem), where=file.name, remedy=remedy, code="E_DISCARDED")
     return refused
@@ -205,7 +232,7 @@ def _discards(heading: str, cell: str) -> bool:
 
 
 def remarks_of(path: Path) -> Results | None:
-    """Return the table of tests with remarks and without currents that a file holds; its currents are zero."""
+    """Return the table of tests with remarks or specimens and no currents that a file holds; its currents are zero."""
     lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
     lines = lines or ask_tables(path, lambda tables: [line for t in tables[:20] for line in lines_of(t)], [])
     for heads, rows in rows_below_heads(lines):
@@ -213,7 +240,7 @@ def remarks_of(path: Path) -> Results | None:
         remarks = any(flags) or not _REMARKS.isdisjoint(word for head in heads for word in words_of(head.casefold()))
         cells = tuple((str(n), *row) for n, row in enumerate(rows, 1))
         table = Results((0.0,) * len(cells), cells, "", ("", *heads))
-        if remarks or table.ranges[1]:
+        if remarks or table.ranges[1] or any(map(_names_specimen, heads)):
             return table
     return None
 
@@ -297,26 +324,35 @@ def _by_scheme(lines: Sequence[str], results: Results | None, tests: _Tests) -> 
     """Return the current [A] of each test by a scheme of names of files, or the number in it and a table of results.
 
     Thus <coil current in A>, or <duty %> with a table of the current by the duty; empty unless all files have one.
-    What a letter or word of a name stands for, a line of its own may tell: MRD_iiii_ff.csv, iiii: coil current in mA.
     """
-    files, stated = [file for file, _ in tests], set[tuple[float, ...]]()
+    stated = set[tuple[float, ...]]()
+    for header, texts in _fields(lines, tests):
+        numbers = [amperes(text, "") for text in texts if _SCHEME_NUMBER.fullmatch(text)]
+        at = [i for i, key in enumerate(results.keys if results else ()) if header.name and key == header.name]
+        rows = zip(results.cells, results.current, strict=True) if results and len(at) == 1 else ()
+        by_number = {amperes(m[0], ""): of for cells, of in rows if (m := _SCHEME_NUMBER.match(cells[at[0]]))}
+        if header.dimension == "current" and names_condition(header.name, "current"):
+            by_number = {number: header.factor * number for number in numbers}
+        if len(numbers) == len(tests) and {*numbers} <= {*by_number}:
+            stated.add(tuple(by_number[number] for number in numbers))
+    return [(current, "the names of files") for current in stated.pop()] if len(stated) == 1 else []
+
+
+def _fields(lines: Sequence[str], tests: _Tests) -> Iterator[tuple[Header, list[str]]]:
+    """Yield the places in the names of files that a scheme of them has, each with what stands there in every name.
+
+    Thus MRD_I<coil current in A>_f<Hz> or MRD_I(coil current, A)_f(Hz); what a letter or word stands for, a line of its
+    own may tell: MRD_iiii_ff.csv, iiii: coil current in mA.
+    """
     meant = {m[1]: f"<{m[2]}>" for m in map(_PLACE.match, lines) if m}
     names = [name for line in lines for name in re.findall(r"\w+_[\w.]+", line) if meant]
-    lines = [*lines, *(re.sub("[^\\W\\d_]+", lambda m: meant.get(m[0], m[0]), name) for name in names)]
-    for parts in (re.split("<([^<>]*)>", m[0].rstrip(".,")) for line in lines for m in _SCHEME.finditer(line)):
+    schemes = [re.sub("[^\\W\\d_]+", lambda m: meant.get(m[0], m[0]), name) for name in names]
+    schemes += [_ATTACHED.sub(r"<\1>", line) if _JOINED.search(line) else line for line in lines]
+    for parts in (re.split("<([^<>]*)>", m[0].rstrip(".,")) for scheme in schemes for m in _SCHEME.finditer(scheme)):
         pattern = "".join("([^_]+?)" if i % 2 else re.escape(part) for i, part in enumerate(parts))
-        names = [re.fullmatch(pattern, file.stem) or re.fullmatch(pattern, file.name) for file in files]
-        for place, texts in zip(parts[1::2], zip(*(m.groups() for m in names if m), strict=True), strict=False):
-            header = split_name(place)
-            numbers = [amperes(text, "") for text in texts if _SCHEME_NUMBER.fullmatch(text)]
-            at = [i for i, key in enumerate(results.keys if results else ()) if header.name and key == header.name]
-            rows = zip(results.cells, results.current, strict=True) if results and len(at) == 1 else ()
-            by_number = {amperes(m[0], ""): of for cells, of in rows if (m := _SCHEME_NUMBER.match(cells[at[0]]))}
-            if header.dimension == "current" and names_condition(header.name, "current"):
-                by_number = {number: header.factor * number for number in numbers}
-            if len(numbers) == len(files) and {*numbers} <= {*by_number}:
-                stated.add(tuple(by_number[number] for number in numbers))
-    return [(current, "the names of files") for current in stated.pop()] if len(stated) == 1 else []
+        matches = [re.fullmatch(pattern, file.stem) or re.fullmatch(pattern, file.name) for file, _ in tests]
+        texts = zip(*(m.groups() for m in matches if m), strict=True) if all(matches) else ()
+        yield from ((split_name(place), list(own)) for place, own in zip(parts[1::2], texts, strict=False))
 
 
 def _meant(key: str, files: Collection[str]) -> list[str]:

@@ -32,6 +32,7 @@ _LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: .
     r"(?:\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até)\b)\s*(?:[^\W\d_]{1,30}[\s_.#]*)?(?P<last>[0-9]{1,6}))?\s*[:=;,\t)]"
 )
 _LABELLED = re.compile(r"(?<![^\W\d_])([^\W\d_]+)[ _.-]?([0-9]+)")
+_LEVEL = re.compile(r"(?<![^\W\d_])([^\W\d_]+)[ _.=-]?([0-9]+(?:[.,][0-9]+)?)")
 _CLOCK = re.compile(r"[0-2][0-9]:[0-5][0-9](?::[0-5][0-9])?")
 _MEASURED = tuple(words("measured"))
 _STARTS, _ENDS, _ROWS = words("start"), words("end"), words("row")
@@ -66,11 +67,13 @@ class Results:
         names = [_names(texts) for texts in tests]
         one_of_several = len(tests) == 1 < len(self.current)  # a number in its name alone may count anything
         by_number = by_number and self.counts_tests and not one_of_several
-        columns = self._columns_of_names(len(tests))
+        columns, of_row = self._columns_of_names(len(tests))
         for exact in (True,) if not by_number else (True, False):
             matches = [(column, match) for column in columns if (match := _match(column, names, exact))]
-            if exact and any(not all(map(NUMBER.fullmatch, column)) for column, _ in matches):  # surer than the row
-                matches = [pair for pair in matches if pair[0] != next(zip(*self.cells, strict=True))]
+            texts = any(not all(map(NUMBER.fullmatch, column)) for column, _ in matches)  # surer than the row's number
+            matches += [
+                (row, match) for row in of_row if not (exact and texts) and (match := _match(row, names, exact))
+            ]
             currents = [{i: self.current[row] for i, row in match.items()} for _, match in matches]
             if currents and all(other == currents[0] for other in currents):
                 return currents[0]
@@ -134,6 +137,23 @@ class Results:
                 return currents
         return {}
 
+    def by_level(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
+        """Return the current [A] of each test by a heading and a cell together in its names: of Level 2 by level2_1Hz.
+
+        A row may have several tests; empty unless all columns that name every test so agree.
+        """
+        stated = []
+        for key, column in list(zip(self.keys, zip(*self.cells, strict=True), strict=True))[1:]:
+            header, rows = split_name(key), {_key(cell): row for row, cell in enumerate(column)}
+            if len(rows) < len(column) or (header.dimension and header.unit != "%"):
+                continue
+            label = header.name.casefold()
+            pairs = [{m for text in texts for m in _LEVEL.findall(text.casefold())} for texts in tests]
+            places = [{rows.get(_key(number)) for word, number in own if word == label} for own in pairs]
+            if all(len(own) == 1 and None not in own for own in places):
+                stated.append([self.current[row] for (row,) in places if row is not None])
+        return dict(enumerate(stated[0])) if stated and all(of == stated[0] for of in stated) else {}
+
     def misfit(self, tests: Sequence[Iterable[str]]) -> str:
         """Tell what the column that names most tests, and more than half, has twice, or which of them it lacks."""
         tests = [list(texts) for texts in tests]
@@ -149,8 +169,8 @@ class Results:
                 text = f"has {twice[0]!r} twice under {key!r}, which may be a mistake" if twice else lacks
         return text
 
-    def _columns_of_names(self, tests: int) -> list[Sequence[str]]:
-        """Return the columns that may name as many tests: none of a quantity, and no numbers of the rows of a log.
+    def _columns_of_names(self, tests: int) -> tuple[list[Sequence[str]], list[Sequence[str]]]:
+        """Return the columns that may name as many tests, none of a quantity or of a log, and apart the rows' numbers.
 
         The number of a row may be that of a test if there are as many rows, and no column that numbers the tests.
         """
@@ -165,9 +185,9 @@ class Results:
             if numbers and header.role == "time"
         ]
         if any(steps.size and np.all(steps > 0) for steps in times) and not numbered:  # samples over time
-            return [column for column, numbers in zip(columns, numeric, strict=True) if not numbers]
+            return [column for column, numbers in zip(columns, numeric, strict=True) if not numbers], []
         names = [column for header, column in zip(headers[1:], columns, strict=True) if header.dimension is None]
-        return names if numbered or tests != len(self.current) else [first, *names]
+        return names, [] if numbered or tests != len(self.current) else [first]
 
     def rows_in_range(self, clocks: Sequence[tuple[Floats, np.ndarray | None]]) -> dict[int, tuple[int, slice]]:
         """Return the row of each test by its number, and the samples between the start and the end that it states.
