@@ -1465,7 +1465,8 @@ FILES_OF_CHANNELS = {  # text beside the folders of the tests, and files of each
         },
     ),
     "scales by the numbers of channels": (
-        "Calibration:\n  CH1 LVDT      displacement   5 mm/V\n  CH2 Cell  force     250 N/V\n  CH3 LEM  coil current  1 A/V\n",
+        "Calibration:\n  CH1 LVDT      displacement   5 mm/V\n  CH2 Cell  force     250 N/V\n"
+        "  CH3 LEM  coil current  1 A/V\n",
         {
             "T{n}/CH1_LVDT.asc": lambda f: volts(1, "LVDT", X / 5),
             "T{n}/CH2_Cell.asc": lambda f: volts(2, "Load Cell", f / 250),

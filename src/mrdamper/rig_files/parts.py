@@ -189,7 +189,8 @@ def _name_tests(table: RawTable, members: _Groups, titles: Mapping[str, str]) ->
 
     Two sensors of one test have nearly the same motion and force, two numbered tests have not.
     """
-    headings = {(*table.names[i : i + 1], *table.over[i : i + 1]) for i in map(min, map(dict.values, members.values()))}
+    firsts = {roles["displacement"]: min(roles.values()) for roles in members.values()}
+    headings = {(*table.names[moved : moved + 1], *table.over[i : i + 1]) for moved, i in firsts.items()}
     if {*map(str.casefold, titles.values())} <= CORNERS:
         return True
     motions = all(map(states_motion, titles.values()))

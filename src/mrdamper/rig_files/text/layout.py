@@ -16,7 +16,7 @@ from itertools import accumulate, islice
 from string import ascii_uppercase
 from typing import Literal
 
-from mrdamper.rig_files.column_names import UNIT_KEYS, holds, is_unit, parse_unit, split_name, words
+from mrdamper.rig_files.column_names import UNIT_KEYS, holds, is_unit, parse_unit, role_of, split_name, words
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RigFileError, Source
 from mrdamper.rig_files.text.tokens import FORTRAN, MISSING, looks_numeric, stamp, with_notes_beside
@@ -33,7 +33,8 @@ _KEY_AND_VALUE = re.compile(  # Samples: 4850, Unit: V
     rf"(?i)[^:=]*[^\W\d_][^:=]*[:=]\s*[-+0-9.,]+\W*[^\W\d_]*|(?:{'|'.join(UNIT_KEYS)})\s*[:=].*"
 )
 _UNIT_OF_ALL = re.compile(  # ; Unit: V, above the only column
-    rf"(?i)[\s#%;\"]*(?:(?:y|vertical|channel|signal|data)[ _-]*)?(?:{'|'.join(UNIT_KEYS)})\"?\s*[:=,;\t]\s*\"?([^\s\",;]+)[\s\",;]*$"
+    rf"(?i)[\s#%;\"]*(?:(?:y|vertical|channel|signal|data)[ _-]*)?(?:{'|'.join(UNIT_KEYS)})\"?"
+    r"\s*[:=,;\t]\s*\"?([^\s\",;]+)[\s\",;]*$"
 )
 _LISTING = re.compile(
     r"^\s*(?:columns?|channels?|fields?|spalten|kanäle|colonnes|header|names)\s*[:=]\s*", re.IGNORECASE
@@ -122,19 +123,15 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     trailing |= header is not None and separator != SPACES and _names_notes(cells_of(lines[header], separator), width)
     if len(names) != width:
         raise _mismatch(source, separator, len(names), width, first, lines)
-    units = _cells(lines[unit_row], separator, width) if unit_row is not None else ("",) * width
+    units = _cells(lines[unit_row], separator, width) if unit_row is not None else _unit_alone(lines[:first], width)
     units = ("" if units[0].casefold() in _UNIT_KEYS else units[0], *units[1:])
-    alone = [match[1] for line in lines[:first] if width == 1 and (match := _UNIT_OF_ALL.match(line))]
-    units = tuple(alone) if len(alone) == 1 and is_unit(alone[0]) and not any(units) else units
     columns = [[row[i] for row in rows if len(row) > i] for i in range(width)]
     names = tuple("" if n == X_VALUE and not any(c) else n for n, c in zip(names, columns, strict=True))
     written = rows if as_written is lines else _rows(as_written[first:], separator, width, trailing)
     behind = tuple(_unit_behind([row[i] for row in written if len(row) > i]) for i in range(width))
     clocks = ("s" if seconds and name == "time" else "" for name in names)
     units = tuple(own or its or clock for own, its, clock in zip(behind, units, clocks, strict=True))
-    kinds: tuple[Kind, ...] = tuple(
-        "number" if unit else _kind(column) for column, unit in zip(columns, behind, strict=True)
-    )
+    kinds = _kinds(columns, behind)
     above = lines[: min(first, len(lines)) if header is None else header]
     row = rows[0] if rows else []
     first -= next((n for n in range(len(below), 0, -1) if _lacks_numbers(lines[first - n], separator, row)), 0)
@@ -156,6 +153,17 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
         behind,
         form.decimal is not None,
     )
+
+
+def _kinds(columns: Sequence[Sequence[str]], behind: Sequence[str]) -> tuple[Kind, ...]:
+    """Kinds of columns; one whose numbers have units behind them holds numbers."""
+    return tuple("number" if unit else _kind(column) for column, unit in zip(columns, behind, strict=True))
+
+
+def _unit_alone(above: Sequence[str], width: int) -> tuple[str, ...]:
+    """Units of columns without a row of units: that of the only column may stand in a line above."""
+    alone = [match[1] for line in above if width == 1 and (match := _UNIT_OF_ALL.match(line))]
+    return tuple(alone) if len(alone) == 1 and is_unit(alone[0]) else ("",) * width
 
 
 def _counts(cells: Iterable[str]) -> bool:
@@ -187,7 +195,7 @@ def _without_keys(above: Sequence[str], separator: str) -> Iterator[str]:
             and sum(mark != "" for _, mark, _ in pairs) > 1
             and all(mark or not key for key, mark, _ in pairs)
         ):
-            yield separator.join(cell for *_, cell in pairs) if keys <= _UNIT_KEYS else ""
+            yield separator.join(cell for *_, cell in pairs) if keys <= _UNIT_KEYS else line * any(map(role_of, keys))
         else:
             yield line
 
