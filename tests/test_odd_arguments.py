@@ -13,7 +13,7 @@ from mrdamper import Condition, Dataset, GasSpring, InputError, Run
 from mrdamper.errors import shown, validate_arguments
 from mrdamper.models.bingham import Bingham
 from mrdamper.physics.motion import sine
-from mrdamper.study.parallel import IN_PROCESS
+from mrdamper.study.processes import IN_PROCESS
 from mrdamper.systems.structure import Link, System
 
 

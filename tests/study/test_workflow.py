@@ -14,7 +14,7 @@ from mrdamper.errors import IdentificationError, OutputError
 from mrdamper.identification.loop_analysis import analyse_loop, dynamic_ranges
 from mrdamper.report.study import write_study
 from mrdamper.study import usable_runs
-from mrdamper.study.parallel import several
+from mrdamper.study.processes import several
 from mrdamper.study.validation import validate
 from mrdamper.study.workflow import run_study
 

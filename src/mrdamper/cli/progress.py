@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from threading import Lock, Timer
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from mrdamper.data.progress import Progress
 
 Item = TypeVar("Item")
-Progress = Callable[[str, float], None]
 _QUICK = 1.0  # seconds without progress
 
 
@@ -18,13 +20,15 @@ def progress_on_stderr(quiet: bool = False) -> Iterator[Progress]:
     if quiet:
         yield lambda what, share: None
         return
+    from rich import progress as bars
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    columns = (
+        bars.TextColumn("{task.description}"), bars.BarColumn(), bars.TimeElapsedColumn(), bars.TimeRemainingColumn()
+    )  # fmt: skip
     console = Console(stderr=True)
     # Steps may last for minutes; a file or a pipe in place of a terminal would get the last bar only.
-    with Progress(*columns, console=console, disable=not console.is_terminal, speed_estimate_period=1e9) as bar:
+    with bars.Progress(*columns, console=console, disable=not console.is_terminal, speed_estimate_period=1e9) as bar:
         task = bar.add_task("", total=1.0)
         yield lambda what, share: bar.update(task, description=what, completed=share)
 

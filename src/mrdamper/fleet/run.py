@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mrdamper.data.atomic import require_writable
+from mrdamper.data.progress import Progress, silent
 from mrdamper.errors import InputError, validate_arguments
 from mrdamper.fleet.engine import Submit, cluster_engine, local_engine, outcome
 from mrdamper.fleet.guard import JobLimits
@@ -24,7 +25,6 @@ from mrdamper.fleet.table import write_table
 from mrdamper.models import model_type
 from mrdamper.rig_files.profile import load_profile
 
-Progress = Callable[[str, float], None]
 REFERENCES = 11  # dampers that make the plan
 _QUEUED_PER_WORKER = 2  # queued jobs per running job
 
@@ -54,7 +54,7 @@ def run_fleet(
     tls: str | Path | None = None,
     patience: float = 10.0,
     limits: JobLimits | None = None,
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
 ) -> Fleet:
     """Identify every damper of a source that is not yet in the journal of `out`, and write the table.
 

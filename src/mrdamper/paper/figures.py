@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
+from mrdamper.data.progress import Progress
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.loop_analysis import dynamic_ranges
 from mrdamper.paper.claims_on_tests import friction_along
@@ -39,7 +40,6 @@ from mrdamper.report.plots.style import (
 )
 from mrdamper.statistics.functions.fitting import fit_function
 from mrdamper.statistics.functions.forms import ParameterFunction, features
-from mrdamper.study.recipe import Progress
 
 _MOST_LOOPS = 9  # in one panel
 _LINE, _SMALL = 0.9, 7  # width of a line, size of the letters of a legend [pt]

@@ -16,6 +16,7 @@ from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition
 from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text
+from mrdamper.data.progress import Progress, silent
 from mrdamper.errors import InputError
 from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.models import Model, model_type
@@ -27,8 +28,7 @@ from mrdamper.paper.results import Reproduction, cost_per_run, rate_rows
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.style import Picture, save_picture
 from mrdamper.report.tables import identification_rows
-from mrdamper.study.parallel import IN_PROCESS, Processes
-from mrdamper.study.recipe import Progress
+from mrdamper.study.processes import IN_PROCESS, Processes
 
 Rows = list[dict[str, Any]]
 _GROUPS = {"paper": "paper (literal)"}  # names of groups of methods in tables
@@ -37,7 +37,7 @@ _GROUPS = {"paper": "paper (literal)"}  # names of groups of methods in tables
 def write_reproduction(
     study: Reproduction,
     folder: str | Path,
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
     *,
     png: bool = False,
     processes: Processes = IN_PROCESS,

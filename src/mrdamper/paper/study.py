@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Dataset, Run
+from mrdamper.data.progress import Progress, silent
 from mrdamper.errors import IdentificationError, InputError, validate_arguments
 from mrdamper.identification import conclude
 from mrdamper.identification.basis import Basis
@@ -35,8 +36,9 @@ from mrdamper.paper.results import GeneticCheck, GeneticEnd, Reproduction
 from mrdamper.paper.sensitivity import OneAtATime, Sobol, one_at_a_time, sobol
 from mrdamper.paper.virtual_rig import CURRENTS, VirtualRig, friction_test, virtual_dataset
 from mrdamper.physics.gas_spring import GasSpring
-from mrdamper.study.parallel import IN_PROCESS, Processes, follow_each, identify_quickly, shortened_method
-from mrdamper.study.recipe import IdentificationCache, Progress, RecipeResult, fit_and_score_all
+from mrdamper.study.parallel import follow_each, identify_quickly, shortened_method
+from mrdamper.study.processes import IN_PROCESS, Processes
+from mrdamper.study.recipe import IdentificationCache, RecipeResult, fit_and_score_all
 from mrdamper.study.usable_runs import usable_sines
 
 SOBOL_SAMPLES = 512
@@ -55,7 +57,7 @@ def reproduce(
     with_models: bool = False,
     seeds: int = 0,
     processes: Processes = IN_PROCESS,
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
 ) -> Reproduction:
     """Run the study.
 

@@ -14,6 +14,7 @@ from mrdamper.dampers.model_file import save_model
 from mrdamper.data import Run
 from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names, finite
+from mrdamper.data.progress import Progress, silent
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.comparison import overlaid_loops, ranking
 from mrdamper.report.plots.cycle import spread_out
@@ -21,13 +22,13 @@ from mrdamper.report.plots.style import save_figure
 from mrdamper.report.summary import omission_lines
 from mrdamper.report.tables import score_rows
 from mrdamper.study.comparison import RANKING, Comparison, RigComparison
-from mrdamper.study.recipe import Progress, RecipeResult
+from mrdamper.study.recipe import RecipeResult
 
 _LOOPS, _OVERLAID = 3, 5
 
 
 def write_comparison(
-    comparison: Comparison, folder: str | Path, progress: Progress = lambda what, share: None, *, png: bool = False
+    comparison: Comparison, folder: str | Path, progress: Progress = silent, *, png: bool = False
 ) -> list[Path]:
     """Write the comparison atomically, and return the files, the page first.
 

@@ -16,6 +16,7 @@ from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.uncertainty import table
 from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names
+from mrdamper.data.progress import Progress, silent
 from mrdamper.data.runs import once_per_run
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.characteristics import Characteristics, characterise
@@ -40,8 +41,8 @@ from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_
 from mrdamper.report.plots.style import MOST_NAMED, Picture, picture_of, save_picture
 from mrdamper.report.summary import error_sentence, omission_lines
 from mrdamper.report.tables import identification_rows, score_rows
-from mrdamper.study.parallel import IN_PROCESS, Processes
-from mrdamper.study.recipe import Progress, RecipeResult
+from mrdamper.study.processes import IN_PROCESS, Processes
+from mrdamper.study.recipe import RecipeResult
 from mrdamper.study.workflow import RigStudy, Study
 
 _LOOPS_SHOWN = 6
@@ -51,7 +52,7 @@ _CV_RANGE = ("low_cv", "high_cv")  # columns with the range of a parameter in cr
 def write_study(
     study: Study,
     folder: str | Path,
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
     *,
     about: About | Mapping[str, Any] | str | Path | None = None,
     limits: Sequence[Limit] | str | Path = (),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import chain
@@ -16,6 +16,7 @@ import numpy as np
 
 from mrdamper.data import Dataset
 from mrdamper.data.displayable import Displayable
+from mrdamper.data.progress import Progress, silent
 from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files.coil_current import as_data, require_current, with_current_behind_label, with_stated_current
@@ -115,7 +116,7 @@ def import_files(
     profile: Profile | str | Path | None = None,
     *,
     tests: str | Path | TestsTable | None = None,
-    progress: Callable[[str, float], None] = lambda what, share: None,
+    progress: Progress = silent,
 ) -> ImportResult:
     """Read and check files and folders of files; a refused file or test does not stop the others.
 

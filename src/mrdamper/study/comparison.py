@@ -17,12 +17,14 @@ import numpy as np
 
 from mrdamper.data import Dataset, Displayable, Run
 from mrdamper.data.displayable import joined
+from mrdamper.data.progress import Progress, silent
 from mrdamper.errors import IdentificationError, InputError, validate_arguments
 from mrdamper.identification import Identification
 from mrdamper.identification.basis import Basis
 from mrdamper.physics.motion import analyse_motion
-from mrdamper.study.parallel import follow_each, identify_each, several
-from mrdamper.study.recipe import IdentificationCache, Progress, Recipe, RecipeResult, StudyMethod, recipes
+from mrdamper.study.parallel import follow_each, identify_each
+from mrdamper.study.processes import several
+from mrdamper.study.recipe import IdentificationCache, Recipe, RecipeResult, StudyMethod, recipes
 from mrdamper.study.usable_runs import UsableRuns
 from mrdamper.study.workflow import headline_of, table_of, with_unused_runs
 
@@ -82,7 +84,7 @@ def compare(
     genetic: bool = False,
     method: StudyMethod | None = None,
     jobs: int | None = None,
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
 ) -> Comparison:
     """Compare models on a dataset.
 

@@ -1,19 +1,15 @@
-"""Work in several processes, bit for bit what one process gives."""
+"""Identifications and recipes of a comparison in several processes, bit for bit what one process gives."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterable, Sequence
-from concurrent.futures import Executor, Future, as_completed
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from functools import lru_cache, partial
-from typing import Any, TypeVar
 
 import numpy as np
 
 from mrdamper.data import Run, index_at
-from mrdamper.discovery import in_main_script
+from mrdamper.data.progress import Progress
 from mrdamper.errors import InputError
 from mrdamper.identification import Identification, Method, Problem, conclude
 from mrdamper.identification.basis import Basis
@@ -22,72 +18,11 @@ from mrdamper.identification.methods.projection import Projection
 from mrdamper.models import model_type
 from mrdamper.physics.motion import analyse_motion
 from mrdamper.statistics.linear import on_one_blas_thread
-from mrdamper.study.processes import processes
-from mrdamper.study.recipe import IdentificationCache, Progress, Recipe, RecipeResult, fit_and_score_all
+from mrdamper.study.processes import Processes
+from mrdamper.study.recipe import IdentificationCache, Recipe, RecipeResult, fit_and_score_all
 
 _CYCLES = 2  # last cycles of a run for expensive identifications
 _PER_CYCLE = 200  # samples per cycle for these
-
-T = TypeVar("T")
-R = TypeVar("R")
-
-
-@dataclass(frozen=True)
-class Processes:
-    """The current process and its pool of worker processes, if any. `several` starts the pool."""
-
-    pool: Executor | None = None
-    count: int = 1
-
-    def map(
-        self,
-        function: Callable[[T, Progress], R],
-        items: Sequence[T],
-        progress: Progress = lambda what, share: None,
-        weights: Sequence[float] = (),
-    ) -> list[R]:
-        """Return the results of a function of a module for every item, in order.
-
-        While worker processes import, this process computes items, too, from the last to the first, as long as no other
-        has begun them: the longest should be first. Weights are relative durations.
-        """
-        weight, last = list(weights or [1.0] * len(items)), len(items) - 1
-        pending = [self.pool.submit(_quietly, function, item) for item in items[:-1]] if self.pool else []
-        here: dict[int, R] = {}
-
-        def tell(what: str, within: float) -> None:
-            ended = (n in here or (n < len(pending) and _done(pending[n])) for n in range(len(items)))
-            done = sum(w for w, end in zip(weight, ended, strict=True) if end)
-            progress(what, (done + within) / sum(weight))
-
-        for n in reversed(range(len(items))) if pending else range(len(items)):
-            if not pending or n == last or pending[n].cancel():
-                here[n] = function(items[n], lambda what, share, n=n: tell(what, weight[n] * share))
-        for future in as_completed([future for future in pending if not future.cancelled()]):
-            future.result()
-            tell(f"{sum(map(_done, pending)) + len(here)} of {len(items)} done", 0.0)
-        return [here[n] if n in here else pending[n].result() for n in range(len(items))]
-
-
-IN_PROCESS = Processes()
-
-
-@contextmanager
-def several(count: int) -> Generator[Processes]:
-    """Start `count` processes, this one included, for the length of a block; none if they lack a class of a script."""
-    if count < 2 or in_main_script():
-        yield IN_PROCESS
-        return
-    with processes(count - 1) as pool:
-        yield Processes(pool, count)
-
-
-def _done(future: Future[Any]) -> bool:
-    return future.done() and not future.cancelled()
-
-
-def _quietly(function: Callable[[T, Progress], R], item: T) -> R:
-    return function(item, lambda what, share: None)
 
 
 def identify_each(tasks: Iterable[tuple[Basis, Run]], processes: Processes, progress: Progress) -> IdentificationCache:

@@ -20,12 +20,12 @@ from mrdamper.dampers.prediction import Prediction
 from mrdamper.dampers.slopes import force_slopes
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition, Floats
+from mrdamper.data.progress import Progress, silent
 from mrdamper.errors import InputError, UnknownNameError, numbers, validate_arguments
 from mrdamper.identification.intervals import student
 from mrdamper.physics.motion import sine
 from mrdamper.study.limits import Limits
 from mrdamper.study.proposal import Proposal
-from mrdamper.study.recipe import Progress
 
 _SAMPLES = 24  # independent samples per cycle; model error leaves fewer than a rig records
 _DRAWS = 2  # of the parameters, beside the estimate
@@ -44,7 +44,7 @@ def plan_tests(
     limits: Limits,
     hours: float,
     about: str | Condition | None = None,
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
 ) -> tuple[list[Proposal], ExperimentDesign]:
     """Choose the records that reduce an uncertainty most, in the order to run them.
 
@@ -110,7 +110,7 @@ class ExperimentDesign:
         limits: Limits,
         conditions: Sequence[Condition],
         about: str | Condition | None = None,
-        progress: Progress = lambda what, share: None,
+        progress: Progress = silent,
     ) -> ExperimentDesign:
         """Of a damper with its covariance; raises as `plan_tests`."""
         uncertainty: Uncertainty | None = damper.uncertainty

@@ -1,21 +1,84 @@
-"""Worker processes that end with their parent, however it ends."""
+"""Work in several processes, which end with their parent, however it ends."""
 
 from __future__ import annotations
 
 import signal
 import sys
 import threading
-from collections.abc import Generator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from dataclasses import dataclass
 from multiprocessing import active_children
 from multiprocessing.context import SpawnContext, SpawnProcess
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 from mrdamper.data.child import end_with_parent
+from mrdamper.data.progress import Progress, silent
 from mrdamper.errors import ResourceError
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class Processes:
+    """The current process and its pool of worker processes, if any. `several` starts the pool."""
+
+    pool: Executor | None = None
+    count: int = 1
+
+    def map(
+        self,
+        function: Callable[[T, Progress], R],
+        items: Sequence[T],
+        progress: Progress = silent,
+        weights: Sequence[float] = (),
+    ) -> list[R]:
+        """Return the results of a function of a module for every item, in order.
+
+        While worker processes import, this process computes items, too, from the last to the first, as long as no other
+        has begun them: the longest should be first. Weights are relative durations.
+        """
+        weight, last = list(weights or [1.0] * len(items)), len(items) - 1
+        pending = [self.pool.submit(_quietly, function, item) for item in items[:-1]] if self.pool else []
+        here: dict[int, R] = {}
+
+        def tell(what: str, within: float) -> None:
+            ended = (n in here or (n < len(pending) and _done(pending[n])) for n in range(len(items)))
+            done = sum(w for w, end in zip(weight, ended, strict=True) if end)
+            progress(what, (done + within) / sum(weight))
+
+        for n in reversed(range(len(items))) if pending else range(len(items)):
+            if not pending or n == last or pending[n].cancel():
+                here[n] = function(items[n], lambda what, share, n=n: tell(what, weight[n] * share))
+        for future in as_completed([future for future in pending if not future.cancelled()]):
+            future.result()
+            tell(f"{sum(map(_done, pending)) + len(here)} of {len(items)} done", 0.0)
+        return [here[n] if n in here else pending[n].result() for n in range(len(items))]
+
+
+IN_PROCESS = Processes()
+
+
+@contextmanager
+def several(count: int) -> Generator[Processes]:
+    """Start `count` processes, this one included, for the length of a block; raises as `processes`."""
+    if count < 2:
+        yield IN_PROCESS
+        return
+    with processes(count - 1) as pool:
+        yield Processes(pool, count)
+
+
+def _done(future: Future[Any]) -> bool:
+    return future.done() and not future.cancelled()
+
+
+def _quietly(function: Callable[[T, Progress], R], item: T) -> R:
+    return function(item, silent)
 
 
 @contextmanager

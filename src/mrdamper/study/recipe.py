@@ -23,6 +23,7 @@ from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
 from mrdamper.dampers.published import Published, all_published
 from mrdamper.data import Run
+from mrdamper.data.progress import Progress, silent
 from mrdamper.discovery import Registry
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
 from mrdamper.identification import Identification
@@ -34,8 +35,6 @@ from mrdamper.physics.motion import analyse_motion
 from mrdamper.study.cross_validation import all_folds, cross_validate, cross_validate_by_kind, stretches
 from mrdamper.study.fit_result import FitResult
 from mrdamper.study.validation import Validation, validate
-
-Progress = Callable[[str, float], None]
 
 STUDIED = ("bouc-wen", "bingham")  # the model of the method, and the usual reference
 _GLOBAL_FIT, _CURRENT_LAWS = "global fit", "current laws"  # procedures in words
@@ -162,7 +161,7 @@ def _spread(dampers: Sequence[Damper]) -> dict[str, tuple[float, float]]:
 def fit_and_score_all(
     steps: Sequence[tuple[Recipe, Sequence[Run]]],
     held_out: Sequence[Run],
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
     *,
     leave_out: bool = True,
     kinds: bool = False,
@@ -195,7 +194,7 @@ def fit_and_score_all(
 
 
 def identified(
-    basis: Basis | None, runs: Sequence[Run], cache: IdentificationCache, progress: Progress = lambda what, share: None
+    basis: Basis | None, runs: Sequence[Run], cache: IdentificationCache, progress: Progress = silent
 ) -> tuple[list[Identification], float]:
     """Identifications of runs, made if missing, and their time [s]; raises `IdentificationError` if one is refused."""
     if basis is None:

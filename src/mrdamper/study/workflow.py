@@ -23,6 +23,7 @@ from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.sessions import GainOffset, Sessions, known_errors
 from mrdamper.data import Dataset, Displayable, Floats, Run
 from mrdamper.data.displayable import joined
+from mrdamper.data.progress import Progress, silent
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError, validate_arguments
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.physics.motion import analyse_motion
@@ -31,11 +32,10 @@ from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.contradictions import Contradiction
 from mrdamper.study.cross_validation import NO_CURRENT
 from mrdamper.study.dissipation import gains_energy
-from mrdamper.study.parallel import IN_PROCESS, Processes
+from mrdamper.study.processes import IN_PROCESS, Processes
 from mrdamper.study.recipe import (
     STUDIED,
     WHOLE_DAMPER,
-    Progress,
     Recipe,
     RecipeResult,
     StudyMethod,
@@ -198,7 +198,7 @@ class Study(Displayable):
 @validate_arguments()
 def run_study(
     dataset: Dataset,
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
     *,
     model: str | StudyMethod | None = None,
     keep: Sequence[str] = (),
@@ -251,7 +251,7 @@ def run_study(
 @on_one_blas_thread
 def study_rig(
     dataset: Dataset,
-    progress: Progress = lambda what, share: None,
+    progress: Progress = silent,
     *,
     model: str | StudyMethod | None = None,
     keep: Collection[str] = (),

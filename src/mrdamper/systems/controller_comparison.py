@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from mrdamper.dampers.base import Damper
+from mrdamper.data.progress import Progress, silent
 from mrdamper.systems.controllers import Controller
 from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.controllers.preview import NonCausalOptimum
@@ -34,7 +35,7 @@ def compare_controllers(
     dampers: Mapping[str, Damper],
     controllers: Sequence[Controller],
     highest: float | None = None,
-    progress: Callable[[str, float], None] = lambda what, share: None,
+    progress: Progress = silent,
 ) -> ControllerComparison:
     """Run controllers at the step of a simulation, which stands for its own controller.
 

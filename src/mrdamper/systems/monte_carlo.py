@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.causal import free_name
 from mrdamper.data import Floats
+from mrdamper.data.progress import Progress, silent
 from mrdamper.errors import InputError, StepError
 from mrdamper.systems.kernel import ElementParameters
 from mrdamper.systems.measures import measures
@@ -112,7 +113,7 @@ def monte_carlo(
     loop: SystemLoop,
     draws: Sequence[Mapping[str, Draw]],
     mean: Simulation,
-    progress: Callable[[str, float], None] = lambda what, share: None,
+    progress: Progress = silent,
 ) -> Bands:
     """Run a loop made with `free` again with other parameters of its dampers; it is traced and compiled once.
 

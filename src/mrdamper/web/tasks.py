@@ -5,7 +5,7 @@ Imports of single tasks stand inside them: workers start sooner.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from mrdamper.dampers.base import Damper
 from mrdamper.dampers.covariance import estimate_uncertainty
 from mrdamper.data import Dataset
+from mrdamper.data.progress import Progress
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import Identification
 from mrdamper.identification.basis import Basis
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from mrdamper.report.about import About
     from mrdamper.study.comparison import Comparison
 
-Progress = Callable[[str, float], None]
 JOINT = "joint"
 FUNCTIONS = "functions"
 

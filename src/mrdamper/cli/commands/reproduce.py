@@ -48,7 +48,7 @@ def reproduce(
     from mrdamper.paper.options import PaperOptions
     from mrdamper.paper.output import summary, write_reproduction
     from mrdamper.paper.study import reproduce as run_reproduction
-    from mrdamper.study.parallel import several
+    from mrdamper.study.processes import several
     from mrdamper.study.recipe import study_method
 
     require_writable(out)

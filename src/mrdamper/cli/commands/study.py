@@ -55,7 +55,7 @@ def study(
     from mrdamper.report.study import write_study
     from mrdamper.report.summary import omission_lines, study_lines
     from mrdamper.rig_files.dataset_folder import load_dataset
-    from mrdamper.study.parallel import several
+    from mrdamper.study.processes import several
     from mrdamper.study.workflow import run_study
 
     chosen = _model(model, gas, setting)
