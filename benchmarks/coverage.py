@@ -130,10 +130,9 @@ class Rig:
         runs = [_slower(run) for run in sines]
         problem = JointProblem(runs, "play-bypass")
         fit = problem.fit()
-        lower, upper = problem.box()
+        lower, upper = problem.space.box()
         point = np.clip(fit.point, lower + _INSIDE * (upper - lower), upper - _INSIDE * (upper - lower))
-        linear = {info.name: getattr(fit.damper.model, info.name) for info in problem.linear}
-        truth = replace(fit.damper, model=replace(problem.without_linear(point), **linear))
+        truth = replace(fit.damper, model=problem.space.with_linear_of(fit.damper.model, point))
         clean = tuple(replace(r, force=truth.predict(r).force) for r in runs)
         return cls(JointProblem(clean, "play-bypass"), clean, truth, point)
 
@@ -203,8 +202,8 @@ def _textbook(problem: JointProblem, fit: JointFit) -> dict[str, float]:
     """Standard errors by s² (JᵀJ)⁻¹ of the weighted residual, in the damper's own numbers."""
     known = problem.linearised(fit)
     residual, jacobian = known.residual, known.jacobian
-    axes = [axis.name for axis in problem.axes]
-    names = [*axes, *(info.name for info in problem.linear)]
+    axes = [axis.name for axis in problem.space.axes]
+    names = [*axes, *(info.name for info in problem.space.linear)]
     turned = np.eye(len(names))
     if "seat_share" in axes:  # e = share · d
         turned[axes.index("seat_share"), axes.index("d")] = 1.0

@@ -7,7 +7,7 @@ import pytest
 
 from mrdamper.dampers import choice
 from mrdamper.dampers.choice import CrossValidation, ModelTerm
-from mrdamper.dampers.current_levels import level_count, undetermined
+from mrdamper.dampers.search_space import level_count, undetermined
 from mrdamper.data import Condition, level_groups
 from mrdamper.models.play_bypass import RISE_CURRENT, PlayBypass, _level_law
 

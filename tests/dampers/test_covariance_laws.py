@@ -103,7 +103,7 @@ def test_of_a_run_beside_parameter_functions_the_last_four_cycles_enter_evenly(w
 def test_what_enters_of_a_run_is_what_entered_its_fit():
     (run,) = runs_of(conditions=CONDITIONS[:1])
     part, joint = RunResiduals.of(TRUTH, run), JointProblem([run], "bingham")
-    table = JointResiduals(joint, joint.parts)
+    table = JointResiduals(joint.space, joint.parts)
     time = part.prediction.motion.time[part.picked]
     at = np.searchsorted(run.time, time)
     assert part.measured == pytest.approx(table.target)

@@ -58,7 +58,7 @@ def test_a_search_frees_no_effect_of_the_current_that_its_runs_do_not_determine(
     levels = [*level_groups(JointProblem(runs, "tanh").currents).values()]
     few = [runs[i] for level in levels[:3] for i in level[:2]]
     problem = JointProblem(few, "tanh", free=("si",))
-    assert [axis.name for axis in problem.axes] == ["vy", "shift", "si"]
+    assert [axis.name for axis in problem.space.axes] == ["vy", "shift", "si"]
     (start, *_) = FoldFits(problem, [[4, 5]])._search(frozenset([4, 5]))
     assert start.searched == ("vy", "shift")
 

@@ -13,10 +13,12 @@ from support.dampers import joint_damper
 
 from mrdamper.dampers import joint
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.concatenated_runs import RunRows, concatenate, envelope_of
+from mrdamper.dampers.concatenated_runs import concatenate, force_slopes
 from mrdamper.dampers.envelope import UNTESTED, Envelope
-from mrdamper.dampers.joint import FALL, RISE, JointDamper, JointFit, JointProblem, damper_of
+from mrdamper.dampers.joint import JointDamper, JointFit, JointProblem, damper_of
 from mrdamper.dampers.model_file import dump_model, parse_model
+from mrdamper.dampers.run_rows import RunRows, envelope_of
+from mrdamper.dampers.search_space import FALL, RISE
 from mrdamper.dampers.uncertainty import FittedParameter, Uncertainty
 from mrdamper.data import Condition, Run
 from mrdamper.errors import IdentificationError, InputError, RunError
@@ -118,9 +120,9 @@ def test_known_damper_is_recovered(runs, fit):
 def test_of_each_length_the_best_start_and_the_first_length_first_unless_another_is_clearly_better(
     problem, monkeypatch
 ):
-    at = [axis.name for axis in problem.axes].index("d")
-    lengths = [problem.axes[at].coordinate(g) for g in problem.axes[at].grid]
-    grid = [np.array(u) for u in product(*([axis.coordinate(g) for g in axis.grid] for axis in problem.axes))]
+    at = [axis.name for axis in problem.space.axes].index("d")
+    lengths = [problem.space.axes[at].coordinate(g) for g in problem.space.axes[at].grid]
+    grid = [np.array(u) for u in product(*([axis.coordinate(g) for g in axis.grid] for axis in problem.space.axes))]
     for costs, order in (([1.0, 0.86, 0.9, 9.0], [0, 1, 2]), ([1.0, 0.9, 0.84, 9.0], [2, 0, 1])):
         other, left = JointProblem(problem.runs, "play-bypass", parts=problem.parts), iter(costs)
         monkeypatch.setattr(
@@ -188,13 +190,13 @@ def test_own_numbers_are_those_the_tests_gave_with_their_units_and_scales(fit):
 @pytest.mark.parametrize("name", ["play-bypass", "bouc-wen", "spencer", "bingham"])
 def test_an_axis_is_entangled_if_it_moves_another_parameter_than_that_of_its_name(runs, name):
     problem = JointProblem(runs, name)
-    lower, upper = problem.box() if problem.axes else (np.zeros(0), np.zeros(0))
+    lower, upper = problem.space.box() if problem.space.axes else (np.zeros(0), np.zeros(0))
     point = lower + 0.4 * (upper - lower)
-    plain = problem.without_linear(point).values()
-    for i, axis in enumerate(problem.axes):
-        moved = problem.without_linear(point + 0.02 * (upper - lower) * (np.arange(point.size) == i)).values()
+    plain = problem.space.without_linear(point).values()
+    for i, axis in enumerate(problem.space.axes):
+        moved = problem.space.without_linear(point + 0.02 * (upper - lower) * (np.arange(point.size) == i)).values()
         others = {n for n in plain if moved[n] != plain[n]} ^ {axis.name}
-        assert (i in problem._entangled_axes) == bool(others), axis.name
+        assert (i in problem.space._entangled_axes) == bool(others), axis.name
 
 
 def test_a_damper_holds_parameters_of_its_model_only():
@@ -209,15 +211,15 @@ def test_a_damper_holds_parameters_of_its_model_only():
 
 def test_a_coil_is_looked_for_where_a_current_changes_or_taken_as_given(runs, problem):
     changing = replace(runs[3], id="changing", current=np.linspace(0.1, 0.9, runs[3].time.size))
-    names = [axis.name for axis in problem.axes]
+    names = [axis.name for axis in problem.space.axes]
     assert not {RISE, FALL} & set(names)
     for coil, more in (("determined", [RISE, FALL]), (Coil(0.02, 0.03), []), (None, [])):
         with_change = JointProblem([*runs[:3], changing], "play-bypass", coil=coil)
-        assert [axis.name for axis in with_change.axes] == [*names, *more]
-        at = with_change.coil_at(np.array([a.coordinate(a.grid[0]) for a in with_change.axes]))
+        assert [axis.name for axis in with_change.space.axes] == [*names, *more]
+        at = with_change.space.coil_at(np.array([a.coordinate(a.grid[0]) for a in with_change.space.axes]))
         wanted = Coil(8e-3, 8e-3) if more else coil
         assert (at and (at.rise_s, at.fall_s)) == (wanted and pytest.approx((wanted.rise_s, wanted.fall_s)))
-        assert [(a.lower, a.upper, a.log) for a in with_change.axes[9:]] == [(1e-4, 0.2, True)] * len(more)
+        assert [(a.lower, a.upper, a.log) for a in with_change.space.axes[9:]] == [(1e-4, 0.2, True)] * len(more)
 
 
 def test_problems_made_of_another_keep_what_it_was_given(runs, problem):
@@ -235,19 +237,19 @@ def test_lags_are_handed_on_and_found_at_their_own_places(runs, problem, fit):
     lagged = JointProblem([*runs[:3], changing], "play-bypass")
     known = SimpleNamespace(damper=replace(fit.damper, coil=Coil(0.02, 0.05)), searched=fit.searched)
     point = lagged.from_point(known)
-    found = lagged.coil_at(point)
+    found = lagged.space.coil_at(point)
     assert (found.rise_s, found.fall_s) == pytest.approx((0.02, 0.05))
     far = lagged.from_point(SimpleNamespace(damper=replace(fit.damper, coil=Coil(1e-9, 9.0)), searched=fit.searched))
-    assert (lagged.coil_at(far).rise_s, lagged.coil_at(far).fall_s) == pytest.approx((1e-4, 0.2))
-    names = [axis.name for axis in lagged.axes]
+    assert (lagged.space.coil_at(far).rise_s, lagged.space.coil_at(far).fall_s) == pytest.approx((1e-4, 0.2))
+    names = [axis.name for axis in lagged.space.axes]
     for low, told in (("d", ("d",)), ("seat_share", ("e",)), (RISE, (RISE,)), (None, ())):
         at = point.copy()
         if low:
-            at[names.index(low)] = lagged.box()[0][names.index(low)]
-        assert tuple(lagged._at_bounds(at)) == told
+            at[names.index(low)] = lagged.space.box()[0][names.index(low)]
+        assert tuple(lagged.space.at_bounds(at)) == told
     at = point.copy()
-    at[names.index("cb")] = lagged.box()[1][names.index("cb")]
-    assert lagged._at_bounds(at) == ["cb"]
+    at[names.index("cb")] = lagged.space.box()[1][names.index("cb")]
+    assert lagged.space.at_bounds(at) == ["cb"]
 
 
 def test_scales_and_ranges_are_those_of_the_runs(runs, problem):
@@ -277,7 +279,7 @@ def test_starts_are_tried_on_six_runs_and_a_single_start_is_taken_as_it_is(runs,
     monkeypatch.setattr(JointProblem, "_downhill", lambda self, u: pytest.fail("one start needs no trial"))
     held = problem.with_free((), {"d": 3e-4, "cb": 3e4})
     (start,) = held.promising
-    assert start.tolist() == [axis.coordinate(axis.grid[0]) for axis in held.axes]
+    assert start.tolist() == [axis.coordinate(axis.grid[0]) for axis in held.space.axes]
 
 
 def test_the_third_valley_is_not_looked_into(problem, monkeypatch):
@@ -296,7 +298,7 @@ def test_a_linearisation_is_that_of_its_own_fit_and_made_once(problem, fit):
     assert problem.linearised(other) is not known
     errors = np.sqrt(np.bincount(table.owner, residual**2))
     assert errors / errors[0] == pytest.approx(np.sqrt(fit.nrmse_pp / fit.nrmse_pp[0]), rel=0.05)  # weights: 1 / √error
-    assert jacobian.shape == (residual.size, len(problem.axes) + len(problem.linear))
+    assert jacobian.shape == (residual.size, len(problem.space.axes) + len(problem.space.linear))
     assert fit.seconds < 600
 
 
@@ -307,7 +309,7 @@ def test_what_a_search_without_some_runs_foresees_is_where_it_goes(problem, fit)
         change = np.arange(triangle.shape[1]) + 1.0
         whole = np.column_stack([known.residual, known.jacobian])[owner == run] / weights[run]
         assert np.linalg.norm(triangle @ change) == pytest.approx(np.linalg.norm(whole @ change))
-    errors, point = known.extrapolate_refit(rows, problem.box())
+    errors, point = known.extrapolate_refit(rows, problem.space.box())
     found = problem.refit(fit, rows, 1e-6)
     assert np.linalg.norm(point - found.point) < 0.3 * np.linalg.norm(fit.point - found.point)
     assert errors == pytest.approx(found.nrmse_pp, rel=0.05)
@@ -317,8 +319,8 @@ def test_what_a_search_without_some_runs_foresees_is_where_it_goes(problem, fit)
 def test_a_refit_begins_where_the_derivatives_lead_unless_that_is_worse(problem, fit, monkeypatch, far):
     """By the sum of squares over the runs that are kept."""
     rows, begins = [0, 3, 5, 7, 8, 11], []
-    lower, upper = problem.box()
-    errors, near = problem.linearised(fit).extrapolate_refit(rows, problem.box())
+    lower, upper = problem.space.box()
+    errors, near = problem.linearised(fit).extrapolate_refit(rows, problem.space.box())
     away = lower + 0.9 * (upper - lower) if far else near
     monkeypatch.setattr(joint.Linearisation, "extrapolate_refit", lambda self, rows, box: (errors, away))
     monkeypatch.setattr(JointProblem, "_search", lambda self, table, parts, point, *rest: begins.append((parts, point)))
@@ -332,19 +334,19 @@ def test_a_refit_begins_where_the_derivatives_lead_unless_that_is_worse(problem,
 def test_slopes_by_the_search_axes_are_those_of_the_force(runs, problem, fit):
     motion = sine(MATRIX[5], 3, 20_000)
     picked = np.arange(0, motion.time.size, 97)
-    slopes = problem.force_slopes(fit.point, fit.damper.one_model, motion, picked)
+    slopes = force_slopes(problem.space, fit.point, fit.damper.one_model, motion, picked)
     linear = {info.name for info in PlayBypass.parameters() if info.linear}
     held = {name: getattr(fit.damper.one_model, name) for name in linear}
-    for i, axis in enumerate(problem.axes):
+    for i, axis in enumerate(problem.space.axes):
         step = np.where(np.arange(fit.point.size) == i, 1e-5, 0.0)
-        ends = [replace(problem.without_linear(fit.point + s * step), **held) for s in (-1, 1)]
+        ends = [replace(problem.space.without_linear(fit.point + s * step), **held) for s in (-1, 1)]
         low, high = (simulate(end, motion).force[picked] for end in ends)
         expected = (high - low) / 2e-5
         assert slopes[:, i] == pytest.approx(expected, abs=2e-3 * np.max(np.abs(expected))), axis.name
     changing = replace(runs[3], id="changing", current=np.linspace(0.1, 0.9, runs[3].time.size))
     lagging = JointProblem([*runs[:3], changing], "play-bypass")
     start = np.append(fit.point, np.log([0.01, 0.01]))
-    assert lagging.force_slopes(start, fit.damper.one_model, motion, picked) is None
+    assert force_slopes(lagging.space, start, fit.damper.one_model, motion, picked) is None
 
 
 def test_the_last_digits_do_not_hang_on_the_start(problem, fit):
@@ -369,15 +371,15 @@ def test_samples_of_some_runs_are_those_they_have_among_all(problem, fit):
 
 def test_a_fit_begins_where_another_problem_ended(problem, fit):
     free = JointProblem(problem.runs, "play-bypass", free=("Ic", "si"), parts=problem.parts)
-    point = dict(zip((a.name for a in free.axes), free.from_point(fit), strict=True))
+    point = dict(zip((a.name for a in free.space.axes), free.from_point(fit), strict=True))
     own = dict(zip(fit.searched, fit.point, strict=True))
     assert {name: point[name] for name in own} == pytest.approx(own)
-    for axis in free.axes:
+    for axis in free.space.axes:
         if axis.name in ("Ic", "si"):
             assert point[axis.name] == axis.coordinate(axis.grid[0])
     held = problem.with_free((), {"d": 3e-4})
-    assert "d" not in [axis.name for axis in held.axes]
-    assert held.without_linear(held.from_point(fit)).d == 3e-4
+    assert "d" not in [axis.name for axis in held.space.axes]
+    assert held.space.without_linear(held.from_point(fit)).d == 3e-4
 
 
 def test_predictions_of_a_run_share_its_motion(runs, fit):

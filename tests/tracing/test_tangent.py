@@ -184,15 +184,15 @@ def test_slopes_of_a_joint_fit_are_those_of_differences(bundled, at_bound):
     """At a bound, too, where the force may have a corner: there they are those from inside."""
     runs = [run for run in bundled.rig("utfsm").split("train") if run.excitation == "sine"][::4]
     problem = JointProblem(runs, "play-bypass", free=("leak", "qb", "Ic"))
-    table, point = JointResiduals(problem, problem.parts), np.mean(problem.box(), axis=0)
+    table, point = JointResiduals(problem.space, problem.parts), np.mean(problem.space.box(), axis=0)
     if at_bound:
-        share = [axis.name for axis in problem.axes].index("seat_share")
-        point[share] = problem.box()[1][share]
+        share = [axis.name for axis in problem.space.axes].index("seat_share")
+        point[share] = problem.space.box()[1][share]
     solved = table.solve(point)
     exact = table._moved(point, solved.model, solved.residual)
     weights = table.weights[table.owner]
     near = forward_differences(
-        lambda u: table.residual(u, solved.model) * weights, point, solved.residual, *problem.box()
+        lambda u: table.residual(u, solved.model) * weights, point, solved.residual, *problem.space.box()
     )
     for column, other in zip(exact.T, near.T, strict=True):
         assert np.linalg.norm(column - other) < 0.02 * np.linalg.norm(other) + 1e-6

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mrdamper.dampers.base import Damper
 from mrdamper.dampers.calibration import Growth, Quantity
 from mrdamper.dampers.prediction import Prediction
-from mrdamper.dampers.protocols import DamperLike as Damper
 from mrdamper.dampers.sessions import SessionCorrection
 from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import Uncertainty
@@ -52,7 +52,7 @@ def band(
     between 0 and 1, and `ParameterError` if the square of the force is not finite.
     """
     student(level, 1.0)
-    uncertainty: Uncertainty | None = damper.uncertainty
+    uncertainty = damper.uncertainty
     if uncertainty is None or not (uncertainty.of_sessions or uncertainty.run_dof > 0):
         return None
     seen_at = slice(None) if shown is None else shown
@@ -105,7 +105,8 @@ def band(
 
 def _by_parameters(damper: Damper, loop: Prediction) -> Floats:
     """(3,) relative variances of the force, the peak and the energy of a loop by the parameters."""
-    uncertainty: Uncertainty = damper.uncertainty
+    uncertainty = damper.uncertainty
+    assert uncertainty is not None
     slopes, motion = force_slopes(damper, loop, uncertainty.names), loop.motion
     return relative_variances(slopes, uncertainty.covariance, loop.force, motion.velocity, motion.time)
 
@@ -128,7 +129,7 @@ def _degrees_of_freedom(uncertainty: Uncertainty, slopes: Floats, level: float) 
 
 def scope(damper: Damper, level: float) -> str:
     """Sessions for which a band holds, and its calibration, as a phrase."""
-    uncertainty: Uncertainty | None = damper.uncertainty
+    uncertainty = damper.uncertainty
     if uncertainty is None:
         return ""
     text = (

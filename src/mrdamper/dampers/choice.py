@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.current_levels import level_count
 from mrdamper.dampers.fold_fits import FoldFits
-from mrdamper.dampers.joint import FALL, RISE, JointFit, JointProblem, LocalMinimum
+from mrdamper.dampers.joint import JointFit, JointProblem, LocalMinimum
+from mrdamper.dampers.search_space import FALL, RISE, level_count
 from mrdamper.data import Floats, Run, condition_groups, level_groups, session_folds
 from mrdamper.models import model_type
 from mrdamper.statistics.functions.selection import Errors, smaller_wins
@@ -181,7 +181,7 @@ def _absent(problem: JointProblem, fit: JointFit) -> tuple[Coil | Literal["deter
     """Return the coil to determine, and presets, without those that ended without an effect."""
     least = {
         a.name
-        for a, u in zip(problem.axes, fit.point, strict=True)
+        for a, u in zip(problem.space.axes, fit.point, strict=True)
         if a.at_bound(float(u)) and a.value(float(u)) < np.sqrt(a.upper * max(a.lower, 1e-9 * a.upper))
     }
     coil = None if {RISE, FALL} <= least else problem.given_coil
@@ -268,8 +268,8 @@ class CrossValidation:
         """Linearise a problem where a fit of it ended; conditions are omitted, and sessions if asked for."""
         linearised = problem.linearised(fit)
         table = linearised.table
-        names = (*(a.name for a in problem.axes), *(i.name for i in problem.linear))
-        values = np.array([*fit.point, *(getattr(fit.damper.model, i.name) for i in problem.linear)])
+        names = (*(a.name for a in problem.space.axes), *(i.name for i in problem.space.linear))
+        values = np.array([*fit.point, *(getattr(fit.damper.model, i.name) for i in problem.space.linear)])
         return cls(
             names, values, linearised.residual, linearised.jacobian, table.weights[table.owner], table.share,
             _folds(problem, table.owner, sessions),
@@ -313,9 +313,9 @@ class CrossValidation:
         moved = np.where(on, self.values, 0.0)
         moved[on] += solve_linear(self.jacobian[:, on], -base, rank_limit=1e-10)
         values = dict(zip(self.names, moved.tolist(), strict=True))
-        lower, upper = problem.box()
+        lower, upper = problem.space.box()
         margin = 0.02 * (upper - lower)
-        return np.clip([values[a.name] for a in problem.axes], lower + margin, upper - margin)
+        return np.clip([values[a.name] for a in problem.space.axes], lower + margin, upper - margin)
 
     def _without(self, active: frozenset[str]) -> tuple[NDArray[np.bool_], Floats]:
         """Return the parameters that are active, lags of the coil always, and the residual without the others."""

@@ -1,4 +1,4 @@
-"""Runs concatenated into one motion: samples that are simulated, samples of the least squares, residuals.
+"""Runs concatenated into one motion: their residuals in a global fit, and the linearisation of these.
 
 The effect of one run on the state decays during the next, and one long array is evaluated faster than many short ones.
 """
@@ -9,175 +9,24 @@ from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.envelope import Envelope
-from mrdamper.data import Condition, Floats, Run, index_at
-from mrdamper.errors import RunError
+from mrdamper.dampers.run_rows import RunRows
+from mrdamper.dampers.search_space import FALL, RISE, SearchSpace
+from mrdamper.data import Floats
 from mrdamper.identification.columns import bounds_of, linear_table
 from mrdamper.models.base import Model
 from mrdamper.models.recorded import force_tangents
 from mrdamper.physics.motion.excitation import Excitation
-from mrdamper.physics.motion.sines import centred_motion, equivalent_sine, extreme_strokes
 from mrdamper.statistics.levenberg_marquardt import forward_differences, least_squares
-from mrdamper.statistics.linear import robust_weights, solve_bounded
+from mrdamper.statistics.linear import project_out, robust_weights, solve_bounded
 
-if TYPE_CHECKING:
-    from mrdamper.dampers.protocols import SearchSpace
-
-_ROWS = 400  # samples of a steady run that enter the least squares, about
-# Samples of a cycle that are simulated: at a reversal, between reversals, at rest.
-_SAMPLES_TURNING, _SAMPLES_RUNNING, _SAMPLES_RESTING = 400, 60, 15
-_TURNING_VELOCITY_RATIO = 0.4  # of the peak velocity, below which a motion is near a reversal
-_REST_CYCLES = 0.05  # cycles of rest around a sample without a reversal
-_CURRENT_TOLERANCE = 1e-3  # of the largest current; where it changes by more, every sample is evaluated
-_TRANSIENT_WEIGHT = 0.1  # weight of what lies outside a steady window, ramps and rests, against what lies inside
-_CYCLES = 4  # of a sine that enter: more repeat the same
-_WARM_UP = 1.5  # cycles before the scored samples in which the effect of the start decays
-_MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight
-_REST_VELOCITY_RATIO = 0.01  # share of the peak velocity below which a damper rests
+MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight
 _REFIT_ROUNDS = 3  # rounds of weights on derivatives that are known
 _DIFFERENCE_RATIO = 1e-3  # of the box, over which the last slopes are taken
-_RIDGE = 1e-11  # regularises nearly equal columns
-
-
-@dataclass(frozen=True, eq=False)
-class RunRows:
-    """Samples of a run that are simulated, those of the least squares, and their weights by the time they represent.
-
-    The middle cycles of a steady sine are omitted, because they repeat the last ones. Samples before the first motion
-    by the amplitude are omitted, because the state of the damper is unknown there.
-    """
-
-    motion: Excitation
-    picked: NDArray[np.intp]
-    target: Floats
-    share: Floats
-    condition: Condition
-    scale: float
-    information: float
-    changes: bool
-    is_sine: bool
-    lowest: float
-    highest: float
-    steady: tuple[int, int]
-
-    @classmethod
-    def of(cls, run: Run) -> RunRows:
-        sine = equivalent_sine(run)
-        motion = centred_motion(run)
-        window = np.flatnonzero(run.in_window)
-        first, last = int(window[0]), int(window[-1])
-        scale = float(np.ptp(run.force[first : last + 1]))
-        if scale == 0:
-            raise RunError("the force does not change", where=f"run {run.id}", remedy="leave the run out")
-        period, time = 1 / sine.condition.frequency_Hz, run.time
-        information = 1.0
-        followed = _carrying(motion, sine.condition)
-        steady = first
-        if sine.is_sine:
-            steady = max(first, index_at(time, time[last] - _CYCLES * period))
-            followed &= (time <= time[first] + period) | (time >= time[steady] - _WARM_UP * period)
-        else:
-            information = max(1.0, np.sqrt((time[last] - time[first]) / period))
-        at = np.flatnonzero(followed)
-        x = motion.displacement
-        moved = np.maximum.accumulate(x) - np.minimum.accumulate(x)  # not the travel, which increases at rest by noise
-        unknown = min(index_at(moved, sine.condition.amplitude_m), max(first, len(motion) // 4))
-        rows = at[(at >= unknown) & (at < len(motion) - 1)]  # the last sample has the velocity toward the next run
-        before, inside, after = rows[rows < first], rows[(rows >= steady) & (rows <= last)], rows[rows > last]
-        inside = inside[:: max(1, int(inside.size / (_ROWS * information)))]
-        every = max(1, (before.size + after.size) // _ROWS)
-        before, after = before[::every], after[::every]
-        picked = np.concatenate([before, inside, after])
-        transient = _TRANSIENT_WEIGHT if before.size + after.size else 0.0
-        lasting = [_lasting(time[part]) for part in (before, inside, after)]
-        outside = float(lasting[0].sum() + lasting[2].sum())
-        sizes = (transient / max(outside, 1e-300), 1 / lasting[1].sum(), transient / max(outside, 1e-300))
-        share = np.concatenate([size * part for size, part in zip(sizes, lasting, strict=True)]) / (1 + transient)
-        return cls(
-            motion.part(at),
-            np.searchsorted(at, picked),
-            run.force[picked],
-            share,
-            sine.condition,
-            scale,
-            information,
-            run.current_changes,
-            sine.is_sine,
-            float(np.min(run.displacement)),
-            float(np.max(run.displacement)),
-            (index_at(at, inside[0]), index_at(at, inside[-1])),
-        )
-
-    @property
-    def sine(self) -> Condition | None:
-        """Condition of a sine at one current; None of any other record."""
-        return self.condition if self.is_sine and not self.changes else None
-
-    def steady_end(self) -> RunRows:
-        """Return the last cycles of the steady part, of other records the last third: enough to compare starts."""
-        kept = np.flatnonzero((self.picked >= self.steady[0]) & (self.picked <= self.steady[1]))
-        kept = kept[-_ROWS if self.is_sine else -max(_ROWS, kept.size // 3) :]
-        begin, end = int(self.picked[kept[0]]), int(self.picked[kept[-1]]) + 1
-        begin = max(0, int(begin - 0.4 * (end - begin)))  # for the decay of the start
-        return replace(
-            self,
-            motion=self.motion.part(slice(begin, end)),
-            picked=self.picked[kept] - begin,
-            target=self.target[kept],
-            share=self.share[kept] / self.share[kept].sum(),
-            steady=(int(self.picked[kept[0]]) - begin, end - 1 - begin),
-        )
-
-
-def envelope_of(parts: Sequence[RunRows]) -> Envelope:
-    """Return the ranges of the sines at one current, and every sample and the extreme strokes of the others."""
-    others = [part for part in parts if part.sine is None]
-    strokes = [stroke for part in others if not part.is_sine for stroke in extreme_strokes(part.motion)]
-    envelope = Envelope.of([*(part.condition for part in parts), *strokes])
-    extent = np.array([[part.lowest, part.highest] for part in others])
-    for part in others:
-        envelope = envelope.with_motion(part.motion.current, extent, part.motion.velocity)
-    return envelope
-
-
-def _carrying(motion: Excitation, condition: Condition) -> NDArray[np.bool_]:
-    """Return the samples that represent a motion: many near reversals, few elsewhere and at rest.
-
-    The force of a damper changes within a short distance after a reversal and slowly between reversals.
-    """
-    size, duration = len(motion), float(motion.time[-1] - motion.time[0])
-    cycle = (size - 1) / (duration * condition.frequency_Hz)  # samples
-    dense = max(1, int(cycle / _SAMPLES_TURNING))
-    sparse = dense * max(1, round(cycle / _SAMPLES_RUNNING / dense))
-    speed = np.abs(motion.velocity) / condition.peak_velocity
-    reach = max(1, int(_REST_CYCLES * cycle))
-    moving = np.cumsum(np.concatenate([np.zeros(reach + 1), speed > _REST_VELOCITY_RATIO, np.zeros(reach)]))
-    resting = moving[2 * reach + 1 :] == moving[: -2 * reach - 1]
-    place = np.arange(size)
-    every = np.where(
-        resting,
-        sparse * round(_SAMPLES_RUNNING / _SAMPLES_RESTING),
-        np.where(speed < _TURNING_VELOCITY_RATIO, dense, sparse),
-    )
-    kept = place % every == 0
-    current = np.abs(np.diff(motion.current)) > _CURRENT_TOLERANCE * float(np.max(np.abs(motion.current)))
-    kept[:-1] |= current
-    kept[1:] |= current
-    return kept
-
-
-def _lasting(time: Floats) -> Floats:
-    """(N,) time that each sample represents: half the distance to its neighbours on both sides [s]."""
-    if time.size < 2:
-        return np.ones(time.size)
-    steps = np.diff(time)
-    return (np.concatenate([steps[:1], steps]) + np.concatenate([steps, steps[-1:]])) / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,8 +67,8 @@ class ConcatenatedRuns:
 class JointResiduals:
     """Residuals of concatenated runs, with the weight of each run."""
 
-    def __init__(self, problem: SearchSpace, parts: Sequence[RunRows]):
-        self.problem, self.concatenated = problem, ConcatenatedRuns(parts)
+    def __init__(self, space: SearchSpace, parts: Sequence[RunRows]):
+        self.space, self.concatenated = space, ConcatenatedRuns(parts)
         begins = self.concatenated.begins
         self.picked = np.concatenate([part.picked + at for part, at in zip(parts, begins, strict=True)])
         self.target = np.concatenate([part.target for part in parts])
@@ -228,7 +77,7 @@ class JointResiduals:
         self.share = np.concatenate([part.share for part in parts])
         self.unit = np.sqrt(self.share) / np.repeat([part.scale for part in parts], [p.target.size for p in parts])
         self.information = np.sqrt([part.information for part in parts])
-        self.bounds = bounds_of(problem.linear)
+        self.bounds = bounds_of(space.linear)
         self._set_weights(self.information)
         self._seen: tuple[Excitation, Excitation] | None = None
         self._columns_at: tuple[Floats, Model, Floats, Floats] | None = None
@@ -249,7 +98,7 @@ class JointResiduals:
 
     def weigh(self, errors: Floats) -> None:
         """Robust weights: the sum of the errors counts, not of their squares; long records by their information."""
-        self._set_weights(self.information * robust_weights(errors, _MIN_ERROR_PP))
+        self._set_weights(self.information * robust_weights(errors, MIN_ERROR_PP))
 
     def _set_weights(self, weights: Floats) -> None:
         self.weights = weights
@@ -258,7 +107,7 @@ class JointResiduals:
 
     def _followed(self, model: Model, point: Floats) -> tuple[Excitation, Floats]:
         """Motion and state of a model at the samples."""
-        motion = self.concatenated.with_field_current(self.problem.coil_at(point))
+        motion = self.concatenated.with_field_current(self.space.coil_at(point))
         if self._seen is None or self._seen[0] is not motion:
             self._seen = motion, motion.part(self.picked)
         return self._seen[1], model.state(motion)[self.picked]
@@ -269,13 +118,13 @@ class JointResiduals:
         Cached for the last point, independent of weights.
         """
         if self._columns_at is None or not np.array_equal(self._columns_at[0], point):
-            reduced = self.problem.without_linear(point)
+            reduced = self.space.without_linear(point)
             self._columns_at = point, reduced, *self._linear_table(reduced, point)
         return self._columns_at[1:]
 
     def _linear_table(self, reduced: Model, point: Floats) -> tuple[Floats, Floats]:
         """Force of a model without linear parameters, and the force per unit of each, in one pass if possible."""
-        motion, linear = self.concatenated.with_field_current(self.problem.coil_at(point)), self.problem.linear
+        motion, linear = self.concatenated.with_field_current(self.space.coil_at(point)), self.space.linear
         names = [info.name for info in type(reduced).parameters() if info.linear]  # one program for all problems
         rows = force_tangents(reduced, motion, names, self.picked)
         if rows is None:
@@ -286,7 +135,7 @@ class JointResiduals:
         """Linear parameters of least weighted squares at a point of the search axes; cached for the last point."""
         if self._solved is not None and np.array_equal(self._solved[0], point):
             return self._solved[1]
-        linear, factor = self.problem.linear, self.factor
+        linear, factor = self.space.linear, self.factor
         reduced, base, columns = self.linear_columns(point)
         columns, right = columns * factor[:, None], (self.target - base) * factor
         solution, held = solve_bounded(columns, right, *self.bounds)
@@ -310,7 +159,7 @@ class JointResiduals:
         problem [Kaufman 1975, BIT 15, 49].
         """
         solved = self.solve(point)
-        return project_out(self._moved(point, solved.model, solved.residual), solved.columns)
+        return project_out(solved.columns, self._moved(point, solved.model, solved.residual))
 
     def gradient(self, point: Floats) -> Floats:
         """(D,) half the slope of the cost, with the linear parameters refitted.
@@ -319,7 +168,7 @@ class JointResiduals:
         reaches the end of the play, at which a derivative would jump.
         """
         solved, weights = self.solve(point), self.weights[self.owner]
-        lower, upper = self.problem.box()
+        lower, upper = self.space.box()
         reach = np.minimum(_DIFFERENCE_RATIO * (upper - lower), np.minimum(point - lower, upper - point))
         slope = np.zeros(point.size)
         for i in np.flatnonzero(reach):
@@ -333,18 +182,16 @@ class JointResiduals:
 
         Exact in one pass where the model gives tangents, else by forward differences.
         """
-        motion = self.concatenated.with_field_current(self.problem.coil_at(point))
-        if (slopes := self.problem.force_slopes(point, model, motion, self.picked)) is not None:
+        motion = self.concatenated.with_field_current(self.space.coil_at(point))
+        if (slopes := force_slopes(self.space, point, model, motion, self.picked)) is not None:
             return np.multiply(slopes, self.factor[:, None], out=slopes)
         weights = self.weights[self.owner]
-        return forward_differences(lambda u: self.residual(u, model) * weights, point, residual, *self.problem.box())
+        return forward_differences(lambda u: self.residual(u, model) * weights, point, residual, *self.space.box())
 
     def residual(self, point: Floats, model: Model) -> Floats:
         """(N,) of the linear parameters of a model at a point; its squares sum to each run's nrmse_pp²."""
-        moved = replace(
-            self.problem.without_linear(point), **{i.name: getattr(model, i.name) for i in self.problem.linear}
-        )
-        motion = self.concatenated.with_field_current(self.problem.coil_at(point))
+        moved = self.space.with_linear_of(model, point)
+        motion = self.concatenated.with_field_current(self.space.coil_at(point))
         values = force_tangents(moved, motion, (), self.picked)
         force = moved.force(*self._followed(moved, point)) if values is None else values[0]
         return (force - self.target) * self.unit
@@ -379,25 +226,33 @@ class Linearisation:
         errors = np.zeros(0)
         for _ in range(_REFIT_ROUNDS):
             weighted = rows * weights[owner][:, None]
-            left = project_out(weighted[:, : own.stop], weighted[:, own.stop :])
+            left = project_out(weighted[:, own.stop :], weighted[:, : own.stop])
             start, slopes = left[:, 0], left[:, own]
             solution = least_squares(
                 lambda u, r=start, J=slopes: r + J @ (u - self.point), point, *box, slopes=lambda _, J=slopes: J
             )
             point = solution.point
             errors = np.sqrt(np.bincount(owner, solution.residual**2)) / weights
-            weights = self.table.information[list(runs)] * robust_weights(errors, _MIN_ERROR_PP)
+            weights = self.table.information[list(runs)] * robust_weights(errors, MIN_ERROR_PP)
         return errors, point
 
 
-def project_out(slopes: Floats, columns: Floats) -> Floats:
-    """Project slopes (N, D) onto the orthogonal complement of some columns."""
-    gram = columns.T @ columns
-    scale = np.sqrt(gram.diagonal())
-    scale = np.where(scale > 0, scale, 1.0)
-    normal = gram / scale / scale[:, None] + _RIDGE * np.eye(scale.size)
-    taken = (np.linalg.solve(normal, columns.T @ slopes / scale[:, None]) / scale[:, None]).T @ columns.T
-    return np.subtract(slopes, taken.T, out=taken.T)
+def force_slopes(
+    space: SearchSpace, point: Floats, model: Model, motion: Excitation, picked: NDArray[np.intp]
+) -> Floats | None:
+    """(N, D) derivatives of the force at some samples of a motion by the search axes, the linear parameters held.
+
+    At a bound they are one-sided, because the force of a model may have a kink there. None where the coil's lags are
+    searched, or where the model has no tangents.
+    """
+    if any(axis.name in (RISE, FALL) for axis in space.axes):
+        return None
+    # One program for all problems of a model: the tangents of held parameters are not used.
+    names = [info.name for info in space.model_type.parameters() if not info.linear]
+    inside = space.inside(point)
+    moved = replace(model, **{name: getattr(inside, name) for name in names})
+    tangents = force_tangents(moved, motion, names, picked)
+    return None if tangents is None else space.along_axes(point, names, tangents[1:])
 
 
 def concatenate(motions: Iterable[Excitation]) -> Excitation:

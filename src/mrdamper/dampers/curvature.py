@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mrdamper.dampers.protocols import DamperLike as Damper
+from mrdamper.dampers.base import Damper
 from mrdamper.dampers.run_residuals import RunResiduals
 from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.data import Condition, Floats

@@ -87,8 +87,7 @@ class FoldFits:
     def _in_whole(self, end: JointFit) -> JointFit:
         """Return the end of a search as a start for fits of this problem."""
         whole, point = self.problem, self.problem.from_point(end)
-        linear = {info.name: getattr(end.damper.model, info.name) for info in whole.linear}
-        damper = replace(end.damper, model=replace(whole.without_linear(point), **linear))
+        damper = replace(end.damper, model=whole.space.with_linear_of(end.damper.model, point))
         start = replace(end, point=point, damper=damper)
         return replace(start, nrmse_pp=whole.errors(start, range(len(whole.parts))))
 

@@ -15,28 +15,24 @@ from functools import cached_property
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper, Saved, not_held
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.concatenated_runs import JointResiduals, Linearisation, RunRows, envelope_of
-from mrdamper.dampers.current_levels import undetermined
+from mrdamper.dampers.concatenated_runs import JointResiduals, Linearisation
 from mrdamper.dampers.envelope import UNTESTED
+from mrdamper.dampers.run_rows import RunRows, envelope_of
+from mrdamper.dampers.search_space import FALL, RISE, SearchSpace, undetermined
 from mrdamper.dampers.uncertainty import FittedParameter
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError, require
 from mrdamper.models import Model, Scale, SearchAxis, model_type
-from mrdamper.models.base import box_of, grid_of, values_at
-from mrdamper.models.recorded import force_tangents
-from mrdamper.physics.motion.excitation import Excitation
+from mrdamper.models.base import grid_of
 from mrdamper.statistics.levenberg_marquardt import Minimum, least_squares, newton_refine
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.statistics.stop_reason import StopReason
 
-RISE, FALL = "coil.rise_s", "coil.fall_s"  # names of the coil's lags on the search axes
 _SEARCH_TOLERANCE = 1e-6  # relative gain of a step at which the search ends
 _LAG_BOUNDS_S, _START_LAG_S = (1e-4, 0.2), 8e-3  # of a coil's field [s]
-_DIFFERENCE_RATIO = 1e-6  # of the box, over which parameters are differentiated by the search axes
 _TRIAL_RUNS, _TRIAL_STEPS = 6, 5  # runs on which starts are tried, and steps from each
 _REFIT_TOLERANCE = 5e-4  # relative gain of a step at which a fit without some runs ends
 _REFIT_STEPS = 15  # of such a fit
@@ -210,13 +206,13 @@ class JointProblem:
         self.fixed = dict(fixed or {})
         infos = self.model_type.parameters()
         self.free = tuple(i.name for i in infos if i.name not in self.fixed and (not i.preset or i.name in free))
-        self.linear = [info for info in infos if info.linear and info.name in self.free]
+        linear = [info for info in infos if info.linear and info.name in self.free]
         self.parts = list(parts) or [RunRows.of(run) for run in runs]
-        self.axes: tuple[SearchAxis, ...] = self.model_type.search_axes(_scale(self.parts), self.free)
+        axes = list(self.model_type.search_axes(_scale(self.parts), self.free))
         self.given_coil: Coil | Literal["determined"] | None = coil
-        self.coil = None if coil == "determined" else coil
         if coil == "determined" and any(part.changes for part in self.parts):
-            self.axes += tuple(SearchAxis(name, *_LAG_BOUNDS_S, (_START_LAG_S,), log=True) for name in (RISE, FALL))
+            axes += [SearchAxis(name, *_LAG_BOUNDS_S, (_START_LAG_S,), log=True) for name in (RISE, FALL)]
+        self.space = SearchSpace(self.model_type, self.fixed, linear, axes, None if coil == "determined" else coil)
 
     def with_free(self, free: Sequence[str], fixed: Mapping[str, float] | None = None) -> JointProblem:
         """Return the same runs with other presets free, or more parameters held."""
@@ -244,12 +240,12 @@ class JointProblem:
         lags = fit.damper.coil
         axis_values = {RISE: lags.rise_s, FALL: lags.fall_s} if lags else {}
         axis_values |= {name: getattr(fit.damper.model, name) for name in fit.searched if name not in axis_values}
-        values = [axis_values.get(a.name, a.grid[0]) for a in self.axes]
-        return np.array([a.coordinate(min(max(v, a.lower), a.upper)) for a, v in zip(self.axes, values, strict=True)])
+        pairs = [(a, axis_values.get(a.name, a.grid[0])) for a in self.space.axes]
+        return np.array([a.coordinate(min(max(value, a.lower), a.upper)) for a, value in pairs])
 
     def errors(self, fit: JointFit, rows: Sequence[int]) -> Floats:
         """(len(rows),) nrmse_pp of some runs predicted by a fit to others."""
-        table = JointResiduals(self, [self.parts[i] for i in rows])
+        table = JointResiduals(self.space, [self.parts[i] for i in rows])
         return np.sqrt(np.bincount(table.owner, table.residual(fit.point, fit.damper.model) ** 2))
 
     @property
@@ -264,12 +260,12 @@ class JointProblem:
         Each length of free play has its own local minimum and its best start. The first is the most probable: another
         must be clearly better.
         """
-        grid = grid_of(self.axes)
+        grid = grid_of(self.space.axes)
         if len(grid) == 1:
             return grid
         table = self._few
         costs = np.array([float(np.sum(table.solve(u).nrmse_pp)) for u in grid])
-        lengths = np.array([u[[len(axis.grid) > 1 for axis in self.axes]][0] for u in grid])
+        lengths = np.array([u[[len(axis.grid) > 1 for axis in self.space.axes]][0] for u in grid])
         kinds = [np.flatnonzero(lengths == d) for d in dict.fromkeys(lengths.tolist())]
         ends = [self._downhill(grid[min(kind, key=costs.__getitem__)]) for kind in kinds]
         first = ends[0]
@@ -280,12 +276,12 @@ class JointProblem:
     def _few(self) -> JointResiduals:
         """A few runs on which starts are tried."""
         few = self.parts[:: max(1, len(self.parts) // _TRIAL_RUNS)]
-        return JointResiduals(self, [part.steady_end() for part in few])
+        return JointResiduals(self.space, [part.steady_end() for part in few])
 
     def _downhill(self, start: Floats) -> Minimum:
         """Return some steps from a start, on few runs."""
         table = self._few
-        return least_squares(table.solved_residual, start, *self.box(), _TRIAL_STEPS, 1e-3, slopes=table.slopes)
+        return least_squares(table.solved_residual, start, *self.space.box(), _TRIAL_STEPS, 1e-3, slopes=table.slopes)
 
     def search(
         self, start: Floats | None = None, rounds: int = 3, most_steps: int = 25, settled: float = _SEARCH_TOLERANCE
@@ -320,7 +316,7 @@ class JointProblem:
         """
         begin = time.perf_counter()
         parts = self.parts if rows is None else [self.parts[i] for i in rows]
-        table, point = JointResiduals(self, parts), self.start if start is None else start
+        table, point = JointResiduals(self.space, parts), self.start if start is None else start
         return self._search(table, parts, point, rounds, most_steps, settled, begin, to_the_last_digit)
 
     def _search(
@@ -337,24 +333,24 @@ class JointProblem:
         """Search in rounds, with weights by the errors the last one left."""
         ending, curved = StopReason.SOLVED, settled < _SEARCH_TOLERANCE
         for left in reversed(range(rounds)):
-            if self.axes:
+            if self.space.axes:
                 solution = least_squares(
-                    table.solved_residual, point, *self.box(), most_steps, settled,
+                    table.solved_residual, point, *self.space.box(), most_steps, settled,
                     slopes=table.slopes, curved=curved, lengthened=True,
                 )  # fmt: skip
                 point, ending = solution.point, solution.ending
                 if to_the_last_digit and not left:
-                    point = newton_refine(table.gradient, point, *self.box())
+                    point = newton_refine(table.gradient, point, *self.space.box())
             table.weigh(table.solve(point).nrmse_pp)
         solved = table.solve(point)
         return JointFit(
             self._damper(solved.model, point, parts),
             solved.nrmse_pp,
-            (*self._at_bounds(point), *solved.held),
+            (*self.space.at_bounds(point), *solved.held),
             point,
             ending,
             time.perf_counter() - begin,
-            tuple(axis.name for axis in self.axes),
+            tuple(axis.name for axis in self.space.axes),
         )
 
     @on_one_blas_thread
@@ -367,7 +363,7 @@ class JointProblem:
         begin, rows = time.perf_counter(), sorted(rows)
         linearised = self.linearised(fit)
         table = linearised.table.only(rows)
-        errors, point = linearised.extrapolate_refit(rows, self.box())
+        errors, point = linearised.extrapolate_refit(rows, self.space.box())
         table.weigh(errors)
         costs = [float(np.sum(table.solve(u).residual ** 2)) for u in (fit.point, point)]
         if costs[1] > costs[0]:  # outside the range of the derivatives
@@ -379,7 +375,7 @@ class JointProblem:
         """All runs linearised at a fit, weighted by its errors; cached for the last fits."""
         linearisation = next((each for one, each in self._linearisations if one is fit), None)
         if linearisation is None:
-            table = JointResiduals(self, self.parts)
+            table = JointResiduals(self.space, self.parts)
             table.weigh(fit.nrmse_pp)
             linearisation = Linearisation(table, fit.point, *table.linearise(fit.point, fit.damper.model))
             self._linearisations = [*self._linearisations[1 - _CACHED_LINEARISATIONS :], (fit, linearisation)]
@@ -389,82 +385,8 @@ class JointProblem:
 
     def _damper(self, model: Model, point: Floats, parts: Sequence[RunRows]) -> JointDamper:
         about = {"runs": str(len(parts)), "fit": "global fit, all runs"}
-        coil, envelope = self.coil_at(point), envelope_of(parts)
+        coil, envelope = self.space.coil_at(point), envelope_of(parts)
         return JointDamper(model, self.free, rig=self.rig, envelope=envelope, provenance=about, coil=coil)
-
-    def coil_at(self, point: Floats) -> Coil | None:
-        """Return the coil at a point of the search axes."""
-        if all(axis.name != RISE for axis in self.axes):
-            return self.coil
-        lags = values_at(self.axes, point)
-        return Coil(lags[RISE], lags[FALL])
-
-    def _at_bounds(self, point: Floats) -> list[str]:
-        """Names of parameters whose search axis ended at a limit."""
-        own = {info.name for info in self.model_type.parameters()}
-        names: list[str] = []
-        middle = np.mean(self.box(), axis=0)
-        for i, axis in enumerate(self.axes):
-            if not axis.at_bound(float(point[i])):
-                continue
-            inward = np.where(np.arange(point.size) == i, middle, point)
-            here, there = self.without_linear(point).values(), self.without_linear(inward).values()
-            stands_for = [n for n in here if here[n] != there[n]]
-            names += [axis.name] if axis.name in own or not stands_for else stands_for
-        return names
-
-    def box(self) -> tuple[Floats, Floats]:
-        """Lower and upper ends of the search axes."""
-        return box_of(self.axes)
-
-    def force_slopes(self, point: Floats, model: Model, motion: Excitation, picked: NDArray[np.intp]) -> Floats | None:
-        """(N, D) derivatives of the force at some samples of a motion by the search axes, the linear parameters held.
-
-        At a bound they are one-sided, because the force of a model may have a kink there. None where the coil's lags
-        are searched, or where the model has no tangents.
-        """
-        if any(axis.name in (RISE, FALL) for axis in self.axes):
-            return None
-        # One program for all problems of a model: the tangents of held parameters are not used.
-        names = [info.name for info in self.model_type.parameters() if not info.linear]
-        lower, upper = self.box()
-        reach = _DIFFERENCE_RATIO * (upper - lower)
-        inside = self.without_linear(np.clip(point, lower + reach, upper - reach))
-        moved = replace(model, **{name: getattr(inside, name) for name in names})
-        tangents = force_tangents(moved, motion, names, picked)
-        if tangents is None:
-            return None
-        slopes = np.empty((point.size, tangents.shape[1]))
-        for i, axis in enumerate(self.axes):
-            if i in self._entangled_axes:
-                np.matmul(self._moved_along(i, point, names), tangents[1:], out=slopes[i])
-            else:
-                scale = axis.value(float(point[i])) if axis.log else 1.0
-                np.multiply(tangents[1 + names.index(axis.name)], scale, out=slopes[i])
-        return slopes.T
-
-    @cached_property
-    def _entangled_axes(self) -> frozenset[int]:
-        """Axes that change further parameters than that of their name."""
-        names = [info.name for info in self.model_type.parameters()]
-        middle = np.mean(self.box(), axis=0)
-        moved = np.array([self._moved_along(i, middle, names) != 0 for i in range(len(self.axes))])
-        own = np.array([[name == axis.name for name in names] for axis in self.axes])
-        return frozenset(np.flatnonzero((moved != own).any(axis=1)).tolist())
-
-    def _moved_along(self, i: int, point: Floats, names: Sequence[str]) -> Floats:
-        """(K,) derivatives of parameters by an axis."""
-        lower, upper = self.box()
-        step = np.where(np.arange(point.size) == i, _DIFFERENCE_RATIO * (upper - lower), 0.0)
-        ends = np.clip(point - step, lower, upper), np.clip(point + step, lower, upper)
-        models = [self.without_linear(end) for end in ends]
-        low, high = (np.array([getattr(model, name) for name in names]) for model in models)
-        return (high - low) / (ends[1][i] - ends[0][i])
-
-    def without_linear(self, point: Floats) -> Model:
-        """Return the model at a point of the search axes, its linear parameters zero."""
-        values = {name: v for name, v in values_at(self.axes, point).items() if name not in (RISE, FALL)}
-        return self.model_type.build({**self.fixed, **values, **{info.name: 0.0 for info in self.linear}})
 
 
 def _scale(parts: Sequence[RunRows]) -> Scale:

@@ -15,10 +15,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Saved, not_held
-from mrdamper.dampers.concatenated_runs import RunRows, envelope_of
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.normal_equations import ABSENT, Condensed, Law, choose_forms, condense, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.dampers.run_rows import RunRows, envelope_of
 from mrdamper.dampers.uncertainty import FittedParameter
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.errors import IdentificationError, ParameterError

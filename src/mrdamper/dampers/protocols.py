@@ -1,13 +1,12 @@
-"""Interfaces of dampers and searches for the modules below them, which must not import them."""
+"""Interface of dampers for the modules below them, which must not import them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol
 
 from mrdamper.data.arrays import Floats
 from mrdamper.data.conditions import Condition
-from mrdamper.data.parameters import ParameterInfo
 
 
 class DamperLike(Protocol):
@@ -73,29 +72,4 @@ class DamperLike(Protocol):
 
     def predict(self, at: Any) -> Any:
         """Predict the steady loop at a condition, or the force along a run."""
-        ...
-
-
-class SearchSpace(Protocol):
-    """Coordinates of a global fit, and the model of each point."""
-
-    @property
-    def linear(self) -> Sequence[ParameterInfo]:
-        """Parameters that enter the force linearly."""
-        ...
-
-    def box(self) -> tuple[Floats, Floats]:
-        """Return the lower and upper bounds of the coordinates."""
-        ...
-
-    def coil_at(self, point: Floats) -> Any:
-        """Return the response of the field at a point."""
-        ...
-
-    def force_slopes(self, point: Floats, model: Any, motion: Any, picked: Any) -> Floats | None:
-        """Return the derivatives of the force at some samples by the coordinates, where they are exact."""
-        ...
-
-    def without_linear(self, point: Floats) -> Any:
-        """Return the model of a point with its linear parameters at zero."""
         ...

@@ -18,6 +18,7 @@ from itertools import chain, combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from mrdamper.dampers.concatenated_runs import MIN_ERROR_PP
 from mrdamper.dampers.run_residuals import RunResiduals
 from mrdamper.data import Floats, session_groups
 
@@ -28,7 +29,6 @@ _MAX_SHOWN = 128  # gains and offsets up to which those of draws are iterated: t
 _MIN_SHARE = 1e-4  # of the largest variance, with which every other one counts in these forms
 _DRAWS, _ROUNDS, _SEED = 600, 4, 20240813  # draws of gains and offsets; rounds of weights, as in the joint fit
 _EXCHANGES = 3  # rounds in which each of some representative draws is exchanged
-_MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
 
 
 @dataclass(frozen=True)
@@ -243,5 +243,5 @@ class GainsAndOffsets:
             moved = np.linalg.solve(normal / unit[:, :, None] / unit[:, None, :], right[:, :, None])[:, :, 0] / unit
             left = np.concatenate([np.broadcast_to(moved[:, None, :], (len(shift), count, size)), -shift], axis=2)
             squares = np.einsum("drp,rpq,drq->dr", left, grams, left, optimize=True) + rest
-            weight = 1 / np.maximum(np.sqrt(np.maximum(squares, 0)), _MIN_ERROR_PP)
+            weight = 1 / np.maximum(np.sqrt(np.maximum(squares, 0)), MIN_ERROR_PP)
         return moved

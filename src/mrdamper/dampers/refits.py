@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.concatenated_runs import JointResiduals, RunRows
+from mrdamper.dampers.concatenated_runs import JointResiduals
 from mrdamper.dampers.joint import JointProblem
 from mrdamper.dampers.run_residuals import RunResiduals
+from mrdamper.dampers.run_rows import RunRows
 from mrdamper.data import Floats
 from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.statistics.linear import on_one_blas_thread
@@ -37,18 +38,18 @@ def refitted(
     fixed = {name: value for name, value in model.values().items() if name not in names}
     rows = [RunRows.of(run.run) for run in runs]
     problem = JointProblem([run.run for run in runs], type(model), fixed, free=names, coil=damper.coil, parts=rows)
-    table, box = JointResiduals(problem, rows), problem.box()
+    table, box = JointResiduals(problem.space, rows), problem.space.box()
     predicted = [run.predicted for run in runs]
     changes = np.zeros((len(shifts), len(names)))
     for change, shift, start in zip(changes, shifts, moved, strict=True):
         values = {n: numbers[n].moved(step) for n, step in zip(names, start.tolist(), strict=True)}
         there = damper.with_parameters(values).one_model
-        point = np.clip([axis.coordinate(getattr(there, axis.name)) for axis in problem.axes], *box)
+        point = np.clip([axis.coordinate(getattr(there, axis.name)) for axis in problem.space.axes], *box)
         table.target = np.concatenate(
             [(1 + g) * force + o - rest for (g, o), force, rest in zip(shift, predicted, rests, strict=True)]
         )
         table.weigh(np.array([run.error for run in runs]))
-        for _ in range(_ROUNDS if problem.axes else 0):
+        for _ in range(_ROUNDS if problem.space.axes else 0):
             table.weigh(table.solve(point).nrmse_pp)
             point = least_squares(
                 table.solved_residual, point, *box, _STEPS, _TOLERANCE, slopes=table.slopes, curved=True

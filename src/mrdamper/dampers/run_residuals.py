@@ -9,14 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.concatenated_runs import RunRows
+from mrdamper.dampers.concatenated_runs import MIN_ERROR_PP
 from mrdamper.dampers.prediction import Prediction
+from mrdamper.dampers.run_rows import CYCLES, WARM_UP, RunRows
 from mrdamper.data import Floats, Run, index_at, session_of
 
 _MAX_SAMPLES = 400  # samples of a run that enter
-_CYCLES = 4  # of a sine that enter, as in the joint fit
-_WARM_UP = 1.5  # cycles before them in which the effect of the start decays
-_MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight, as in the joint fit
 _MIN_STRETCH = 10  # samples for the spectrum of a residual
 
 
@@ -65,9 +63,9 @@ class RunResiduals:
         window = np.flatnonzero(run.in_window)
         first, last = int(window[0]), int(window[-1])
         if whole.is_sine:
-            first = max(first, index_at(run.time, run.time[last] - _CYCLES / whole.condition.frequency_Hz))
+            first = max(first, index_at(run.time, run.time[last] - CYCLES / whole.condition.frequency_Hz))
         if damper.one_model is None:
-            begin = index_at(run.time, run.time[first] - _WARM_UP / frequency) if frequency else 0
+            begin = index_at(run.time, run.time[first] - WARM_UP / frequency) if frequency else 0
             motion, information = whole.motion.part(slice(begin, last + 1)), 1.0
             picked = np.arange(first - begin, last + 1 - begin, max(1, (last + 1 - first) // _MAX_SAMPLES))
             target, share = run.force[picked + begin], np.full(picked.size, 1 / picked.size)
@@ -79,7 +77,7 @@ class RunResiduals:
         prediction = replace(whole, motion=motion)
         prediction = replace(prediction, force=damper.force_for(prediction))
         residual = prediction.force[picked] - target
-        error = max(float(np.sqrt(share @ residual**2)) / scale, _MIN_ERROR_PP)
+        error = max(float(np.sqrt(share @ residual**2)) / scale, MIN_ERROR_PP)
         weight = information * np.sqrt(share / error) / scale
         time, stretches = motion.time[picked], list[Stretch]()
         for inside in (

@@ -152,10 +152,10 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
         more |= _beside_the_line(fit, own, plan)
         if plan.draft:
             more |= {
-                "axes": [axis.name for axis in problem.axes],
+                "axes": [axis.name for axis in problem.space.axes],
                 # a relevant change of each search axis
-                "changes": [0.2 if axis.log else 0.05 * (axis.upper - axis.lower) for axis in problem.axes],
-                "stands_for": [_stands_for(fit.damper.model, axis.name) for axis in problem.axes],
+                "changes": [0.2 if axis.log else 0.05 * (axis.upper - axis.lower) for axis in problem.space.axes],
+                "stands_for": [_stands_for(fit.damper.model, axis.name) for axis in problem.space.axes],
                 "curvature": _curvature(problem, fit),
             }
     return {
@@ -197,7 +197,7 @@ def _curvature(problem: JointProblem, fit: JointFit) -> list[list[float]]:
     """Second derivatives of the squared error along the search axes, linear parameters following, over that error."""
     linearised = problem.linearised(fit)
     residual, jacobian = linearised.residual, linearised.jacobian
-    own, linear = np.split(jacobian, [len(problem.axes)], axis=1)
+    own, linear = np.split(jacobian, [len(problem.space.axes)], axis=1)
     own = own - linear @ np.linalg.lstsq(linear, own, rcond=1e-10)[0]
     return (own.T @ own / (residual @ residual)).tolist()
 
@@ -209,15 +209,16 @@ def _standard_errors(problem: JointProblem, fit: JointFit) -> dict[str, float]:
     model, held = fit.damper.model, set(fit.at_bounds)
     values = model.values()
     slopes = np.zeros((len(values), jacobian.shape[1]))
-    axes = [axis for axis in problem.axes if hasattr(model, axis.name)]
-    own = {axis.name: axis.value(float(u)) for axis, u in zip(problem.axes, fit.point, strict=True) if axis in axes}
-    for i, (axis, u) in enumerate(zip(problem.axes, fit.point, strict=True)):
+    axes = [axis for axis in problem.space.axes if hasattr(model, axis.name)]
+    point = list(zip(problem.space.axes, fit.point.tolist(), strict=True))
+    own = {axis.name: axis.value(u) for axis, u in point if axis in axes}
+    for i, (axis, u) in enumerate(point):
         if axis in axes:
-            step = _DIFFERENCE_STEP if axis.value(float(u) + _DIFFERENCE_STEP) <= axis.upper else -_DIFFERENCE_STEP
-            moved = type(model).build({**values, **own, axis.name: axis.value(float(u) + step)}).values()
+            step = _DIFFERENCE_STEP if axis.value(u + _DIFFERENCE_STEP) <= axis.upper else -_DIFFERENCE_STEP
+            moved = type(model).build({**values, **own, axis.name: axis.value(u + step)}).values()
             slopes[:, i] = [(moved[name] - values[name]) / step for name in values]
-    for i, info in enumerate(problem.linear):
-        slopes[list(values).index(info.name), len(problem.axes) + i] = 1.0
+    for i, info in enumerate(problem.space.linear):
+        slopes[list(values).index(info.name), len(problem.space.axes) + i] = 1.0
     # Errors that are correlated over several samples dominate the standard errors.
     kept = residual.size // _AVERAGED_SAMPLES * _AVERAGED_SAMPLES
     means = (a[:kept].reshape(-1, _AVERAGED_SAMPLES, *a.shape[1:]).mean(axis=1) for a in (jacobian, residual))

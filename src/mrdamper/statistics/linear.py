@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]  # as in `data`, which this package does not import
 _WELL_APART = 1e-4  # smallest pivot of equilibrated columns at which the normal equations keep their digits
+_RIDGE = 1e-11  # of equilibrated columns that may be nearly equal
 _RANK_LIMIT = 1e-10  # singular value over the largest below which a direction is rounding
 _MIN_RELATIVE_PIVOT = 1e-5  # pivot over the largest below which a column is explained by the others
 
@@ -70,6 +71,20 @@ def project_out_columns(columns: Floats, right: Floats) -> Floats:
         turned, sizes, _ = np.linalg.svd(triangle)
         basis = basis @ turned[:, sizes > _RANK_LIMIT * sizes[0]]
     return right - basis @ (basis.T @ right)
+
+
+def project_out(columns: Floats, slopes: Floats) -> Floats:
+    """Project slopes (N, D) onto the orthogonal complement of columns, as a step of a search needs it.
+
+    By normal equations with a ridge: a fraction of the time of `project_out_columns` for thousands of rows, and not to
+    the last digits.
+    """
+    gram = columns.T @ columns
+    scale = np.sqrt(gram.diagonal())
+    scale = np.where(scale > 0, scale, 1.0)
+    normal = gram / scale / scale[:, None] + _RIDGE * np.eye(scale.size)
+    taken = (np.linalg.solve(normal, columns.T @ slopes / scale[:, None]) / scale[:, None]).T @ columns.T
+    return np.subtract(slopes, taken.T, out=taken.T)
 
 
 def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) -> tuple[Floats, NDArray[np.bool_]]:
