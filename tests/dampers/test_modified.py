@@ -179,7 +179,7 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
     monkeypatch.setattr(modified, "_condensed", condensed)
     monkeypatch.setattr(modified, "choose_forms", chosen)
     monkeypatch.setattr(modified, "fit_jointly", lambda part, forms, start: SimpleNamespace(parameters=parameters))
-    rows = SimpleNamespace(of=lambda c: SimpleNamespace(condition=c, changes=False, is_sine=True))
+    rows = SimpleNamespace(of=lambda c: SimpleNamespace(condition=c, sine=c))
     monkeypatch.setattr(modified, "RunRows", rows)
     fit, refit = modified.fit_modified_jointly(tuple(CONDITIONS), identified(by_the_papers_laws), {"a": "b"})
     lengths = [by_the_papers_laws(c).yield_displacement for c in CONDITIONS]
