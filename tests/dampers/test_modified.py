@@ -12,7 +12,7 @@ from mrdamper.dampers import modified
 from mrdamper.dampers.causal import causal_force
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.modified import ModifiedModel, fit_modified
-from mrdamper.dampers.normal_equations import FormChoice
+from mrdamper.dampers.normal_equations import FormChoice, Law
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, InputError
@@ -169,7 +169,7 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
 
     def chosen(data, candidates, shapes, dissipating):
         asked.update(candidates=candidates, shapes=shapes, dissipating=dissipating)
-        forms, fit = dict.fromkeys(functions, "constant"), SimpleNamespace(parameters=parameters, at_bounds=("c",))
+        forms, fit = dict.fromkeys(functions, Law("constant")), SimpleNamespace(parameters=parameters, at_bounds=("c",))
         return FormChoice(forms, fit, {"c: plane": "negative at 0 A"})
 
     def condensed(runs, cls, more):
@@ -189,11 +189,11 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
     assert asked["shapes"] == pytest.approx(np.array(lengths))
     for name, forms in BoucWen.map_forms().items():
         rated = [form for form in forms if FORMS[form].rate_bounds]
-        free = [law for law in asked["candidates"][name] if isinstance(law, str) and FORMS[law].rate_bounds]
-        held = [law for law in asked["candidates"][name] if not isinstance(law, str)]
+        free = [law.name for law in asked["candidates"][name] if not law.rates and law.form.rate_bounds]
+        held = [law for law in asked["candidates"][name] if law.rates]
         assert free == (rated if name == "yield_displacement" else [])
         assert {form for form, _ in held} == ({"decaying-current"} if name in ("c", "yield_force") else set())
-        assert set(forms) - set(rated) <= set(asked["candidates"][name])
+        assert {Law(form) for form in set(forms) - set(rated)} <= set(asked["candidates"][name])
     assert fit.values["c"] == pytest.approx([by_the_papers_laws(c).c for c in CONDITIONS])
     assert (fit.conditions, fit.at_bounds) == (tuple(CONDITIONS), ("c",))
     assert (fit.damper.rig, fit.damper.provenance["a"], set(fit.functions)) == ("bench", "b", set(functions))
@@ -216,8 +216,8 @@ def test_decays_are_tried_relative_to_the_highest_current_where_a_parameter_may_
             (1.0, candidates(model, 0)),
         ):
             for name, forms in model.map_forms().items():
-                plain = [law for law in given[name] if isinstance(law, str)]
-                tried = [law for law in given[name] if not isinstance(law, str)]
+                plain = [law.name for law in given[name] if not law.rates]
+                tried = [law for law in given[name] if law.rates]
                 assert plain == [
                     f for f in forms
                     if (any_motion or not FORMS[f].follows_motion)

@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 from support.synthetic import TRUTH, synthetic_run
 
+from mrdamper.dampers.condensed_runs import condense
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.modified import fit_modified, fit_modified_jointly
 from mrdamper.dampers.normal_equations import (
+    Law,
     _Design,
     _ShapeSearch,
     _solve,
     choose_forms,
-    condense,
     fit_jointly,
     leave_out_errors,
 )
@@ -27,12 +28,9 @@ from mrdamper.study.validation import leave_out, validate
 
 MATRIX = [Condition(i, f, a) for i in (0.0, 0.5, 1.0, 1.5) for f, a in ((1.0, 0.02), (2.0, 0.02), (0.5, 0.05))]
 FORMS = {
-    "c": "linear-current",
-    "yield_force": "quadratic-current",
-    "yield_displacement": "constant",
-    "k1": "constant",
-    "k3": "constant",
-    "f0": "constant",
+    "c": Law("linear-current"),
+    "yield_force": Law("quadratic-current"),
+    **dict.fromkeys(("yield_displacement", "k1", "k3", "f0"), Law("constant")),
 }
 
 
@@ -82,7 +80,7 @@ def test_what_is_found_does_not_show_rounding(runs):
     for share in (0.0, 1e-14):
         seed = np.random.default_rng(3)
         moved = [replace(r, force=r.force * (1 + share * seed.standard_normal(r.force.size))) for r in runs]
-        forms = {**FORMS, "yield_displacement": "linear-current"}
+        forms = {**FORMS, "yield_displacement": Law("linear-current")}
         fit = fit_jointly(condense(moved, BoucWen), forms, start)
         found.append([c for f in fit.parameters.functions.values() for c in f.coefficients])
     np.testing.assert_allclose(*found, rtol=1e-10, atol=1e-12)
@@ -103,7 +101,7 @@ def test_condensed_error_is_the_error_in_time(runs, identifications):
     """The Gram matrices say of every run what simulating it says."""
     fit, _ = fit_modified_jointly(runs, identifications)
     data = condense(runs, BoucWen)
-    forms = {name: f.function.form for name, f in fit.functions.items()}
+    forms = {name: Law(f.function.form) for name, f in fit.functions.items()}
     condensed = fit_jointly(data, forms, fit.functions["yield_displacement"].function).nrmse_pp
     in_time = [run.scores.nrmse_pp for run in validate(fit.damper, runs).runs]
     np.testing.assert_allclose(condensed, in_time, rtol=0.05, atol=2e-4)
@@ -125,10 +123,10 @@ def test_leave_out_is_larger_than_fit_and_needs_every_group(runs):
 def test_forms_are_chosen_short(runs, identifications):
     data = condense(runs, BoucWen)
     shapes = np.array([i.model.yield_displacement for i in identifications])
-    candidates = {name: ("constant", "linear-current", "quadratic-current") for name in FORMS}
+    candidates = {name: [Law(form) for form in ("constant", "linear-current", "quadratic-current")] for name in FORMS}
     forms = choose_forms(data, candidates, shapes).forms
-    assert forms["yield_force"] == "quadratic-current"
-    assert forms["k1"] == forms["f0"] == "constant"
+    assert forms["yield_force"].name == "quadratic-current"
+    assert forms["k1"] == forms["f0"] == Law("constant")
 
 
 def test_a_condition_left_out_is_predicted(runs, identifications):
@@ -207,7 +205,7 @@ def test_a_knee_of_any_length_is_fitted_jointly_as_run_by_run(knee):
 def test_without_a_current_the_slope_of_the_shape_over_it_stays_that_of_the_start(runs):
     """As in a fold that keeps the runs at 0 A alone."""
     start = ParameterFunction("linear-current", (0.2, np.log(5e-4)), log=True)
-    fit = fit_jointly(condense(runs[:3], BoucWen), dict.fromkeys(FORMS, "constant"), start)
+    fit = fit_jointly(condense(runs[:3], BoucWen), dict.fromkeys(FORMS, Law("constant")), start)
     slope, log = fit.parameters.functions["yield_displacement"].coefficients
     assert (slope, np.exp(log)) == pytest.approx((0.2, 1.2e-3), rel=0.02)
 

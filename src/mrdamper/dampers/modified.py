@@ -15,8 +15,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from mrdamper.dampers.base import Damper, Saved, not_held
+from mrdamper.dampers.condensed_runs import Condensed, condense
 from mrdamper.dampers.envelope import Envelope
-from mrdamper.dampers.normal_equations import ABSENT, Condensed, Law, choose_forms, condense, fit_jointly
+from mrdamper.dampers.normal_equations import ABSENT, Law, choose_forms, fit_jointly
 from mrdamper.dampers.parameter_map import ParameterMap
 from mrdamper.dampers.run_rows import RunRows, envelope_of
 from mrdamper.dampers.uncertainty import FittedParameter
@@ -267,22 +268,21 @@ def fit_modified_jointly(
 _condensed = lru_cache(maxsize=2)(condense)  # functions of the motion are tried on them, and of the current alone
 
 
-def _candidates(data: Condensed, any_motion: bool) -> dict[str, list[str | Law]]:
+def _candidates(data: Condensed, any_motion: bool) -> dict[str, list[Law]]:
     """Forms of every coordinate, shortest first; rates of laws over the current are tried on a grid."""
     highest = max(abs(c.current_A) for c in data.conditions) or 1.0
-    decaying: list[str | Law] = [("decaying-current", (rate / highest,)) for rate in _RATES]
-    candidates: dict[str, list[str | Law]] = {}
+    decaying = [Law("decaying-current", (rate / highest,)) for rate in _RATES]
+    candidates: dict[str, list[Law]] = {}
     for name, forms in data.model_type.map_forms().items():
-        laws: list[str | Law] = [
-            form
+        laws = [
+            Law(form)
             for form in forms
             if (any_motion or not FORMS[form].follows_motion) and (name == data.shape or not FORMS[form].rate_bounds)
         ]
         if name in _dissipating(data.model_type) and len(laws) > 1 and highest:
             laws += decaying
         candidates[name] = laws
-    inertia: list[str | Law] = [ABSENT, "constant"]
-    return candidates | {name: list(inertia) for name in data.linear if name not in candidates}
+    return candidates | {name: [Law(ABSENT), Law("constant")] for name in data.linear if name not in candidates}
 
 
 def _tells_inertia(model_type: type[Model], conditions: Sequence[Condition]) -> bool:

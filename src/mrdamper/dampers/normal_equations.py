@@ -10,25 +10,21 @@ a run from a drifting session then has less weight (iteratively reweighted least
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
-from typing import Any, TypeAlias
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
+from mrdamper.dampers.condensed_runs import GRID_RATIO, Condensed
 from mrdamper.dampers.parameter_map import ParameterMap
-from mrdamper.data import Condition, Floats, Run
+from mrdamper.data import Condition, Floats
 from mrdamper.errors import IdentificationError
-from mrdamper.identification import Problem
-from mrdamper.models import Model, Scale
-from mrdamper.physics.hysteresis import Shape
-from mrdamper.physics.hysteresis.batch import follow_alike
 from mrdamper.statistics.functions.fitting import fit_function, require_determined
 from mrdamper.statistics.functions.forms import FORMS, Form, ParameterFunction, features
-from mrdamper.statistics.functions.selection import broken_law, fold_groups, rises, smaller_wins, supported
+from mrdamper.statistics.functions.selection import broken_law, rises, smaller_wins, supported
 from mrdamper.statistics.levenberg_marquardt import least_squares, newton_refine
 from mrdamper.statistics.linear import (
     on_one_blas_thread,
@@ -38,11 +34,6 @@ from mrdamper.statistics.linear import (
     solve_weighted,
 )
 
-_GRID_RATIO = 1500 ** (1 / 40)  # from one yield displacement to the next; between them Gram matrices are interpolated
-_GRID_ORIGIN_M = 2e-6  # m, a grid point for any data
-# yield displacement looked for, in the smallest amplitude; the longest is the largest amplitude
-_MIN_LENGTH_RATIO = 5e-4
-_MAX_STATES = 2**17  # states held at a time
 _SEARCH_TOLERANCE = 1e-6  # relative gain of a step at which a search ends
 _WEIGHT_TOLERANCE = 1e-3  # change of the robust weights below which the rounds end
 _SEARCH_RANGE = 6.0  # of a search, in units of a function's terms
@@ -51,185 +42,32 @@ _PASSES = 2  # over all coordinates in the choice of forms
 _RANK_LIMIT = 1e-10  # singular value over the largest below which a coefficient is not determined
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
-# Six times the weights of the values at both ends of an interval and of the second derivatives there, for a cubic
-# spline and its slope in the interval: a row for each power of the share of the interval
-_SPLINE = np.array(
-    [[6, 0, 0, 0, -6, 6, -2, -1], [-6, 6, -2, -1, 0, 0, 6, 0], [0, 0, 3, 0, 0, 0, -3, 3], [0, 0, -1, 1, 0, 0, 0, 0]]
-)
-
-_Trial: TypeAlias = "tuple[JointFunctionFit, dict[str, Floats]]"  # and its errors by kind of fold
-
-
-@dataclass(frozen=True, eq=False)
-class Condensed:
-    """Runs of one rig, condensed for one model type."""
-
-    model_type: type[Model]
-    linear: tuple[str, ...]  # coordinates the force is linear in, in the order of the Gram matrices
-    shape: str  # the one shape coordinate
-    run_ids: tuple[str, ...]  # length R
-    conditions: tuple[Condition, ...]  # length R
-    scale: Floats  # (R,) peak-to-peak force [N]
-    ladder: Floats  # (K,) values of the shape coordinate, evenly in the logarithm
-    # (R, K, L+1, L+1) mean products of the columns and, last, the measured force over its peak-to-peak value, at each
-    # value of the ladder
-    gram: Floats
-    # (R, K, L+1, L+1) their second derivatives along the ladder, counted in rungs, as a cubic spline has them
-    bend: Floats
-    # of the choice of forms, by these and where the shape starts
-    trials: dict[tuple[Any, ...], _Trial] = field(default_factory=lambda: {}, init=False, repr=False)
-
-    @cached_property
-    def folds(self) -> dict[str, list[list[int]]]:
-        """Runs that each fold omits in the choice of forms, by kind of fold."""
-        return fold_groups(self.conditions)
-
-    def only(self, rows: Sequence[int]) -> Condensed:
-        """Return the same for some of the runs."""
-        index = list(rows)
-        return replace(
-            self,
-            run_ids=tuple(self.run_ids[i] for i in index),
-            conditions=tuple(self.conditions[i] for i in index),
-            scale=self.scale[index],
-            gram=self.gram[index],
-            bend=self.bend[index],
-        )
-
-    def at(self, shape_values: Floats) -> tuple[Floats, Floats]:
-        """Gram matrices at one shape value a run, and their slopes by its logarithm, on the spline through the ladder.
-
-        Both (R, L+1, L+1).
-        """
-        logs = np.log(self.ladder)
-        u = np.minimum(np.maximum((np.log(shape_values) - logs[0]) / (logs[1] - logs[0]), 0), logs.size - 1)
-        first = np.minimum(u.astype(int), logs.size - 2)
-        weights = ((u - first)[:, None] ** np.arange(4) @ _SPLINE).reshape(-1, 2, 4) / 6
-        both = (weights @ self._cells[np.arange(u.size), first]).reshape(u.size, 2, *self.gram.shape[2:])
-        return both[:, 0], both[:, 1] / (logs[1] - logs[0])
-
-    @cached_property
-    def _cells(self) -> Floats:
-        """(R, K-1, 4, (L+1)²) matrices and derivatives at both ends of every interval of the ladder."""
-        both = (values.reshape(*values.shape[:2], -1) for values in (self.gram, self.bend))
-        return np.stack([end for values in both for end in (values[:, :-1], values[:, 1:])], axis=2)
-
-
-@on_one_blas_thread
-def condense(runs: Sequence[Run], model_type: type[Model], more: Sequence[str] = ()) -> Condensed:
-    """Condense runs for a model type whose search has one axis.
-
-    `more` are preset linear parameters to determine as well: one run may not separate them, all together may. Raises
-    `IdentificationError` if the model has no such single axis, or there are no runs.
-    """
-    if not runs:
-        raise IdentificationError("no runs", remedy="give at least one")
-    problems = [Problem.of(run, model_type) for run in runs]
-    axes = model_type.search_axes(Scale(1.0, 1.0), problems[0].free)
-    coordinates = tuple(model_type.map_forms())
-    if len(axes) > 1 or not {axis.name for axis in axes} <= set(coordinates):
-        raise IdentificationError(
-            f"{model_type.title} is searched along {len(axes)} axes", remedy="fix all shape parameters but one"
-        )
-    shape = axes[0].name if axes else ""
-    linear = (*(name for name in coordinates if name != shape), *more)
-    conditions = tuple(problem.analysis.condition for problem in problems)
-    ladder = _length_grid([c.amplitude_m for c in conditions]) if shape else np.geomspace(1.0, 8.0, 4)
-    gram = np.stack([_gram(problem, linear, shape, ladder) for problem in problems])
-    return Condensed(
-        model_type,
-        linear,
-        shape,
-        tuple(run.id for run in runs),
-        conditions,
-        np.array([np.ptp(problem.force) for problem in problems]),
-        ladder,
-        gram,
-        _spline_curvature(gram),
-    )
-
-
-def _spline_curvature(gram: Floats) -> Floats:
-    """Second derivatives of the cubic spline along the second axis that goes on unbroken over its outer knots."""
-    size = gram.shape[1]
-    second = np.eye(size, k=-1) - 2 * np.eye(size) + np.eye(size, k=1)
-    system, right = second + 6 * np.eye(size), 6 * second
-    system[0, :3] = system[-1, -3:] = (1, -2, 1)
-    right[[0, -1]] = 0.0
-    return np.einsum("jk,rk...->rj...", np.linalg.solve(system, right), gram)
-
-
-def _length_grid(amplitudes: Sequence[float]) -> Floats:
-    """Rungs [m] from far inside the smallest amplitude to the largest."""
-    low, high = (
-        float(np.log(v / _GRID_ORIGIN_M) / np.log(_GRID_RATIO))
-        for v in (_MIN_LENGTH_RATIO * min(amplitudes), max(amplitudes))
-    )
-    return _GRID_ORIGIN_M * _GRID_RATIO ** np.arange(math.floor(low), math.ceil(high) + 1.0)
-
-
-def _gram(problem: Problem, linear: tuple[str, ...], shape: str, ladder: Floats) -> Floats:
-    target = problem.force / np.ptp(problem.force)
-    if not shape:
-        table, _ = _columns(problem, linear, {})
-        table = np.column_stack([table, target])
-        return np.stack([table.T @ table / target.size] * ladder.size)
-    table, reduced = _columns(problem, linear, {shape: float(ladder[0])})
-    if reduced.shape is not None and "yield_force" in linear:  # its column is zeta, the only one the ladder changes
-        table = np.column_stack([table, target])
-        return _gram_of_shapes(problem, table, linear.index("yield_force"), reduced.shape, ladder)
-    tables = [np.column_stack([_columns(problem, linear, {shape: float(v)})[0], target]) for v in ladder]
-    return np.stack([table.T @ table / target.size for table in tables])
-
-
-def _columns(problem: Problem, linear: tuple[str, ...], shape: Mapping[str, float]) -> tuple[Floats, Model]:
-    """(N, L) force per unit of every linear coordinate, and the model without them."""
-    point = {**problem.fixed, **shape, **dict.fromkeys(linear, 0.0)}
-    reduced = problem.model_type.build(point)
-    state = reduced.state(problem.motion)[problem.scored]
-    base = reduced.force(problem.seen, state)
-    columns = [problem.model_type.build({**point, name: 1.0}).force(problem.seen, state) - base for name in linear]
-    return np.column_stack(columns), reduced
-
-
-def _gram_of_shapes(problem: Problem, table: Floats, moving: int, shape: Shape, ladder: Floats) -> Floats:
-    """Return the same matrices, all shapes followed at once; only the rows of the moving column differ."""
-    grams = np.stack([table.T @ table] * ladder.size)
-    few = max(1, _MAX_STATES // len(problem.motion))
-    for begin in range(0, ladder.size, few):
-        part = slice(begin, begin + few)
-        zeta = follow_alike(shape.n, float(shape.rho), 1 / ladder[part], problem.motion.path)[:, problem.scored]
-        grams[part, moving, :] = grams[part, :, moving] = zeta @ table
-        grams[part, moving, moving] = np.einsum("kn,kn->k", zeta, zeta)
-    return grams / len(table)
-
-
-Law = tuple[str, tuple[float, ...]]  # a form, and the rates it is held at
-
-
 ABSENT = "absent"  # in place of a form: the coordinate stays zero
 _NO_TERMS = Form(ABSENT, ())
 
 
-def _form(law: str | Law) -> Form:
-    name = law_of(law)[0]
-    return _NO_TERMS if name == ABSENT else FORMS[name]
+class Law(NamedTuple):
+    """Name of a form, and the rates it is held at."""
 
+    name: str
+    rates: tuple[float, ...] = ()
 
-def _size(law: str | Law) -> int:
-    return len(_form(law).terms) + len(_form(law).rate_bounds)
+    @property
+    def form(self) -> Form:
+        """The form of that name; without terms if the coordinate is absent."""
+        return _NO_TERMS if self.name == ABSENT else FORMS[self.name]
 
-
-def law_of(form: str | Law) -> Law:
-    """Return a form with its rates; a name alone has none."""
-    return (form, ()) if isinstance(form, str) else form
+    @property
+    def size(self) -> int:
+        """Number of terms and rates."""
+        return len(self.form.terms) + len(self.form.rate_bounds)
 
 
 @dataclass(frozen=True, eq=False)
 class FormChoice:
     """Forms chosen for a joint fit."""
 
-    forms: Mapping[str, str | Law]
+    forms: Mapping[str, Law]
     fit: JointFunctionFit
     refused: Mapping[str, str]  # forms that broke a law of physics, and which
 
@@ -246,7 +84,7 @@ class JointFunctionFit:
 @on_one_blas_thread
 def fit_jointly(
     data: Condensed,
-    forms: Mapping[str, str | Law],
+    forms: Mapping[str, Law],
     start: ParameterFunction | None,
     *,
     reweightings: int = 6,
@@ -281,12 +119,12 @@ def fit_jointly(
     function = ParameterFunction(start.form, tuple((centre / search.scale).tolist()), start.rates, log=True)
     fit = _finish(design, solution, {data.shape: function})
     reached, ends = search.shape_values(centre), data.ladder[[0, -1]]
-    outside = np.any((reached <= ends[0] * _GRID_RATIO**0.01) | (reached >= ends[1] / _GRID_RATIO**0.01))
+    outside = np.any((reached <= ends[0] * GRID_RATIO**0.01) | (reached >= ends[1] / GRID_RATIO**0.01))
     return replace(fit, at_bounds=(data.shape,)) if outside else fit
 
 
 @on_one_blas_thread
-def leave_out_errors(data: Condensed, fit: JointFunctionFit, forms: Mapping[str, str | Law]) -> dict[str, Floats]:
+def leave_out_errors(data: Condensed, fit: JointFunctionFit, forms: Mapping[str, Law]) -> dict[str, Floats]:
     """Calculate nrmse_pp of the runs of every fold, cross-validated in the linear coefficients, by kind of fold.
 
     The shape function is that of the fit to all runs: fast enough to select forms, but no final score.
@@ -327,11 +165,10 @@ class _Solution:
 class _Design:
     """Linear coordinates of every run as a matrix times the coefficients of all functions."""
 
-    def __init__(self, data: Condensed, forms: Mapping[str, str | Law]):
+    def __init__(self, data: Condensed, forms: Mapping[str, Law]):
         self.data = data
-        laws = {name: law_of(forms[name]) for name in data.linear}
-        self.forms = {name: _form(law) for name, law in laws.items()}
-        self.rates = {name: rates for name, (_, rates) in laws.items()}
+        self.forms = {name: forms[name].form for name in data.linear}
+        self.rates = {name: forms[name].rates for name in data.linear}
         blocks = [form.columns(*features(data.conditions), self.rates[n]) for n, form in self.forms.items()]
         self.sizes = [block.shape[1] for block in blocks]
         runs, total = data.scale.size, sum(self.sizes)
@@ -444,9 +281,12 @@ def _finish(design: _Design, solution: _Solution, functions: dict[str, Parameter
     return JointFunctionFit(ParameterMap(design.data.model_type, ordered), solution.nrmse_pp)
 
 
+_Trial = tuple[JointFunctionFit, dict[str, Floats]]  # and its errors by kind of fold
+
+
 def choose_forms(
     data: Condensed,
-    candidates: Mapping[str, Sequence[str | Law]],
+    candidates: Mapping[str, Sequence[Law]],
     shape_values: Floats,
     dissipating: Mapping[str, str] | None = None,
 ) -> FormChoice:
@@ -459,10 +299,10 @@ def choose_forms(
     """
     start, units = tuple(shape_values.tolist()), dissipating or {}
     options = {
-        name: [law for law in laws if supported(_form(law), data.conditions)] or [laws[0]]
+        name: [law for law in laws if supported(law.form, data.conditions)] or [laws[0]]
         for name, laws in candidates.items()
     }
-    forms: dict[str, str | Law] = {name: laws[0] for name, laws in options.items()}
+    forms = {name: laws[0] for name, laws in options.items()}
     fit, errors = _tried(data, forms, start)
     refused: dict[str, str] = {}
     for _ in range(_PASSES):
@@ -475,13 +315,13 @@ def choose_forms(
                     trial, other = _tried(data, {**forms, name: law}, start)
                 except IdentificationError:
                     continue  # the tests do not separate the terms of this form
-                larger = _size(law) >= _size(forms[name])
+                larger = law.size >= forms[name].size
                 better = not smaller_wins(errors, other) if larger else smaller_wins(other, errors)
                 better = _risen(fit, trial, name, data.conditions, units, better)
                 checked = trial.parameters.functions.get(name) if better and name in units else None
                 reason = broken_law(checked, data.conditions, units[name]) if checked else ""
                 if reason:
-                    refused[f"{name}: {law_of(law)[0]}"] = reason
+                    refused[f"{name}: {law.name}"] = reason
                 elif better:
                     forms, fit, errors = {**forms, name: law}, trial, other
         if forms == before:
@@ -506,7 +346,7 @@ def _risen(
     return better or rises(one, other, dissipating[name], conditions)
 
 
-def _tried(data: Condensed, forms: Mapping[str, str | Law], shape_values: tuple[float, ...]) -> _Trial:
+def _tried(data: Condensed, forms: Mapping[str, Law], shape_values: tuple[float, ...]) -> _Trial:
     """Return a fit with some forms, and its errors by kind of fold."""
     # Of all forms and of those over the current alone, and in the second pass, many are the same.
     trial = *forms.items(), shape_values
@@ -515,11 +355,11 @@ def _tried(data: Condensed, forms: Mapping[str, str | Law], shape_values: tuple[
     return data.trials[trial]
 
 
-def _fitted(data: Condensed, forms: Mapping[str, str | Law], shape_values: tuple[float, ...]) -> _Trial:
+def _fitted(data: Condensed, forms: Mapping[str, Law], shape_values: tuple[float, ...]) -> _Trial:
     for name in data.linear:
-        if not law_of(forms[name])[1] and _form(forms[name]).terms:
-            require_determined(law_of(forms[name])[0], data.conditions)
-    start = _start(law_of(forms[data.shape])[0], data.conditions, shape_values) if data.shape else None
+        if not forms[name].rates and forms[name].form.terms:
+            require_determined(forms[name].name, data.conditions)
+    start = _start(forms[data.shape].name, data.conditions, shape_values) if data.shape else None
     fit = fit_jointly(data, forms, start, reweightings=2, most_steps=5, polish=False)
     return fit, leave_out_errors(data, fit, forms)
 
