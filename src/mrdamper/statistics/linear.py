@@ -217,13 +217,12 @@ def nonnegative_least_squares(table: Floats, right: Floats) -> tuple[Floats, flo
 
 
 def inverse_of_triangle(triangle: NDArray[np.floating[Any]]) -> Floats:
-    """Invert a lower triangle by halves: NumPy has no method for triangles, and SciPy is slow to import."""
-    half = len(triangle) // 2
+    """Invert lower triangles (..., L, L) by halves: NumPy has no method for them, and SciPy is slow to import."""
+    half = triangle.shape[-1] // 2
     inverse = np.zeros(triangle.shape)
-    inverse[:half, :half], inverse[half:, half:] = (
-        np.linalg.inv(part) for part in (triangle[:half, :half], triangle[half:, half:])
-    )
-    inverse[half:, :half] = -inverse[half:, half:] @ (triangle[half:, :half] @ inverse[:half, :half])
+    upper = inverse[..., :half, :half] = np.linalg.inv(triangle[..., :half, :half])
+    lower = inverse[..., half:, half:] = np.linalg.inv(triangle[..., half:, half:])
+    inverse[..., half:, :half] = -lower @ (triangle[..., half:, :half] @ upper)
     return inverse
 
 

@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, lru_cache
 from itertools import product
-from typing import TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -28,31 +28,44 @@ _YIELDS = (0.015, 0.06, 0.2, 0.6)  # yield displacements of the stop operators, 
 _LEAKY = tuple(product((0.06, 0.2), (0.3, 1.0)))
 _VELOCITIES = (0.03, 0.1, 0.3)  # velocities at which friction saturates, relative to the median peak velocity
 _LEADS = (0.1, 0.4)  # displacements that count as velocity in friction, relative to the median amplitude
-R = TypeVar("R", "Moments", "RowProducts")
+S = TypeVar("S")
 T = TypeVar("T")
+Scale = Any  # a number, or an array (B,) of several choices
 _ELEMENTS = 7 + len(_VELOCITIES) + len(_LEADS) + len(_YIELDS) + len(_LEAKY)
 _MAX_ELEMENT = 20.0  # size of an element relative to its usual one
 _MAX_NODES = 7  # currents at which coefficients are estimated
 _COMMON_DEVIATION, _SLOPE_DEVIATION = 1.5, 1.5  # standard deviations of a coefficient, relative to the median force
 _CORRELATION_LENGTH = 0.5  # correlation length of a coefficient over the current, relative to the highest current
+_FIRST, _SECOND = np.eye(2)[:, :, None]
 _MISFIT = 0.05  # standard deviation of the model error, relative to the run's force
 _MIN_MISFIT = 0.03  # the same, relative to the median force
+_TRACKS_PER_BLOCK = 100  # runs whose stop operators are computed at once
 _INDEPENDENT_SAMPLES = 12.0  # independent samples of a run's model error
 
 
 @dataclass(frozen=True)
 class AssumedScatter:
-    """Assumed differences between a run and the model of all runs."""
+    """Assumed differences between a run and the model of all runs: one choice of them, or arrays (B,) of several.
 
-    misfit: float = 1.0  # factor of the model error that is usual
-    gain: float = 0.06  # standard deviation of a run's gain
-    offset: float = 0.04  # standard deviation of a run's offset, relative to the median force
+    Results of several choices have them as first axis.
+    """
+
+    misfit: Scale = 1.0  # factor of the model error that is usual
+    gain: Scale = 0.06  # standard deviation of a run's gain
+    offset: Scale = 0.04  # standard deviation of a run's offset, relative to the median force
     # current at which the course that all coefficients have over the current saturates, relative to the highest
-    saturation: float = 4.0
+    saturation: Scale = 4.0
     # standard deviation of a coefficient about the course that all have over the current, relative to the median force
-    bend: float = 0.8
+    bend: Scale = 0.8
     # weight of the stop operators that leak: none, or that of the other elements
-    leak: float = 0.0
+    leak: Scale = 0.0
+
+    @classmethod
+    def several(cls, choices: Sequence[Self]) -> Self:
+        """Return several choices at once; the scatter or the course, if they have it in common, is computed once."""
+        values: Floats = np.array([list(vars(choice).values()) for choice in choices]).T
+        vary = np.repeat(np.any(values != values[:, :1], axis=1).reshape(2, 3).any(axis=1), 3)
+        return cls(*(own if varies else float(own[0]) for own, varies in zip(values, vary, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,92 +105,129 @@ class RowProducts:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Weighted products of the rows of a run, for its probability."""
+    """Weighted products of the rows of a run, for its probability, of one choice of scatter or several (B, ...)."""
 
     gram: Floats  # (E, E), or (P, P) where the current changes
     moment: Floats  # (E,) or (P,)
-    power: float
+    power: Scale
     over: Floats | None  # (K,) shares of the nodes at the run's constant current
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Coefficients determined by a set of runs: mean and covariance."""
+    """Coefficients determined by a set of runs, mean and covariance, for one choice of scatter or several (B, ...)."""
 
     mean: Floats  # (P,)
     root: Floats  # (P, P) the covariance is root root'
     evidence: Evidence
-    log_evidence: float = 0.0  # logarithm of the evidence that the runs follow one model
+    log_evidence: Scale = 0.0  # logarithm of the evidence that the runs follow one model
     # mean and covariance at the currents that were asked for
     known: dict[bytes, tuple[Floats, Floats]] = field(default_factory=dict[bytes, tuple[Floats, Floats]])
 
     def at(self, over: Floats | None) -> tuple[Floats, Floats]:
         """Mean and covariance of the coefficients at a constant current, or of all of them."""
-        key = b"" if over is None else over.tobytes()
-        if key not in self.known:
-            mean, root = self.mean, self.root
-            if over is not None:
-                size = mean.size // over.size
-                mean = over @ mean.reshape(over.size, size)
-                root = (over @ root.reshape(over.size, -1)).reshape(size, -1)
-            self.known[key] = mean, root @ root.T
-        return self.known[key]
+        return self.at_each([over])[0]
+
+    def at_each(self, overs: Sequence[Floats | None]) -> list[tuple[Floats, Floats]]:
+        """Return `at` for several currents."""
+        keys = [b"" if over is None else over.tobytes() for over in overs]
+        missing = {key: over for key, over in zip(keys, overs, strict=True) if key not in self.known}
+        if missing.pop(b"", missing) is None:
+            self.known[b""] = self.mean, self.root @ self.root.swapaxes(-1, -2)
+        if missing:
+            mean, root, shares = self.mean, self.root, np.array(list(missing.values()))
+            means = shares @ mean.reshape(*mean.shape[:-1], shares.shape[1], -1)
+            roots = shares @ root.reshape(*root.shape[:-2], shares.shape[1], -1)
+            roots = roots.reshape(*means.shape, root.shape[-1])
+            pairs = zip(_parted(means, 1), _parted(roots @ roots.swapaxes(-1, -2), 2), strict=True)
+            self.known.update(zip(missing, pairs, strict=True))
+        return [self.known[key] for key in keys]
 
     def weigh(self, runs: Sequence[RowProducts]) -> list[Moments]:
         """Weighted products of runs that are compared with these coefficients."""
         return self.evidence.weigh(runs, self)
 
-    def log_probabilities(self, runs: Sequence[Moments]) -> list[float]:
+    def log_probabilities(self, runs: Sequence[Moments]) -> list[Any]:
         """Logarithm of the probability density of each run's force."""
-        return _of_each_size(runs, lambda alike: _log_probabilities(_stacked(alike), *self._stacked_at(alike)))
+        return _of_each_kind(runs, _size, lambda alike: _log_probabilities(*self._beside(alike)))
 
-    def without(self, run: Moments) -> tuple[Floats, Floats]:
-        """Mean and covariance of the coefficients at a run's current, without that run."""
-        mean, covariance = self._without([run])
-        return mean[0], covariance[0]
+    def without(self, run: Moments) -> Floats:
+        """Mean of the coefficients at a run's current, without that run."""
+        return _without(*self._beside([run]))[0][0]
 
-    def log_probabilities_by_others(self, runs: Sequence[Moments]) -> list[float]:
+    def log_probabilities_by_others(self, runs: Sequence[Moments]) -> list[Any]:
         """Logarithm of the probability density of each run's force, by the other runs alone."""
-        return _of_each_size(runs, lambda alike: _log_probabilities(_stacked(alike), *self._without(alike)))
+        return _of_each_kind(runs, _size, lambda alike: _log_probabilities_by_others(*self._beside(alike)))
 
-    def _stacked_at(self, runs: Sequence[Moments] | Sequence[RowProducts]) -> tuple[Floats, Floats]:
-        """(M, E) means and (M, E, E) covariances of the coefficients at the currents of runs of one size."""
-        means, covariances = zip(*(self.at(run.over) for run in runs), strict=True)
-        return np.array(means), np.array(covariances)
-
-    def _without(self, runs: Sequence[Moments]) -> tuple[Floats, Floats]:
-        """Means and covariances at the currents of runs of one size, each without that run."""
-        gram, moment, _ = _stacked(runs)
-        mean, covariance = self._stacked_at(runs)
-        left = _identity(mean.shape[1]) - covariance @ gram
-        kept = mean - (covariance @ moment[:, :, None])[:, :, 0]
-        moments: Floats = np.linalg.solve(left, np.concatenate([kept[:, :, None], covariance], axis=2)).astype(float)
-        return moments[:, :, 0], moments[:, :, 1:]
+    def _beside(self, runs: Sequence[Moments]) -> list[Floats]:
+        """Products of runs of one size, and means and covariances of the coefficients at their currents."""
+        means, covariances = zip(*self.at_each([run.over for run in runs]), strict=True)
+        return [*_products(runs), _joined(means, 1), _joined(covariances, 2)]
 
 
-def _of_each_size(runs: Sequence[R], function: Callable[[list[R]], Iterable[T]]) -> list[T]:
-    """Results of a function of runs of one size, for runs of several; in their order."""
+def _size(run: Moments | RowProducts) -> int:
+    return run.gram.shape[-1]
+
+
+def _of_each_kind(
+    items: Sequence[S], kind: Callable[[S], object], function: Callable[[list[S]], Iterable[T]]
+) -> list[T]:
+    """Results of a function of items of one kind, for items of several; in their order."""
+    places: dict[object, list[int]] = {}
+    for k, item in enumerate(items):
+        places.setdefault(kind(item), []).append(k)
     results: dict[int, T] = {}
-    for size in {len(run.gram) for run in runs}:
-        places = [k for k, run in enumerate(runs) if len(run.gram) == size]
-        results |= zip(places, function([runs[k] for k in places]), strict=True)
-    return [results[k] for k in range(len(runs))]
+    for at in places.values():
+        results |= zip(at, function([items[k] for k in at]), strict=True)
+    return [results[k] for k in range(len(items))]
 
 
-def _stacked(runs: Sequence[Moments] | Sequence[RowProducts]) -> tuple[Floats, Floats, Floats]:
+def _products(runs: Sequence[Moments] | Sequence[RowProducts]) -> list[Floats]:
     """(M, E, E), (M, E) and (M,) products of runs of one size."""
-    return np.array([r.gram for r in runs]), np.array([r.moment for r in runs]), np.array([r.power for r in runs])
+    return [_joined([getattr(r, name) for r in runs], k) for k, name in ((2, "gram"), (1, "moment"), (0, "power"))]
 
 
-def _log_probabilities(runs: tuple[Floats, Floats, Floats], mean: Floats, covariance: Floats) -> list[float]:
-    gram, moment, power = runs
-    left = (gram @ mean[:, :, None])[:, :, 0]
+def _joined(arrays: Sequence[Any], axes: int) -> Floats:
+    """Arrays of runs as one, in which the runs precede the last axes of one choice."""
+    joined = np.array(arrays)
+    return joined if joined.ndim == 1 + axes else np.moveaxis(joined, 0, -1 - axes)
+
+
+def _parted(array: Floats, axes: int) -> Iterable[Any]:
+    """Arrays of runs that `_joined` joined."""
+    return array if array.ndim == 1 + axes else np.moveaxis(array, -1 - axes, 0)
+
+
+def _times(matrix: Floats, vector: Floats) -> Floats:
+    product: Floats = (matrix @ vector[..., None])[..., 0]
+    return product
+
+
+def _log_probabilities(gram: Floats, moment: Floats, power: Floats, mean: Floats, covariance: Floats) -> Iterable[Any]:
+    left = _times(gram, mean)
     rest = moment - left
-    matrix = _identity(mean.shape[1]) + gram @ covariance
-    solved = (covariance @ np.linalg.solve(matrix, rest[:, :, None]))[:, :, 0]
-    log_determinant = np.linalg.slogdet(matrix)[1]
-    explained = np.sum(rest * solved - mean * (left - 2 * moment), axis=1)
-    return (0.5 * (explained - power - log_determinant)).tolist()
+    matrix = _identity(mean.shape[-1]) + gram @ covariance
+    solved = _times(covariance, np.asarray(np.linalg.solve(matrix, rest[..., None])[..., 0], dtype=float))
+    explained = np.sum(rest * solved - mean * (left - 2 * moment), axis=-1)
+    return _parted(0.5 * (explained - power - np.linalg.slogdet(matrix)[1]), 0)
+
+
+def _without(gram: Floats, moment: Floats, power: Floats, mean: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+    """Means at the currents of runs, each without that run, and the matrix that divides the covariance without it."""
+    left = _identity(mean.shape[-1]) - covariance @ gram
+    kept = np.linalg.solve(left, (mean - _times(covariance, moment))[..., None])[..., 0]
+    return np.asarray(kept, dtype=float), left
+
+
+def _log_probabilities_by_others(
+    gram: Floats, moment: Floats, power: Floats, mean: Floats, covariance: Floats
+) -> Iterable[Any]:
+    """`_log_probabilities` by the coefficients without each run, whose covariance reduces to that with it."""
+    mean, left = _without(gram, moment, power, mean, covariance)
+    forces = _times(gram, mean)
+    rest = moment - forces
+    explained = np.sum(rest * _times(covariance, rest) - mean * (forces - 2 * moment), axis=-1)
+    return _parted(0.5 * (explained - power + np.linalg.slogdet(left)[1]), 0)
 
 
 @cache
@@ -201,100 +251,111 @@ class Evidence:
         self._acceleration = float(np.median([np.max(np.abs(t.acceleration)) for t in tracks])) or 1.0
         self.nodes = _nodes(tracks)
         self._shares: dict[float, Floats] = {}
-        self._priors: dict[tuple[float, float, float], tuple[Floats, Floats, Posterior]] = {}
+        self._priors: dict[tuple[float, float, float], Posterior] = {}
 
     @property
     def prior(self) -> Posterior:
-        """Coefficients before any run."""
-        return self._course[2]
-
-    @property
-    def _course(self) -> tuple[Floats, Floats, Posterior]:
-        """Root of the covariance of a coefficient at the nodes, weights of the elements there, and the prior.
-
-        (K, K), (P,), and the coefficients before any run.
-        """
+        """Coefficients before any run, for one course over the current."""
         course = self.spread.saturation, self.spread.bend, self.spread.leak
         if course not in self._priors:
-            nodes = _root_covariance(self.nodes, self.spread.saturation, self.spread.bend)
-            weights = np.repeat([1.0, self.spread.leak], [_ELEMENTS - len(_LEAKY), len(_LEAKY)])
-            root: Floats = np.asarray(np.kron(nodes, np.diag(weights)), dtype=float)
-            prior = Posterior(np.zeros(len(root)), root, self)
-            self._priors[course] = nodes, np.tile(weights, self.nodes.size), prior
+            nodes, weights = self._course
+            root: Floats = np.asarray(np.kron(nodes, np.diag(weights[:_ELEMENTS])), dtype=float)
+            self._priors[course] = Posterior(np.zeros(len(root)), root, self)
         return self._priors[course]
+
+    @property
+    def _course(self) -> tuple[Floats, Floats]:
+        """(K, K) root of the covariance of a coefficient at the nodes, and (P,) weights of the elements there."""
+        course, nodes = (self.spread.saturation, self.spread.bend, self.spread.leak), tuple(self.nodes.tolist())
+        if isinstance(course[0], float):
+            return _course_of(nodes, *course)
+        roots, weights = zip(*(_course_of(nodes, *one) for one in zip(*course, strict=True)), strict=True)
+        return np.array(roots), np.array(weights)
 
     def posterior(self, members: Sequence[Moments]) -> Posterior:
         """Coefficients determined by runs."""
         gram, moment = self._scaled(members)
         factor = np.linalg.cholesky(gram)
         inverse = inverse_of_triangle(factor)
-        nodes, weights, _ = self._course
-        spread, half = weights[:, None] * _along_nodes(nodes, inverse.T), inverse @ moment
-        power = sum(member.power for member in members)
-        log_evidence = 0.5 * float(half @ half - power) - float(np.sum(np.log(factor.diagonal())))
-        return Posterior(spread @ half, spread, self, log_evidence)
+        nodes, weights = self._course
+        spread, half = weights[..., None] * _along_nodes(nodes, inverse.swapaxes(-1, -2)), _times(inverse, moment)
+        log_determinant = np.sum(np.log(np.diagonal(factor, 0, -2, -1)), axis=-1)
+        log_evidence = 0.5 * (np.sum(half * half, axis=-1) - sum(member.power for member in members)) - log_determinant
+        return Posterior(_times(spread, half), spread, self, log_evidence)
 
-    def log_evidence(self, members: Sequence[Moments]) -> float:
+    def log_evidence(self, members: Sequence[Moments]) -> Scale:
         """Logarithm of the evidence that runs follow one model."""
         gram, moment = self._scaled(members)
         # The last row of the factor is the solution for the others: no eigenvalue of the products is below one.
-        bordered = np.zeros((len(moment) + 1, len(moment) + 1))
-        bordered[:-1, :-1], bordered[-1, :-1], bordered[-1, -1] = gram, moment, 1 + moment @ moment
+        size = moment.shape[-1]
+        bordered = np.zeros((*moment.shape[:-1], size + 1, size + 1))
+        bordered[..., :-1, :-1], bordered[..., -1, :-1] = gram, moment
+        bordered[..., -1, -1] = 1 + np.sum(moment * moment, axis=-1)
         factor = np.linalg.cholesky(bordered)
-        half, diagonal = factor[-1, :-1], factor.diagonal()[:-1]
+        half, diagonal = factor[..., -1, :-1], np.diagonal(factor, 0, -2, -1)[..., :-1]
         power = sum(member.power for member in members)
-        return float(0.5 * (half @ half) - np.sum(np.log(diagonal)) - 0.5 * power)
+        return 0.5 * (np.sum(half * half, axis=-1) - power) - np.sum(np.log(diagonal), axis=-1)
 
     def weigh(self, runs: Sequence[RowProducts], expected: Posterior) -> list[Moments]:
         """Weighted products of runs; the gain of a run multiplies the force that is expected of it."""
-        return _of_each_size(runs, lambda alike: self._weigh_alike(alike, expected))
+        return _of_each_kind(runs, _size, lambda alike: self._weigh_alike(alike, expected))
 
     def _weigh_alike(self, runs: Sequence[RowProducts], expected: Posterior) -> Iterable[Moments]:
         spread, one = self.spread, runs[0].constant
-        gram, moment, power = _stacked(runs)
-        mean = np.array([expected.at(run.over)[0] for run in runs])
-        rows, size, level, gain = np.array(
-            [
-                (r.rows, r.size, (spread.misfit * model_error(r)) ** 2, spread.gain if r.gain is None else r.gain)
-                for r in runs
-            ]
-        ).T
-        varied = gain[:, None] * (mean - (((one @ gram) * mean).sum(axis=1) / rows)[:, None] * one)
-        shared = np.stack([varied, (spread.offset * np.sqrt(np.maximum(size, 0.1)))[:, None] * one], axis=1)
+        gram, moment, power = _products(runs)
+        mean = _joined([mean for mean, _ in expected.at_each([run.over for run in runs])], 1)
+        own = [(r.rows, r.size, model_error(r), np.nan if r.gain is None else r.gain) for r in runs]
+        rows, size, errors, gains = np.array(own).T
+        misfit, gain, offset = (np.asarray(own)[..., None] for own in (spread.misfit, spread.gain, spread.offset))
+        level, gain = (misfit * errors) ** 2, np.where(np.isnan(gains), gain, gains)
+        varied = gain[..., None] * (mean - (np.sum((one @ gram) * mean, axis=-1) / rows)[..., None] * one)
+        constant = (offset * np.sqrt(np.maximum(size, 0.1)))[..., None] * one
+        shared = varied[..., None, :] * _FIRST + constant[..., None, :] * _SECOND
         weight = _INDEPENDENT_SAMPLES / (rows * level)
-        gram, moment = weight[:, None, None] * gram, weight[:, None] * moment
-        along = shared @ np.concatenate([gram, moment[:, :, None]], axis=2)
-        inside = along[:, :, :-1] @ shared.transpose(0, 2, 1)
-        a, b, d = 1 + inside[:, 0, 0], inside[:, 0, 1], 1 + inside[:, 1, 1]
+        gram, moment = weight[..., None, None] * gram, weight[..., None] * moment
+        along = shared @ np.concatenate([gram, moment[..., None]], axis=-1)
+        inside = along[..., :-1] @ shared.swapaxes(-1, -2)
+        a, b, d = 1 + inside[..., 0, 0], inside[..., 0, 1], 1 + inside[..., 1, 1]
         determinant = a * d - b * b
-        inverse = np.array([[d, -b], [-b, a]] / determinant).transpose(2, 0, 1)
-        weighted = inverse @ along
-        explained = along[:, :, :-1].transpose(0, 2, 1) @ weighted
-        power = weight * power - (along[:, :, -1] * weighted[:, :, -1]).sum(axis=1)
-        power += _INDEPENDENT_SAMPLES * np.log(level / size**2) + np.log(determinant)
-        grams, moments = gram - explained[:, :, :-1], moment - explained[:, :, -1]
-        return map(Moments, grams, moments, power.tolist(), (run.over for run in runs))
+        inverse = np.stack([d, -b, -b, a], axis=-1) / determinant[..., None]
+        weighted = inverse.reshape(inside.shape) @ along
+        explained = along[..., :-1].swapaxes(-1, -2) @ weighted
+        power = weight * power - np.sum(along[..., -1] * weighted[..., -1], axis=-1)
+        power = power + _INDEPENDENT_SAMPLES * np.log(level / size**2) + np.log(determinant)
+        grams, moments = gram - explained[..., :-1], moment - explained[..., -1]
+        return map(Moments, _parted(grams, 2), _parted(moments, 1), _parted(power, 0), (run.over for run in runs))
 
     def products(self, tracks: Sequence[Track]) -> list[RowProducts]:
         """Products of the rows of runs."""
         yields = np.array([*_YIELDS, *(length for length, _ in _LEAKY)]) * self.amplitude
         velocities = np.array([*(0.0 for _ in _YIELDS), *(velocity for _, velocity in _LEAKY)]) * self._velocity
-        stops = stop_operators(tracks, yields, velocities / yields)
-        return [self._of_rows(track, stop[track.rows] / yields) for track, stop in zip(tracks, stops, strict=True)]
+        products: list[RowProducts] = []
+        for start in range(0, len(tracks), _TRACKS_PER_BLOCK):
+            block = tracks[start : start + _TRACKS_PER_BLOCK]
+            stops = stop_operators(block, yields, velocities / yields)
+            pairs = [(track, stop[track.rows] / yields) for track, stop in zip(block, stops, strict=True)]
+            products += _of_each_kind(pairs, lambda pair: (len(pair[1]), pair[0].current_changes), self._of_rows)
+        return products
 
-    def _of_rows(self, track: Track, stops: Floats) -> RowProducts:
-        rows = track.rows
-        x, v = track.displacement[rows] / self.amplitude, track.velocity[rows] / self._velocity
+    def _of_rows(self, tracks: Sequence[tuple[Track, Floats]]) -> Iterable[RowProducts]:
+        """Products of runs of one number of rows, with their stop operators there."""
+        channels = [(t.displacement, t.velocity, t.acceleration, t.force) for t, _ in tracks]
+        rows = np.array([[own[t.rows] for own in of] for (t, _), of in zip(tracks, channels, strict=True)])
+        scales = np.array([self.amplitude, self._velocity, self._acceleration, self.force])
+        x, v, a, y = rows.swapaxes(0, 1) / scales[:, None, None]
         friction = [np.tanh(v / scale) for scale in _VELOCITIES]
         led = [np.tanh((v + lead * x) / _VELOCITIES[1]) for lead in _LEADS]
-        linear = [np.ones(rows.size), x, x * x, v, track.acceleration[rows] / self._acceleration]
-        uneven = [np.abs(v), np.abs(friction[1])]
-        table = np.clip(np.column_stack([*linear, *friction, *led, *uneven, stops]), -_MAX_ELEMENT, _MAX_ELEMENT)
-        over = None if track.current_changes else self.share(float(track.current[0]))
-        if over is None:
-            table = (self.shares(track.current[rows])[:, :, None] * table[:, None, :]).reshape(rows.size, -1)
-        y = track.force[rows] / self.force
-        return RowProducts(table.T @ table, table.T @ y, float(y @ y), rows.size, track.half_range / self.force, over)
+        columns = [np.ones_like(x), x, x * x, v, a, *friction, *led, np.abs(v), np.abs(friction[1])]
+        table = np.concatenate([np.stack(columns, axis=-1), [stops for _, stops in tracks]], axis=-1)
+        np.clip(table, -_MAX_ELEMENT, _MAX_ELEMENT, out=table)
+        overs = [None if t.current_changes else self.share(float(t.current[0])) for t, _ in tracks]
+        if overs[0] is None:
+            shares = np.array([self.shares(t.current[t.rows]) for t, _ in tracks])
+            table = (shares[..., :, None] * table[..., None, :]).reshape(*x.shape, -1)
+        across = table.swapaxes(1, 2)
+        sums = across @ table, _times(across, y), np.sum(y * y, axis=1).tolist()
+        sizes = [t.half_range / self.force for t, _ in tracks]
+        return map(RowProducts, *sums, [x.shape[1]] * len(tracks), sizes, overs)
 
     def share(self, current: float) -> Floats:
         """(K,) shares of the nodes at one current [A]."""
@@ -308,23 +369,24 @@ class Evidence:
 
     def _scaled(self, members: Sequence[Moments]) -> tuple[Floats, Floats]:
         """Return sums of the moments of runs over all nodes in units of the prior, which adds one to the products."""
-        root, weights, _ = self._course
-        count = self.nodes.size
+        root, weights = self._course
+        count, constant = self.nodes.size, [member for member in members if member.over is not None]
         gram, moment = np.zeros((count * _ELEMENTS, count * _ELEMENTS)), np.zeros(count * _ELEMENTS)
-        if changing := [member for member in members if member.over is None]:
-            gram = _along_nodes(root.T, sum((member.gram for member in changing), gram))
-            gram = _along_nodes(root.T, gram.T)
-            moment = _along_nodes(root.T, sum((member.moment for member in changing), moment))
-        constant = [(member.over, member) for member in members if member.over is not None]
+        if len(constant) < len(members):
+            grams, moments, _ = _products([member for member in members if member.over is None])
+            along = root.swapaxes(-1, -2)
+            gram = _along_nodes(along, _along_nodes(along, np.sum(grams, axis=-3)).swapaxes(-1, -2))
+            moment = _along_nodes(along, np.sum(moments, axis=-2)[..., None])[..., 0]
         if constant:
-            over = np.array([shares for shares, _ in constant]) @ root
-            grams, moments, _ = _stacked([member for _, member in constant])
-            pairs = (over[:, :, None] * over[:, None, :]).reshape(len(over), -1)
-            summed = (pairs.T @ grams.reshape(len(grams), -1)).reshape(count, count, _ELEMENTS, _ELEMENTS)
-            gram += summed.transpose(0, 2, 1, 3).reshape(gram.shape)
-            moment += (over.T @ moments).ravel()
-        gram *= weights[:, None] * weights
-        gram.flat[:: len(gram) + 1] += 1
+            grams, moments, _ = _products(constant)
+            over = np.array([member.over for member in constant]) @ root
+            pairs = (over[..., :, None] * over[..., None, :]).reshape(*over.shape[:-1], -1)
+            summed = pairs.swapaxes(-1, -2) @ grams.reshape(*grams.shape[:-2], -1)
+            summed = summed.reshape(*summed.shape[:-2], count, count, _ELEMENTS, _ELEMENTS).swapaxes(-3, -2)
+            gram = gram + summed.reshape(*summed.shape[:-4], *gram.shape[-2:])
+            summed = over.swapaxes(-1, -2) @ moments
+            moment = moment + summed.reshape(*summed.shape[:-2], -1)
+        gram = weights[..., :, None] * gram * weights[..., None, :] + _identity(moment.shape[-1])
         return gram, weights * moment
 
 
@@ -335,23 +397,33 @@ def model_error(run: RowProducts) -> float:
 
 def _along_nodes(matrix: Floats, array: Floats) -> Floats:
     """Multiply the coefficients at the nodes, the rows of an array (P, ...), by a matrix (K, K)."""
-    return (matrix @ array.reshape(len(matrix), -1)).reshape(array.shape)
+    product = matrix @ array.reshape(*array.shape[:-2], matrix.shape[-1], -1)
+    return product.reshape(*product.shape[:-2], *array.shape[-2:])
 
 
 def stop_operators(tracks: Sequence[Track], yields: Floats, rates: Floats) -> list[Floats]:
-    """(L, Y) outputs [m] of elastic-plastic elements of some yield displacements [m] that leak at some rates [1/s]."""
-    longest = max(track.displacement.size for track in tracks)
-    steps, kept = np.zeros((2, longest, len(tracks), yields.size))
+    """(L, Y) outputs [m] of elastic-plastic elements of some yield displacements [m], some of which leak.
+
+    The rates of the leaks [1/s] are zero for the first elements.
+    """
+    longest, first = max(track.displacement.size for track in tracks), int(np.argmax(rates > 0))
+    moved, leaks = np.zeros((longest, len(tracks))), dict[bytes, tuple[Floats, Floats]]()
+    kept = np.ones((longest, len(tracks), yields.size))
+    share = np.ones_like(kept[..., first:])
     for i, track in enumerate(tracks):
-        leak = np.diff(track.time, prepend=track.time[:1])[:, None] * rates
-        kept[: leak.shape[0], i] = np.exp(-leak)
-        share = np.divide(-np.expm1(-leak), leak, out=np.ones_like(leak), where=leak > 0)
-        steps[: leak.shape[0], i] = np.diff(track.displacement, prepend=track.displacement[:1])[:, None] * share
-    state, least = np.zeros((len(tracks), yields.size)), -yields
-    outputs = np.empty_like(steps)
-    for step, held, row in zip(steps, kept, outputs, strict=True):
-        np.multiply(state, held, out=row)
-        np.add(row, step, out=row)
+        size, time = track.time.size, track.time.tobytes()  # which several versions of a run may have
+        if time not in leaks:
+            leak = np.diff(track.time, prepend=track.time[:1])[:, None] * rates[first:]
+            lost = -np.expm1(-leak)
+            leaks[time] = 1 - lost, np.divide(lost, leak, out=np.ones_like(leak), where=leak > 0)
+        kept[:size, i, first:], share[:size, i] = leaks[time]
+        moved[1:size, i] = np.diff(track.displacement)
+    outputs = np.repeat(moved[:, :, None], yields.size, axis=2)
+    outputs[..., first:] *= share
+    (state, before), least = np.zeros((2, len(tracks), yields.size)), -yields
+    for row, held in zip(outputs, kept, strict=True):  # a row is the step before it is the output
+        np.multiply(state, held, out=before)
+        np.add(row, before, out=row)
         np.minimum(row, yields, out=row)
         state = np.maximum(row, least, out=row)
     return [outputs[: track.displacement.size, i] for i, track in enumerate(tracks)]
@@ -370,10 +442,12 @@ def _nodes(tracks: Sequence[Track]) -> Floats:
     return values
 
 
-def _root_covariance(nodes: Floats, saturation: float, bend: float) -> Floats:
-    """(K, K) root of the covariance of a coefficient at the nodes."""
-    share = nodes / (nodes.max() or 1.0)
+@lru_cache
+def _course_of(nodes: tuple[float, ...], saturation: float, bend: float, leak: float) -> tuple[Floats, Floats]:
+    """(K, K) root of the covariance of a coefficient at nodes, and (P,) weights of the elements there."""
+    share = np.array(nodes) / (max(nodes) or 1.0)
     near = np.exp(-0.5 * ((share[:, None] - share) / _CORRELATION_LENGTH) ** 2)
     rise = np.tanh(share / saturation) / np.tanh(1 / saturation)
     covariance = _COMMON_DEVIATION**2 + _SLOPE_DEVIATION**2 * rise[:, None] * rise + bend**2 * near
-    return np.asarray(np.linalg.cholesky(covariance + 1e-6 * np.eye(nodes.size)), dtype=float)
+    root = np.asarray(np.linalg.cholesky(covariance + 1e-6 * np.eye(len(nodes))), dtype=float)
+    return root, np.tile(np.repeat([1.0, leak], [_ELEMENTS - len(_LEAKY), len(_LEAKY)]), len(nodes))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -9,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 
-from mrdamper.data import Floats
 from mrdamper.study.contradictions.evidence import Evidence, Posterior, RowProducts
 from mrdamper.study.contradictions.tracks import SAME_CURRENT, Track, irregularity
 
@@ -60,7 +60,7 @@ class Trial:
         if self.cause != other.cause:
             return False
         if self.cause in ("force", "displacement", "time"):
-            return abs(np.log(self.value / other.value)) < _UNIT_TOLERANCE
+            return abs(math.log(self.value / other.value)) < _UNIT_TOLERANCE
         return abs(self.value - other.value) <= 0.1 * max(abs(self.value), abs(other.value))
 
 
@@ -97,7 +97,7 @@ class ExplanationCandidate:
         `others` are coefficients by the other runs. Only explanations like one of some trials are looked at, if there
         are any.
         """
-        changes = [change for change in self._trials(others, like) if self._is_large(*change, others)]
+        changes = list(self._trials(others, like))
         least, *odds = others.log_probabilities(others.weigh([self.own, *(products for _, products in changes)]))
         candidates: list[Explanation] = []
         for (trial, products), logarithm in zip(changes, odds, strict=True):
@@ -132,15 +132,27 @@ class ExplanationCandidate:
         )
 
     def _trials(self, others: Posterior, like: Sequence[Trial]) -> Iterator[tuple[Trial, RowProducts]]:
-        for trial in (*self._of_the_force(others), *self._of_the_current()):
+        self.prepare([self])
+        changes = [
+            *((trial, self.changed(trial)) for trial in self._of_the_force(others)),
+            *((trial, replace(products, misfit=self.own.misfit)) for trial, products in self._motions),
+        ]
+        for trial, products in (
+            *(change for change in changes if self._is_large(change[0])),
+            *self._of_the_current(others),
+        ):
             if not like or any(trial.is_like(one) for one in like):
-                yield trial, self.changed(trial)
-        if not self._motions:
-            trials, moved = zip(*self._of_the_motion(), strict=True)
-            self._motions = list(zip(trials, self.evidence.products(moved), strict=True))
-        for trial, products in self._motions:
-            if not like or any(trial.is_like(one) for one in like):
-                yield trial, replace(products, misfit=self.own.misfit)
+                yield trial, products
+
+    @staticmethod
+    def prepare(candidates: Sequence[ExplanationCandidate]) -> None:
+        """Compute the products of the other motions of runs, of all at once where these are asked for in turn."""
+        missing = [candidate for candidate in candidates if not candidate._motions]
+        moved = [list(candidate._of_the_motion()) for candidate in missing]
+        if missing:
+            products = iter(missing[0].evidence.products([track for of in moved for _, track in of]))
+            for candidate, of in zip(missing, moved, strict=True):
+                candidate._motions = [(trial, next(products)) for trial, _ in of]
 
     def _of_the_force(self, others: Posterior) -> Iterator[Trial]:
         """Yield a factor or an offset of the force."""
@@ -154,19 +166,22 @@ class ExplanationCandidate:
             best = float(swing @ self.own.gram @ swing) / along
             yield Trial("force", best, "", _FREE_ODDS)
             for unit, factor in _both_ways(FORCE_UNITS):
-                if abs(np.log(best / factor)) < 3 * _UNIT_TOLERANCE:
+                if abs(math.log(best / factor)) < 3 * _UNIT_TOLERANCE:
                     yield Trial("force", factor, unit, _UNIT_ODDS)
 
-    def _of_the_current(self) -> Iterator[Trial]:
-        """Another constant current."""
+    def _of_the_current(self, others: Posterior) -> Iterator[tuple[Trial, RowProducts]]:
+        """Yield another constant current that changes the force, with the run there."""
         if self.track.current_changes:
             return
         levels: list[float] = self.evidence.nodes.tolist()
-        yield from (Trial("current", level, "", _LEVEL_ODDS) for level in levels)
-        yield from (
-            Trial("current", level, "", _FREE_ODDS)
-            for level in np.linspace(0, levels[-1], _TRIED_CURRENTS)[1:-1].tolist()
-        )
+        tried: list[float] = np.linspace(0, levels[-1], _TRIED_CURRENTS)[1:-1].tolist()
+        overs = [self.evidence.share(current) for current in (*levels, *tried)]
+        change = np.array([mean for mean, _ in others.at_each(overs)]) - others.at(self.own.over)[0]
+        power = np.maximum(np.sum(change @ self.own.gram * change, axis=1), 0.0)
+        large = np.sqrt(power / self.own.rows) > MIN_CURRENT_EFFECT * self.own.size
+        for k in np.flatnonzero(large).tolist():
+            odds = _LEVEL_ODDS if k < len(levels) else _FREE_ODDS
+            yield Trial("current", (*levels, *tried)[k], "", odds), replace(self.own, over=overs[k])
 
     def _of_the_motion(self) -> Iterator[tuple[Trial, Track]]:
         """Yield a factor of displacement or time, with the run as corrected; both channels inverted."""
@@ -179,7 +194,7 @@ class ExplanationCandidate:
                 *((f, "", _ODD_MOTION_ODDS) for f in (*_FACTORS, *self._ratios(cause))),
             ]
             for k, (factor, unit, odds) in enumerate(factors):
-                if any(abs(np.log(factor / f)) < _SAME_FACTOR for f, *_ in factors[:k]):
+                if any(abs(math.log(factor / f)) < _SAME_FACTOR for f, *_ in factors[:k]):
                     continue
                 trial = Trial(cause, factor, unit, odds)
                 moved = self.moved(trial)
@@ -218,15 +233,11 @@ class ExplanationCandidate:
             return replace(moved, force=-self.track.force)
         return self.track.scaled(time=trial.value) if trial.cause == "time" else self.track.scaled(trial.value)
 
-    def _is_large(self, trial: Trial, products: RowProducts, others: Posterior) -> bool:
-        value, size = trial.value, self.own.size
+    def _is_large(self, trial: Trial) -> bool:
         if trial.cause in ("force", "displacement", "time"):
-            return abs(np.log(value)) > np.log(MIN_FACTOR)
+            return abs(math.log(trial.value)) > math.log(MIN_FACTOR)
         if trial.cause == "offset":
-            return abs(value) > MIN_OFFSET * self.evidence.force * max(size, 0.3)
-        if trial.cause == "current":
-            change = others.at(products.over)[0] - others.at(self.own.over)[0]
-            return _rms(products, change) > MIN_CURRENT_EFFECT * size
+            return abs(trial.value) > MIN_OFFSET * self.evidence.force * max(self.own.size, 0.3)
         return True
 
     def _is_nearer(self, cause: Cause, factor: float) -> bool:
@@ -235,7 +246,7 @@ class ExplanationCandidate:
             size = self.track.step / self._usual_step
         else:
             size = float(np.ptp(self.track.displacement)) / 2 / self.evidence.amplitude
-        return abs(np.log(size * factor)) < abs(np.log(size))
+        return abs(math.log(size * factor)) < abs(math.log(size))
 
 
 def unproven_currents(tracks: Sequence[Track], apparent: Mapping[int, float]) -> set[int]:
@@ -282,10 +293,6 @@ def completed_matrix_odds(odds: float, tracks: Sequence[Track], moved: Mapping[i
     if min(present, missing) > MAX_IRREGULARITY * len(kept):
         return odds
     return max(odds - EMPTY_CELL_ODDS * (present - missing), min(odds, -EMPTY_CELL_ODDS))
-
-
-def _rms(products: RowProducts, coefficients: Floats) -> float:
-    return float(np.sqrt(max(float(coefficients @ products.gram @ coefficients), 0.0) / products.rows))
 
 
 def _both_ways(units: dict[str, float]) -> list[tuple[str, float]]:

@@ -11,6 +11,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from math import inf, lgamma
 
+import numpy as np
+
 from mrdamper.study.contradictions.evidence import Evidence, Moments, Posterior, RowProducts
 
 _GAIN = 0.6  # standard deviation of the gain of a run of another damper
@@ -34,11 +36,11 @@ def gain_differences(evidence: Evidence, products: Sequence[RowProducts]) -> Gai
     best: tuple[float, float, Sequence[RowProducts]] | None = None
     usual = [replace(run, misfit=1.0) for run in products]
     for variant in (products, usual) if any(run.misfit != 1.0 for run in products) else (products,):
-        for misfit in _MISFITS:
-            evidence.spread = replace(scatter, misfit=misfit)
-            odds = evidence.log_evidence(_expected(evidence, variant).weigh(variant))
-            if best is None or odds > best[0]:
-                best = odds, misfit, variant
+        evidence.spread = replace(scatter, misfit=np.array(_MISFITS))
+        odds = evidence.log_evidence(_expected(evidence, variant).weigh(variant))
+        k = int(np.argmax(odds))
+        if best is None or odds[k] > best[0]:
+            best = float(odds[k]), _MISFITS[k], variant
     assert best is not None
     evidence.spread = replace(scatter, misfit=best[1])
     differences = _grown(evidence, best[2], best[0])

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import combinations, product
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,7 @@ _COMPARED_EXPLANATIONS = 6  # explanations of a run that are compared with those
 _GROUP_SEEDS = 5  # runs from which a second group of runs is grown
 _GROUP_ERROR_RATIO = 2.5  # factor by which the model error of a group of its own is smaller than that of all runs
 _MIN_MISFIT = 0.5  # factor of the usual model error for groups at least
-_ERROR_FACTORS = (1.0, 0.7, 0.45, 0.3)  # factors of the model error that explained runs leave
+_ERROR_FACTORS = np.array([1.0, 0.7, 0.45, 0.3])  # factors of the model error that explained runs leave
 _REFINED_EXPLANATIONS = 4  # single explanations whose model error is adapted
 _GROUP_GAIN_DIFFERENCE = 0.3  # difference of the logarithms of the gains of two groups of runs at one current
 _MIN_BESIDE = 3  # other runs at a motion or a current that show how well the model describes it
@@ -204,23 +205,18 @@ class Search:
         for _ in range(2):
             expected = self.evidence.posterior(expected.weigh([self._products[k] for k in agreeing]))
         scores: dict[AssumedScatter, float] = {}
-        weighed: dict[tuple[float, ...], list[Moments]] = {}  # by all that the weights depend on
-
-        def score(spread: AssumedScatter) -> float:
-            self.evidence.spread = spread
-            scatter = spread.misfit, spread.gain, spread.offset
-            if scatter not in weighed:
-                weighed[scatter] = expected.weigh([self._products[k] for k in agreeing])
-            members = weighed[scatter]
-            posterior = self.evidence.posterior(members)
-            return float(np.median(posterior.log_probabilities_by_others(members))) - _LEAK_ODDS * spread.leak
 
         def choose(variants: Iterable[dict[str, float]]) -> None:
             best = max(scores, key=scores.__getitem__, default=AssumedScatter())
-            for variant in variants:
-                spread = replace(best, **variant)
-                if spread not in scores:
-                    scores[spread] = score(spread)
+            spreads = [one for one in (replace(best, **variant) for variant in variants) if one not in scores]
+            # Moments of records of changing current are large.
+            size = 1 if any(self._products[k].over is None for k in agreeing) else len(spreads)
+            for block in (spreads[k : k + size] for k in range(0, len(spreads), size or 1)):
+                self.evidence.spread = AssumedScatter.several(block)
+                members = expected.weigh([self._products[k] for k in agreeing])
+                odds = self.evidence.posterior(members).log_probabilities_by_others(members)
+                for spread, median in zip(block, np.ravel(np.median(odds, axis=0)).tolist(), strict=True):
+                    scores[spread] = median - _LEAK_ODDS * spread.leak
 
         for _ in range(2):
             choose({"saturation": saturation, "bend": bend} for saturation, bend in product(_SATURATIONS, _BENDS))
@@ -245,7 +241,7 @@ class Search:
         posterior = self.posterior()
         ratios: dict[int, float] = {}
         for k in self._agreeing():
-            error = self._products[k].unexplained(posterior.without(self._members[k])[0], MAX_SESSION_GAIN)
+            error = self._products[k].unexplained(posterior.without(self._members[k]), MAX_SESSION_GAIN)
             ratios[k] = error / (self.evidence.spread.misfit * model_error(self._products[k]))
         widened: list[RowProducts] = []
         for i, (track, products) in enumerate(zip(self.tracks, self._products, strict=True)):
@@ -270,7 +266,9 @@ class Search:
         most = max(_RUNS_PER_ROUND, len(order) // 4)
         # A record of many currents is improbable a priori: its error by the others counts as well.
         improbable = sorted(left, key=by_others.__getitem__)
-        singles = [self._of_one(i) for i in dict.fromkeys([*order[:most], *improbable[: most // 3]])]
+        chosen = dict.fromkeys([*order[:most], *improbable[: most // 3]])
+        ExplanationCandidate.prepare([self._candidates[i] for i in chosen])
+        singles = [self._of_one(i) for i in chosen]
         yield from map(self._refined, sorted(singles, key=lambda proposal: -proposal.gain)[:_REFINED_EXPLANATIONS])
         groups = dict.fromkeys([*self._groups(order, posterior), *self._alike()])
         ranked = sorted(map(self._of_group, groups), key=lambda proposal: -proposal.gain)
@@ -335,29 +333,27 @@ class Search:
         self, products: Sequence[RowProducts], expected: Posterior, apart: Sequence[Sequence[RowProducts]] = ()
     ) -> float:
         """Logarithm of the evidence of runs, and of others apart, at the model error most probable for them."""
-        spread, best = self.evidence.spread, -np.inf
-        for factor in _ERROR_FACTORS:
-            self.evidence.spread = replace(spread, misfit=max(factor * spread.misfit, _MISFITS[-1]))
-            members = expected.weigh(products)
-            posterior = self.evidence.posterior(members)
-            total = posterior.log_evidence - self._falling(members, posterior)
-            for group in apart:
-                own = self.evidence.posterior(expected.weigh(group))
-                total += self.evidence.log_evidence(own.weigh(group))
-            best = max(best, total)
+        spread = self.evidence.spread
+        self.evidence.spread = replace(spread, misfit=np.maximum(_ERROR_FACTORS * spread.misfit, _MISFITS[-1]))
+        members = expected.weigh(products)
+        posterior = self.evidence.posterior(members)
+        total = posterior.log_evidence - self._falling(members, posterior)
+        for group in apart:
+            own = self.evidence.posterior(expected.weigh(group))
+            total += self.evidence.log_evidence(own.weigh(group))
         self.evidence.spread = spread
-        return best
+        return float(np.max(total))
 
-    def _falling(self, members: Sequence[Moments], posterior: Posterior) -> float:
+    def _falling(self, members: Sequence[Moments], posterior: Posterior) -> Any:
         """Logarithm of the prior odds against a force that falls with the current, by its relative decrease."""
         occupied = np.sum([m.over for m in members if m.over is not None and m.over.max() > _AT_NODE], axis=0)
         if np.ndim(occupied) == 0 or np.count_nonzero(np.asarray(occupied) > 0) < 2:
             return 0.0
         nodes = np.eye(self.evidence.nodes.size)[np.asarray(occupied) > 0]
-        means = [posterior.at(node)[0] for node in nodes]
-        sizes = np.sqrt([mean @ self._usual_gram @ mean for mean in means])
-        fall = float(np.max(1 - sizes / np.maximum.accumulate(sizes)))
-        return min(_FALLING_ODDS * max(fall - _MIN_FALL, 0.0), _MAX_FALLING_ODDS)
+        means = np.array([posterior.at(node)[0] for node in nodes])
+        sizes = np.sqrt(np.sum(means @ self._usual_gram * means, axis=-1))
+        fall = np.max(1 - sizes / np.maximum.accumulate(sizes), axis=0)
+        return np.clip(_FALLING_ODDS * (fall - _MIN_FALL), 0.0, _MAX_FALLING_ODDS)
 
     @cached_property
     def _usual_gram(self) -> Floats:
@@ -394,16 +390,15 @@ class Search:
                 break
             for explanation in self._options[i][:_SHARED_EXPLANATIONS]:
                 trial = explanation.trial
-                alike = {k: [e for e in of if e.trial.is_like(trial)] for k, of in self._options.items()}
-                sets.append([k for k, of in alike.items() if any(e.gain > 0 for e in of)])
+                sets.append([k for k, of in self._options.items() if _any_like(of, trial)])
                 if trial.cause in ("displacement", "time"):  # together they may complete the matrix of tests
-                    sets.append([k for k, of in alike.items() if any(e.gain + e.trial.odds > 0 for e in of)])
+                    sets.append([k for k, of in self._options.items() if _any_like(of, trial, by_odds=True)])
         return [tuple(sorted(s)) for s in sets if 2 <= len(s) <= len(self.tracks) // 2]
 
     def _gain(self, k: int, posterior: Posterior) -> float:
         """Force of a run over that expected by the others."""
         products = self._products[k]
-        expected = posterior.without(self._members[k])[0]
+        expected = posterior.without(self._members[k])
         swing = expected - products.constant * float(products.constant @ products.gram @ expected) / products.rows
         return float(swing @ products.moment) / max(float(swing @ products.gram @ swing), 1e-12)
 
@@ -558,6 +553,11 @@ class Search:
                 del self.found[i]
                 self._products[i] = self._candidates[i].own
             self._members[i] = others.weigh([self._products[i]])[0]
+
+
+def _any_like(explanations: Sequence[Explanation], trial: Trial, by_odds: bool = False) -> bool:
+    """Tell whether an explanation like a trial makes its run more probable, or would without its prior odds."""
+    return any(e.gain + by_odds * e.trial.odds > 0 and e.trial.is_like(trial) for e in explanations)
 
 
 def _apparent_currents(explanations: Mapping[int, Explanation]) -> dict[int, float]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -86,13 +87,17 @@ def tracks_of(runs: Sequence[Run]) -> list[Track]:
 
 def irregularity(tracks: Sequence[Track], currents: Sequence[float]) -> int:
     """Repeated tests, and empty cells of the matrix of currents [A] and motions, of tests at constant current."""
-    frequency, amplitude = (np.array([getattr(t, name) for t in tracks]) for name in ("frequency", "amplitude"))
-    alike = (frequency > 0)[:, None] & np.logical_and(
-        *(np.abs(size[:, None] - size) <= _SAME_MOTION * size for size in (frequency, amplitude))
-    )
-    first = [int(np.argmax(column)) for column in (alike | np.eye(len(tracks), dtype=bool)).T]  # run at each motion
+    return _irregularity(tuple((t.frequency, t.amplitude) for t in tracks), tuple(currents))
+
+
+@lru_cache
+def _irregularity(motions: tuple[tuple[float, float], ...], currents: tuple[float, ...]) -> int:
+    sizes = np.reshape(motions, (-1, 2))
+    alike = np.all(np.abs(sizes[:, None] - sizes) <= _SAME_MOTION * sizes, axis=2) & (sizes[:, :1] > 0)
+    runs = alike | np.eye(len(motions), dtype=bool)
+    first: list[int] = np.argmax(runs, axis=0).tolist() if motions else []  # run at each motion
     cells = set(zip(currents, first, strict=True))
-    return len(tracks) - len(cells) + len(set(currents)) * len(set(first)) - len(cells)
+    return len(motions) - len(cells) + len(set(currents)) * len(set(first)) - len(cells)
 
 
 def _track(run: Run) -> Track:
