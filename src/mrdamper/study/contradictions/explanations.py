@@ -132,17 +132,20 @@ class ExplanationCandidate:
         )
 
     def _trials(self, others: Posterior, like: Sequence[Trial]) -> Iterator[tuple[Trial, RowProducts]]:
+        causes = {one.cause for one in like}
+
+        def is_tried(trial: Trial) -> bool:
+            return self._is_large(trial) and (not like or any(trial.is_like(one) for one in like))
+
+        currents = self._of_the_current(others) if not like or "current" in causes else ()
+        for trial in filter(is_tried, (*self._of_the_force(others), *currents)):
+            yield trial, self.changed(trial)
+        if like and not causes & {"sign", "displacement", "time"}:
+            return
         self.prepare([self])
-        changes = [
-            *((trial, self.changed(trial)) for trial in self._of_the_force(others)),
-            *((trial, replace(products, misfit=self.own.misfit)) for trial, products in self._motions),
-        ]
-        for trial, products in (
-            *(change for change in changes if self._is_large(change[0])),
-            *self._of_the_current(others),
-        ):
-            if not like or any(trial.is_like(one) for one in like):
-                yield trial, products
+        for trial, products in self._motions:
+            if is_tried(trial):
+                yield trial, replace(products, misfit=self.own.misfit)
 
     @staticmethod
     def prepare(candidates: Sequence[ExplanationCandidate]) -> None:
@@ -169,8 +172,8 @@ class ExplanationCandidate:
                 if abs(math.log(best / factor)) < 3 * _UNIT_TOLERANCE:
                     yield Trial("force", factor, unit, _UNIT_ODDS)
 
-    def _of_the_current(self, others: Posterior) -> Iterator[tuple[Trial, RowProducts]]:
-        """Yield another constant current that changes the force, with the run there."""
+    def _of_the_current(self, others: Posterior) -> Iterator[Trial]:
+        """Yield another constant current that changes the force."""
         if self.track.current_changes:
             return
         levels: list[float] = self.evidence.nodes.tolist()
@@ -180,11 +183,11 @@ class ExplanationCandidate:
         power = np.maximum(np.sum(change @ self.own.gram * change, axis=1), 0.0)
         large = np.sqrt(power / self.own.rows) > MIN_CURRENT_EFFECT * self.own.size
         for k in np.flatnonzero(large).tolist():
-            odds = _LEVEL_ODDS if k < len(levels) else _FREE_ODDS
-            yield Trial("current", (*levels, *tried)[k], "", odds), replace(self.own, over=overs[k])
+            yield Trial("current", (*levels, *tried)[k], "", _LEVEL_ODDS if k < len(levels) else _FREE_ODDS)
 
     def _of_the_motion(self) -> Iterator[tuple[Trial, Track]]:
         """Yield a factor of displacement or time, with the run as corrected; both channels inverted."""
+        here = sum(map(self.track.is_at_motion, self._others))
         yield (inverted := Trial("sign", -1.0, "", _SIGN_ODDS)), self.moved(inverted)
         kinds: tuple[tuple[Cause, dict[str, float]], ...] = (("displacement", LENGTH_UNITS), ("time", TIME_UNITS))
         for cause, units in kinds:
@@ -198,9 +201,11 @@ class ExplanationCandidate:
                     continue
                 trial = Trial(cause, factor, unit, odds)
                 moved = self.moved(trial)
-                tested = self._tested(moved)
-                if not unit and tested < 0 and not any(moved.is_at_motion(t) for t in self._others):
+                there = sum(map(moved.is_at_motion, self._others))
+                tested = int(np.sign(there - here)) if self.track.frequency else 0
+                if not unit and tested < 0 and not there:
                     odds += _LOST_MOTION_ODDS
+                # 1 for a motion that more of the other runs have, −1 for one that fewer have
                 odds -= _TESTED_MOTION_ODDS * tested + _USUAL_STEP * (cause == "time") * self._is_usual(factor)
                 if tested != 0:
                     odds = completed_matrix_odds(odds, [*self._others, self.track], {len(self._others): moved})
@@ -214,12 +219,6 @@ class ExplanationCandidate:
         ratios = [getattr(t, name) / getattr(own, name) for t in self._others if t.frequency]
         ratios = [1 / r if cause == "time" else r for r in ratios]
         return [r for r in ratios if MIN_FACTOR < max(r, 1 / r) < _MAX_FACTOR]
-
-    def _tested(self, moved: Track) -> int:
-        """1 if a change brings the motion to one that more of the other runs have, −1 if to one that fewer have."""
-        if not self.track.frequency:
-            return 0
-        return int(np.sign(sum(moved.is_at_motion(t) - self.track.is_at_motion(t) for t in self._others)))
 
     def _is_usual(self, factor: float) -> int:
         """1 if a factor of time makes the time between two samples that of most other runs, −1 if it was that."""
