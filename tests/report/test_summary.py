@@ -2,7 +2,11 @@
 
 from dataclasses import replace
 
-from mrdamper.report.page import plain
+import jinja2
+import pytest
+
+from mrdamper.report import page
+from mrdamper.report.page import percent, plain, render_page
 from mrdamper.report.summary import omission_lines, study_lines
 
 
@@ -50,3 +54,24 @@ def test_runs_that_a_model_of_sines_does_not_use_are_not_among_its_identificatio
 
 def test_conditions_are_written_as_in_a_test_plan():
     assert [plain(v) for v in (1.5003, -0.0004, 0.500000000013146, 12.0, 0.25)] == ["1.5", "0", "0.5", "12", "0.25"]
+    assert (percent(-0.0004), plain(None)) == ("0.0", "–")
+
+
+@pytest.mark.parametrize(
+    ("values", "columns"), [(("1", "–"), "abc"), (("–", "–"), "ac"), (("", "–"), "ac"), (("<b>–</b>", "–"), "abc")]
+)
+def test_a_column_without_a_value_in_any_row_is_left_out(monkeypatch, values, columns):
+    rows = "".join(f'<tr class="r"><td>x</td><td class="wrap">{value}</td><td>0</td></tr>' for value in values)
+    table = f"<table><thead><tr><th>a</th><th>b</th><th>c</th></tr></thead><tbody>{rows}</tbody></table>"
+    facts = '<table class="facts"><tr><td>name</td><td>–</td></tr></table>'
+    monkeypatch.setattr(page._ENVIRONMENT, "loader", jinja2.DictLoader({"page": table + facts}))
+    text = render_page("page", "", "")
+    assert [name for name in "abc" if f"<th>{name}</th>" in text] == list(columns)
+    assert text.count("<td") == len(columns) * len(values) + 2
+    assert text.endswith(facts)
+
+
+def test_a_table_of_headings_alone_is_kept(monkeypatch):
+    table = "<table><tr><th>a</th><th>b</th></tr></table>"
+    monkeypatch.setattr(page._ENVIRONMENT, "loader", jinja2.DictLoader({"page": table}))
+    assert render_page("page", "", "") == table

@@ -16,6 +16,7 @@ from mrdamper.dampers.sessions import SessionCorrection
 from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import SESSIONS_NEEDED, Floats
+from mrdamper.data.wording import number
 from mrdamper.errors import ParameterError
 from mrdamper.identification.intervals import student
 from mrdamper.statistics.metrics import peak_force
@@ -61,7 +62,7 @@ def band(
     distance = prediction.distance(damper)
     half = peak_force(force)
     if not half < _LARGEST_FORCE_N:
-        raise ParameterError(f"the predicted force reaches {half:.3g} N", remedy="check the parameters of the model")
+        raise ParameterError(f"the predicted force reaches {number(half, 3)} N", remedy="check the model's parameters")
     parameter = np.einsum("np,pq,nq->n", slopes, uncertainty.covariance, slopes)
     session = (uncertainty.gain * force) ** 2 + uncertainty.offset**2
     model = (uncertainty.run_gain * force) ** 2 + uncertainty.run_offset**2 + (uncertainty.force * half) ** 2

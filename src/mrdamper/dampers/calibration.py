@@ -25,6 +25,7 @@ from mrdamper.data.arrays import Floats, index_at
 from mrdamper.data.runs import Run, once_per_run
 from mrdamper.data.sessions import session_of
 from mrdamper.data.strict_text import STRICT
+from mrdamper.data.wording import number
 from mrdamper.identification.intervals import student
 from mrdamper.physics.motion.sines import equivalent_sine, sine_condition
 from mrdamper.statistics.linear import nonnegative_least_squares
@@ -304,7 +305,7 @@ class Calibration:
         if self.units < _ENOUGH_UNITS:
             few = f"; {self.units} independent {self.unit}s reach {100 * self.reachable:.0f} % at most"
         return (
-            f"{100 * self.level:.3g} % prediction intervals covered {force} of the samples, "
+            f"{number(100 * self.level, 3)} % prediction intervals covered {force} of the samples, "
             f"{peak} of the peak forces and {energy} of the energies of {self.units} cross-validated {self.unit}s{few}"
         )
 

@@ -13,6 +13,7 @@ import numpy as np
 from mrdamper.dampers.distance import Distance, distance_from
 from mrdamper.data.conditions import Condition, same_condition
 from mrdamper.data.runs import Floats
+from mrdamper.data.wording import number, span
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.statistics.functions.motion_hull import MotionHull
 from mrdamper.statistics.linear import nonnegative_least_squares
@@ -44,8 +45,8 @@ class Beyond(NamedTuple):
         times = float(f"{1 + share:.2g}")
         by = f" by {100 * share:.0f} %" if share < 1 else f", {times:g} times the largest" if high else ""
         return (
-            f"{self.quantity} {scale * self.value:.3g} {unit} lies {side} the tested range "
-            f"({scale * low:.3g} to {scale * high:.3g} {unit}){by}{self._other_unit()}"
+            f"{self.quantity} {number(scale * self.value, 3)} {unit} lies {side} the tested range "
+            f"({span(scale * low, scale * high, unit, to=' to ')}){by}{self._other_unit()}"
         )
 
     def _other_unit(self) -> str:
@@ -97,6 +98,16 @@ class Envelope:
     def tested(self) -> bool:
         """True where the tested ranges are known; a model without a damper has none."""
         return bool(np.isfinite([*self.current_A, *self.amplitude_m]).all())
+
+    def ranges(self, to: str = "–") -> dict[str, str]:
+        """Write the tested range of each quantity in the units of a test plan; `to` stands between its ends."""
+        amplitudes = (1e3 * self.amplitude_m[0], 1e3 * self.amplitude_m[1])
+        return {
+            "current": span(*self.current_A, "A", to=to),
+            "frequency": span(*self.frequency_Hz, "Hz", to=to),
+            "amplitude": span(*amplitudes, "mm", to=to),
+            "peak velocity": span(*self.peak_velocity_m_s, "m/s", to=to),
+        }
 
     @property
     def middle(self) -> Condition:

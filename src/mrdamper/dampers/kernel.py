@@ -13,6 +13,7 @@ from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.piece import Piece
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.data.parameters import ParameterInfo
+from mrdamper.data.wording import counted
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification.problem import Identification
 from mrdamper.physics.motion import Excitation
@@ -106,7 +107,7 @@ class KernelDamper(Damper):
     ) -> Self:
         """Fit to the last cycle of every run, each run by its own force scale."""
         if len(runs) < 2:
-            raise IdentificationError(f"{len(runs)} runs", where=cls.heading, remedy="give two or more")
+            raise IdentificationError(counted(len(runs), "run"), where=cls.heading, remedy="give two or more")
         pieces = [Piece.of(run) for run in runs]
         raw = np.concatenate([_inputs(piece.motion.part(piece.scored)) for piece in pieces])
         spread = np.where(raw.std(axis=0) > 1e-12, raw.std(axis=0), 1.0)

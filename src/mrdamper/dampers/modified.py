@@ -118,8 +118,7 @@ class ModifiedModel(Damper):
 
     @property
     def fitted_parameters(self) -> Mapping[str, FittedParameter]:
-        kind = self.parameters.model_type
-        units = {n: unit for n, (_, _, unit) in kind.coordinates.items()} | {i.name: i.unit for i in kind.parameters()}
+        units = self.parameters.units
         return {
             f"{name}.{i}": FittedParameter(value, unit=unit, exponent=exponent)
             for name, f in self.functions.items()

@@ -33,6 +33,12 @@ class ParameterMap:
         return self.model_type.nearest({name: function(*point) for name, function in self.functions.items()})
 
     @property
+    def units(self) -> dict[str, str]:
+        """Unit of each parameter of the model, and of each coordinate it can be built from."""
+        coordinates = {name: unit for name, (_, _, unit) in self.model_type.coordinates.items()}
+        return coordinates | {info.name: info.unit for info in self.model_type.parameters()}
+
+    @property
     def follows_motion(self) -> bool:
         """True where a function depends on the frequency or the amplitude."""
         return any(form_named(function.form).follows_motion for function in self.functions.values())

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrdamper.dampers.likelihood import Likelihood, positive
 from mrdamper.data import Floats
+from mrdamper.data.wording import counted
 from mrdamper.errors import InputError, MissingExtraError
 
 _SEED = 1
@@ -72,7 +73,7 @@ def posterior(likelihood: Likelihood, steps: int = 2000) -> Samples:
     rhat = split_rhat(kept)
     if not (len(kept) > _MIN_AUTOCORRELATION_TIMES * time and rhat <= _MAX_RHAT):
         raise InputError(
-            f"not converged: {len(kept)} steps of {time:.0f} autocorrelation times each, split-R̂ {rhat:.3f}",
+            f"not converged: {counted(len(kept), 'step')} of {time:.0f} autocorrelation times each, split-R̂ {rhat:.3f}",
             remedy=f"take {int(70 * time * 1.25)} steps or more; more than 50 times and 1.01 at most are asked for",
             code="E_CONVERGENCE",
         )

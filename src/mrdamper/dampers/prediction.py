@@ -12,6 +12,7 @@ from mrdamper.dampers.protocols import DamperLike
 from mrdamper.data.conditions import Condition
 from mrdamper.data.displayable import Displayable
 from mrdamper.data.runs import Floats
+from mrdamper.data.wording import number
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.made import sine
 from mrdamper.statistics.metrics import peak_force
@@ -81,7 +82,7 @@ class Prediction(Displayable):
         """Condition, peak forces and what is extrapolated."""
         low, high = float(np.min(self.force)), float(np.max(self.force))
         outside = f"; outside the tested range in {', '.join(self.extrapolation)}" if self.extrapolation else ""
-        return f"prediction at {self.condition}: {low:.4g} to {high:.4g} N{outside}"
+        return f"prediction at {self.condition}: {number(low)} to {number(high)} N{outside}"
 
     @property
     def table(self) -> Mapping[str, Floats]:

@@ -19,6 +19,7 @@ from mrdamper.data.arrays import Floats
 from mrdamper.data.runs import Run
 from mrdamper.data.sessions import SESSIONS_NEEDED, hour_of, session_folds, session_groups, session_of
 from mrdamper.data.strict_text import STRICT
+from mrdamper.data.wording import counted
 from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
@@ -192,7 +193,7 @@ class Sessions:
         _refuse_disorder(runs, when)
         if not session_folds(runs):
             count = len({w.session for w in when} - {None})
-            reason = "every session holds one run" if count >= SESSIONS_NEEDED else f"{count} known sessions"
+            reason = "every session holds one run" if count >= SESSIONS_NEEDED else counted(count, "known session")
             raise InputError(
                 f"{reason}: the scatter between sessions cannot be estimated", remedy=_REMEDY, code="E_SESSION"
             )

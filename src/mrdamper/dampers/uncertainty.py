@@ -18,6 +18,7 @@ import numpy as np
 from mrdamper.dampers.calibration import Calibration, Growth
 from mrdamper.dampers.sessions import Sessions
 from mrdamper.data import Displayable, Floats
+from mrdamper.data.wording import number
 from mrdamper.errors import InputError, listed
 from mrdamper.identification.intervals import NOT_IDENTIFIABLE, interval_about, weaknesses, written
 
@@ -93,11 +94,11 @@ class Uncertainty(Displayable):
     @property
     def headline(self) -> str:
         """Number of parameters, scatter between sessions and prediction intervals."""
-        sessions = f"gain {100 * self.gain:.2g} % between sessions, " if self.of_sessions else "gain "
+        sessions = f"gain {number(100 * self.gain, 2)} % between sessions, " if self.of_sessions else "gain "
         coverage = f"; {self.calibration.summary}" if self.calibration else ""
         return (
-            f"uncertainty of {len(self.names)} parameters: {sessions}{100 * self.run_gain:.2g} % between runs, "
-            f"model error of the force {100 * self.force:.2g} %{coverage}"
+            f"uncertainty of {len(self.names)} parameters: {sessions}{number(100 * self.run_gain, 2)} % "
+            f"between runs, model error of the force {number(100 * self.force, 2)} %{coverage}"
         )
 
     @property
@@ -168,8 +169,9 @@ def uncertainty_warnings(damper: Damper) -> list[str]:
     elif uncertainty.session_dof < 2:
         sentences.append("The scatter between sessions rests on fewer than two degrees of freedom.")
     sentences += [
-        f"The forces of session {session} are {100 * abs(ratio - 1):.2g} % {'above' if ratio > 1 else 'below'} those "
-        "of the other sessions, which differ less from each other: check its load cell, temperature and preload."
+        f"The forces of session {session} are {number(100 * abs(ratio - 1), 2)} % "
+        f"{'above' if ratio > 1 else 'below'} those of the other sessions, which differ less from each other: check "
+        "its load cell, temperature and preload."
         for session, ratio in (uncertainty.sessions.deviating() if uncertainty.sessions else {}).items()
     ]
     apart, wide, weak = list[int](), list[tuple[str, str]](), list[tuple[str, str]]()

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrdamper.data.displayable import Displayable
 from mrdamper.data.runs import Run, Split
+from mrdamper.data.wording import counted
 from mrdamper.errors import RunError, UnknownNameError, check_fields, shown, validate_arguments
 
 
@@ -60,7 +61,7 @@ class Dataset(Displayable):
     def headline(self) -> str:
         """Name, runs per rig and number of validation runs."""
         rigs = "".join(f", {len(self.rig(name))} of rig {name}" for name in self.rigs if name)
-        runs = f"{len(self)} run{'s' * (len(self) > 1)}"
+        runs = f"{counted(len(self), 'run')}"
         return f"dataset {self.name}: {runs}{rigs}; {len(self.split('validate')) or 'no'} validation runs"
 
     @property

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from mrdamper.data.wording import number
 from mrdamper.errors import MissingExtraError
 
 _ROWS_SHOWN = 30  # of a table in a notebook
@@ -66,7 +67,7 @@ def _library(name: str) -> Any:
 
 def _cell(value: Any) -> str:
     if isinstance(value, float | np.floating):
-        return f"{value:.4g}"
+        return number(value)
     return "" if value is None else str(value)
 
 

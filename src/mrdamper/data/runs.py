@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from mrdamper.data.arrays import Floats, chunks, index_at, take
 from mrdamper.data.conditions import Condition
 from mrdamper.data.displayable import Displayable
+from mrdamper.data.wording import counted, number, span
 from mrdamper.errors import (
     NonFiniteError,
     RunError,
@@ -143,10 +144,10 @@ class Run(Displayable):
     def headline(self) -> str:
         """Id, rig, length, current and split."""
         low, high = float(np.min(self.current)), float(np.max(self.current))
-        current = f"{low:.3g}–{high:.3g}" if self.current_changes else f"{self.mean_current:.3g}"
+        current = span(low, high, "A") if self.current_changes else f"{number(self.mean_current, 3)} A"
         seconds = self.time[-1] - self.time[0]
         rig = f" of rig {self.rig}" if self.rig else ""
-        return f"run {self.id}{rig}: {self.time.size} samples, {seconds:.4g} s, {current} A, {self.split}"
+        return f"run {self.id}{rig}: {counted(self.time.size, 'sample')}, {number(seconds)} s, {current}, {self.split}"
 
     @property
     def table(self) -> Mapping[str, Floats]:
@@ -210,7 +211,7 @@ class Run(Displayable):
         inside = np.flatnonzero(self.in_window)
         if inside.size < 3:
             raise RunError(
-                f"the steady window {self.window} s holds {inside.size} samples",
+                f"the steady window {self.window} s holds {counted(inside.size, 'sample')}",
                 where=self._where,
                 remedy="correct steady_t0_s and steady_t1_s",
             )
@@ -223,7 +224,7 @@ class Run(Displayable):
             return self
         time = self.time[start:stop]
         if time.size < 3:
-            raise RunError(f"{time.size} samples", where=self._where, remedy="a run needs at least 3")
+            raise RunError(counted(time.size, "sample"), where=self._where, remedy="a run needs at least 3")
         inner = [(max(a, start) - start, min(b, stop) - start) for a, b in self.segments]
         part: Run = object.__new__(type(self))  # samples that were checked with the whole run
         values = {name: getattr(self, name) for name in self.__dataclass_fields__} | dict(
@@ -263,7 +264,7 @@ class Run(Displayable):
             raise RunError(f"{name} has {array.ndim} dimensions", where=self._where, remedy="pass 1-D arrays")
         if size is not None and array.size != size:
             raise RunError(
-                f"{name} has {array.size} samples, time has {size}",
+                f"{name} has {counted(array.size, 'sample')}, time has {size}",
                 where=self._where,
                 remedy="trim or resample the run",
             )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.joint import damper_of
 from mrdamper.data.encoding import latex, markdown
 from mrdamper.data.parameters import latex_symbol
@@ -68,19 +67,5 @@ def document_facts(given: Damper | Model) -> dict[str, Any]:
         "rig": damper.rig,
         "equations": equations(damper),
         "parameters": rows,
-        "ranges": _ranges(damper.envelope),
+        "ranges": list(damper.envelope.ranges(" to ").items()) if damper.envelope.tested else [],
     }
-
-
-def _ranges(envelope: Envelope) -> list[tuple[str, str]]:
-    if not envelope.tested:
-        return []
-    return [
-        (title, f"{scale * low:.4g} to {scale * high:.4g} {unit}")
-        for title, (low, high), scale, unit in (
-            ("current", envelope.current_A, 1, "A"),
-            ("frequency", envelope.frequency_Hz, 1, "Hz"),
-            ("amplitude", envelope.amplitude_m, 1e3, "mm"),
-            ("peak velocity", envelope.peak_velocity_m_s, 1, "m/s"),
-        )
-    ]

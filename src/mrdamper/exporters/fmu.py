@@ -30,12 +30,6 @@ _SAMPLES_PER_CYCLE = 200
 _INTERNAL_STEP = 2.0**-9  # s; two milliseconds, so that the usual communication step of 1 ms is one internal step
 MOST_STEPS = 1_000_000  # internal ones, in a communication step
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest date of a zip file: the same FMU has the same bytes
-_TESTED = (
-    ("current", "current_A", 1.0, "A"),
-    ("frequency", "frequency_Hz", 1.0, "Hz"),
-    ("amplitude", "amplitude_m", 1e3, "mm"),
-    ("peak velocity", "peak_velocity_m_s", 1e3, "mm/s"),
-)
 
 
 @dataclass(frozen=True)
@@ -172,11 +166,7 @@ def _facts(stepping: Stream, name: str, rig: str, fmi: int, expected: Reference)
     facts |= description_facts(stepping, fmi, expected.internal_step, facts["members"])
     return facts | {
         "fmi": fmi,
-        "envelope": [
-            (text, *(f"{factor * bound:.4g}" for bound in getattr(envelope, field)), unit)
-            for text, field, factor, unit in _TESTED
-            if envelope
-        ],
+        "envelope": envelope.ranges(" to ") if envelope else {},
         "most_steps": MOST_STEPS,
         "stop_time": repr(expected.step * (expected.force.size - 1)),
         "about": f"{stepping.title}{f' of rig {rig}' if rig else ''}, written by mrdamper.",

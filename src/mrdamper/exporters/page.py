@@ -16,6 +16,7 @@ from mrdamper.dampers.base import Damper
 from mrdamper.dampers.envelope import SLACK, Envelope
 from mrdamper.dampers.joint import damper_of
 from mrdamper.dampers.streaming import FLAGS, Stream, stream
+from mrdamper.data.wording import number, span
 from mrdamper.exporters.base import Exporter, Written, identifier
 from mrdamper.exporters.c import TOLERANCE, c_facts, c_sources, reference_force, shared_points
 from mrdamper.exporters.templates import render
@@ -107,7 +108,12 @@ def _tested(envelope: Envelope) -> list[dict[str, Any]]:
     named = [(field, label.lower(), unit, factor) for _, field, label, unit, factor, *_ in _KNOBS]
     named.append(("peak_velocity_m_s", "peak velocity", "mm/s", 1e3))
     return [
-        {"field": field, "low": low, "high": high, "said": f"{label} was tested {_span((low, high), factor)} {unit}"}
+        {
+            "field": field,
+            "low": low,
+            "high": high,
+            "said": f"{label} was tested {span(factor * low, factor * high, unit)}",
+        }
         for field, label, unit, factor in named
         for low, high in (getattr(envelope, field),)
     ]
@@ -122,12 +128,10 @@ def _words(damper: Damper | Model, stepping: Stream) -> list[str]:
         sentence += f" ({facts})" if facts else ""
     sentences = [f"{sentence}.", _SIGNS]
     if stepping.envelope is not None:
-        parts = [
-            f"{_span(getattr(stepping.envelope, field), factor)} {unit}" for _, field, _, unit, factor, *_ in _KNOBS
-        ]
-        top = 1e3 * stepping.envelope.peak_velocity_m_s[1]
+        *motion, _ = stepping.envelope.ranges().values()
+        top = number(1e3 * stepping.envelope.peak_velocity_m_s[1], 3)
         sentences.append(
-            f"Tested at {', '.join(parts)}, up to {top:.3g} mm/s; dashed curves are extrapolated beyond this range."
+            f"Tested at {', '.join(motion)}, up to {top} mm/s; dashed curves are extrapolated beyond this range."
         )
         if stepping.model is None:
             sentences.append(_FUNCTIONS)
@@ -154,7 +158,7 @@ def _knobs(envelope: Envelope | None) -> list[dict[str, Any]]:
             {"key": key, "label": label, "unit": unit, "step": _short(step)}
             | {"low": _short(least), "high": _short(most), "start": _short(_on(step, middle))}
             | {"tested": [f"{share * (low - least):.4g}", f"{share * (high - low):.4g}"] if envelope else []}
-            | {"said": f"tested {_span((low, high), 1.0)} {unit}" if envelope else ""}
+            | {"said": f"tested {span(low, high, unit)}" if envelope else ""}
         )
     return knobs
 
@@ -162,10 +166,6 @@ def _knobs(envelope: Envelope | None) -> list[dict[str, Any]]:
 def _on(step: float, value: float, least: int = 0) -> float:
     """Round to the nearest multiple of a slider's step."""
     return max(round(value / step), least) * step
-
-
-def _span(bounds: tuple[float, float], factor: float) -> str:
-    return "–".join(f"{factor * bound:.3g}" for bound in bounds)
 
 
 def _short(value: float) -> str:

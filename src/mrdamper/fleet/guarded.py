@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from mrdamper.data.child import descendants, send, standard_output, writable_memory
+from mrdamper.data.wording import number
 from mrdamper.errors import InputError
 
 _MAX_LEFTOVER_BYTES = 256 * 2**20  # bytes that jobs may leave allocated before the process is replaced
@@ -63,7 +64,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         return {"code": error.code, "found": error.found, "where": error.where, "remedy": error.remedy}
     except MemoryError:
         gc.collect()
-        return {"code": "E_JOB_MEMORY", "found": f"over {limits['memory_bytes'] / 2**30:.3g} GiB of memory"}
+        return {"code": "E_JOB_MEMORY", "found": f"over {number(limits['memory_bytes'] / 2**30, 3)} GiB of memory"}
     except Exception:
         text = "".join(traceback.format_exc().splitlines(keepends=True)[-_TRACEBACK_LINES:])
         return {"code": "E_JOB_FAULT", "found": text.strip(), "remedy": "internal error; please report it"}

@@ -12,6 +12,7 @@ from typing import Any
 
 from mrdamper.data.atomic import require_writable
 from mrdamper.data.progress import Progress, silent
+from mrdamper.data.wording import counted
 from mrdamper.errors import InputError, validate_arguments
 from mrdamper.fleet.engine import Submit, cluster_engine, local_engine, outcome
 from mrdamper.fleet.guard import JobLimits
@@ -142,7 +143,7 @@ class _Line:
                     reason, remedy = error.strerror or str(error), "correct the file or its permissions"
                     self._failed[number] = refused(InputError(reason, where=item.paths[0], remedy=remedy))
             if number % 100 == 0:
-                self._progress(f"reading {len(self._items)} dampers", 0.0)
+                self._progress(f"reading {counted(len(self._items), 'damper')}", 0.0)
         self._make_plan()
         if self.plan is not None:
             self._measure(list(self._digests), self.plan, count=True)
@@ -220,7 +221,7 @@ class _Line:
             done += len(finished)
             what = "reference dampers" if plan is None else "dampers"
             rate = done / max(time.monotonic() - begin, 1e-9)
-            self._progress(f"{done} of {len(waiting)} {what}, {rate:.3g} a second", done / len(waiting))
+            self._progress(f"{done} of {len(waiting)} {what}, {number(rate, 3)} a second", done / len(waiting))
 
     def _is_kept(self, number: int, plan: Plan | None) -> bool:
         if self._journal.status(self._key(number, plan)) is not None:

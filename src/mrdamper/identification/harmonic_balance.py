@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
+from mrdamper.data.wording import counted
 from mrdamper.errors import ExcitationError, IdentificationError
 from mrdamper.physics.hysteresis import Shape, loop_harmonics
 from mrdamper.physics.motion import SINE_DISTORTION_LIMIT, STRAY_LIMIT, Excitation, analyse_motion
@@ -151,7 +152,7 @@ def separate_mass(conditions: Sequence[Condition], in_phase: Sequence[float]) ->
     omega = 2 * np.pi * np.array([c.frequency_Hz for c in conditions])
     if omega.size < 2 or np.ptp(omega) < 0.03 * np.max(omega):
         raise IdentificationError(
-            f"{omega.size} runs at one frequency: it takes two to tell mass from stiffness",
+            f"{counted(omega.size, 'run')} at one frequency: it takes two to tell mass from stiffness",
             remedy="add runs at another frequency, or give the gas spring",
         )
     columns = np.column_stack([np.ones_like(omega), -(omega**2)])

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrdamper.data.arrays import Floats
 from mrdamper.data.conditions import Condition
+from mrdamper.data.wording import number
 from mrdamper.errors import InputError
 
 _STRONG_CORRELATION = 0.98  # correlation from which two parameters are strongly correlated
@@ -20,7 +21,6 @@ _SERIES_DEGREES_OF_FREEDOM = 1000.0  # degrees of freedom from which the series 
 _MOST_DEGREES_OF_FREEDOM, _HALVINGS = 1e6, 30  # that a quantile is looked for in, and steps of bisection
 _RULE_END, _NODES = 3.2, 81  # of the tanh-sinh rule: the weights beyond its end are below rounding
 _MAX_NEWTON_STEPS = 200  # of Newton's method
-_EXPONENT = 1e6  # from this number on, numbers are written with an exponent
 _LOPSIDED = 0.1  # share of an interval's half width: less asymmetric, it is written with ±
 
 
@@ -105,23 +105,17 @@ def written(value: float, ends: tuple[float, float] | None, unit: str = "") -> s
     factor, unit = _SHOWN.get(unit, (1.0, unit))
     value, ends = factor * value, ends and (factor * ends[0], factor * ends[1])
     if ends is None or not all(map(math.isfinite, ends)):
-        return f"{_plain(value, 4)} {unit}".strip()
+        return f"{number(value)} {unit}".strip()
     low, high = ends
     half = (high - low) / 2
     if half == 0:
-        return f"{_plain(value, 6)} ± 0 {unit}".strip()
+        return f"{number(value, 6)} ± 0 {unit}".strip()
     largest = max(abs(value), half)
     digits = math.floor(math.log10(largest)) - math.floor(math.log10(half)) + 2
+    estimate, least, most = (number(each, digits, largest) for each in (value, low, high))
     if abs(high + low - 2 * value) > _LOPSIDED * half:
-        return f"{_plain(value, digits)} ({_plain(low, digits)} to {_plain(high, digits)}) {unit}".strip()
-    if largest >= _EXPONENT:  # both with an exponent
-        return f"{value:.{digits - 1}e} ± {half:.1e} {unit}".strip()
-    return f"{_plain(value, digits)} ± {_plain(half, 2)} {unit}".strip()
-
-
-def _plain(value: float, digits: int) -> str:
-    """Write a number to some digits, without an exponent below a million."""
-    return f"{float(f'{value:.{digits}g}'):.10g}" if abs(value) < _EXPONENT else f"{value:.{digits}g}"
+        return f"{estimate} ({least} to {most}) {unit}".strip()
+    return f"{estimate} ± {number(half, 2, largest)} {unit}".strip()
 
 
 def weaknesses(

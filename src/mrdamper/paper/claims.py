@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from mrdamper.data.wording import number
 from mrdamper.errors import UnknownNameError
 from mrdamper.paper import claims_on_fits, claims_on_tests
 from mrdamper.paper.results import Measured, Reproduction
@@ -181,7 +182,7 @@ def _checked(study: Reproduction, key: str, row: _Row, measured: Measured) -> Cl
     if row.kind == "damper" and virtual and verdict != "cannot be checked":
         verdict = "not checked"
     listed = [
-        f"{limit.value} {value:.3g}" if math.isfinite(value) else f"{limit.value}: not tested"
+        f"{limit.value} {number(value, 3)}" if math.isfinite(value) else f"{limit.value}: not tested"
         for limit, value in zip(row.limits, measured.values, strict=False)
     ]
     evidence = "; ".join(part for part in (*listed, measured.evidence) if part)

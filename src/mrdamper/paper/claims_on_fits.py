@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mrdamper.data import Condition, Floats
+from mrdamper.data.wording import number, span
 from mrdamper.paper.options import ALI, CONSISTENT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import Measured, Reproduction, function_of, unknown, values
 from mrdamper.study.recipe import RecipeResult
@@ -21,8 +22,8 @@ def viscosity(study: Reproduction) -> Measured:
         return unknown("one of the two balances could not be followed on every run")
     return Measured.of(
         np.median(literal / np.maximum(consistent, 1e-9)),
-        evidence=f"closed form {literal.min():.0f}–{literal.max():.0f} N s/m, consistent balance "
-        f"{consistent.min():.0f}–{consistent.max():.0f} N s/m",
+        evidence=f"closed form {span(literal.min(), literal.max(), 'N s/m')}, consistent balance "
+        f"{span(consistent.min(), consistent.max(), 'N s/m')}",
     )
 
 
@@ -32,7 +33,7 @@ def mass(study: Reproduction) -> Measured:
     if fit is None or not fit.function.form.startswith("mass") or not np.ptp(literal):
         return unknown("m is held, or the runs determine no function of current and frequency for it")
     truth = f"; true {study.rig.mass:g} kg" if study.rig else ""
-    evidence = f"closed form {literal.min():.0f}…{literal.max():.0f} kg{truth}"
+    evidence = f"closed form {span(literal.min(), literal.max(), 'kg', to='…')}{truth}"
     return Measured.of(fit.r2, amplitude_spread(study.conditions, literal), literal.min(), evidence=evidence)
 
 
@@ -42,7 +43,7 @@ def alpha(study: Reproduction) -> Measured:
     if fit is None or fit.function.form != "plane":
         return unknown("too few motions for a plane over frequency and amplitude")
     _, _, e1, e2, _ = fit.function.coefficients
-    evidence = f"{1e-3 * e1:+.3g} kN/m per Hz, {1e-6 * e2:+.3g} kN/m per mm"
+    evidence = f"{number(1e-3 * e1, 3, sign='+')} kN/m per Hz, {number(1e-6 * e2, 3, sign='+')} kN/m per mm"
     return Measured.of(np.sign(e1), np.sign(e2), fit.r2, evidence=evidence)
 
 
@@ -58,7 +59,7 @@ def beta(study: Reproduction) -> Measured:
     if first < 1e-6:
         return unknown("at the lowest current every run ended at the same limit of the box: nothing to compare")
     limit = float(np.mean(["beta" in i.at_bounds for i in literal.identifications]))
-    evidence = f"median β {np.exp(np.median(ln_beta)):.3g} m⁻ⁿ; runs at the limit are in every value, as for α"
+    evidence = f"median β {number(np.exp(np.median(ln_beta)), 3)} m⁻ⁿ; runs at the limit are in every value, as for α"
     return Measured.of(last / first, fit.r2, limit, evidence=evidence)
 
 
@@ -80,8 +81,8 @@ def search(study: Reproduction) -> Measured:
     error = max(end.error for end in study.ended)
     return Measured.of(
         *np.exp(np.median(np.log(factors), axis=0)),
-        evidence=f"{len(factors)} runs, a seed each; worst factors {a:.3g} and {b:.3g}; largest error over the least "
-        f"{error:.3g}",
+        evidence=f"{len(factors)} runs, a seed each; worst factors {number(a, 3)} and {number(b, 3)}; largest error "
+        f"over the least {number(error, 3)}",
     )
 
 

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run, same_motion
+from mrdamper.data.wording import span
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.paper.options import CONSISTENT
@@ -40,14 +41,14 @@ def friction(study: Reproduction) -> Measured:
 def bulges(study: Reproduction) -> Measured:
     """Return the share of loops that are widest at mid-stroke."""
     ratios = np.array([bulge(run) for run in study.train])
-    return Measured.of(np.mean(ratios > 1), evidence=f"ratio of widths {ratios.min():.2f}–{ratios.max():.2f}")
+    return Measured.of(np.mean(ratios > 1), evidence=f"ratio of widths {span(ratios.min(), ratios.max())}")
 
 
 def energy(study: Reproduction) -> Measured:
     """Return the shares of steps in current and frequency that raise the energy of a cycle."""
     energies = [loop.dissipated_energy for loop in study.loops]
     shares = rising_shares([loop.condition for loop in study.loops], energies)
-    return Measured.of(*shares, evidence=f"{min(energies):.3g}–{max(energies):.3g} J per cycle")
+    return Measured.of(*shares, evidence=f"{span(min(energies), max(energies), 'J')} per cycle")
 
 
 def stroke_end(study: Reproduction) -> Measured:
@@ -77,7 +78,7 @@ def phase(study: Reproduction) -> Measured:
     """Return the share of runs with a lead of 1.4–1.5 rad, and its largest change with the current."""
     leads = np.array([r.phase for r in study.readings])
     spread = max((float(np.ptp(leads[g])) for g in motions(study) if len(g) > 1), default=float("nan"))
-    evidence = f"{leads.min():.3f}–{leads.max():.3f} rad; smallest sine {np.sin(leads).min():.3f}"
+    evidence = f"{span(leads.min(), leads.max(), 'rad')}; smallest sine {np.sin(leads).min():.3f}"
     return Measured.of(np.mean((leads > 1.4) & (leads < 1.5)), spread, evidence=evidence)
 
 

@@ -14,6 +14,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.wording import number
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.harmonic_balance import (
     AmplitudeReading,
@@ -223,7 +224,7 @@ def _hysteretic_share(problem: Problem, values: dict[str, float]) -> tuple[str, 
     if surplus < _MAX_HYSTERETIC_SHARE * values["c"]:
         return ()
     return (
-        f"counted twice: {100 * min(surplus / values['c'], 1):.0f} % of c = {values['c']:.4g} N s/m is the first "
+        f"counted twice: {100 * min(surplus / values['c'], 1):.0f} % of c = {number(values['c'])} N s/m is the first "
         "harmonic of the hysteretic force, which alpha z holds too, and m is shifted likewise; method balance "
         "separates them",
     )

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.data.arrays import Floats
+from mrdamper.data.wording import number
 from mrdamper.errors import ParameterError, shown, validate_arguments
 
 Direction = Literal["compression", "extension"]
@@ -83,7 +84,7 @@ class GasSpring:
         if np.any(left <= 0):
             limit = self.volume / self.rod_area
             raise ParameterError(
-                f"a compression of {1e3 * np.max(x):.4g} mm leaves no gas volume (limit {1e3 * limit:.4g} mm)",
+                f"a compression of {number(1e3 * np.max(x))} mm leaves no gas volume (limit {number(1e3 * limit)} mm)",
                 remedy="check V0 and the rod area, or stay below the limit",
             )
         return self.pressure * self._force_area * (left**-self.exponent - 1.0)

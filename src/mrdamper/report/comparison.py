@@ -15,6 +15,7 @@ from mrdamper.data import Run
 from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names, finite
 from mrdamper.data.progress import Progress, silent
+from mrdamper.data.wording import counted
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.comparison import overlaid_loops, ranking
 from mrdamper.report.plots.cycle import spread_out
@@ -141,11 +142,11 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
         "verdict": (
             f"{first.title} has the least cross-validated error: "
             f"{100 * first.cross_validated.median():.1f} % of the "
-            f"peak-to-peak force, among {len(rig.entries)} models."
+            f"peak-to-peak force, among {counted(len(rig.entries), 'model')}."
         ),
         "loops_caption": (
             f"Last cycle of the {'validation' if runs[0].split == 'validate' else 'identification'} runs; "
-            f"the best {len(best)} models."
+            f"the best {counted(len(best), 'model')}."
         ),
         "figures": {
             name: save_figure(figure, folder / f"{name}{suffix}", ("png",) if png else ())

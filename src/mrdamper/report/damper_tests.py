@@ -14,10 +14,11 @@ import numpy as np
 from mrdamper.data import Dataset, Run, same_motion
 from mrdamper.data.atomic import publish
 from mrdamper.data.encoding import csv_text
+from mrdamper.data.wording import counted, span
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification.characteristics import SIDES, Characteristics, Stroke, characterise
 from mrdamper.report.about import About, Limit
-from mrdamper.report.page import made_from, number, plain, render_page
+from mrdamper.report.page import made_from, plain, render_page
 from mrdamper.report.plots.characteristics import continuous_velocity_plot, figures_over_current, peak_velocity_plot
 from mrdamper.report.plots.figure import Figure
 from mrdamper.report.plots.style import picture_of, save_picture
@@ -137,20 +138,17 @@ def provenance(specimens: Mapping[str, Dataset]) -> list[tuple[str, str]]:
     """List the sources of a report: runs, sampling rates, dates, files and a hash of the samples."""
     rows = []
     for name, dataset in specimens.items():
-        rates = {float(number((run.time.size - 1) / (run.time[-1] - run.time[0]))) for run in dataset.runs}
-        span = _span([f"{rate:g}" for rate in sorted(rates)])
+        rates = [(run.time.size - 1) / (run.time[-1] - run.time[0]) for run in dataset.runs]
+        sampling = span(min(rates), max(rates), "Hz", 4, " to ")
         notes = [run.notes for run in dataset.runs]
         files = sorted({note[key] for note in notes for key in _SOURCES if note.get(key)})
         dates = sorted({note["recorded_at"][:10] for note in notes if note.get("recorded_at")})
-        rows.append((name, f"{len(dataset)} runs at {span} Hz" + (f", recorded {_span(dates)}" if dates else "")))
+        recorded = f", recorded {' to '.join(dict.fromkeys((dates[0], dates[-1])))}" if dates else ""
+        rows.append((name, f"{counted(len(dataset), 'run')} at {sampling}{recorded}"))
         if files:
             rows.append((f"{name}: files", ", ".join(files)))
         rows.append((f"{name}: SHA-256 of the samples", data_hash(dataset.runs)))
     return [*rows, ("software", f"mrdamper {version('mrdamper')}")]
-
-
-def _span(texts: Sequence[str]) -> str:
-    return texts[0] if len(texts) == 1 else f"{texts[0]} to {texts[-1]}"
 
 
 def data_hash(runs: Sequence[Run]) -> str:
@@ -180,7 +178,7 @@ def _characterised(name: str, dataset: Dataset) -> Characteristics:
 def _summary(name: str, specimen: Characteristics) -> str:
     friction = "" if np.isnan(specimen.friction) else f"{specimen.friction:.0f} N "
     return (
-        f"{name}: {len(specimen.strokes)} tests at {', '.join(plain(c) for c in specimen.currents)} A. "
+        f"{name}: {counted(len(specimen.strokes), 'test')} at {', '.join(plain(c) for c in specimen.currents)} A. "
         f"Gas force {specimen.gas_force:.0f} N ({specimen.gas_from}). Friction {friction}({specimen.friction_from})."
     )
 

@@ -13,6 +13,7 @@ from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.prediction import NOT_A_SINE
 from mrdamper.dampers.uncertainty import Uncertainty, uncertainty_warnings
 from mrdamper.data import Floats, Run
+from mrdamper.data.wording import counted
 from mrdamper.errors import listed
 from mrdamper.identification import Identification
 from mrdamper.identification.loop_analysis import LoopAnalysis
@@ -64,12 +65,9 @@ def limitations(
 
 def validity(damper: Damper) -> str:
     """State the tested range of a damper."""
-    e = damper.envelope
+    *motion, velocity = damper.envelope.ranges().values()
     return (
-        f"Tested range: {e.current_A[0] + 0.0:.3g}–{e.current_A[1]:.3g} A, "
-        f"{e.frequency_Hz[0]:.3g}–{e.frequency_Hz[1]:.3g} Hz, "
-        f"{1e3 * e.amplitude_m[0]:.3g}–{1e3 * e.amplitude_m[1]:.3g} mm, "
-        f"peak velocity {e.peak_velocity_m_s[0]:.3g}–{e.peak_velocity_m_s[1]:.3g} m/s. "
+        f"Tested range: {', '.join(motion)}, peak velocity {velocity}. "
         "Predictions outside it are marked as extrapolation."
     )
 
@@ -91,7 +89,7 @@ def _design(loops: Sequence[LoopAnalysis], identified: Sequence[str]) -> list[st
     sentences = []
     if 0 < len(identified) < MIN_RUNS:
         sentences.append(
-            f"Only {len(identified)} identification runs: they were not compared with each other, "
+            f"Only {counted(len(identified), 'identification run')}: they were not compared with each other, "
             f"which shows wrong units, currents and signs from {MIN_RUNS} runs on."
         )
     sines = [loop.condition for loop in loops if loop.run_id in identified]
@@ -171,7 +169,7 @@ def _functions(fit: ModifiedFit, damper: Damper) -> list[str]:
         sentences.append(f"Parameter functions at a bound of the search: {', '.join(names)}.")
     levels = len({round(c.current_A, 3) for c in fit.conditions})
     if 1 < levels < _MIN_LEVELS:
-        sentences.append(f"Only {levels} currents were tested: the form between them is an assumption.")
+        sentences.append(f"Only {counted(levels, 'current')} were tested: the form between them is an assumption.")
     return sentences
 
 
@@ -208,7 +206,9 @@ def _identifications(identifications: Sequence[Identification]) -> list[str]:
         for name in identification.at_bounds:
             bound.setdefault(name, []).append(identification.run_id)
     for name, runs in bound.items():
-        sentences.append(f"{name} at a bound of its range in {len(runs)} individual fits: {listed(runs, _MAX_RUNS)}.")
+        sentences.append(
+            f"{name} at a bound of its range in {counted(len(runs), 'individual fit')}: {listed(runs, _MAX_RUNS)}."
+        )
     notes = dict.fromkeys(note for identification in identifications for note in identification.notes)
     return sentences + [f"Individual fits: {note}." for note in notes if note.lower().startswith("mass")]
 
@@ -228,14 +228,14 @@ def _tests(loops: Sequence[LoopAnalysis]) -> list[str]:
     if distorted:
         worst = max(loop.motion.distortion for loop in distorted)
         sentences.append(
-            f"Distorted sine motion in {len(distorted)} of {len(loops)} runs (distortion up to {100 * worst:.0f} %); "
-            "identification uses the measured motion."
+            f"Distorted sine motion in {len(distorted)} of {counted(len(loops), 'run')} (distortion up to "
+            f"{100 * worst:.0f} %); identification uses the measured motion."
         )
     drifting = [loop.run_id for loop in loops if abs(loop.motion.drift) > _MAX_DRIFT_M_S]
     if drifting:
         fastest = max(abs(loop.motion.drift) for loop in loops)
         sentences.append(
-            f"Drift of the mean position in {len(drifting)} runs, up to {1e3 * fastest:.2f} mm/s: "
+            f"Drift of the mean position in {counted(len(drifting), 'run')}, up to {1e3 * fastest:.2f} mm/s: "
             f"{listed(drifting, _MAX_RUNS)}."
         )
     return sentences

@@ -6,16 +6,21 @@ Templates are in `templates/`; each extends `base.html.j2` with layout and style
 from __future__ import annotations
 
 import base64
+import re
 from importlib.metadata import version
+from itertools import compress
 
 import jinja2
 import numpy as np
 from markupsafe import Markup
 
 from mrdamper.data import Dataset
+from mrdamper.data.wording import counted, number, span
 from mrdamper.errors import UnknownNameError
 
 PAPERS = ("a4", "letter")  # sizes of the pages of a PDF
+_TABLE = re.compile(r"<table(?! class)[^>]*>.*?</table>", re.DOTALL)  # with headings; a table of facts has a class
+_ROW, _CELL = re.compile(r"(<tr\b[^>]*>)(.*?)</tr>", re.DOTALL), re.compile(r"<(th|td)\b.*?>(.*?)</\1>", re.DOTALL)
 
 
 def paper_size(name: str) -> str:
@@ -27,12 +32,24 @@ def paper_size(name: str) -> str:
 
 def render_page(template: str, title: str, footer: str, **facts: object) -> str:
     """Render a template of `templates/`; the footer states the origin of the page."""
-    return _ENVIRONMENT.get_template(template).render(title=title, footer=footer, **facts)
+    page = _ENVIRONMENT.get_template(template).render(title=title, footer=footer, **facts)
+    return _TABLE.sub(_without_empty_columns, page)
+
+
+def _without_empty_columns(table: re.Match[str]) -> str:
+    """Leave out the columns of a table that have no value in any row below their heading."""
+    _, *rows = ([cell[2] for cell in _CELL.finditer(row[0])] for row in _ROW.finditer(table[0]))
+    filled = [any(text not in ("", "–") for text in column) for column in zip(*rows, strict=True)]
+    if all(filled):
+        return table[0]
+    return _ROW.sub(
+        lambda row: f"{row[1]}{''.join(cell[0] for cell in compress(_CELL.finditer(row[2]), filled))}</tr>", table[0]
+    )
 
 
 def made_from(*datasets: Dataset) -> str:
     """Return the start of a footer: version of mrdamper and the datasets."""
-    text = "; ".join(f"{dataset.name}, {len(dataset)} runs" for dataset in datasets)
+    text = "; ".join(f"{dataset.name}, {counted(len(dataset), 'run')}" for dataset in datasets)
     return f"mrdamper {version('mrdamper')}; dataset{'s' if len(datasets) > 1 else ''}: {text}"
 
 
@@ -42,20 +59,15 @@ def inline_svg(picture: bytes, alt: str) -> Markup:
     return Markup('<img alt="{}" src="data:image/svg+xml;base64,{}">').format(alt, data)
 
 
-def number(value: float | None, digits: int = 4) -> str:
-    """Format a value to some significant digits; a dash where there is none."""
-    return "–" if value is None or not np.isfinite(value) else f"{value + 0.0:.{digits}g}"
-
-
-def plain(value: float) -> str:
-    """Format a condition as in a test plan: three significant digits, zero without a sign.
+def plain(value: float | None) -> str:
+    """Format a value to three digits and decimals, as a condition in a test plan; a dash where there is none.
 
     Examples
     --------
     >>> plain(1.5003), plain(-0.0004), plain(0.500000000013146)
     ('1.5', '0', '0.5')
     """
-    return number(round(value, 3), 3)
+    return number(value and round(value, 3), 3)
 
 
 def whole(value: float) -> str:
@@ -71,7 +83,7 @@ def median_worst(median: float | None, worst: float | None) -> str:
 
 def percent(share: float | None, digits: int = 1) -> str:
     """Format a share in per cent; a dash where there is none."""
-    return "–" if share is None or not np.isfinite(share) else f"{100 * share:.{digits}f}"
+    return "–" if share is None or not np.isfinite(share) else f"{100 * share:z.{digits}f}"
 
 
 _ENVIRONMENT = jinja2.Environment(
@@ -84,6 +96,7 @@ _ENVIRONMENT = jinja2.Environment(
 _ENVIRONMENT.globals |= {
     "svg": inline_svg,
     "number": number,
+    "span": span,
     "plain": plain,
     "whole": whole,
     "median_worst": median_worst,

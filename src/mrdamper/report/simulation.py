@@ -10,6 +10,7 @@ import numpy as np
 
 from mrdamper.data.atomic import publish
 from mrdamper.data.encoding import csv_text, rows_of
+from mrdamper.data.wording import number
 from mrdamper.report.page import render_page
 from mrdamper.report.plots.simulation import histories, spectra
 from mrdamper.report.plots.style import save_figure
@@ -46,7 +47,7 @@ def write_simulation(
         page = render_page(
             "simulation.html.j2",
             f"{done.system.title or done.system.name}: {type(done.controller).title}",
-            f"mrdamper {version('mrdamper')}; step {1e3 * done.step:.3g} ms",
+            f"mrdamper {version('mrdamper')}; step {number(1e3 * done.step, 3)} ms",
             done=done,
             columns=columns,
             names=names,

@@ -18,7 +18,9 @@ from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names
 from mrdamper.data.progress import Progress, silent
 from mrdamper.data.runs import once_per_run
+from mrdamper.data.wording import counted, span
 from mrdamper.errors import IdentificationError
+from mrdamper.identification import Identification
 from mrdamper.identification.characteristics import Characteristics, characterise
 from mrdamper.identification.intervals import written
 from mrdamper.models import Model
@@ -38,7 +40,7 @@ from mrdamper.report.plots.model import (
 )
 from mrdamper.report.plots.reversal import force_since_reversal
 from mrdamper.report.plots.rig_tests import measured_loops, test_analysis, test_matrix
-from mrdamper.report.plots.style import MOST_NAMED, Picture, picture_of, save_picture
+from mrdamper.report.plots.style import MOST_NAMED, Picture, picture_of, powered, save_picture
 from mrdamper.report.summary import error_sentence, omission_lines
 from mrdamper.report.tables import identification_rows, score_rows
 from mrdamper.study.processes import IN_PROCESS, Processes
@@ -182,7 +184,6 @@ def _measured(rig: RigStudy) -> dict[str, Characteristics]:
 def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limit]) -> dict[str, Any]:
     chosen = rig.chosen
     mapped, functions = _mapped(rig)
-    first = mapped.identifications[0] if mapped else None
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
     limits_of_use = limitations(chosen, rig.loops, rig.dataset, rig.undescribed)
     held = all(run.split == "validate" for run in _shown(rig))
@@ -201,7 +202,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
         "contradictions": rig.contradictions,
         "omissions": omission_lines(rig.candidates, rig.omitted, len(rig.omitted)),
         "identifications": mapped.identifications if mapped else (),
-        "parameter_names": [name for name in first.model.values() if name in first.free] if first else (),
+        "fit_columns": _fit_columns(mapped.identifications) if mapped else (),
         "mapped": mapped,
         "every_motion_drawn": functions is not None and len(motions_of(functions)) <= MOST_NAMED,
         "joint": _joint_table(chosen, chosen.fit.damper.model) if isinstance(chosen.fit, JointFit) else (),
@@ -222,6 +223,16 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
 def _mapped(rig: RigStudy) -> tuple[RecipeResult, ModifiedFit] | tuple[None, None]:
     """Return the best candidate with parameter functions, if any: its curves are drawn."""
     return next(((c, c.fit) for c in rig.candidates if isinstance(c.fit, ModifiedFit)), (None, None))
+
+
+def _fit_columns(fits: Sequence[Identification]) -> list[tuple[str, str, float]]:
+    """List the free parameters of individual fits: name, unit with a power of a thousand, and the factor for it."""
+    columns = []
+    for info in fits[0].model.parameters() if fits else ():
+        if info.name in fits[0].free:
+            unit, factor = powered(f"({info.unit})", max(abs(getattr(fit.model, info.name)) for fit in fits))
+            columns.append((info.name, unit[1:-1], factor))
+    return columns
 
 
 def _joint_table(chosen: RecipeResult, model: Model) -> list[dict[str, Any]]:
@@ -303,7 +314,7 @@ def _choice(rig: RigStudy) -> str:
 def _tests(rig: RigStudy) -> str:
     used = {run.run_id for scores in (rig.chosen.cross_validated, rig.chosen.validation) for run in scores.runs}
     others, unused = len(used - {loop.run_id for loop in rig.loops}), len({run.id for run in rig.dataset} - used)
-    records = f"{others} {'record' if others == 1 else 'records'} of other motion or of a varying current"
+    records = f"{counted(others, 'record')} of other motion or of a varying current"
     more = " and ".join([records] * (others > 0) + [f"{unused} not used"] * (unused > 0))
     if not rig.loops:
         return f"Tests: {more}; no steady sine at constant current."
@@ -312,8 +323,8 @@ def _tests(rig: RigStudy) -> str:
     listed = ", ".join(currents) if len(currents) < 9 else f"{currents[0]} to {currents[-1]}"
     frequencies = [c.frequency_Hz for c in conditions]
     amplitudes = [1e3 * c.amplitude_m for c in conditions]
+    motions = f"{span(min(frequencies), max(frequencies), 'Hz')} and {span(min(amplitudes), max(amplitudes), 'mm')}"
     return (
-        f"Tests: {len(rig.loops)} sine runs at {listed} A, {min(frequencies):.3g}–{max(frequencies):.3g} Hz and "
-        f"{min(amplitudes):.3g}–{max(amplitudes):.3g} mm{f', and {more}' if more else ''}; "
-        f"{len(rig.dataset.split('validate'))} runs for validation."
+        f"Tests: {counted(len(rig.loops), 'sine run')} at {listed} A, {motions}{f', and {more}' if more else ''}; "
+        f"{counted(len(rig.dataset.split('validate')), 'run')} for validation."
     )

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrdamper.dampers.uncertainty import table
 from mrdamper.data.runs import once_per_run
+from mrdamper.data.wording import counted
 from mrdamper.errors import listed
 from mrdamper.report.limitations import limitations
 from mrdamper.study.recipe import RecipeResult
@@ -101,14 +102,14 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
     chosen = rig.chosen
     lines = [
         f"{rig.dataset.name}: {chosen.title}, {chosen.damper.parameter_count} parameters, "
-        f"{len(chosen.identifications) or len(chosen.cross_validated.runs)} identification runs",
+        + counted(len(chosen.identifications) or len(chosen.cross_validated.runs), "identification run"),
         f"  force error (median, worst run): {_errors('cross-validation', chosen.cross_validated)}; "
         f"{_errors('validation', chosen.validation)}",
     ]
     if intervals := check_intervals(rig):
         lines.append(
             f"  {100 * LEVEL:.0f} % prediction interval of the peak force: ±{100 * intervals.half_width:.0f} %; "
-            f"{intervals.inside} of {intervals.runs} validation runs inside"
+            f"{intervals.inside} of {counted(intervals.runs, 'validation run')} inside"
         )
     if rig.calibration is not None:
         lines.append(f"  {rig.calibration.summary}")

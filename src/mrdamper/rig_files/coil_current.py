@@ -13,6 +13,7 @@ import numpy as np
 
 from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import chunks
+from mrdamper.data.wording import number
 from mrdamper.errors import ColumnError, InputError, printable
 from mrdamper.rig_files.column_names import COIL, RATING, holds, names_condition, split_name
 from mrdamper.rig_files.columns import coil_currents
@@ -91,7 +92,7 @@ def _refuse_contradicted_line(table: RawTable, stated: Statement, rows: slice, w
     name, low, high = table.names[first], np.min(values[first]), np.max(values[first])
     line = f"[channels.current] column = {json.dumps(name, ensure_ascii=False)}"
     raise ColumnError(
-        printable(f"{stated.whence} gives {stated.amperes:g} A, the column {name!r} {low:.3g} to {high:.3g} A"),
+        printable(f"{stated.whence} gives {stated.amperes:g} A, the column {name!r} {number(low, 3)} to {high:.3g} A"),
         where=where,
         remedy=f"{_DECIDE}: if the line, set {line} in a profile",
         code="E_CURRENT_CONTRADICTS",
@@ -109,7 +110,7 @@ def _agreed(statements: list[Statement], channel: Floats | None, where: str) -> 
     measured = [f"the current channel gives {mean:g} A"] if not change and contradicts(mean, current) else []
     over = [statement for statement in statements if abs(statement.amperes) > LARGEST_STATED]
     if whence == _PROFILE:
-        varies = [f"the current channel goes from {finite.min():.3g} to {finite.max():.3g} A"] if change else []
+        varies = [f"the current channel goes from {number(finite.min(), 3)} to {finite.max():.3g} A"] if change else []
         code, whence, against = "E_CURRENT_CONTRADICTS", "the profile", [*varies, *measured, *against]
         remedy = "leave [current] out of the profile; if the file is wrong, correct it, or rename it"
     elif over or against:

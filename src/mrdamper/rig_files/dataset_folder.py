@@ -19,6 +19,7 @@ from mrdamper.data import Condition, Dataset, Floats, Run
 from mrdamper.data.arrays import chunks, drop_pages
 from mrdamper.data.atomic import path_of, write_file, write_folder
 from mrdamper.data.encoding import csv_text, csv_value
+from mrdamper.data.wording import counted
 from mrdamper.errors import ColumnError, DatasetError, OutputError, shown, validate_arguments
 from mrdamper.rig_files.coil_current import contradicted
 from mrdamper.rig_files.dataset_samples import OPTIONAL, REQUIRED, SAMPLE_FILES, Channels, missing_column, read_samples
@@ -174,12 +175,12 @@ def _rows_of(lines: Iterable[list[str]], path: Path) -> list[dict[str, Any]]:
     if "run_id" not in heads:
         raise missing_column("run_id", heads, path)
     if len(set(heads)) < len(heads) or len(heads) > MOST_COLUMNS:
-        raise refuse(f"{len(heads)} columns, {len(set(heads))} of different names")
+        raise refuse(f"{counted(len(heads), 'column')}, {len(set(heads))} of different names")
     rows = []
     for line in lines:
         if len(line) > len(heads):
             run = line[heads.index("run_id")][:80]
-            raise refuse(f"{len(line)} cells under {len(heads)} columns in the row of run {run}")
+            raise refuse(f"{counted(len(line), 'cell')} under {counted(len(heads), 'column')} in the row of run {run}")
         if len(rows) == _MOST_RUNS:
             raise refuse(f"over {_MOST_RUNS:,} runs")
         rows.append({head: csv_value(cell) or None for head, cell in zip_longest(heads, line, fillvalue="")})

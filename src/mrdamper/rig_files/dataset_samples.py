@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mrdamper.data import Floats, Run
+from mrdamper.data.wording import number
 from mrdamper.errors import ColumnError, DatasetError, RunError, UnitError
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import opened
@@ -214,6 +215,6 @@ def _refuse_gap(time: Floats, path: Path) -> None:
     wide = steps > 5 * np.median(steps) if steps.size else np.zeros(0, dtype=bool)
     if wide.any():
         at = int(np.argmax(wide))
-        problem = f"a gap of {steps[at]:.4g} s after {time[at]:.6g} s"
+        problem = f"a gap of {number(steps[at])} s after {time[at]:.6g} s"
         remedy = "predict each part separately: the damper's state is unknown after a gap"
         raise RunError(problem, where=str(path), remedy=remedy, code="E_TIME_GAP")

@@ -11,6 +11,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.arrays import chunks, rescale
+from mrdamper.data.wording import counted
 from mrdamper.errors import ColumnError, CombinedError, InputError, listed, printable
 from mrdamper.physics.motion.measured import smooth
 from mrdamper.rig_files.coil_current import (
@@ -143,7 +144,7 @@ def _read(table: RawTable, assigned: dict[str, Assigned], profile: Profile):
         try:
             values = table.read([assigned[name].column]).values[assigned[name].column]
             if values.size != (size := content.values[assigned["force"].column].size):
-                raise table.source.refuse("E_FIELD_COUNT", f"it has {values.size} samples, the force {size}")
+                raise table.source.refuse("E_FIELD_COUNT", f"it has {counted(values.size, 'sample')}, the force {size}")
             raw[assigned[name].column] = values
         except InputError as error:
             code = "W_ENCODING" if error.code == "E_ENCODING" else "W_COLUMN"

@@ -11,6 +11,7 @@ from statistics import median
 
 from mrdamper.data import held_current
 from mrdamper.data.strict_text import content_of
+from mrdamper.data.wording import counted
 from mrdamper.errors import CombinedError, InputError, listed
 from mrdamper.rig_files.coil_current import with_decided_current
 from mrdamper.rig_files.column_names import split_name, words
@@ -84,7 +85,7 @@ class TestsTable:
             fitting = {path for path, run in tests if run and row.names(path, run)}
             if len(fitting) > 1:
                 shown = ", ".join(sorted("/".join(path.parts[-2:]) for path in fitting)[:4])
-                problem = f"{row.label!r} names tests of {len(fitting)} files: {shown}"
+                problem = f"{row.label!r} names tests of {counted(len(fitting), 'file')}: {shown}"
                 remedy = "write the file with its folder, and one row for each"
                 raise TestsTableError(problem, where=f"{self.path.name}, line {row.line}", remedy=remedy)
         absent = [
@@ -220,7 +221,7 @@ def _key(name: str) -> str:
 
 def _row(line: int, cells: list[str], names: list[str], keys: list[str], wrong: _Wrong) -> StatedTest:
     if len(cells) > len(names) and any(cell.strip() for cell in cells[len(names) :]):
-        wrong(line, f"{len(cells)} cells under {len(names)} names", "quote cells with commas")
+        wrong(line, f"{counted(len(cells), 'cell')} under {len(names)} names", "quote cells with commas")
     says = {}
     notes = {}
     for name, key, cell in zip(names, keys, cells, strict=False):

@@ -9,6 +9,7 @@ from typing import Any, Concatenate, Literal, ParamSpec
 
 from mrdamper import identification
 from mrdamper.data import Dataset, Displayable, Run
+from mrdamper.data.wording import counted
 from mrdamper.errors import InputError, is_a, validate_arguments
 from mrdamper.rig_files.quality.table import check_run, with_findings
 from mrdamper.study.contradictions import ContradictionError, compare_runs
@@ -46,7 +47,7 @@ class DatasetCheck(Displayable):
             kind: sum(one.severity == kind for one in self.findings) for kind in ("refused", "set aside", "noted")
         }
         listed = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
-        return f"check of {self.dataset.name}: {len(self.dataset)} runs, {listed or 'nothing found'}"
+        return f"check of {self.dataset.name}: {counted(len(self.dataset), 'run')}, {listed or 'nothing found'}"
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:

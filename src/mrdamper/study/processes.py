@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 from mrdamper.data.child import end_with_parent
 from mrdamper.data.progress import Progress, silent
+from mrdamper.discovery import in_main_script
 from mrdamper.errors import ResourceError
 
 T = TypeVar("T")
@@ -65,8 +66,11 @@ IN_PROCESS = Processes()
 
 @contextmanager
 def several(count: int) -> Generator[Processes]:
-    """Start `count` processes, this one included, for the length of a block; raises as `processes`."""
-    if count < 2:
+    """Start `count` processes, this one included, for the length of a block; raises as `processes`.
+
+    None are started if they would lack a class of the main script.
+    """
+    if count < 2 or in_main_script():
         yield IN_PROCESS
         return
     with processes(count - 1) as pool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.data import Dataset, Run
+from mrdamper.data.wording import number
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import refuse_unusable
 from mrdamper.physics.motion import analyse_motion, equivalent_sine
@@ -128,7 +129,7 @@ def _of_another_size(runs: Sequence[Run]) -> dict[str, str]:
             if too_large or too_small:
                 other = quantity.if_smaller if too_small else quantity.if_larger * (size > _UNIT_RATIO * usual)
                 reasons[name] = (
-                    f"{quantity.name} of {size:.3g} {unit}, {usual:.3g} {unit} in the other runs"
+                    f"{quantity.name} of {number(size, 3)} {unit}, {number(usual, 3)} {unit} in the other runs"
                     f"{f', as if in {other}' if other else ''}; "
                     "state its unit when it is imported, or take it out of the dataset [E_OTHER_SIZE]"
                 )

@@ -15,6 +15,7 @@ from mrdamper.dampers.calibration import PredictedRun, measured_peak
 from mrdamper.dampers.prediction import Prediction, distance_from_tests
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, GainOffset, RecordingTime, SessionCorrection, Sessions
 from mrdamper.data import Condition, Displayable, Run
+from mrdamper.data.wording import counted, number
 from mrdamper.errors import InputError, RunError, UnknownNameError, require, validate_arguments
 from mrdamper.statistics.metrics import Scores, dissipated_power, score
 
@@ -50,7 +51,7 @@ class Validation(Displayable):
     def headline(self) -> str:
         """Title, runs, and the median error."""
         refused = f", {len(self.refused)} refused" if self.refused else ""
-        return f"{self.title}: {len(self.runs)} runs{refused}, median nrmse_pp {100 * self.median():.2f} %"
+        return f"{self.title}: {counted(len(self.runs), 'run')}{refused}, median nrmse_pp {100 * self.median():.2f} %"
 
     @property
     def table(self) -> Mapping[str, Sequence[Any]]:
@@ -143,7 +144,7 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> Run
     """
     swing = float(np.ptp(run.force[run.in_window]))
     if not _MIN_SWING_N < swing < 1 / _MIN_SWING_N:
-        text = f"the force changes by {swing:.3g} N" if swing else "the force does not change"
+        text = f"the force changes by {number(swing, 3)} N" if swing else "the force does not change"
         raise RunError(text, where=f"run {run.id}", remedy="check the channel")
     prediction = damper.predict(run)
     inside = run.in_window

@@ -24,6 +24,7 @@ from mrdamper.dampers.sessions import GainOffset, Sessions, known_errors
 from mrdamper.data import Dataset, Displayable, Floats, Run
 from mrdamper.data.displayable import joined
 from mrdamper.data.progress import Progress, silent
+from mrdamper.data.wording import counted
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError, validate_arguments
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
 from mrdamper.physics.motion import analyse_motion
@@ -308,7 +309,7 @@ def _require_runs(sines: Sequence[Run], usable: Sequence[Run], unusable: Mapping
         )
     if len(usable) == len(sines) < 2:
         raise IdentificationError(
-            f"{len(sines)} identification runs with a steady sine",
+            f"{counted(len(sines), 'identification run')} with a steady sine",
             where=where,
             remedy="a model over conditions needs at least two, or a record of other motion; check the split column",
         )

@@ -19,6 +19,7 @@ from mrdamper.dampers.causal import steps_of
 from mrdamper.dampers.coil import Coil, field_step
 from mrdamper.dampers.streaming import stream
 from mrdamper.data import Floats
+from mrdamper.data.wording import number
 from mrdamper.errors import ParameterError, numbers, series, validate_arguments
 from mrdamper.tracing import Program, Tape, program
 from mrdamper.tracing.graft import ProgramCopy
@@ -69,7 +70,7 @@ def check_monotone(damper: Damper, highest: float | None = None) -> float:
     if back.max() > _TURNS_BACK:
         at = grid[back.max(axis=0).argmax()]
         raise ParameterError(
-            f"the force falls back by {100 * back.max():.2g} % of its range above {at:.3g} A",
+            f"the force falls back by {number(100 * back.max(), 2)} % of its range above {at:.3g} A",
             where=damper.title,
             remedy="cap the current there, or identify with forms that rise with current",
             code="E_NOT_MONOTONE",

@@ -17,6 +17,7 @@ from functools import cache
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.wording import number
 from mrdamper.errors import ParameterError, RecordError, StepError
 from mrdamper.statistics.levenberg_marquardt import least_squares
 from mrdamper.tracing import Tape, program
@@ -84,7 +85,7 @@ class Oscillator:
         if lost.any() or states.failed >= 0:
             bad = int(np.flatnonzero(lost)[0]) if lost.any() else states.failed // steps
             raise StepError(
-                f"the state runs away after {bad / sample_rate:.3g} s", where="oscillator",
+                f"the state runs away after {number(bad / sample_rate, 3)} s", where="oscillator",
                 remedy="lower the force: an element with beta (gamma + delta) < 0 has no bound", code="E_RUNAWAY",
             )  # fmt: skip
         start = lead // (2 * steps)

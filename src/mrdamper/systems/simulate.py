@@ -12,6 +12,7 @@ import numpy as np
 
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Floats
+from mrdamper.data.wording import number
 from mrdamper.errors import ExcitationError, StepError, StructureError, numbers, validate_arguments
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.systems.controllers import Controller
@@ -96,9 +97,9 @@ def simulate_system(
         del fine  # releases its histories before the next run
     if step is not None and dt < step:
         raise StepError(
-            f"halving the step of {step:g} s changes a peak by {100 * first:.2g} %",
+            f"halving the step of {step:g} s changes a peak by {number(100 * first, 2)} %",
             where=system.name,
-            remedy=f"give --step {dt:.3g} or less, or none" if change <= HALVING else "leave --step out",
+            remedy=f"give --step {number(dt, 3)} or less, or none" if change <= HALVING else "leave --step out",
             code="E_STEP_COARSE",
         )
     return replace(fine, halving=change)

@@ -108,6 +108,7 @@ def _refuse_taken(out: Path | None, add: bool) -> None:
 
 def _write_tests(files: list[Path], settings: Profile, target: Path) -> None:
     """Every test that can be read, also those whose current is not known yet."""
+    from mrdamper.data.wording import counted
     from mrdamper.rig_files.rig_import import found_tests
     from mrdamper.rig_files.tests_table import tests_text
 
@@ -117,7 +118,7 @@ def _write_tests(files: list[Path], settings: Profile, target: Path) -> None:
         raise InputError("no test can be read", remedy="correct the files listed above, or give a profile")
     put_text(tests_text(records), target)
     if str(target) != "-":
-        print(f"table of {len(records)} tests: {target}; complete it, then import with it")
+        print(f"table of {counted(len(records), 'test')}: {target}; complete it, then import with it")
 
 
 def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
@@ -176,6 +177,8 @@ def _asked(
 
 
 def _print(result: ImportResult, out: Path | None, total: int, new: int, *, dry: bool, verbose: bool) -> None:
+    from mrdamper.data.wording import counted, number
+
     columns = {record.provenance["columns"] for record in result.records}
     if dry and result.records:
         print("Taken for tests:")
@@ -190,7 +193,7 @@ def _print(result: ImportResult, out: Path | None, total: int, new: int, *, dry:
         seconds = float(valid[-1] - valid[0])
         current = "" if record.current is None else f", {_current(record)}"
         more = f", {record.provenance['columns']}" if columns else ""
-        lines.append(f"{record.id}: {record.time.size} samples, {seconds:.4g} s{current}{more}")
+        lines.append(f"{record.id}: {counted(record.time.size, 'sample')}, {number(seconds)} s{current}{more}")
     every = (
         (record.id, finding)
         for record in result.records
@@ -217,10 +220,10 @@ def _print(result: ImportResult, out: Path | None, total: int, new: int, *, dry:
         )  # fmt: skip
     tests = {record.provenance.get("file", "") for record in result.records}
     if out is not None:
-        whence = f", {new} of them new" if total > new else f" from {len(tests)} file{'s' * (len(tests) != 1)}"
-        print(f"dataset: {out} ({total} runs{whence})")
+        whence = f", {new} of them new" if total > new else f" from {counted(len(tests), 'file')}"
+        print(f"dataset: {out} ({counted(total, 'run')}{whence})")
     elif dry:
-        would = _tests(len(result.records))
+        would = counted(len(result.records), "test")
         print(f"{would} would be written, {_refused_tests(result.refusals)} refused; --out DATASET writes")
     else:
         print("nothing written; correct or leave out the refused files, or give --skip-refused")
@@ -228,6 +231,8 @@ def _print(result: ImportResult, out: Path | None, total: int, new: int, *, dry:
 
 def _refused_lines(all_refused: Sequence[Refusal]) -> list[str]:
     """One line a refusal; those of several files that differ in numbers only are one, with folder and number."""
+    from mrdamper.data.wording import counted
+
     alike: dict[tuple[str, ...], list[Refusal]] = {}
     for refusal in all_refused:
         error = refusal.error
@@ -248,7 +253,7 @@ def _refused_lines(all_refused: Sequence[Refusal]) -> list[str]:
         texts = {(refusal.error.found, getattr(refusal.error, "line", None)) for refusal in refusals}
         first = "" if len(texts) == 1 else f"the first of them{f', line {line}' if line else ''}: "
         remedy = f"; {error.remedy}" if error.remedy else ""
-        tests = _tests(_refused_tests(refusals))
+        tests = counted(_refused_tests(refusals), "test")
         lines.append(f"refused {tests} in {folder} ({shown}): {first}{error.found}{remedy} [{error.code}]")
     return lines
 
@@ -258,16 +263,13 @@ def _refused_tests(refusals: Sequence[Refusal]) -> int:
     return len({(refusal.file, refusal.run) for refusal in refusals})
 
 
-def _tests(count: int) -> str:
-    return f"{count} test{'s' * (count != 1)}"
-
-
 def _current(record: Record) -> str:
     from mrdamper.data import held_current
+    from mrdamper.data.wording import span
     from mrdamper.rig_files.quality.motion import current_in
 
     mean, change = held_current(current := current_in(record, None))
-    return f"{current.min():.4g} to {current.max():.4g} A" if change else f"{round(mean, 3) + 0.0:g} A"
+    return span(current.min(), current.max(), "A", 4, " to ") if change else f"{round(mean, 3) + 0.0:g} A"
 
 
 def _summary(result: ImportResult, out: Path | None) -> dict:

@@ -35,6 +35,7 @@ def plan(
     from mrdamper.data import Condition
     from mrdamper.data.atomic import require_writable, write_result
     from mrdamper.data.encoding import csv_text
+    from mrdamper.data.wording import counted
     from mrdamper.study.first_matrix import first_matrix
     from mrdamper.study.limits import Limits
     from mrdamper.study.plan import least_informative_runs, plan_tests
@@ -66,8 +67,8 @@ def plan(
     sessions = len({item.session for item in chosen})
     minutes = sessions * allowed.opening + sum(item.minutes for item in chosen)
     typer.echo(
-        f"{out / 'plan.csv'}\n{len(chosen)} records in {sessions} sessions, {minutes:.0f} of {60 * hours:.0f} "
-        "minutes; force_N is the predicted force"
+        f"{out / 'plan.csv'}\n{counted(len(chosen), 'record')} in {counted(sessions, 'session')}, {minutes:.0f} of "
+        f"{60 * hours:.0f} minutes; force_N is the predicted force"
     )
     if damper is None or reckoning is None:
         return

@@ -124,6 +124,7 @@ def _session_known(
     """Correct gain and offset of a prediction for the session of the check runs; its band."""
     from mrdamper.dampers.bands import session_band
     from mrdamper.dampers.sessions import RecordingTime, sessions_known
+    from mrdamper.data.wording import number
     from mrdamper.rig_files.dataset_folder import load_dataset
 
     dataset = load_dataset(data)
@@ -132,7 +133,7 @@ def _session_known(
     assert expected is not None  # the last check run's own session
     typer.echo(
         f"session known by {', '.join(check_run)}: gain {expected.gain:.3f} ± {expected.gain_spread:.3f}, "
-        f"offset {expected.offset:.3g} ± {expected.offset_spread:.2g} N",
+        f"offset {number(expected.offset, 3)} ± {number(expected.offset_spread, 2)} N",
         err=True,
     )
     return prediction.corrected(expected.gain, expected.offset), session_band(expected, damper, prediction, level)
@@ -157,23 +158,24 @@ def _summary(prediction: Prediction, interval: Band | None) -> dict[str, tuple[f
 
 def _in_words(summary: dict[str, tuple[float, float, float]], interval: Band, level: float, where: str) -> str:
     """Describe peak force, energy and damping with their intervals."""
+    from mrdamper.data.wording import number, span
+
     parts = ", ".join(
-        f"{name} {float((part**2).mean() ** 0.5):.3g} N"
+        f"{name} {number(float((part**2).mean() ** 0.5), 3)} N"
         for name, part in (("parameters", interval.parameter), ("session", interval.session), ("model", interval.model))
         if part.any()  # without three known sessions the variation between sessions is unknown
     )
     corrected = ""
     if interval.session.any():
-        least, most = interval.known_session
-        corrected = f"; with gain and offset of the session corrected {least:.4g} to {most:.4g} N"
+        corrected = f"; with gain and offset of the session corrected {span(*interval.known_session, 'N', 4, ' to ')}"
     peak, energy, damping = summary.values()
     return "\n".join(
         (
-            f"peak force (half the peak-to-peak force) {peak[0]:.4g} N, "
-            f"{100 * level:g} % prediction interval {peak[1]:.4g} to {peak[2]:.4g} N "
+            f"peak force (half the peak-to-peak force) {number(peak[0])} N, "
+            f"{100 * level:g} % prediction interval {span(*peak[1:], 'N', 4, ' to ')} "
             f"{where}{corrected}",
-            f"dissipated energy {energy[0]:.4g} J per cycle ({energy[1]:.4g} to {energy[2]:.4g})",
-            f"equivalent damping {damping[0]:.4g} N s/m ({damping[1]:.4g} to {damping[2]:.4g})",
+            f"dissipated energy {number(energy[0])} J per cycle ({number(energy[1])} to {number(energy[2])})",
+            f"equivalent damping {number(damping[0])} N s/m ({number(damping[1])} to {number(damping[2])})",
             f"standard deviation of the force: {parts}",
         )
     )

@@ -199,6 +199,8 @@ def _banded(bands: Bands | None) -> dict[str, Any]:
 
 
 def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Damper]) -> None:
+    from mrdamper.data.wording import number
+
     if bands is None:
         return
     from mrdamper.systems.result import HALVING
@@ -216,7 +218,7 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
         typer.echo(f"  {link.name:12} F {low['force_N'][i]:9.1f} to {high['force_N'][i]:.1f} N")
     if bands.step_change > HALVING:
         typer.echo(
-            f"the step of the draws, {1e3 * bands.step:.3g} ms, changes a peak by {100 * bands.step_change:.2g} %",
+            f"the step of the draws, {1e3 * bands.step:.3g} ms, moves a peak by {number(100 * bands.step_change, 2)} %",
             err=True,
         )
     if bands.lost:
@@ -224,10 +226,11 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
     for name, damper in dampers.items():
         if damper.uncertainty and damper.uncertainty.left_out:
             share = 100 * damper.uncertainty.force
-            typer.echo(f"not included: model error of {name}, {share:.2g} % of half the peak-to-peak force")
+            typer.echo(f"not included: model error of {name}, {number(share, 2)} % of half the peak-to-peak force")
 
 
 def _print_peaks(done: Simulation) -> None:
+    from mrdamper.data.wording import number
     from mrdamper.systems.controllers.passive import Passive
 
     peaks, law = done.peaks, done.controller
@@ -241,8 +244,8 @@ def _print_peaks(done: Simulation) -> None:
     for link, value in zip(done.dampers, peaks["force_N"], strict=True):
         typer.echo(f"  {link.name:12} F {value:9.1f} N")
     typer.echo(
-        f"step {1e3 * done.step:.3g} ms; the last halving changed a peak value by {100 * done.halving:.2g} %; "
-        f"relative error of the energy balance {done.energy_gap:.1g}"
+        f"step {1e3 * done.step:.3g} ms; the last halving changed a peak value by {number(100 * done.halving, 2)} %; "
+        f"relative error of the energy balance {number(done.energy_gap, 1)}"
     )
 
 
@@ -256,6 +259,7 @@ def _print_comparison(compared: ControllerComparison | None) -> None:
 
 def _print_warnings(done: Simulation) -> None:
     from mrdamper.dampers.streaming import FLAGS
+    from mrdamper.data.wording import number
 
     if not done.settled:
         typer.echo(
@@ -264,11 +268,11 @@ def _print_warnings(done: Simulation) -> None:
             err=True,
         )
     for name, shares in done.outside.items():
-        parts = ", ".join(f"{quantity} {100 * share:.3g} %" for quantity, share in shares.items())
+        parts = ", ".join(f"{quantity} {number(100 * share, 3)} %" for quantity, share in shares.items())
         beyond = " outside the tested range" if set(shares) <= set(FLAGS) else ""
         typer.echo(f"warning: {name}{beyond}: {parts} of the time", err=True)
     for name, share in done.unreachable.items():
-        typer.echo(f"{name}: the force command could not be reached {100 * share:.3g} % of the time")
+        typer.echo(f"{name}: the force command could not be reached {number(100 * share, 3)} % of the time")
     if type(done.controller).calms:
         for name, timing in done.timing.items():
             if timing < 0:

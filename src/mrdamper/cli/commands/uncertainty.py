@@ -36,6 +36,7 @@ def uncertainty(
     from mrdamper.dampers.model_file import load_model
     from mrdamper.dampers.uncertainty import table, uncertainty_warnings
     from mrdamper.data.atomic import require_writable
+    from mrdamper.data.wording import span
     from mrdamper.identification.intervals import student
 
     student(level, 1.0)  # refuses an invalid level
@@ -63,7 +64,7 @@ def uncertainty(
         for name in profile:
             curves.append(profiled(likelihood, name))
             low, high = curves[-1].interval
-            print(f"profile of {name}: {curves[-1].kind}, 95 % from {low:.4g} to {high:.4g} {curves[-1].unit}".strip())
+            print(f"profile of {name}: {curves[-1].kind}, 95 % from {span(low, high, curves[-1].unit, 4, ' to ')}")
         if samples:
             drawn = posterior(likelihood, steps)
             print(f"{drawn.steps} steps, autocorrelation time {drawn.time:.0f}, split-R̂ {drawn.split_rhat:.3f}")

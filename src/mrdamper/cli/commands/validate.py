@@ -106,6 +106,7 @@ def _print_summary(
 ) -> None:
     """Print the errors over all runs, and how many peak forces lie inside their band."""
     from mrdamper.dampers.sessions import KNOWN
+    from mrdamper.data.wording import counted
 
     inside = [
         p["peak_force_low_N"] <= p["peak_force_measured_N"] <= p["peak_force_high_N"]
@@ -120,11 +121,11 @@ def _print_summary(
     floors = [run.floor for run in validation.runs if run.floor is not None]
     outside = sum(bool(run.extrapolation) for run in validation.runs)
     typer.echo(
-        f"{damper.title} on {len(validation.runs)} runs of {rig}: median nrmse_pp "
+        f"{damper.title} on {counted(len(validation.runs), 'run')} of {rig}: median nrmse_pp "
         f"{100 * validation.median():.2f} %, worst {100 * validation.worst().scores.nrmse_pp:.2f} % "
         f"({validation.worst().run_id}), median energy error {100 * validation.median('energy_error'):.1f} %"
         + (f", scatter of the rig {100 * sorted(floors)[len(floors) // 2]:.2f} %" if floors else "")
-        + (f"; {outside} runs extrapolate" if outside else "")
+        + (f"; extrapolation in {counted(outside, 'run')}" if outside else "")
         + f"; runs corrected for their session: {sum(run.session == KNOWN for run in validation.runs)}",
         err=True,
     )

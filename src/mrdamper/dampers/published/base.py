@@ -14,6 +14,7 @@ from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.piece import Pieces
 from mrdamper.dampers.uncertainty import FittedParameter
 from mrdamper.data import Condition, Floats, Run
+from mrdamper.data.wording import counted
 from mrdamper.errors import IdentificationError, ParameterError
 from mrdamper.identification.problem import Identification
 from mrdamper.models import Model
@@ -93,7 +94,7 @@ class ConditionedDamper(Damper):
         """Return the damper from the identifications alone."""
         if len(identifications) < 3:
             raise IdentificationError(
-                f"{len(identifications)} identifications",
+                counted(len(identifications), "identification"),
                 where=cls.heading,
                 remedy="give runs at three conditions or more",
             )

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.wording import number
 from mrdamper.errors import ExcitationError, ParameterError
 from mrdamper.physics.integrator.streamed import Rate, integrate_step
 from mrdamper.physics.motion.traced import TracedStep
@@ -65,7 +66,7 @@ def integrate(
         at = int(lost[0]) if lost.size else states_along.failed
         why = "runs away" if lost.size else f"needs more than {_MAX_STEPS_PER_SAMPLE:_} steps".replace("_", " ")
         raise ParameterError(
-            f"the model's state {why} between samples {at - 1} and {at} ({time[at]:.4g} s)",
+            f"the model's state {why} between samples {at - 1} and {at} ({number(time[at])} s)",
             remedy="its parameters are too stiff or unstable; bring them nearer to the data's scales",
         )
     return out

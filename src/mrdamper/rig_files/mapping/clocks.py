@@ -10,6 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.wording import number
 from mrdamper.rig_files.column_names import is_unit, parse_unit, split_name, words
 from mrdamper.rig_files.conditions import stated_rate, stated_speed
 from mrdamper.rig_files.mapping.proposals import frequency_of, stated_frequencies
@@ -100,7 +101,7 @@ def refuse_two_rates(table: RawTable, profile: Profile, time: Floats, displaceme
     if any(near) or (profile.channel("time").column is not None and not near):
         return
     beside = f", and the motion {measured:.3g} Hz where {min(frequencies):g} Hz are stated" if measured and near else ""
-    problem = f"the file states {stated:g} samples per second, its time column has {1 / step:.4g}{beside}"
+    problem = f"the file states {stated:g} samples per second, its time column has {number(1 / step)}{beside}"
     other = "correct the line that is wrong" if near else '[channels.time] column = "..." if the time column is right'
     remedy = f"set [file] sample_rate_Hz = ... in a profile, or {other}"
     raise table.source.refuse("E_AMBIGUOUS", f"{problem}: which is right?", remedy)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mrdamper.data.wording import number
 from mrdamper.errors import InputError, QualityError, listed, printable
 from mrdamper.rig_files.coil_current import NO_CHANNEL
 from mrdamper.rig_files.column_names import RATING, Header, names_condition, role_of, split_name, words, words_of
@@ -162,7 +163,7 @@ def other_motions(path: Path, results: Results | None, tests: _Tests) -> InputEr
         usual = 1.0 if unit == "Hz" or not pairs else float(np.median([ours / theirs for _, theirs, ours in pairs]))
         for record, stated, own in pairs:
             if max(share := own / stated / usual, 1 / share) > 1 + limit:
-                moving = f"{record.id}, which moves {'at' if unit == 'Hz' else 'by'} {size * own:.3g} {unit}"
+                moving = f"{record.id}, which moves {'at' if unit == 'Hz' else 'by'} {number(size * own, 3)} {unit}"
                 texts.append(f"{path.name} states {size * stated:g} {unit} of {moving}")
     if not texts:
         return None

@@ -9,6 +9,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from mrdamper.data import Floats, held_current
+from mrdamper.data.wording import number, span
 from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.readers.arrays import array_table
 from mrdamper.rig_files.readers.base import Content, RawTable
@@ -164,7 +165,7 @@ def _resampled(table: RawTable, clock: int, kept: Sequence[int], owner: dict[int
     names = sorted({table.headers[i].name for i in kept if owner.get(i) in apart and table.headers[i].channel})
     own, text = "on clocks of their own", f"interpolated onto the force's: {', '.join(names[:6])}"
     if max(apart.values(), default=np.inf) < np.inf:
-        own += f", up to {1e3 * max(apart.values()):.4g} ms apart"
+        own += f", up to {number(1e3 * max(apart.values()))} ms apart"
     resampled_table = table.picked(kept, columns_of).named({0: ("time", table.headers[clock].unit)})
     return resampled_table.noted(Finding("W_RASTER", f"{own}, {text}")) if names else resampled_table
 
@@ -187,7 +188,7 @@ def _with_clocks_compared(table: RawTable) -> RawTable:
         return table
     one, two = (table.headers[i].name for i in clocks)
     text = (
-        f"the clocks {one!r} and {two!r} are up to {1e3 * apart:.4g} ms apart and all channels are taken by one "
+        f"the clocks {one!r} and {two!r} are up to {number(1e3 * apart)} ms apart and all channels are taken by one "
         "of them: if the force follows the other, set delay_ms in [channels.force] of a profile"
     )
     return table.noted(Finding("W_RASTER", text))
@@ -224,7 +225,8 @@ def _interpolated(table: RawTable, column: int, target: Floats, time: Floats, va
     if np.mean(inside) < _FEWEST_OVERLAP:
         raise table.source.refuse(
             "E_RASTER",
-            f"{name!r} is recorded from {time[0]:.4g} to {time[-1]:.4g} s, the force from {begin:.4g} to {end:.4g} s",
+            f"{name!r} is recorded from {span(time[0], time[-1], 's', 4, ' to ')}, "
+            f"the force from {span(begin, end, 's', 4, ' to ')}",
             "export the channels with one clock",
         )
     on_target = np.interp(target, time, values)

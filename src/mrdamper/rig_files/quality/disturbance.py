@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.wording import number
 from mrdamper.physics.motion import SINE_DISTORTION_LIMIT
 from mrdamper.rig_files.quality.cycles import POINTS, REFUSED, effect_on, percent, percent_of, steady_cycles
 from mrdamper.rig_files.quality.motion import current_changes
@@ -129,8 +130,8 @@ def force_lines(view: View) -> Iterator[Finding]:
     if line.amplitude > _LINE * half:
         yield Finding(
             "W_DISTURBED",
-            f"a line of {line.frequency:.4g} Hz and {line.amplitude:.3g} N runs on the force and is no answer to the "
-            f"motion (mains hum, if 50 or 60 Hz): it moves the peak force by {percent(line.amplitude / half)}",
+            f"a line of {line.frequency:.4g} Hz and {number(line.amplitude, 3)} N runs on the force and is no answer "
+            f"to the motion (mains hum, if 50 or 60 Hz): it moves the peak force by {percent(line.amplitude / half)}",
         )
 
 
@@ -196,8 +197,8 @@ def channels_are_unfiltered(view: View) -> Iterator[Finding]:
         if corner * cycles.period < _CORNER:
             yield Finding(
                 "W_FILTERED",
-                f"noise of the {name} falls by {average:.2g} dB an octave from about {corner:.3g} Hz on: a filter of "
-                f"this corner makes the {name} late by {100 * late:.2g} % of the period and moves "
+                f"noise of the {name} falls by {number(average, 2)} dB an octave from about {corner:.3g} Hz on: a "
+                f"filter of this corner makes the {name} late by {100 * late:.2g} % of the period and moves "
                 f"{percent_of(*effect_on(cycles, before))}; filter both channels alike, or neither",
             )
 

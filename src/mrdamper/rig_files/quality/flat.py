@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrdamper.data import Floats, once_per_run
+from mrdamper.data.wording import counted
 from mrdamper.rig_files.quality.cycles import NOTED, POINTS, CycleChannel, percent, steady_cycles
 from mrdamper.rig_files.quality.view import View, runs_of, sample_noise, shown
 from mrdamper.rig_files.record import Finding
@@ -76,7 +77,7 @@ def frozen(view: View) -> Iterator[Finding]:
         if len(stretches):
             yield Finding(
                 "W_FROZEN",
-                f"{name} stands still in {len(stretches)} place{'s' * (len(stretches) > 1)} while {other} goes on: "
+                f"{name} stands still in {counted(len(stretches), 'place')} while {other} goes on: "
                 f"{_samples(stretches)} samples, the first {view.place(int(stretches[0, 0]))}",
             )
 

@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.wording import number, span
 from mrdamper.rig_files.quality.cycles import (
     POINTS,
     WARNED,
@@ -96,10 +97,10 @@ def velocity_channel(view: View) -> None:
         what = "runs against the derivative of displacement"
     elif late:
         side = "behind" if delay.delay > 0 else "ahead of"
-        what = f"is {1e3 * abs(delay.delay):.4g} ms {side} the derivative of displacement"
+        what = f"is {number(1e3 * abs(delay.delay))} ms {side} the derivative of displacement"
         remedy = f"set [channels.velocity] delay_ms = {1e3 * delay.delay:.4g} in a profile"
     elif abs(delay.gain - 1) > GAIN:
-        what = f"is {delay.gain:.3g} times the derivative of displacement"
+        what = f"is {number(delay.gain, 3)} times the derivative of displacement"
     else:
         return
     raise view.refused("E_CHANNEL_LAG", f"velocity {what}", f"{remedy}, or leave the column out")
@@ -219,9 +220,9 @@ def force_channel(view: View) -> Iterator[Finding]:
     if share > _LEAD and mass > _MASS:
         yield Finding(
             "W_LAG",
-            f"{100 * share:.2g} % of the force acts as a spring of negative stiffness, for which {mass:.3g} kg would "
-            f"have to move with the rod: the force is early by about {100 * share / (2 * np.pi):.2g} % of the period "
-            "or more, or the displacement late (filter, or a high-pass in the force)",
+            f"{100 * share:.2g} % of the force acts as a spring of negative stiffness, for which {number(mass, 3)} "
+            f"kg would have to move with the rod: the force is early by about {100 * share / (2 * np.pi):.2g} % of "
+            "the period or more, or the displacement late (filter, or a high-pass in the force)",
         )
 
 
@@ -232,14 +233,15 @@ def _description(lag: ForceLag, cycles: Cycles) -> str:
         low, high = sorted(abs(1e3 * cycles.period * end) for end in lag.interval("delay"))
         word = "later" if best.delay > 0 else "earlier"
         parts.append(
-            f"{1e3 * abs(best.delay) * cycles.period:.3g} ms ({100 * abs(best.delay):.1f} % of the period; {low:.3g} "
-            f"to {high:.3g} ms explain it nearly as well) {word} than hysteresis explains"
+            f"{number(1e3 * abs(best.delay) * cycles.period, 3)} ms ({100 * abs(best.delay):.1f} % of the period; "
+            f"{span(low, high, 'ms', to=' to ')} explain it nearly as well) {word} than hysteresis explains"
         )
     if best.constant:
         low, high = (1e3 * cycles.period * end for end in lag.interval("constant"))
         parts.append(
-            f"behind a first-order filter of {1e3 * best.constant * cycles.period:.3g} ms ({low:.3g} to {high:.3g} ms "
-            f"explain it nearly as well; corner {1 / (2 * np.pi * best.constant * cycles.period):.3g} Hz)"
+            f"behind a first-order filter of {number(1e3 * best.constant * cycles.period, 3)} ms "
+            f"({span(low, high, 'ms', to=' to ')} explain it nearly as well; corner "
+            f"{1 / (2 * np.pi * best.constant * cycles.period):.3g} Hz)"
         )
     return f"the force is {' and '.join(parts)}"
 

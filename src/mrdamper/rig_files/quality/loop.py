@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats, once_per_run
+from mrdamper.data.wording import number
 from mrdamper.errors import QualityError
 from mrdamper.identification.loop_analysis import damping_share as share_of_damping
 from mrdamper.rig_files.quality.cycles import POINTS, every_cycle, steady_cycles
@@ -53,7 +54,7 @@ def dissipates(view: View) -> None:
             remedy = "name the columns the other way round: [channels.force] column = ... in a profile"
         elif share > -_CLEARLY and elastic > _ELASTIC:
             delay = -share / elastic * np.std(displacement) / np.std(view.moving.velocity)
-            what = f"the force is nearly that of a spring, {1e3 * delay:.2g} ms or more behind the displacement"
+            what = f"the force is nearly that of a spring, {number(1e3 * delay, 2)} ms or more behind the displacement"
             remedy = "record it again with both channels filtered alike, or set the force's known delay_ms in a profile"
         else:
             what = "force and displacement count in opposite directions"
@@ -133,16 +134,16 @@ def _keeps_its_scale(view: View, starts: Floats, folded: Floats) -> None:
             leap = float(np.mean(new) - np.mean(old))
             if max(np.ptp(old), np.ptp(new)) < _EVEN and abs(leap) > _GAIN:
                 problem = (
-                    f"the force is {np.exp(leap):.3g} times as large from about {starts[at]:.4g} s on: a range, a unit "
-                    "or the current was changed over"
+                    f"the force is {number(np.exp(leap), 3)} times as large from about {number(starts[at])} s on: a "
+                    "range, a unit or the current was changed over"
                 )
                 raise view.refused("E_UNRELATED", problem, "cut the record there, or name the channel of the current")
 
 
 def _flip(view: View, time: float, count: int, cycles: int) -> QualityError:
     problem = (
-        f"the force changes its sign within the record, from {time:.4g} s on ({count} of {cycles} cycles): the load "
-        "cell or its amplifier was changed over"
+        f"the force changes its sign within the record, from {number(time)} s on ({count} of {cycles} cycles): the "
+        "load cell or its amplifier was changed over"
     )
     return view.refused("E_DISSIPATION_SIGN", problem, "cut the record there")
 
@@ -255,5 +256,5 @@ def _force_rests_with_the_motion(view: View) -> None:
             continue
         still = float(np.ptp(run.displacement[rest])) < _STILL * stroke
         if still and float(np.ptp(run.force[rest])) > _GOES_ON * swing:
-            problem = f"the force goes on from {time[rest.start]:.4g} s on while the displacement rests"
+            problem = f"the force goes on from {number(time[rest.start])} s on while the displacement rests"
             raise view.refused("E_UNRELATED", problem, "check the displacement channel there, or cut the record")

@@ -9,6 +9,7 @@ import numpy as np
 
 from mrdamper.data import Floats, held_current, once_per_run
 from mrdamper.data.arrays import take
+from mrdamper.data.wording import counted, number
 from mrdamper.physics.motion.sines import SINE_DISTORTION_LIMIT
 from mrdamper.rig_files.conditions import motions_in
 from mrdamper.rig_files.quality.view import View
@@ -36,7 +37,9 @@ def moves(view: View) -> None:
     """Refuse a record without motion."""
     x = view.run.displacement
     if x.size < 3:
-        raise view.refused("E_NO_EXCITATION", f"{x.size} samples without gaps", "record again: a cycle or more")
+        raise view.refused(
+            "E_NO_EXCITATION", f"{counted(x.size, 'sample')} without gaps", "record again: a cycle or more"
+        )
     span = float(np.ptp(x))
     # Von Neumann's ratio: one for white noise, near zero for any motion sampled finely enough.
     noise = span < NOISE_MOTION and np.mean(np.diff(x) ** 2) > np.var(x)
@@ -88,7 +91,7 @@ def drifts(view: View) -> Iterator[Finding]:
         if abs(drift) > limit:
             yield Finding(
                 "W_DRIFT",
-                f"the {what} drifts by {1e3 * drift:+.3g} mm over the record, "
+                f"the {what} drifts by {number(1e3 * drift, 3, sign='+')} mm over the record, "
                 f"{100 * abs(drift) / amplitude:.0f} % of the amplitude",
             )
 
@@ -181,20 +184,20 @@ def _sizes(view: View) -> tuple[Size, ...]:
     )
     speed = float(np.median(strokes.lengths / strokes.durations)) if strokes.durations.size else 0.0
     unit = "set its unit in a profile: [channels.{}] unit{}"
-    length = f"displacement moves {f'{stroke:.4g} m' if stroke > 0.9 else f'{1e3 * stroke:.3g} mm'} peak to peak"
+    length = f"displacement moves {f'{number(stroke)} m' if stroke > 0.9 else f'{1e3 * stroke:.3g} mm'} peak to peak"
     remedy = unit.format("displacement", ' = "mm"?')
     if force < 3.0 < stroke:
-        length += f", force {force:.4g} N"
+        length += f", force {number(force)} N"
         remedy = "displacement and force look exchanged: name the columns the other way round"
     check = "check the load cell, the unit of force (kN?), or whether columns are exchanged"
     return (  # [m] of test rigs, [N] of seismic test machines, [N] that load cells resolve, [A], [m/s] and [s]
         Size(length, stroke, (0.0, 3.0), (0.15e-3, 0.9), remedy),
-        Size(f"force reaches {largest:.4g} N", largest, (0.0, 2e7), _ANY, unit.format("force", "")),
-        Size(f"force changes by {force:.3g} N in the whole record", force, (0.5, np.inf), (8.0, 1.5e6), check),
+        Size(f"force reaches {number(largest)} N", largest, (0.0, 2e7), _ANY, unit.format("force", "")),
+        Size(f"force changes by {number(force, 3)} N in the whole record", force, (0.5, np.inf), (8.0, 1.5e6), check),
         Size(f"current reaches {current:.4g} A", current, (0.0, 200.0), _ANY, unit.format("current", ' = "mA"?')),
-        Size(f"the mean speed of the strokes is {speed:.4g} m/s", speed, (0.0, 30.0), _ANY,
+        Size(f"the mean speed of the strokes is {number(speed)} m/s", speed, (0.0, 30.0), _ANY,
              "check the units of time and displacement"),
-        Size(f"a cycle takes {strokes.period or 0:.3g} s", strokes.period or 0.0, _ANY, (0.0, 300.0), ""),
+        Size(f"a cycle takes {number(strokes.period or 0, 3)} s", strokes.period or 0.0, _ANY, (0.0, 300.0), ""),
     )  # fmt: skip
 
 

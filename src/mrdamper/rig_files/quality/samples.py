@@ -9,6 +9,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.arrays import odd_steps
+from mrdamper.data.wording import counted, number
 from mrdamper.rig_files.quality.cycles import REFUSED, percent, steady_cycles
 from mrdamper.rig_files.quality.view import View, longest_run, runs_of, sample_noise
 from mrdamper.rig_files.record import COARSE_CLOCK, Finding
@@ -57,7 +58,7 @@ def changes_at_every_sample(view: View) -> Iterator[Finding]:
             yield Finding(
                 "W_HELD",
                 f"the {name} changes at every {usual}th sample only: it was recorded at a slower rate and is late by "
-                f"{1e3 * late / motion.condition.frequency_Hz:.3g} ms, {100 * late:.2g} % of the period",
+                f"{number(1e3 * late / motion.condition.frequency_Hz, 3)} ms, {100 * late:.2g} % of the period",
             )
 
 
@@ -99,8 +100,8 @@ def no_bit_is_stuck(view: View) -> Iterator[Finding]:
     if width:
         yield Finding(
             "W_COARSE",
-            f"the force leaps by about {width:.3g} N in full motion, over levels that no sample has or for a single "
-            "sample: a bit of its converter is stuck or flips",
+            f"the force leaps by about {number(width, 3)} N in full motion, over levels that no sample has or for a "
+            "single sample: a bit of its converter is stuck or flips",
         )
 
 
@@ -200,7 +201,8 @@ def copied(view: View) -> Iterator[Finding]:
         return
     problem = (
         f"{percent(share)} of the samples repeat earlier cycles exactly, noise included: the record holds "
-        f"{motion.cycles * (1 - share):.2g} measured cycles of {motion.cycles:.2g}, and its scatter means nothing"
+        f"{number(motion.cycles * (1 - share), 2)} measured cycles of {number(motion.cycles, 2)}, and its scatter "
+        "means nothing"
     )
     if share > REFUSED:
         raise view.refused("E_COPIED", problem, "export the cycles that were measured")
@@ -228,7 +230,7 @@ def finite(view: View) -> Iterator[Finding]:
         if infinite.any():
             at = int(np.argmax(infinite))
             count = int(np.count_nonzero(infinite))
-            text = f"{name} is infinite in {count} sample{'s' * (count > 1)}, first {view.place(at)}"
+            text = f"{name} is infinite in {counted(count, 'sample')}, first {view.place(at)}"
             if name in USED:
                 remedy = "export the channel again with a wider number format"
                 raise view.refused("E_NONFINITE", text, remedy)
@@ -295,6 +297,6 @@ def gaps_in_time(view: View) -> Iterator[Finding]:
     _, before, after = max(gaps, key=lambda gap: gap[2] - gap[1])
     yield Finding(
         "W_TIME_GAP",
-        f"{len(gaps)} gap{'s' * (len(gaps) > 1)} in time, the widest {after - before:.4g} s after {before:.6g} s "
-        f"(usual step {view.step:.4g} s): split into {len(gaps) + 1} segments",
+        f"{counted(len(gaps), 'gap')} in time, the widest {number(after - before)} s after {before:.6g} s "
+        f"(usual step {number(view.step)} s): split into {len(gaps) + 1} segments",
     )

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.wording import counted
 from mrdamper.rig_files.column_names import SI
 from mrdamper.rig_files.quality.samples import USED
 from mrdamper.rig_files.quality.view import View, runs_of, shown
@@ -47,7 +48,7 @@ def missing_value_codes(view: View) -> Iterator[Finding]:
         if code is not None:
             at = np.flatnonzero(values == code)
             text = (
-                f"{name} is {code:g} {SI[name]} in {at.size} sample{'s' * (at.size > 1)} among others it does not "
+                f"{name} is {code:g} {SI[name]} in {counted(at.size, 'sample')} among others it does not "
                 f"fit, first {view.place(int(at[0]))}: it reads like a logger's code for a missing value"
             )
             if name in USED:
@@ -156,7 +157,7 @@ def spikes(view: View) -> None:
         if positions.size:
             raise view.refused(
                 "E_SPIKE",
-                f"{name} has {positions.size} sample{'s' * (positions.size > 1)} far off between ordinary ones, "
+                f"{name} has {counted(positions.size, 'sample')} far off between ordinary ones, "
                 f"first {view.place(int(positions[0]))}: a glitch of the logger",
                 "leave these cells empty: up to 2 % are taken",
             )

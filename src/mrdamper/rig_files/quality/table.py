@@ -12,6 +12,7 @@ import numpy as np
 
 from mrdamper.data import Run, once_per_run
 from mrdamper.data.arrays import chunks, drop_pages
+from mrdamper.data.wording import counted
 from mrdamper.errors import ColumnError, QualityError, RunError
 from mrdamper.rig_files.quality import check_record, checked, lag, loop, motion, samples
 from mrdamper.rig_files.quality.view import SHORTEST, View
@@ -152,7 +153,7 @@ def to_run(record: Record) -> Run:
     sizes = [int(np.count_nonzero(keep[start:stop])) for start, stop in record.segments]
     bounds = np.cumsum([0, *filter(None, sizes)]).tolist()
     if sum(sizes) < 3:
-        raise RunError(f"{sum(sizes)} samples", where=f"run {record.id}", remedy="a run needs at least 3")
+        raise RunError(counted(sum(sizes), "sample"), where=f"run {record.id}", remedy="a run needs at least 3")
     keep = slice(None) if sum(sizes) == keep.size else keep  # nothing is copied: a long record lies in a file
     steady = record.steady or loop.steady_part(View(record))
     codes = " ".join(dict.fromkeys(finding.code for finding in record.findings))

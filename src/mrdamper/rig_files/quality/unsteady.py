@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.wording import number
 from mrdamper.rig_files.quality.cycles import Cycles, percent, steady_cycles
 from mrdamper.rig_files.quality.motion import current_changes
 from mrdamper.rig_files.quality.view import View
@@ -41,8 +42,8 @@ def stroke_steps(view: View) -> Iterator[Finding]:
         if abs(change) < _FOLLOWS * abs(step):
             yield Finding(
                 "W_UNSTEADY",
-                f"the stroke changes by {100 * step:+.3g} % at {view.run.time[strokes.reversals[at]]:.4g} s and the "
-                f"force does not: damping is uncertain by {percent(abs(step))}; check the displacement sensor",
+                f"the stroke changes by {100 * step:+.3g} % at {number(view.run.time[strokes.reversals[at]])} s and "
+                f"the force does not: damping is uncertain by {percent(abs(step))}; check the displacement sensor",
             )
         return
 
@@ -63,15 +64,15 @@ def cycles_are_steady(view: View) -> Iterator[Finding]:
     changes = (
         (stroke, STROKE, f"the amplitude changes by {100 * stroke:+.3g} % over the record and the force does not: "
          f"damping is uncertain by {percent(abs(stroke) / 2)}; check the displacement sensor"),
-        (jump, LATE, f"the motion shifts by {jump * period:+.3g} ms ({100 * jump:+.2g} % of the period) against its "
-         "clock within the record: samples are lost, or the clock does not run evenly"),
-        (gain, GAIN, f"the force changes by {100 * np.expm1(gain):+.3g} % over the record at one motion: damping and "
-         f"force are uncertain by {percent(abs(gain) / 2)}; warm the damper up, or check the amplifier and the "
-         "current"),
-        (offset, OFFSET, f"the mean force changes by {force.span * offset:+.3g} N over the record, "
+        (jump, LATE, f"the motion shifts by {number(jump * period, 3, sign='+')} ms ({100 * jump:+.2g} % of the "
+         "period) against its clock within the record: samples are lost, or the clock does not run evenly"),
+        (gain, GAIN, f"the force changes by {number(100 * np.expm1(gain), 3, sign='+')} % over the record at one "
+         f"motion: damping and force are uncertain by {percent(abs(gain) / 2)}; warm the damper up, or check the "
+         "amplifier and the current"),
+        (offset, OFFSET, f"the mean force changes by {number(force.span * offset, 3, sign='+')} N over the record, "
          f"{percent(abs(offset))} of its peak-to-peak value: check the load cell's zero and its temperature"),
-        (late, LATE, f"the force shifts by {late * period:+.3g} ms ({100 * late:+.2g} % of the period) against the "
-         "motion over the record: the channels have clocks of their own, or samples of one are lost"),
+        (late, LATE, f"the force shifts by {number(late * period, 3, sign='+')} ms ({100 * late:+.2g} % of the period) "
+         "against the motion over the record: the channels have clocks of their own, or samples of one are lost"),
     )  # fmt: skip
     for change, limit, text in changes:
         if abs(change) > limit:

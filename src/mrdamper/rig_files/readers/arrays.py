@@ -16,6 +16,7 @@ from typing import IO, Any
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.wording import number
 from mrdamper.errors import InputError, MissingExtraError
 from mrdamper.rig_files.column_names import KEYS, UNIT_KEYS, is_unit, parse_unit, split_name
 from mrdamper.rig_files.readers.base import (
@@ -240,7 +241,7 @@ def _formula_of(says: Mapping[str, Any]) -> tuple[float, float] | None:
 def check_unpacked(source: Source, size: int) -> None:
     """Refuse tables that are far larger than their file: E_ARCHIVE_RATIO."""
     if size > RATIO_MATTERS_FROM and (size > MOST_RATIO * source.size or size > 10 * MOST_UNPACKED):
-        problem = f"{size / 1e6:.0f} MB of numbers in a file of {source.size / 1e6:.3g} MB"
+        problem = f"{size / 1e6:.0f} MB of numbers in a file of {number(source.size / 1e6, 3)} MB"
         raise source.refuse("E_ARCHIVE_RATIO", problem, "export only the channels and the time needed")
 
 

@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 
+from mrdamper.data.wording import counted
 from mrdamper.errors import printable
 from mrdamper.rig_files.column_names import Header, split_name
 from mrdamper.rig_files.profile import FileForm
@@ -221,7 +222,7 @@ def _without_footer(form: RowFormat, block: Block) -> tuple[Block, tuple[Finding
         left += [text.strip()[:40]] if text.strip() else []
     if not left:
         return block, ()
-    shown = f"{len(left)} line{'s' * (len(left) > 1)} below the last row left out: {left[-1]!r}"
+    shown = f"{counted(len(left), 'line')} below the last row left out: {left[-1]!r}"
     return replace(block, stop=stop), (Finding("W_FOOTER", printable(shown)),)
 
 

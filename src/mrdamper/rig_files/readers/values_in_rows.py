@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mrdamper.data.wording import counted
 from mrdamper.rig_files.column_names import split_name
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.arrays import array_table, whole
@@ -43,7 +44,7 @@ class ValuesInRows(Reader):
         except ValueError as error:
             raise source.refuse("E_NUMBER", f"a value is no number ({error})", "export the file again") from error
         if values.size != points:
-            problem = f"{values.size} values where the line of NPTS states {points}"
+            problem = f"{counted(values.size, 'value')} where the line of NPTS states {points}"
             raise source.refuse("E_TRUNCATED", problem, "copy or export the file again")
         name, _, unit = _IN_UNITS.sub("\n", head[-1] if head else "").partition("\n")
         channel = split_name(name.strip(), unit.strip())

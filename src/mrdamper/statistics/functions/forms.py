@@ -17,6 +17,7 @@ import numpy as np
 
 from mrdamper.data.arrays import Floats
 from mrdamper.data.conditions import Condition
+from mrdamper.data.wording import number
 from mrdamper.errors import IdentificationError, UnknownNameError
 from mrdamper.tracing import Expression
 
@@ -55,7 +56,7 @@ class Term:
         """Write the unit of the coefficient of the term in a function of that unit."""
         power = self.frequency - (0 if self.power_f is None else rates[self.power_f])
         powers = {"A": self.current, "Hz": power, "m": self.amplitude}
-        sized = {name: name if abs(p) == 1 else f"{name}^{abs(p):.3g}" for name, p in powers.items() if p}
+        sized = {name: name if abs(p) == 1 else f"{name}^{number(abs(p), 3)}" for name, p in powers.items() if p}
         times = [text for name, text in sized.items() if powers[name] < 0]
         over = "".join(f"/{text}" for name, text in sized.items() if powers[name] > 0)
         return (" ".join([*times, *({of} - {"-"})]) or ("1" if over else "-")) + over
@@ -65,11 +66,11 @@ class Term:
         powers = {"I": self.current, "f": self.frequency, "A": self.amplitude}
         factors = [name if power == 1 else f"{name}^{power}" for name, power in powers.items() if power]
         if self.decay_I is not None:
-            factors.append(f"exp(-{rates[self.decay_I]:.4g} I)")
+            factors.append(f"exp(-{number(rates[self.decay_I])} I)")
         if self.decay_f is not None:
-            factors.append(f"exp(-{rates[self.decay_f]:.4g} f)")
+            factors.append(f"exp(-{number(rates[self.decay_f])} f)")
         if self.power_f is not None:
-            factors.append(f"f^-{rates[self.power_f]:.4g}")
+            factors.append(f"f^-{number(rates[self.power_f])}")
         return " ".join(factors)
 
 
@@ -192,7 +193,8 @@ class ParameterFunction:
     def formula(self) -> str:
         """The function as text."""
         terms = zip(self.coefficients, form_named(self.form).terms, strict=True)
-        text = " ".join(f"{value:+.4g} {term.label(self.rates)}".strip() for value, term in terms).lstrip("+")
+        text = " + ".join(f"{number(value)} {term.label(self.rates)}".strip() for value, term in terms)
+        text = text.replace("+ -", "- ")
         return f"exp({text})" if self.log else text
 
     def units(self, unit: str) -> list[str]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrdamper.data import Run
+from mrdamper.data.wording import counted, number
 from mrdamper.rig_files.column_names import DIMENSION, SI, Unit, parse_unit
 from mrdamper.study.contradictions.copies import Copy
 from mrdamper.study.contradictions.explanations import Explanation, Trial
@@ -58,7 +59,7 @@ def describe(run: Run, explanation: Explanation, others: int) -> Contradiction:
     contradiction, remedy = text(run, explanation.trial)
     power = explanation.gain / np.log(10)
     odds = f"10^{power:.0f}" if power < _MAX_POWER else f"over 10^{_MAX_POWER}"
-    against = f"contradicts the other {others} runs: {contradiction} (odds of {odds} to 1)"
+    against = f"contradicts the other {counted(others, 'run')}: {contradiction} (odds of {odds} to 1)"
     return Contradiction(run.id, explanation.cause, explanation.trial.value, explanation.gain, against, remedy)
 
 
@@ -72,7 +73,7 @@ def describe_copy(copy: Copy, validation: bool) -> Contradiction:
 def _force(run: Run, e: Trial) -> tuple[str, str]:
     if e.unit:
         return _misread(run, "force", "N", e)
-    what = f"its force is {1 / e.value:.3g} times what the others show: another range of the load cell"
+    what = f"its force is {number(1 / e.value, 3)} times what the others show: another range of the load cell"
     remedy = f"{_corrected(run, 'force', e.value)}, or {_specimen(run)}"
     if abs(run.mean_current) <= SAME_CURRENT:
         what += ", a magnetisation that other tests left"
@@ -83,19 +84,19 @@ def _force(run: Run, e: Trial) -> tuple[str, str]:
 def _displacement(run: Run, e: Trial) -> tuple[str, str]:
     if e.unit:
         return _misread(run, "displacement", "mm", e)
-    text = f"its displacement is about {1 / e.value:.2g} times what its force shows"
+    text = f"its displacement is about {number(1 / e.value, 2)} times what its force shows"
     return text, _corrected(run, "displacement", e.value)
 
 
 def _misread(run: Run, channel: str, usual: str, e: Trial) -> tuple[str, str]:
     """Describe a channel in the usual unit that was read in another, or the reverse."""
     true, read = (usual, e.unit[4:]) if e.unit.startswith("not ") else (e.unit, usual)
-    text = f"its {channel} is {1 / e.value:.3g} times what the others show, the ratio of {read} to {true}"
+    text = f"its {channel} is {number(1 / e.value, 3)} times what the others show, the ratio of {read} to {true}"
     return text, _corrected(run, channel, e.value, true, read=read)
 
 
 def _offset(run: Run, e: Trial) -> tuple[str, str]:
-    return f"the zero of its force is off by {-e.value:.3g} N", _shifted_by(run, "force", e.value)
+    return f"the zero of its force is off by {number(-e.value, 3)} N", _shifted_by(run, "force", e.value)
 
 
 def _current(run: Run, e: Trial) -> tuple[str, str]:
@@ -113,7 +114,7 @@ def _time(run: Run, e: Trial) -> tuple[str, str]:
     if run.notes.get("time_from"):  # no column contains it
         rate = (run.time.size - 1) / float(np.ptp(run.time)) / e.value
         remedy = _own_profile(run, f"[file] sample_rate_Hz = {rate:.5g}")
-    return f"its time runs {1 / e.value:.2g} times as long as its force shows: another sample rate", remedy
+    return f"its time runs {number(1 / e.value, 2)} times as long as its force shows: another sample rate", remedy
 
 
 def _sign(run: Run, e: Trial) -> tuple[str, str]:

@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from mrdamper.data import Run
+from mrdamper.data.wording import span
 from mrdamper.errors import InputError, listed
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.contradictions.copies import find_copies
@@ -146,7 +147,8 @@ def _parted(train: Sequence[Track], gains: Mapping[int, float]) -> list[dict[str
 def _differing(train: Sequence[Track], groups: Sequence[Mapping[str, float]]) -> ContradictionError:
     """Return the refusal of runs whose gains differ too much, with both groups."""
     low, high = (
-        f"{', '.join(sorted(group))} ({min(group.values()):.2g} to {max(group.values()):.2g} times" for group in groups
+        f"{', '.join(sorted(group))} ({span(min(group.values()), max(group.values()), 'times', 2, ' to ')}"
+        for group in groups
     )
     return ContradictionError(
         f"the forces of {sum(map(len, groups))} of {len(train)} runs differ by factors that neither currents, motions "

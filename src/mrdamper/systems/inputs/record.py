@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from mrdamper.data import Floats
+from mrdamper.data.wording import counted, number
 from mrdamper.errors import ColumnError, RecordError, UnitError
 from mrdamper.rig_files.dataset_samples import read_table
 from mrdamper.systems.inputs.base import Input
@@ -83,7 +84,7 @@ def record(
     if quantity not in _COLUMNS:
         raise UnitError(f"quantity {quantity!r}", where=where, remedy=f"one of {', '.join(_COLUMNS)}")
     if time.size < 3:
-        raise RecordError(f"{time.size} samples", where=where, remedy="give at least three")
+        raise RecordError(counted(time.size, "sample"), where=where, remedy="give at least three")
     if not (np.isfinite(time).all() and np.isfinite(values).all()):
         raise RecordError("not every number is finite", where=where, remedy="remove or fill those rows")
     if not (np.isfinite(time_scale) and time_scale > 0):
@@ -101,7 +102,7 @@ def record(
     scaled = values * _COLUMNS[quantity]
     if quantity != "height_m" and np.abs(scaled).max() > _STRONGEST:
         raise UnitError(
-            f"a peak of {np.abs(values).max():.4g} in {quantity} is {np.abs(scaled).max():.4g} m/s²",
+            f"a peak of {number(np.abs(values).max())} in {quantity} is {number(np.abs(scaled).max())} m/s²",
             where=where,
             remedy="no ground moves like that: is it in cm/s² (gal), or m/s² under the name of g?",
         )
