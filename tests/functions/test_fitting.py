@@ -72,9 +72,9 @@ def test_every_form_is_the_formula_it_names():
 @pytest.mark.parametrize(
     ("form", "coefficients", "rates", "text"),
     [
-        ("quadratic-current-speed", (1.0, -2.5, 3.0, 4.0, -5.0), (), "1 I^2 -2.5 I +3 f^2 A^2 +4 f A -5"),
-        ("mass-power", (1.0, 2.0, 3.0, 4.0), (0.5,), "1 I^2 +2 I +3 f^-0.5 +4"),
-        ("current-decay-frequency", (1.0, 2.0, 3.0), (0.25, 7.0), "1 exp(-0.25 I) exp(-7 f) +2 exp(-0.25 I) +3"),
+        ("quadratic-current-speed", (1.0, -2.5, 3.0, 4.0, -5.0), (), "1 I^2 - 2.5 I + 3 f^2 A^2 + 4 f A - 5"),
+        ("mass-power", (-1.188e7, 2.0, 3.0, 4.0), (0.5,), "-11.88e6 I^2 + 2 I + 3 f^-0.5 + 4"),
+        ("current-decay-frequency", (1.0, 2.0, 3.0), (0.25, 7.0), "1 exp(-0.25 I) exp(-7 f) + 2 exp(-0.25 I) + 3"),
     ],
 )
 def test_a_function_reads_as_it_is_computed(form, coefficients, rates, text):
@@ -194,10 +194,13 @@ def test_no_value_counts_more_than_those_of_the_most_certain_quarter():
     assert fit.function.coefficients == pytest.approx(np.polyfit(CURRENT, VALUES, 1, w=w).tolist())
 
 
-def test_values_that_do_not_vary_are_explained_whole():
-    fit = fit_function("constant", CONDITIONS, np.full(CURRENT.size, 7.0))
-    assert (fit.r2, fit.left_out) == (1.0, pytest.approx(0.0, abs=1e-12))
-    assert assess(fit.function, CONDITIONS, np.full(CURRENT.size, 7.0)).r2 == 1.0
+@pytest.mark.parametrize("value", [0.0, 7.0])
+def test_values_that_do_not_vary_have_no_variance_to_explain(value):
+    values = np.full(CURRENT.size, value)
+    fit = fit_function("constant", CONDITIONS, values)
+    assert (fit.r2, fit.left_out) == (pytest.approx(np.nan, nan_ok=True), pytest.approx(0.0, abs=1e-12))
+    for other in (values, values * (1 + 1e-11 * CURRENT)):
+        assert np.isnan(assess(fit.function, CONDITIONS, other).r2)
 
 
 def test_a_constant_knows_less_than_the_mean_of_all_and_explains_nothing():

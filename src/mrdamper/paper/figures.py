@@ -16,6 +16,7 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, Run
 from mrdamper.data.progress import Progress
+from mrdamper.data.wording import number
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.loop_analysis import dynamic_ranges
 from mrdamper.paper.claims_on_tests import friction_along
@@ -40,6 +41,7 @@ from mrdamper.report.plots.style import (
 )
 from mrdamper.statistics.functions.fitting import fit_function
 from mrdamper.statistics.functions.forms import ParameterFunction, features
+from mrdamper.statistics.metrics import explained_variance
 
 _MOST_LOOPS = 9  # in one panel
 _LINE, _SMALL = 0.9, 7  # width of a line, size of the letters of a legend [pt]
@@ -71,8 +73,8 @@ def pictures(
 ) -> dict[str, Picture | str]:
     """Draw figures by name, or state why they cannot be drawn."""
     drawn: dict[str, Picture | str] = {}
-    for number, name in enumerate(names):
-        progress(f"figure {name}", number / len(names))
+    for place, name in enumerate(names):
+        progress(f"figure {name}", place / len(names))
         figure = FIGURES[name].make(study, FIGURES[name].axes)
         drawn[name] = figure if isinstance(figure, str) else picture_of(figure, also)
     return drawn
@@ -239,7 +241,7 @@ def _over_current(name: str, form: str, study: Reproduction, axes: Texts) -> Dra
             panel.plot(dense, curve, color=colour, lw=_LINE)
         name_and_fit = f"{motion_name(first)}: {text}" if text else motion_name(first)
         panel.plot([], [], label=name_and_fit, color=colour, ls="" if function is None else "-", **_POINTS)
-    panel.title, panel.y.log = f"R² {whole.r2:.3f} over all runs" if whole and form == "whole" else "", log
+    panel.title, panel.y.log = _r2(whole.r2, " over all runs") if whole and form == "whole" else "", log
     panel.legend("right", size=_SMALL)
     return figure
 
@@ -251,8 +253,7 @@ def _function_at(
     log = name == "beta"
     if form == "whole" and (whole := function_of(study, name)):
         curve = study.options.scaled(name, 1.0) * whole.function(*features(conditions))
-        r2 = _r2(*((np.log(values), np.log(curve)) if log else (values, curve)))
-        return whole.function, f"R² {r2:.3f}" if np.isfinite(r2) else ""
+        return whole.function, _r2(explained_variance(*((np.log(values), np.log(curve)) if log else (values, curve))))
     if not form:
         return None, ""
     try:
@@ -260,9 +261,13 @@ def _function_at(
     except IdentificationError:
         return None, "too few currents"
     if form == "constant":  # R² of a mean is zero: state its value instead
-        return fit.function, f"{fit.function.coefficients[0]:.4g}"
+        return fit.function, number(fit.function.coefficients[0])
     exact = len(fit.function.coefficients) + len(fit.function.rates) >= len(conditions)
-    return fit.function, "through its points" if exact else f"R² {fit.r2:.3f}"
+    return fit.function, "through its points" if exact else _r2(fit.r2)
+
+
+def _r2(share: float, over: str = "") -> str:
+    return f"R² {share:z.3f}{over}" if np.isfinite(share) else ""
 
 
 def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
@@ -312,8 +317,7 @@ def _constant_term(name: str, form: str, study: Reproduction, axes: Texts) -> Dr
     for f, A in pairs:
         panel.plot(dense, power * function(0.0, f, A) * np.ones(40), lw=0.7, color=MEASURED, alpha=0.6)
     panel.plot([], [], label="by the function", color=MEASURED, **dash)
-    r2 = _r2(level, fitted)
-    panel.title = f"R² {r2:.3f} over the motions" if np.isfinite(r2) else "one motion: no R²"
+    panel.title = _r2(explained_variance(level, fitted), " over the motions") or "one motion: no R²"
     panel.legend("right", size=_SMALL)
     return figure
 
@@ -322,11 +326,6 @@ def beside_current_law(function: ParameterFunction, conditions: Sequence[Conditi
     """Return values less the function of the current alone [Qian et al. 2024, Eq. 24, 28, 33, 37]."""
     I, f, A = features(conditions)
     return values - (function(I, f, A) - function(np.zeros(I.size), f, A))
-
-
-def _r2(values: Floats, fitted: Floats) -> float:
-    spread = float(np.sum((values - values.mean()) ** 2))
-    return 1 - float(np.sum((fitted - values) ** 2)) / spread if spread > 0 else float("nan")
 
 
 # Methods compared, searches, noise seeds, sensitivities.
@@ -352,8 +351,8 @@ def _errors(study: Reproduction, axes: Texts) -> Drawing:
     if not study.held_out:
         return "nothing predicts a validation run"
     figure, panel = _figure(axes, 3.4, right=2.6)
-    for number, method in enumerate(study.contenders):
-        again, place = divmod(number, 7)  # yellow is hardly visible on white
+    for rank, method in enumerate(study.contenders):
+        again, place = divmod(rank, 7)  # yellow is hardly visible on white
         runs = sorted(method.validation.runs, key=lambda r: r.condition.current_A)
         errors = [100 * r.scores.nrmse_pp for r in runs]
         look = {"color": PALETTE[place], "ls": ("-", "--", ":")[min(again, 2)], **_POINTS}

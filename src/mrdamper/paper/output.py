@@ -15,7 +15,7 @@ from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.published import all_published
 from mrdamper.data import Condition
 from mrdamper.data.atomic import ResultRecord, publish
-from mrdamper.data.encoding import csv_text
+from mrdamper.data.encoding import csv_text, finite
 from mrdamper.data.progress import Progress, silent
 from mrdamper.errors import InputError
 from mrdamper.identification.harmonic_balance import SineRecord
@@ -227,11 +227,9 @@ def _function_rows(study: Reproduction) -> Rows:
         if not isinstance(fit := method.fit, ModifiedFit):
             continue
         for name, one in fit.functions.items():
-            # A parameter that was held has no variation to explain.
-            varies = np.ptp(fit.values[name]) > 1e-9 * np.max(np.abs(fit.values[name]), initial=0.0)
             rows.append(
                 {"method": method.recipe.title, "parameter": name, "form": one.function.form,
-                 "function": one.function.formula, "r2": one.r2 if varies else None,
+                 "function": one.function.formula, "r2": finite(one.r2),
                  "coefficients": " ".join(map(repr, one.function.coefficients)),
                  "rates": " ".join(map(repr, one.function.rates))}
             )  # fmt: skip

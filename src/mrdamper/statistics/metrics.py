@@ -42,6 +42,13 @@ def mean_relative_error(measured: Floats, predicted: Floats) -> float:
     return float(np.mean(np.abs((predicted - measured)[counted] / measured[counted])))
 
 
+def explained_variance(values: Floats, fitted: Floats) -> float:
+    """Share of the variance of values (N,) of any unit that others explain, R²; NaN where they do not vary."""
+    if not np.ptp(values) > 1e-9 * np.max(np.abs(values)):
+        return float("nan")
+    return 1.0 - float(np.sum((fitted - values) ** 2)) / float(np.sum((values - values.mean()) ** 2))
+
+
 def peak_force(force: Floats) -> float:
     """Half the peak-to-peak force [N]."""
     return float(np.ptp(force) / 2)

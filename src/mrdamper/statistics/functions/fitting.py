@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mrdamper.data import Condition, Floats
+from mrdamper.data.wording import counted
 from mrdamper.errors import IdentificationError
 from mrdamper.statistics.functions.forms import Form, ParameterFunction, features, form_named
 from mrdamper.statistics.functions.selection import broken_law, fold_groups, rises, smaller_wins, supported
 from mrdamper.statistics.levenberg_marquardt import least_squares, newton_refine
 from mrdamper.statistics.linear import project_out_columns, solve_linear
+from mrdamper.statistics.metrics import explained_variance
 
 # Below this share of the largest singular value the tests do not separate the terms: a rig repeats a motion to 1e-6.
 _RANK_LIMIT = 1e-5
@@ -26,7 +28,8 @@ class FunctionFit:
     """A fitted parameter function and how well it describes the identified values."""
 
     function: ParameterFunction
-    r2: float  # share of the variance it explains (in the logarithm, where the parameter is logarithmic)
+    # share of the variance it explains (in the logarithm, where the parameter is logarithmic); NaN without variance
+    r2: float
     # RMS cross-validation error at omitted conditions, over the parameter's spread: below 1 the function predicts
     # better than the mean; infinite where one condition alone determines a term
     left_out: float
@@ -72,17 +75,15 @@ def _fitted(form: str | Form, conditions: Sequence[Condition], values: ArrayLike
     if log:
         target = np.log(target)
     if target.size < len(chosen.terms) + len(chosen.rate_bounds):
-        raise _undetermined(chosen, f"{target.size} conditions", I, f, A)
+        raise _undetermined(chosen, counted(target.size, "condition"), I, f, A)
     rates = _best_rates(chosen, I, f, A, target, weight)
     columns = chosen.columns(I, f, A, rates) if rates else _fixed_columns(chosen, tuple(conditions))
     if columns is None or (rates and not _determined(columns)):
         raise _undetermined(chosen, "they do not tell its terms apart", I, f, A)
     coefficients, left_out, basis, residual = _solved(columns, target, weight, len(rates))
-    cost = float(np.sum((columns @ coefficients - target) ** 2))
-    spread = float(np.sum((target - target.mean()) ** 2))
     function = ParameterFunction(chosen.name, tuple(coefficients.tolist()), tuple(float(r) for r in rates), log)
-    size = np.sqrt(spread / target.size) or 1.0
-    fit = FunctionFit(function, r2=1.0 - cost / spread if spread > 0 else 1.0, left_out=left_out / size)
+    size = float(np.std(target)) or 1.0
+    fit = FunctionFit(function, r2=explained_variance(target, columns @ coefficients), left_out=left_out / size)
     return _Fitted(fit, basis, residual)
 
 
@@ -150,8 +151,7 @@ def assess(function: ParameterFunction, conditions: Sequence[Condition], values:
     target, fitted = np.asarray(values, dtype=float), function(*features(conditions))
     if function.log:
         target, fitted = np.log(target), np.log(fitted)
-    spread = float(np.sum((target - target.mean()) ** 2))
-    return FunctionFit(function, 1.0 - float(np.sum((fitted - target) ** 2)) / spread if spread else 1.0, float("nan"))
+    return FunctionFit(function, explained_variance(target, fitted), left_out=float("nan"))
 
 
 def require_determined(form: str, conditions: Sequence[Condition]) -> None:
@@ -164,7 +164,7 @@ def require_determined(form: str, conditions: Sequence[Condition]) -> None:
     if chosen.rate_bounds:
         raise IdentificationError(f"{form} has rates to search", remedy="choose a form without")
     if len(conditions) < len(chosen.terms) or _fixed_columns(chosen, tuple(conditions)) is None:
-        raise _undetermined(chosen, f"{len(conditions)} conditions do not tell its terms apart", I, f, A)
+        raise _undetermined(chosen, f"{counted(len(conditions), 'condition')} do not tell its terms apart", I, f, A)
 
 
 def _best_rates(form: Form, I: Floats, f: Floats, A: Floats, target: Floats, weight: Floats) -> tuple[float, ...]:
