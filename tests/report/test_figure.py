@@ -79,6 +79,20 @@ def test_a_logarithmic_axis_has_ticks_at_powers_of_ten_and_between_few_of_them()
     assert axis.ticks((0.9, 30.0))[1] == ["1", "2", "5", "10", "20"]
     assert axis.ticks((1e-6, 1.0))[1][0] == "10⁻⁶"
     assert axis.share([1.0, 10.0, 100.0], (1.0, 100.0)) == pytest.approx([0, 0.5, 1])
+    axis.most = 6
+    assert axis.ticks((0.85, 1.8))[1] == ["1.0", "1.2", "1.4", "1.6", "1.8"]  # one power of ten is no scale
+    assert len(axis.ticks((2.1, 19.0))[0]) >= 3
+
+
+@pytest.mark.parametrize("amplitudes", [(12.0, 12.0), (11.99, 12.01)])
+def test_marks_are_clear_of_the_frame_where_one_end_of_the_axis_is_given(amplitudes):
+    axis = Axis()
+    axis.low = 0.0
+    low, high = axis.limits([np.array(amplitudes)])
+    assert low == 0.0
+    assert high > 12.5
+    axis.low, axis.high = None, 12.0
+    assert axis.limits([np.array([0.0, 6.0])]) == (pytest.approx(-0.6), 12.0)
 
 
 def test_colours_rise_in_brightness_with_their_value():

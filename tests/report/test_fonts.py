@@ -50,6 +50,13 @@ def test_characters_without_a_font_are_named(monkeypatch):
     assert "Not printed, because no installed font contains them: U+4EAC" in text_of(pdf_of(PAGE, {}))
 
 
+def test_a_word_of_another_type_is_not_broken_at_the_end_of_a_line():
+    lines = "".join(f"<p>{'i' * n} (<b>Current laws</b>: <code>global</code>-fit)</p>" for n in range(100, 200))
+    text = text_of(pdf_of(PAGE.replace("<p>東京 damper</p>", lines), {}))
+    for word in ("(Current", "laws:", "global-fit)"):
+        assert text.count(word) == 100, word
+
+
 @pytest.mark.parametrize(("paper", "height"), [("a4", 841.89), ("letter", 792.0)])
 def test_pages_have_the_size_asked_for(paper, height):
     (page,) = PdfReader(io.BytesIO(pdf_of(PAGE.replace("東京", ""), {}, paper))).pages

@@ -21,6 +21,9 @@ FIGURE_AUDIT = (Path(__file__).parents[1] / "support" / "figure_audit.js").read_
 CUT = """[...document.querySelectorAll(".scroll")]
     .filter((e) => e.scrollWidth > e.clientWidth + 1 && !e.closest("details")).map((e) => e.textContent.slice(0, 80))"""
 
+PAST_THE_EDGE = """[...document.querySelectorAll("caption, figcaption")]
+    .filter((e) => e.getBoundingClientRect().right > document.documentElement.clientWidth).map((e) => e.textContent)"""
+
 
 @pytest.fixture(scope="session")
 def drawings(written):
@@ -77,6 +80,8 @@ def test_the_page_passes_at_any_width(shown, written, width):
     assert shown.evaluate(AUDIT) == []
     shown.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = true))")
     assert shown.evaluate("document.documentElement.scrollWidth") <= width
+    assert shown.evaluate(PAST_THE_EDGE) == []
+    assert min(shown.evaluate("[...document.querySelectorAll('figure img')].map((e) => e.clientWidth)")) > 500
     if width == 1280:
         assert shown.evaluate(CUT) == []
         axe = pytest.importorskip("axe_playwright_python.sync_playwright")

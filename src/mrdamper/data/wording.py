@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LEAST, _MOST = 1e-4, 1e6  # numbers from the least up to the most are written without an exponent
 
 
@@ -46,3 +48,14 @@ def counted(count: int, noun: str) -> str:
     ('1 run', '0 cross-validated runs')
     """
     return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def raised(text: str) -> str:
+    """Raise the whole exponents of units and powers.
+
+    Examples
+    --------
+    >>> raised("10^-3 N/m^3")
+    '10⁻³ N/m³'
+    """
+    return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(_RAISED), text)

@@ -15,7 +15,7 @@ import numpy as np
 from markupsafe import Markup
 
 from mrdamper.data import Dataset
-from mrdamper.data.wording import counted, number, span
+from mrdamper.data.wording import counted, number, raised, span
 from mrdamper.errors import UnknownNameError
 
 PAPERS = ("a4", "letter")  # sizes of the pages of a PDF
@@ -97,6 +97,7 @@ _ENVIRONMENT.globals |= {
     "svg": inline_svg,
     "number": number,
     "span": span,
+    "raised": raised,
     "plain": plain,
     "whole": whole,
     "median_worst": median_worst,

@@ -19,6 +19,7 @@ from typing import Any
 
 from fpdf import FPDF, FontFace
 from fpdf.enums import Align, TableBordersLayout, TextEmphasis
+from fpdf.text_region import TextColumns
 
 from mrdamper.report.fonts import Fallback, fallback_fonts
 from mrdamper.report.page import paper_size
@@ -30,6 +31,7 @@ _SMALLEST = 6.0  # type size [pt] below which a table is split by columns
 _MIN_SCALE = 0.7  # smallest scale of a figure that is reduced to fit the rest of a page [-]
 _PADDING = 3.0  # mm beside a cell's text
 _NARROWEST = 28.0  # mm of a column whose text runs over lines
+_LINE_HEIGHT = 1.28  # of running text over its type size [-]
 _LOGO = (50.0, 14.0)  # mm, largest size of a logo
 _KEEP = 42.0  # mm required below a heading, so that it does not end a page
 _VOID = frozenset({"br", "img", "meta", "link", "hr", "input"})
@@ -221,26 +223,24 @@ class _Writer:
         """Draw running text, with bold and code inside."""
         paper = self.paper
         paper.set_text_color(*(_FAINT if {"faint", "caption"} & element.classes else _INK))
-        paper.set_left_margin(_MARGIN + indent)
-        paper.set_x(_MARGIN + indent)
-        self._runs(element, size, "")
-        paper.set_left_margin(_MARGIN)
-        paper.ln(0.5 * size)
-        paper.ln(0.15 * size)
+        with paper.text_columns(l_margin=_MARGIN + indent, line_height=_LINE_HEIGHT) as column:
+            self._runs(column, element, size, "")
+        paper.set_x(_MARGIN)
+        paper.ln(0.2 * size)
         paper.set_text_color(*_INK)
 
-    def _runs(self, element: _Element, size: float, style: str) -> None:
+    def _runs(self, column: TextColumns, element: _Element, size: float, style: str) -> None:
         for child in element.children:
             if isinstance(child, str):
                 words = " ".join(child.split())
                 lead = " " if child[:1].isspace() and words else ""
                 trail = " " if child[-1:].isspace() else ""
                 self.paper.set_font("code" if style == "code" else "text", "B" if style == "B" else "", size)
-                self.paper.write(0.45 * size, lead + words + trail)
+                column.write(lead + words + trail)
             elif child.tag == "br":
-                self.paper.ln(0.45 * size)
+                column.write("\n")
             else:
-                self._runs(child, size, {"b": "B", "strong": "B", "code": "code"}.get(child.tag, style))
+                self._runs(column, child, size, {"b": "B", "strong": "B", "code": "code"}.get(child.tag, style))
 
     def folded(self, element: _Element) -> None:
         """Set the title of a folded part of the page; in print the part is open."""

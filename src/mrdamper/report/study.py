@@ -18,7 +18,7 @@ from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names
 from mrdamper.data.progress import Progress, silent
 from mrdamper.data.runs import once_per_run
-from mrdamper.data.wording import counted, span
+from mrdamper.data.wording import counted, raised, span
 from mrdamper.errors import IdentificationError
 from mrdamper.identification import Identification
 from mrdamper.identification.characteristics import Characteristics, characterise
@@ -231,7 +231,7 @@ def _fit_columns(fits: Sequence[Identification]) -> list[tuple[str, str, float]]
     for info in fits[0].model.parameters() if fits else ():
         if info.name in fits[0].free:
             unit, factor = powered(f"({info.unit})", max(abs(getattr(fit.model, info.name)) for fit in fits))
-            columns.append((info.name, unit[1:-1], factor))
+            columns.append((info.name, raised(unit[1:-1]), factor))
     return columns
 
 

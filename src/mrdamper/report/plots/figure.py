@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrdamper.data import Floats
+from mrdamper.data.wording import raised
 from mrdamper.report.plots.drawing import INCH, INK, Drawing, DrawnPath, DrawnText, Look, text_width
 
 WIDTH = 7.2  # inches, two journal columns
@@ -25,7 +26,7 @@ _SPACED = 1.4  # width of a tick's text and the gap to the next one, over the te
 _MARGIN = 0.05  # share of the range left free beside the data
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # distances of ticks in a decade
 _MAX_LABELLED_DECADES = 2.5  # of a logarithmic axis with ticks at 2 and 5, too
-_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_FEWEST_DECADES = 3  # ticks of a logarithmic axis; with fewer they are even numbers, as on a linear axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,7 @@ class Axis:
 
     def limits(self, values: Sequence[Floats]) -> tuple[float, float]:
         """Return ends of the axis, where they are not given, a margin beyond the values."""
-        every = np.concatenate([np.zeros(0), *values])
+        every = np.concatenate([[end for end in (self.low, self.high) if end is not None], *values])
         every = every[np.isfinite(every) & ((every > 0) | np.full(every.size, not self.log))]
         low, high = (float(every.min()), float(every.max())) if every.size else (0.1, 1.0)
         if self.log:
@@ -81,18 +82,13 @@ class Axis:
         if self.places is not None:
             places = np.asarray(self.places, dtype=float)
             return places, self.texts if self.texts is not None else [f"{p:g}" for p in places]
-        if self.log:
-            return _decades(*ends)
+        if self.log and len((ticks := _decades(*ends))[0]) >= _FEWEST_DECADES:
+            return ticks
         for most in range(self.most, 1, -1):
             places, texts = _even(*ends, most)
             if sum(text_width(text, _SPACED) for text in texts) < room:
                 return places, texts
         return _even(*ends, 1)
-
-
-def power_of_ten(power: int) -> str:
-    """Write a power of ten in one line."""
-    return f"10{str(power).translate(_SUPERSCRIPT)}"
 
 
 def _even(low: float, high: float, most: int) -> tuple[Floats, list[str]]:
@@ -112,7 +108,7 @@ def _decades(low: float, high: float) -> tuple[Floats, list[str]]:
     places = np.array([s * 10.0**k for k in range(first, last + 1, every) for s in within])
     places = places[(places >= low * (1 - 1e-9)) & (places <= high * (1 + 1e-9))]
     plain = low > 1e-4 and high < 1e5
-    return places, [f"{p:g}" if plain else power_of_ten(round(np.log10(p))) for p in places]
+    return places, [f"{p:g}" if plain else raised(f"10^{round(np.log10(p))}") for p in places]
 
 
 @dataclass(eq=False)

@@ -33,7 +33,7 @@ _AXES = {
     "c": ("Viscous damping c (N s/m)", 1.0),
     "fy": ("Yield force (N)", 1.0),
     "yield_force": ("Yield force (N)", 1.0),
-    "yield_displacement": ("Yield displacement (µm)", 1e6),
+    "yield_displacement": ("Yield displacement (mm)", 1e3),
     "k1": ("Stiffness k1 (N/m)", 1.0),
     "k3": ("Cubic stiffness k3 (N/m³)", 1.0),
     "f0": ("Offset force f0 (N)", 1.0),

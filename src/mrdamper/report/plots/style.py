@@ -9,7 +9,8 @@ import numpy as np
 
 from mrdamper.data import Condition, Floats, current_levels
 from mrdamper.data.encoding import csv_text
-from mrdamper.report.plots.figure import Figure, power_of_ten
+from mrdamper.data.wording import raised
+from mrdamper.report.plots.figure import Figure
 
 # Okabe and Ito's palette, black first.
 PALETTE = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
@@ -57,7 +58,7 @@ def powered(text: str, largest: float) -> tuple[str, float]:
     if not power:
         return text, 1.0
     name, _, unit = text.rpartition("(")
-    return f"{name}({power_of_ten(power)} {unit}", 10.0**-power
+    return raised(f"{name}(10^{power} {unit}"), 10.0**-power
 
 
 def thin(array: Floats, most: int = 400) -> Floats:
