@@ -170,7 +170,7 @@ def test_a_calibrated_band_is_its_factor_times_the_band_at_the_tests():
 def test_a_band_says_for_which_sessions_it_holds_and_how_far_it_is_calibrated():
     few = Calibration("session", 4, (1.0,), (1.0,), (1.0,), (0.9, 0.9, 0.9))
     future, like = "in a future test session", "for sessions like the tested ones (fewer than 3 known)"
-    beyond = ", calibrated to 80 % at most by 4 independent sessions and beyond by Student's distribution"
+    beyond = ", calibrated up to 80 %, as 4 sessions allow, and extrapolated beyond by Student's distribution"
     for dof, said in ((2.0, future), (0.0, like)):
         known = replace(KNOWN, session_dof=dof)
         assert scope(damper(known), 0.9) == said + ", not calibrated: no cross-validated runs"

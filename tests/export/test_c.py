@@ -186,6 +186,8 @@ def test_a_hostile_rig_name_stays_in_its_comment(tmp_path):
     build(damper, tmp_path, COMPILERS[0])
     written = CExporter().export(damper, "damper").files["damper.h"].decode()
     assert "*/ int evil" not in written
+    written = CExporter().export(replace(damper, rig=""), "damper").files["damper.h"].decode()
+    assert "from a model. C99" in written
 
 
 @pytest.mark.usefixtures("one_platform")

@@ -16,7 +16,7 @@ from mrdamper.dampers.sessions import SessionCorrection
 from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import SESSIONS_NEEDED, Floats
-from mrdamper.data.wording import number
+from mrdamper.data.wording import counted, number
 from mrdamper.errors import ParameterError
 from mrdamper.identification.intervals import student
 from mrdamper.statistics.metrics import peak_force
@@ -142,10 +142,9 @@ def scope(damper: Damper, level: float) -> str:
     if calibration is None:
         return f"{text}, not calibrated: no cross-validated runs"
     if level > calibration.reachable:
-        text += (
-            f", calibrated to {100 * calibration.reachable:.0f} % at most by {calibration.units} independent "
-            f"{calibration.unit}s and beyond by Student's distribution"
-        )
+        units = counted(calibration.units, calibration.unit)
+        text += f", calibrated up to {100 * calibration.reachable:.0f} %, as {units} allow, and extrapolated beyond "
+        text += "by Student's distribution"
     return text
 
 

@@ -25,7 +25,7 @@ from mrdamper.data.arrays import Floats, index_at
 from mrdamper.data.runs import Run, once_per_run
 from mrdamper.data.sessions import session_of
 from mrdamper.data.strict_text import STRICT
-from mrdamper.data.wording import number
+from mrdamper.data.wording import counted, number
 from mrdamper.identification.intervals import student
 from mrdamper.physics.motion.sines import equivalent_sine, sine_condition
 from mrdamper.statistics.linear import nonnegative_least_squares
@@ -303,10 +303,12 @@ class Calibration:
         force, peak, energy = (f"{100 * share:.0f} %" for share in self.coverage)
         few = ""
         if self.units < _ENOUGH_UNITS:
-            few = f"; {self.units} independent {self.unit}s reach {100 * self.reachable:.0f} % at most"
+            few = f"; {100 * REPORTED_LEVEL:.0f} % requires {_ENOUGH_UNITS} independent {self.unit}s"
         return (
             f"{number(100 * self.level, 3)} % prediction intervals covered {force} of the samples, "
-            f"{peak} of the peak forces and {energy} of the energies of {self.units} cross-validated {self.unit}s{few}"
+            f"{peak} of the peak forces and {energy} of the energies of "
+            + counted(self.units, f"cross-validated {self.unit}")
+            + few
         )
 
     def factor(self, quantity: Quantity, level: float) -> float:

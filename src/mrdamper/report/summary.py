@@ -20,7 +20,6 @@ from mrdamper.study.workflow import RigStudy, Study
 LEVEL = 0.9  # coverage of the stated prediction intervals [-]
 _MAX_LINES = 20  # number of lines on a terminal
 _MAX_LIMITATIONS = 5  # number of limitations on a terminal
-_MAX_WIDTH = 160  # characters of a line on a terminal
 
 
 @dataclass(frozen=True)
@@ -94,7 +93,6 @@ def study_lines(study: Study, files: Sequence[str], *, verbose: bool = False) ->
     if not verbose and len(lines) + len(files) > _MAX_LINES:
         rest = len(lines) + len(files) - _MAX_LINES + 1
         lines = [*lines[: _MAX_LINES - len(files) - 1], f"... {rest} more lines with --verbose"]
-    lines = lines if verbose else [_cut(line) for line in lines]
     return [*lines, *files]
 
 
@@ -148,7 +146,3 @@ def _errors(kind: str, scores: Validation) -> str:
     if not scores.runs:
         return f"no {kind} runs"
     return f"{kind} {100 * scores.median():.2f} %, {100 * scores.worst_error():.1f} %"
-
-
-def _cut(line: str) -> str:
-    return line if len(line) <= _MAX_WIDTH else f"{line[: _MAX_WIDTH - 3].rsplit(' ', 1)[0]} ..."
