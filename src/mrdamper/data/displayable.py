@@ -67,7 +67,7 @@ def _library(name: str) -> Any:
 
 def _cell(value: Any) -> str:
     if isinstance(value, float | np.floating):
-        return number(value)
+        return number(float(value))
     return "" if value is None else str(value)
 
 

@@ -221,7 +221,7 @@ class _Line:
             done += len(finished)
             what = "reference dampers" if plan is None else "dampers"
             rate = done / max(time.monotonic() - begin, 1e-9)
-            self._progress(f"{done} of {len(waiting)} {what}, {number(rate, 3)} a second", done / len(waiting))
+            self._progress(f"{done} of {len(waiting)} {what}, {rate:.3g} a second", done / len(waiting))
 
     def _is_kept(self, number: int, plan: Plan | None) -> bool:
         if self._journal.status(self._key(number, plan)) is not None:

@@ -54,7 +54,7 @@ def dissipates(view: View) -> None:
             remedy = "name the columns the other way round: [channels.force] column = ... in a profile"
         elif share > -_CLEARLY and elastic > _ELASTIC:
             delay = -share / elastic * np.std(displacement) / np.std(view.moving.velocity)
-            what = f"the force is nearly that of a spring, {number(1e3 * delay, 2)} ms or more behind the displacement"
+            what = f"the force is nearly that of a spring, {1e3 * delay:.2g} ms or more behind the displacement"
             remedy = "record it again with both channels filtered alike, or set the force's known delay_ms in a profile"
         else:
             what = "force and displacement count in opposite directions"

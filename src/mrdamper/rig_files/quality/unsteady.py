@@ -42,7 +42,7 @@ def stroke_steps(view: View) -> Iterator[Finding]:
         if abs(change) < _FOLLOWS * abs(step):
             yield Finding(
                 "W_UNSTEADY",
-                f"the stroke changes by {100 * step:+.3g} % at {number(view.run.time[strokes.reversals[at]])} s and "
+                f"the stroke changes by {100 * step:+.3g} % at {view.run.time[strokes.reversals[at]]:.4g} s and "
                 f"the force does not: damping is uncertain by {percent(abs(step))}; check the displacement sensor",
             )
         return
