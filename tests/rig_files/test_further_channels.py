@@ -8,11 +8,12 @@ import scipy.io
 from support.rig_files import AMPLITUDE, FREQUENCY, channels, rows, text, write
 
 from mrdamper.data import Run
-from mrdamper.errors import RunError
+from mrdamper.errors import InputError, RunError
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
+from mrdamper.rig_files.preview import columns_of, question_of, tree_lines
 from mrdamper.rig_files.profile import parse_profile, profile_text
 from mrdamper.rig_files.profile_template import profile_template
-from mrdamper.rig_files.rig_import import read_run, to_dataset
+from mrdamper.rig_files.rig_import import read_run, read_runs, to_dataset
 
 HEADER = "time [s],disp [mm],force [N],oil temperature [°C],gas pressure [bar],LVDT 2 [in],body temp [°F]"
 
@@ -94,7 +95,7 @@ def test_a_temperature_of_another_length_is_left_out_and_named(tmp_path):
 def test_a_further_channel_of_another_length_is_refused():
     time = np.arange(5.0)
     with pytest.raises(RunError, match="temperature_C has 4 samples"):
-        Run("a", time, time, time, 0.0, further={"temperature_C": np.zeros(4)})
+        Run("a", time, time, time, np.array(0.0), further={"temperature_C": np.zeros(4)})
 
 
 def test_inertia_and_gas_force_are_taken_off_as_stated(path, tmp_path):
@@ -113,3 +114,34 @@ def test_inertia_and_gas_force_are_taken_off_as_stated(path, tmp_path):
     np.testing.assert_allclose(record.force[inside], true["force"][inside], atol=0.3)
     np.testing.assert_allclose(record.further["force_raw_N"], table[:, 2], atol=1e-5)
     assert "8 kg" in record.provenance["force_correction"]
+
+
+def test_numbers_of_columns_are_those_of_the_file_whatever_is_left_out(tmp_path):
+    """A column of runs in front, columns beside a test and empty columns of a sheet do not shift the numbers."""
+    plain = rows()
+    table = np.column_stack([plain, 0.7 * plain[:, 2]])
+    runs = np.vstack([np.column_stack([np.full(len(table), number), number * table]) for number in (1, 2)])
+    runs = write(tmp_path, "runs_1A.csv", text(runs, ("run," + ",".join(EQUAL[:4]),)))
+    book = pytest.importorskip("openpyxl").Workbook()
+    for i, row in enumerate((EQUAL[:4], *table.tolist()), 3):
+        for j, cell in enumerate(row, 2):
+            book.active.cell(i, j, cell)
+    sheet = tmp_path / "sheet_1A.xlsx"
+    book.save(sheet)
+    assert [line.split()[0] for line in tree_lines([sheet])[1:5]] == ["2", "3", "4", "5"]
+    for path in (runs, sheet):
+        with pytest.raises(InputError, match=r"set its number: \[channels.force\] column = 4 or 5 ") as refused:
+            read_runs(path)
+        question = question_of(refused.value, columns_of(path))
+        assert question is not None
+        assert [answer.value for answer in question.answers][-2:] == [4, 5]
+        written, _ = profile_template([path], parse_profile(""))
+        assert '#   5  "Force [N]"' in written
+        for number, factor in ((4, 1.0), (5, 0.7)):
+            profile = parse_profile(written.replace("[channels.force]", f"[channels.force]\ncolumn = {number}"))
+            for i, record in enumerate(read_runs(path, profile), 1):
+                np.testing.assert_allclose(record.force, i * factor * table[:, 2], atol=1e-4)
+            again, _ = profile_template([path], profile)
+            assert parse_profile(again).channels["force"].column == number
+    with pytest.raises(InputError, match="no column 1: there are of the test: 2, 3, 4, 5"):
+        read_runs(runs, parse_profile("[channels.force]\ncolumn = 1\n"))

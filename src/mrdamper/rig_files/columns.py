@@ -171,7 +171,7 @@ def noted_columns(table: RawTable, profile: Profile, assigned: Mapping[str, Assi
         yield Finding("W_COLUMN", f"{text} not taken; if they are further tests, import each with a profile of its own")
     for role in [role for role in SIGNED if role in assigned]:
         same = _differing(table, columns[role])
-        numbers = ", ".join(str(i + 1) for i in same if i != columns[role])
+        numbers = ", ".join(str(table.number(i)) for i in same if i != columns[role])
         name = table.headers[columns[role]].name
         text = f"of {len(same)} columns called {name!r} one is taken as the {role}, not {numbers}; "
         if same:
@@ -215,9 +215,13 @@ def coil_currents(table: RawTable) -> list[int]:
 
 def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
     """Column and unit of every channel as far as the file says them, for a profile to be completed."""
-    headers = {role: (i, table.headers[i]) for role, i in _columns(table, Profile())[0].items()}
-    proposed = {role: (i, h.unit if h.dimension == DIMENSION[role] else "") for role, (i, h) in headers.items()}
-    return {**dict.fromkeys(REQUIRED, (None, "")), **proposed}
+    proposed: dict[str, tuple[int | None, str]] = dict.fromkeys(REQUIRED, (None, ""))
+    for role, i in _columns(table, Profile())[0].items():
+        header = table.headers[i]
+        with contextlib.suppress(RigFileError):  # two columns of its name differ
+            _refuse_two_values(table, role, i, Profile())
+            proposed[role] = i, header.unit if header.dimension == DIMENSION[role] else ""
+    return proposed
 
 
 def candidates_of(table: RawTable, role: str) -> list[int]:
@@ -267,9 +271,11 @@ def column_called(table: RawTable, column: str | int, what: str, key: str = "") 
     """Return the column that a profile names, for a channel or by another key; `ColumnError` if there is none."""
     remedy = f"correct {key or f'[channels.{what}]'} of the profile"
     if isinstance(column, int):
-        if not 1 <= column <= len(table.names):
-            raise _refusal(ColumnError, table, f"no column {column}: there are {len(table.names)}", remedy)
-        return column - 1
+        numbers = [*map(table.number, range(len(table.names)))]
+        if column not in numbers:
+            shown = f"of the test: {listed(list(map(str, numbers)), 12)}" if table.numbers else f"{len(numbers)}"
+            raise _refusal(ColumnError, table, f"no column {column}: there are {shown}", remedy)
+        return numbers.index(column)
     wanted, named = column.strip(), split_name(column)
     with_unit = [f"{header.name} {header.known}" if header.unit else "" for header in table.headers]
     headings = (table.names, [header.name for header in table.headers], with_unit)
@@ -294,7 +300,7 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
             'file = "...{run}..." under [channels.displacement] and [channels.force]'
         )
         return [_refusal(UnitError, table, what, remedy, "E_UNITS_MISSING")]
-    shown = ", ".join(name or f"column {i}" for i, name in enumerate(table.names, 1))
+    shown = ", ".join(name or f"column {table.number(i)}" for i, name in enumerate(table.names))
     shown += "" if any(header.unit for header in table.headers) else ", without units"
     remedy = 'set [channels.{}] column = "..."{} in a profile'
     fixed = {"time": " or, with a fixed rate, [file] sample_rate_Hz = ..."}
@@ -394,7 +400,7 @@ def _refuse_factor(table: RawTable, role: str, unit: str) -> None:
 
 def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitError | None:
     parsed = parse_unit(unit)
-    named = f"column {table.names[column] or column + 1!r}"
+    named = f"column {table.names[column] or table.number(column)!r}"
     if parsed is None and not unit and table.odd and table.odd[column]:
         stamps = ", or time stamps like 2024-03-31 01:59:59.123" if role == "time" else ""
         problem = f"{named} holds no numbers but {table.odd[column][:40]!r}"
@@ -450,7 +456,7 @@ def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> Non
     heading = "heading" if inner is None else "row of units"
     problem = f"column {table.names[column]!r} is in {unit} by its {heading} and in {own} by {where}"
     remedy = f'set one: [channels.{role}] unit = "..." in a profile'
-    raise table.source.refuse("E_AMBIGUOUS", problem, remedy, line=table.line, column=column + 1)
+    raise table.source.refuse("E_AMBIGUOUS", problem, remedy, line=table.line, column=table.number(column))
 
 
 def _refuse_two_values(table: RawTable, role: str, column: int, profile: Profile) -> None:
@@ -461,8 +467,9 @@ def _refuse_two_values(table: RawTable, role: str, column: int, profile: Profile
         return
     if same := _differing(table, column):
         problem = f"{len(same)} columns are called {table.headers[column].name!r} and differ"
-        remedy = f"rename one, or set its number: column = 2{_or_split(table)} in a profile"
-        raise table.source.refuse("E_DUPLICATE_COLUMN", problem, remedy, line=table.line, column=same[1] + 1)
+        numbers = " or ".join(str(table.number(i)) for i in same[:6])
+        remedy = f"rename one, or set its number: [channels.{role}] column = {numbers}{_or_split(table)} in a profile"
+        raise table.source.refuse("E_DUPLICATE_COLUMN", problem, remedy, line=table.line, column=table.number(same[1]))
 
 
 def _differing(table: RawTable, column: int) -> list[int]:

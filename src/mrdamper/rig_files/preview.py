@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from mrdamper.errors import InputError, listed
@@ -74,7 +75,8 @@ def preview(path: str | Path, profile: Profile | str | Path | None = None) -> di
         }
     rows = [[column[i] if i < len(column) else "" for column in cells] for i in range(_ROWS_SHOWN)]
     names, units = table.names[:_MOST_SHOWN], table.units[:_MOST_SHOWN]
-    return {"names": names, "units": units, "rows": rows, "channels": places}
+    numbers = [*map(table.number, range(len(names)))]
+    return {"names": names, "units": units, "numbers": numbers, "rows": rows, "channels": places}
 
 
 def _first_cells(table: RawTable, column: int) -> list[str]:
@@ -101,7 +103,7 @@ def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable,
         says: dict[str, Any] = {"column": None, "unit": unit or None}
         if column is not None:
             header = table.names[column]
-            says["column"] = header if header and table.names.count(header) == 1 else column + 1
+            says["column"] = header if header and table.names.count(header) == 1 else table.number(column)
             sign = sign_of(table, profile, name)
             sign = (-1 if name in SIGNED and names_compression(header) else 1) if sign is None else sign
             says |= {"sign": sign} if sign else {}
@@ -116,7 +118,9 @@ def tree_lines(paths: Iterable[str | Path], profile: Profile | str | Path | None
     Tables that hold the same columns are one entry with a count.
     """
     profile = profile_of(profile)
-    alike: dict[tuple[Header, ...], tuple[list[str], list[str]]] = {}  # by columns: tables, lines beside one
+    alike: dict[
+        tuple[tuple[int, Header], ...], tuple[list[str], list[str]]
+    ] = {}  # by columns: tables, lines beside one
     problems = []
     with unpacked(paths) as given:
         for path in files_in(given)[0]:
@@ -124,7 +128,8 @@ def tree_lines(paths: Iterable[str | Path], profile: Profile | str | Path | None
                 with raw_tables(path, profile.file) as tables:
                     for table in tables:
                         beside = [*(f"{name} = {value:g}" for name, value in table.constants.items()), *table.remarks]
-                        names, _ = alike.setdefault(table.headers, ([], beside))
+                        numbered = tuple((table.number(i), header) for i, header in enumerate(table.headers))
+                        names, _ = alike.setdefault(numbered, ([], beside))
                         names.append(f"{path.name}: {table.label}" if table.label else path.name)
             except InputError as error:
                 problems.append(f"{path.name}: {error.found} [{error.code}]")
@@ -133,8 +138,7 @@ def tree_lines(paths: Iterable[str | Path], profile: Profile | str | Path | None
         shown = listed(names, _MOST_NAMES)
         lines.append(shown if len(names) == 1 else f"{len(names)} tables with the same columns: {shown}")
         lines += [
-            f"  {i}  {c.name or '(no name)'}{f' [{c.unit}]' if c.unit else ''}"
-            for i, c in enumerate(columns[:_MOST_COLUMNS], 1)
+            f"  {i}  {c.name or '(no name)'}{f' [{c.unit}]' if c.unit else ''}" for i, c in columns[:_MOST_COLUMNS]
         ]
         if columns[_MOST_COLUMNS:]:
             lines.append(f"  ... and {len(columns) - _MOST_COLUMNS} more columns")
@@ -142,10 +146,15 @@ def tree_lines(paths: Iterable[str | Path], profile: Profile | str | Path | None
     return lines + problems
 
 
-def columns_of(path: str | Path, profile: Profile | str | Path | None = None) -> tuple[str, ...]:
-    """Names of the columns of a file's first table; empty if it cannot be opened."""
+def columns_of(path: str | Path, profile: Profile | str | Path | None = None) -> dict[int, str]:
+    """Names of the columns of a file's first table, by their numbers; empty if it cannot be opened."""
     profile = profile_of(profile)
-    return ask_tables(path, lambda tables: test_tables(tables, profile)[0].names, (), profile.file)
+
+    def numbered(tables: list[RawTable]) -> dict[int, str]:
+        table = test_tables(tables, profile)[0]
+        return {table.number(i): name for i, name in enumerate(table.names)}
+
+    return ask_tables(path, numbered, {}, profile.file)
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,10 +180,10 @@ class Question:
     answers: tuple[Answer, ...]
 
 
-def question_of(error: InputError, columns: Sequence[str] = ()) -> Question | None:
+def question_of(error: InputError, columns: Mapping[int, str] = MappingProxyType({})) -> Question | None:
     """Return the question behind a refusal that a profile answers; None where the file itself must be corrected.
 
-    The columns are the names of those of the refused file, in order, empty where there is none.
+    The columns are the names of those of the refused file by their numbers, empty where there is none.
     """
     match = _ROLE.search(error.remedy or "")
     role = match[1] if match else ""
@@ -184,9 +193,10 @@ def question_of(error: InputError, columns: Sequence[str] = ()) -> Question | No
         units = _UNITS.get(DIMENSION[role], ())
         return Question(f"{error.found}. Unit of the {role}?", tuple(Answer(role, "unit", unit) for unit in units))
     if error.code in ("E_COLUMN", "E_AMBIGUOUS", "E_DUPLICATE_COLUMN"):
-        named = [name for name in columns if name and list(columns).count(name) == 1]
+        names = [*columns.values()]
+        named = [name for name in names if name and names.count(name) == 1]
         answers = [Answer(role, "column", name) for name in named]
-        answers += [Answer(role, "column", i) for i, name in enumerate(columns, 1) if name not in named]
+        answers += [Answer(role, "column", i) for i, name in columns.items() if name not in named]
         return Question(f"{error.found}. Which column is the {role}?", tuple(answers)) if answers else None
     if error.code in ("E_SIGN_CONVENTION", "E_DISSIPATION_SIGN"):
         return Question(f"{error.found}. Sign of the {role}?", (Answer(role, "sign", 1), Answer(role, "sign", -1)))

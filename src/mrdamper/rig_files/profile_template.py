@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from glob import escape
 from itertools import chain
 from pathlib import Path
@@ -51,7 +51,7 @@ def _file_for_profile(paths: Sequence[str | Path], profile: Profile) -> Iterator
         yield next(chain(first, tests), files[0])
 
 
-def _missing_currents(paths: Sequence[str | Path], guess: Profile, columns: tuple[str, ...]) -> str:
+def _missing_currents(paths: Sequence[str | Path], guess: Profile, columns: Mapping[int, str]) -> str:
     """List what a person fills in for tests without a current, as comments: their currents, or a column's scale."""
     refusals = import_files(paths, guess).refusals if guess.current is None else ()
     missing = [r for r in refusals if r.error.code == "E_CURRENT_MISSING" or CURRENT_TOO in r.error.remedy]
@@ -59,7 +59,9 @@ def _missing_currents(paths: Sequence[str | Path], guess: Profile, columns: tupl
         return ""
     lines = []
     reasons = ["" if r.error.code != "E_CURRENT_MISSING" else r.error.found for r in missing]  # else of units
-    column = next((name for name in columns if name and any(f"column {name!r}" in why for why in reasons)), None)
+    column = next(
+        (name for name in columns.values() if name and any(f"column {name!r}" in why for why in reasons)), None
+    )
     if column is not None:
         shown = json.dumps(column, ensure_ascii=False)
         lines = ["# Calibration of the current: A for 1 of the column:", "#[channels.current]", f"#column = {shown}"]
@@ -75,9 +77,9 @@ def _missing_currents(paths: Sequence[str | Path], guess: Profile, columns: tupl
     return "\n".join(["", *lines, ""])
 
 
-def _alternatives(columns: tuple[str, ...]) -> str:
+def _alternatives(columns: Mapping[int, str]) -> str:
     """List the columns and the most used keys of a profile as comments."""
-    named = [f"#   {number}  {json.dumps(name, ensure_ascii=False)}" for number, name in enumerate(columns, 1) if name]
+    named = [f"#   {number}  {json.dumps(name, ensure_ascii=False)}" for number, name in columns.items() if name]
     return "\n".join(
         [
             "", "# Columns of the file, for column = \"...\" or column = NUMBER:", *named,

@@ -135,9 +135,13 @@ def _read(table: RawTable, assigned: dict[str, Assigned], profile: Profile):
     raw = dict(content.values)
     for column, values in raw.items():
         if content.lines is not None and thousands_in(values):
-            problem = f"column {table.names[column] or column + 1!r} goes from hundreds to ones with three decimals"
+            problem = (
+                f"column {table.names[column] or table.number(column)!r} goes from hundreds to ones with three decimals"
+            )
             remedy = "export it without separators of thousands"
-            raise table.source.refuse("E_AMBIGUOUS", f"{problem}: points of thousands?", remedy, column=column + 1)
+            raise table.source.refuse(
+                "E_AMBIGUOUS", f"{problem}: points of thousands?", remedy, column=table.number(column)
+            )
     _refuse_unscaled(table, assigned, raw, profile)
     findings = [*table.findings, *content.findings]
     for name in [name for name in assigned if name in _LENIENT]:
@@ -196,7 +200,7 @@ def _refuse_tiny_currents(table: RawTable, assigned: dict[str, Assigned], channe
     if 0 < largest < _LEAST_CURRENT:
         problem = f"the current in MA is {1e3 * largest:.3g} at most: milliamperes would be no current of a coil"
         remedy = 'set [channels.current] unit = "A" or unit = "mA" in a profile'
-        raise table.source.refuse("E_AMBIGUOUS", problem, remedy, column=assigned["current"].column + 1)
+        raise table.source.refuse("E_AMBIGUOUS", problem, remedy, column=table.number(assigned["current"].column))
 
 
 def _counted_time(table: RawTable, profile: Profile, size: int) -> tuple[Floats, str]:
@@ -243,7 +247,9 @@ def _further(table: RawTable, assigned: dict[str, Assigned], size: int) -> dict[
             continue
         bare = re.sub(r"[^A-Za-z0-9]+", "_", header.name).strip("_")[:40].lower() or "column"
         si = _KEPT[unit_of.dimension]
-        name = f"{bare}_{si}" if f"{bare}_{si}" not in {*taken, *wanted} else f"{bare}_column_{column + 1}_{si}"
+        name = (
+            f"{bare}_{si}" if f"{bare}_{si}" not in {*taken, *wanted} else f"{bare}_column_{table.number(column)}_{si}"
+        )
         wanted[name] = (column, unit_of)
     columns = [column for column, _ in wanted.values()]
     values = table.try_read(*columns) if columns else {}
@@ -301,7 +307,8 @@ def _remarks(table: RawTable, profile: Profile, assigned: dict[str, Assigned]) -
     columns += sessions if len(session) == 1 else []
     ignored = [name for i, name in enumerate(table.names) if name and i not in used and i not in columns]
     taken = [
-        f"{role} = {table.names[e.column] or f'column {e.column + 1}'} in {e.unit}" for role, e in assigned.items()
+        f"{role} = {table.names[e.column] or f'column {table.number(e.column)}'} in {e.unit}"
+        for role, e in assigned.items()
     ]
     remarks = {"columns": ", ".join(taken)} | ({"session": session[0]} if len(session) == 1 else {})
     remarks |= {"specimen": table.label} if table.label.casefold() in CORNERS else {}

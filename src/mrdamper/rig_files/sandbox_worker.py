@@ -17,7 +17,7 @@ from mrdamper.errors import CombinedError, MissingExtraError
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import NoTableError, RawTable, Reader, RigFileError, Source
 
-_SAYS = ("names", "units", "line", "label", "form", "constants", "odd", "remarks", "over")
+_SAYS = ("names", "units", "line", "label", "form", "constants", "odd", "remarks", "over", "numbers")
 _TOLD = ("code", "found", "line", "column", "remedy")
 
 

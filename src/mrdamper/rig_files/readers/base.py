@@ -75,6 +75,7 @@ class Source:
     size: int  # bytes after unpacking
     keep: ExitStack = field(default_factory=ExitStack)  # closes what readers opened when the file is closed
     added: int = 0  # lines of names that were written above the rows
+    before: int = 0  # empty columns of a sheet in front of the first one
 
     def head(self, size: int = 4096) -> bytes:
         """Return the first bytes; the file stands at its start afterwards."""
@@ -95,6 +96,7 @@ class Source:
     ) -> RigFileError:
         """Return a refusal that names this file."""
         line = None if line is None else max(line - self.added, 1)
+        column = None if column is None else column + self.before
         return RigFileError(code, problem, file=self.name, line=line, column=column, remedy=remedy)
 
 
@@ -138,6 +140,7 @@ class RawTable:
     chosen: Mapping[str, int] = field(default_factory=dict)  # columns by channel that the samples decide on
     calibrated: frozenset[str] = frozenset()  # channels whose scale the profile states
     stated_in: str = ""  # where a constant that was added on that way stands
+    numbers: tuple[int, ...] = ()  # of the columns in their file, where others were left out or stood before them
 
     @cached_property
     def headers(self) -> tuple[Header, ...]:
@@ -159,6 +162,10 @@ class RawTable:
     def quantities(self) -> tuple[Quantity, ...]:
         """Quantities that lines and single numbers beside the columns state."""
         return tuple(stated_quantities(self.remarks, self.constants, self.decimal))
+
+    def number(self, column: int) -> int:
+        """Return the number of a column in the file, counted from one, whatever was left out before it."""
+        return self.numbers[column] if self.numbers else column + 1
 
     def columns(self, role: str | None = None, dimension: str | None = None) -> list[int]:
         """Return the columns whose name stands for a channel, whose unit is of a dimension, or both."""
@@ -191,8 +198,9 @@ class RawTable:
         def pick(entries: tuple[str, ...]) -> tuple[str, ...]:
             return tuple(entries[i] for i in columns) if entries else ()
 
-        odd = pick(self.odd)
-        return replace(self, names=pick(self.names), units=pick(self.units), odd=odd, over=(), words=None, read=read)
+        odd, numbers = pick(self.odd), tuple(map(self.number, columns))
+        own = {"names": pick(self.names), "units": pick(self.units), "odd": odd, "over": (), "numbers": numbers}
+        return replace(self, words=None, read=read, **own)
 
     def computed(self, column: int, needs: Sequence[int], make: Callable[[Mapping[int, Floats]], Floats]) -> RawTable:
         """Return the table with a column made of the values of others, of its own among them; the next one is added."""
@@ -209,7 +217,8 @@ class RawTable:
         if column < len(self.names):
             return replace(self, read=read)
         wider = {key: (*old, "") for key in ("names", "units", "odd", "over") if (old := getattr(self, key))}
-        return replace(self, read=read, words=None, **wider)
+        numbers = (*self.numbers, 0) if self.numbers else ()  # that no profile gives
+        return replace(self, read=read, words=None, numbers=numbers, **wider)
 
 
 class Reader(ABC):

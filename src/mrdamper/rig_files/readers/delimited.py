@@ -89,6 +89,7 @@ class DelimitedText(Reader):
             odd=layout.odd,
             remarks=block.remarks or layout.remarks,
             over=layout.over,
+            numbers=tuple(range(before + 1, before + len(units) + 1)) if (before := stream.source.before) else (),
             words=lambda column: _words(stream, layout, block, column),
         )
 

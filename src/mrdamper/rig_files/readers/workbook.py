@@ -86,7 +86,8 @@ def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
         )
     texts = []
     for name in names if form.sheet is None else [form.sheet]:
-        text = as_text(source, name, book.get_sheet_by_name(name).iter_rows())
+        sheet = book.get_sheet_by_name(name)
+        text = replace(as_text(source, name, sheet.iter_rows()), before=sheet.start[1] if sheet.start else 0)
         if text.size:
             texts.append((name, text))
     if not texts:

@@ -108,7 +108,7 @@ function columnPicker(name, preview) {
   column.addEventListener("change", () => {
     if (column.value !== "") unit.value = units.find((u) => u === preview.units[Number(column.value)]) ?? unit.value;
   });
-  const chosen = () => (column.value === "" ? null : [name, { column: Number(column.value), unit: unit.value, sign: Number(sign?.value ?? 1) }]);
+  const chosen = () => (column.value === "" ? null : [name, { column: preview.numbers[Number(column.value)] - 1, unit: unit.value, sign: Number(sign?.value ?? 1) }]);
   return { chosen, element: h("div", { class: "row" }, h("span", { class: "small picked" }, capitalise(name)), column, unit, sign) };
 }
 
