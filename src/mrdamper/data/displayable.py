@@ -66,7 +66,7 @@ def _library(name: str) -> Any:
 
 
 def _cell(value: Any) -> str:
-    if isinstance(value, float | np.floating):
+    if isinstance(value, float | np.float32):
         return number(float(value))
     return "" if value is None else str(value)
 
