@@ -240,3 +240,19 @@ def test_two_dampers_in_one_folder_are_asked_about(bundled, tmp_path):
     assert isinstance(done.exception, IdentificationError)
     assert "FOLDER:RIG" in str(done.exception)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_clipped_test_is_named_and_decides_no_limit(dataset, tmp_path):
+    """The force that the load cell cut off would pass where the damper fails."""
+    clipped = made_run(0.5, 2.9, seed=99)
+    top = 0.7 * float(np.max(clipped.force))
+    clipped = replace(clipped, id="clipped", force=np.minimum(clipped.force, top))
+    save_dataset(Dataset((*dataset.runs, clipped), "made damper"), tmp_path / "ds")
+    (tmp_path / "limits.toml").write_text(
+        f'[[limit]]\ncurrent_A = 0.5\nvelocity_m_s = 0.182\nside = "rebound"\nlower_N = 1\nupper_N = {top - GAS:.0f}\n'
+    )
+    done = invoke("report", tmp_path / "ds", "--limits", tmp_path / "limits.toml", "--out", tmp_path / "report")
+    assert "not evaluated: clipped: a channel is cut off" in done.output
+    page = (tmp_path / "report/report.html").read_text(encoding="utf-8")
+    assert "Not evaluated: clipped (" in page
+    assert "0 of 1 passed" in page

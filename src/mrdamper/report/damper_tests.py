@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -16,12 +16,13 @@ from mrdamper.data.atomic import publish
 from mrdamper.data.encoding import csv_text
 from mrdamper.data.wording import counted, span
 from mrdamper.errors import IdentificationError, InputError
-from mrdamper.identification.characteristics import SIDES, Characteristics, Stroke, characterise
+from mrdamper.identification.characteristics import SIDES, Characteristics, Stroke
 from mrdamper.report.about import About, Limit
 from mrdamper.report.page import made_from, plain, render_page
 from mrdamper.report.plots.characteristics import continuous_velocity_plot, figures_over_current, peak_velocity_plot
 from mrdamper.report.plots.figure import Figure
 from mrdamper.report.plots.style import picture_of, save_picture
+from mrdamper.study.usable_runs import characterise_usable
 
 _SOURCES = ("source", "file", "source_file")  # keys of a run's notes that name its source
 _CURRENT_TOLERANCE = 0.03  # relative difference [-] up to which a current counts as that of a limit
@@ -36,18 +37,22 @@ def write_test_report(
     ladder: Sequence[float] = (),
     png: bool = False,
     paper: str = "a4",
+    tell: Callable[[str], None] = lambda line: None,
 ) -> list[Path]:
     """Write report.html, report.pdf, forces.csv, tests.csv and figures/ of one or several specimens.
 
     `specimens` are the tests of one damper each, by the name in the report. Pass or fail is stated only against
     `limits` of the damping force. `ladder` holds the velocities of the force table [m/s]; default: round values within
-    the tests of the first specimen. Pages of report.pdf have the size `paper`, "a4" or "letter". Raises
-    `IdentificationError` if a specimen has no steady cycle, or the tests of several dampers, and `OutputError` if the
-    folder cannot be written to.
+    the tests of the first specimen. `tell` is called with each test that is not evaluated, and why. Pages of report.pdf
+    have the size `paper`, "a4" or "letter". Raises `IdentificationError` if a specimen has no steady cycle, or the
+    tests of several dampers, and `OutputError` if the folder cannot be written to.
     """
     from mrdamper.report.pdf import pdf_of
 
     characteristics = {name: _characterised(name, dataset) for name, dataset in specimens.items()}
+    passed_over = {run: why for one in characteristics.values() for run, why in one.passed_over.items()}
+    for run, why in passed_over.items():
+        tell(f"not evaluated: {run}: {why}")
     facts = facts_of_tests(characteristics, ladder, limits)
     first = next(iter(specimens.values()))
     about = about or About()
@@ -67,7 +72,7 @@ def write_test_report(
             lead=facts["summary"],
             t=facts,
             pictures=saved,
-            passed_over={run: why for one in characteristics.values() for run, why in one.passed_over.items()},
+            passed_over=passed_over,
         )
         (work / "report.html").write_text(page, encoding="utf-8")
         (work / "report.pdf").write_bytes(pdf_of(page, {key: p["pdf"] for key, p in pictures.items()}, paper))
@@ -169,7 +174,7 @@ def _characterised(name: str, dataset: Dataset) -> Characteristics:
             remedy="name one: FOLDER:RIG",
         )
     try:
-        return characterise(dataset.runs)
+        return characterise_usable(dataset)
     except InputError as error:
         error.where = error.where or name
         raise

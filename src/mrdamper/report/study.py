@@ -21,7 +21,7 @@ from mrdamper.data.runs import once_per_run
 from mrdamper.data.wording import counted, raised, span
 from mrdamper.errors import IdentificationError
 from mrdamper.identification import Identification
-from mrdamper.identification.characteristics import Characteristics, characterise
+from mrdamper.identification.characteristics import Characteristics
 from mrdamper.identification.intervals import written
 from mrdamper.models import Model
 from mrdamper.report.about import About, Limit, about_of, load_about, load_limits
@@ -45,6 +45,7 @@ from mrdamper.report.summary import error_sentence, omission_lines
 from mrdamper.report.tables import identification_rows, score_rows
 from mrdamper.study.processes import IN_PROCESS, Processes
 from mrdamper.study.recipe import RecipeResult
+from mrdamper.study.usable_runs import characterise_usable
 from mrdamper.study.workflow import RigStudy, Study
 
 _LOOPS_SHOWN = 6
@@ -176,7 +177,7 @@ def _shown(rig: RigStudy) -> list[Any]:
 def _measured(rig: RigStudy) -> dict[str, Characteristics]:
     """Characterise the tests without a model; empty if no run has a steady cycle."""
     try:
-        return {rig.dataset.name: characterise(rig.dataset.runs)}
+        return {rig.dataset.name: characterise_usable(rig.dataset)}
     except IdentificationError:
         return {}
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from mrdamper.data import Dataset, Run
 from mrdamper.data.wording import number
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification import refuse_unusable
+from mrdamper.identification.characteristics import Characteristics, characterise
 from mrdamper.physics.motion import analyse_motion, equivalent_sine
 from mrdamper.rig_files.quality.table import check_run, with_findings
-from mrdamper.study.contradictions import RunComparison, compare_runs
+from mrdamper.study.contradictions import ContradictionError, RunComparison, compare_runs
 
 _MIN_SAMPLES_PER_CYCLE = 8  # below, velocity and loop are not determined
 _MAX_DISTORTION = 0.35  # harmonics over the fundamental: a triangle has 0.12, a square wave 0.48
@@ -173,6 +175,24 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
         else:
             refused[run.id] = "the motion is not a sine, which individual fits require"
     return sines, refused
+
+
+def characterise_usable(dataset: Dataset) -> Characteristics:
+    """Characterise the sound runs of one damper, those that contradict the others apart; the reasons are kept.
+
+    If runs contradict each other as those of two dampers do, all sound ones count. Raises `IdentificationError` as
+    `characterise`.
+    """
+    kept, refused = accepted_runs(dataset)
+    for run in kept:
+        try:
+            refuse_unusable(with_findings(run))
+        except InputError as error:
+            refused[run.id] = _reason(error, run)
+    with suppress(ContradictionError):
+        refused |= {one.run_id: str(one) for one in compare_runs(kept).contradictions}
+    measured = characterise([run for run in dataset if run.id not in refused])
+    return replace(measured, passed_over={**refused, **measured.passed_over})
 
 
 def _reason(error: InputError, run: Run) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from mrdamper.cli.output import warn
 from mrdamper.cli.progress import progress_on_stderr
 
 if TYPE_CHECKING:
@@ -43,8 +44,12 @@ def report(
         progress("reading", 0.0)
         loaded = dict(_specimen(text) for text in specimens)
         progress("report", 0.4)
-        written = write_test_report(loaded, out, about=head, limits=bands, ladder=ladder, png=png, paper=page_size)
+        aside: list[str] = []
+        written = write_test_report(
+            loaded, out, about=head, limits=bands, ladder=ladder, png=png, paper=page_size, tell=aside.append
+        )
         progress("written", 1.0)
+    warn(aside)
     print(f"report: {written[0]}")
 
 
