@@ -59,7 +59,8 @@ def follow_one(kappa: float, rho: float, n: float, path: Path, part: slice = sli
     """
     curve = master_curve(n)
     starts = np.array(starts_of_strokes(curve, kappa, rho, path, path.first_direction * zeta0))
-    return path.direction[part] * state_at(curve, rho, starts, path.stroke[part], kappa * path.distance[part])
+    along = state_at(curve, rho, starts, path.stroke[part], kappa * path.distance[part])
+    return np.multiply(path.direction[part], along, out=along)
 
 
 def starts_of_strokes(curve: MasterCurve, kappa: float, rho: float, path: Path, w: float) -> list[float]:
@@ -77,7 +78,7 @@ def on_curve(curve: MasterCurve, rho: float, phi: Floats) -> Floats:
     """State at signed distances phi [yield displacements] past zero."""
     with np.errstate(over="ignore"):  # far before zero; replaced below
         w = curve.rise(phi, np)
-    releasing = np.flatnonzero(phi < 0)
+    releasing = (phi < 0).nonzero()[0]
     if releasing.size:
         w[releasing] = -curve.release(-phi[releasing], rho, np)
     return w

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from mrdamper.data.arrays import Floats
 from mrdamper.errors import ExcitationError, is_a
 
+_AROUND = np.array([[-1], [0], [1]])
 LONG = 200_000  # samples from which results are not cached
 
 
@@ -44,11 +45,11 @@ class Path:
         arrival, departure, first = _reversals(x)
         peak, begin = x[arrival], departure + 1  # a rest belongs to the stroke it ends
         if peaks == "parabola":
-            beyond, is_early = _vertex(x, arrival, departure)
-            peak, begin = peak + beyond, np.where(beyond == 0, begin, arrival + 1 - is_early)
+            beyond, begin = _vertex(x, arrival, departure)
+            peak = peak + beyond
 
-        counts = np.diff(np.concatenate([[0], begin, [x.size]]))
-        origin = np.concatenate([x[:1], peak])
+        bounds = np.concatenate([[0], begin, [x.size]])
+        counts, origin = bounds[1:] - bounds[:-1], np.concatenate([x[:1], peak])
         directions = np.full(counts.size, first)
         directions[1::2] = -first
         distance = x - np.repeat(origin, counts)
@@ -56,7 +57,7 @@ class Path:
             stroke=np.repeat(np.arange(counts.size), counts),
             distance=np.abs(distance, out=distance),
             direction=np.repeat(directions, counts),
-            lengths=tuple(np.abs(np.diff(origin)).tolist()),
+            lengths=tuple(np.abs(origin[1:] - origin[:-1]).tolist()),
             first_direction=first,
         )
 
@@ -124,23 +125,27 @@ def _reversals(x: Floats) -> tuple[np.ndarray, np.ndarray, float]:
     moving = np.flatnonzero(~resting) if resting.any() else None
     if moving is not None:
         rising = rising[moving]
-    turn = np.flatnonzero(rising[1:] != rising[:-1])
+    turn = (rising[1:] != rising[:-1]).nonzero()[0]
     first = -1.0 if rising.size and not rising[0] else 1.0
-    return (turn + 1, turn + 1, first) if moving is None else (moving[turn] + 1, moving[turn + 1], first)
+    arrival = turn + 1 if moving is None else moving[turn] + 1
+    return arrival, arrival if moving is None else moving[turn + 1], first
 
 
 def _vertex(x: Floats, arrival: np.ndarray, departure: np.ndarray) -> tuple[Floats, np.ndarray]:
-    """Calculate the distance of the reversal beyond the outermost sample (signed), and if it is before that sample.
+    """Calculate the distance of the reversal beyond the outermost sample (signed), and the first sample after it.
 
     The vertex of the parabola through the sample and its neighbours, at most an eighth of the larger neighbouring move
     beyond the sample. Two equal outermost samples are on both sides of the peak, as in the parabola; three or more are
     a rest or the resolution of the sensor, and the reversal is there.
     """
-    before, here, after = x[arrival - 1], x[arrival], x[arrival + 1]
+    before, here, after = x[arrival + _AROUND]
     came, leaves = here - before, here - after  # of one sign; `leaves` may be 0
     slope = came - leaves  # twice the velocity at the sample, in displacement per sample
-    beyond = slope**2 / (8 * (came + leaves))
-    beyond[departure > arrival + 1] = 0.0
+    beyond = slope * slope / (8 * (came + leaves))
     # If it is slower on the far side, the reversal is after the sample.
-    is_early = (slope * came < 0) & (beyond != 0)
-    return beyond, is_early
+    begin = arrival + 1 - (slope * came < 0)
+    if departure is not arrival:
+        rests = departure > arrival + 1
+        beyond[rests] = 0.0
+        begin[rests] = departure[rests] + 1
+    return beyond, begin
