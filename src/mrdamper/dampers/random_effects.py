@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from mrdamper.dampers.concatenated_runs import MIN_ERROR_PP
 from mrdamper.dampers.run_residuals import RunResiduals
 from mrdamper.data import Floats, session_groups
+from mrdamper.data.arrays import blocks
 
 _MIN_RETAINED = 0.05  # share of a variance that the fit must have left in the residuals for it to be estimated
 _MAX_CONDITION = 100.0  # condition number of the equations; beyond, runs and sessions are not separated
@@ -28,6 +29,7 @@ _ITERATIONS = 4  # of the variances at which the quadratic forms are of least va
 _MAX_SHOWN = 128  # gains and offsets up to which those of draws are iterated: time grows with the cube of their number
 _MIN_SHARE = 1e-4  # of the largest variance, with which every other one counts in these forms
 _DRAWS, _ROUNDS, _SEED = 600, 4, 20240813  # draws of gains and offsets; rounds of weights, as in the joint fit
+_DRAWS_PER_BLOCK = 40  # draws whose matrices fit the processor's cache
 _EXCHANGES = 3  # rounds in which each of some representative draws is exchanged
 
 
@@ -161,8 +163,8 @@ class GainsAndOffsets:
         estimates = np.tile(np.mean(shown**2, axis=1)[:, None], len(self._designs))
         for _ in range(_ITERATIONS):
             some = np.flatnonzero(estimates.any(axis=1))
-            if some.size:
-                estimates[some] = self._variances(shown[some], estimates[some], noise)[0]
+            for part in (some[rows] for rows in blocks(some.size, _DRAWS_PER_BLOCK)):
+                estimates[part] = self._variances(shown[part], estimates[part], noise)[0]
         return estimates
 
     def effects(self) -> Effects:
