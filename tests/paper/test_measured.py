@@ -150,7 +150,7 @@ def test_shares_of_loops_and_of_steps_are_counted():
         patch.setattr(claims_on_tests, "bulge", lambda run: run)
         found = claims_on_tests.bulges(study_of(train=[0.9, 1.1, 1.2, 1.3]))
     assert found.values == (0.75,)
-    assert found.evidence == "ratio of widths 0.90–1.30"
+    assert found.evidence == "ratio of widths 0.9–1.3"
     energies = {(0.0, 1.0): 5.0, (1.0, 1.0): 9.0, (0.0, 2.0): 7.0, (1.0, 2.0): 9.5}
     loops = [loop(I, f, energy=E) for (I, f), E in energies.items()]
     found = claims_on_tests.energy(study_of(loops=loops))
@@ -169,7 +169,7 @@ def test_the_phase_counts_runs_in_the_band_and_the_motion_that_changes_most():
     assert above.values[0] == 3 / 5
     found = claims_on_tests.phase(study_of(conditions=conditions, readings=readings))
     assert list(found.values) == pytest.approx([3 / 5, 0.15])
-    assert found.evidence == f"1.200–1.450 rad; smallest sine {np.sin(1.2):.3f}"
+    assert found.evidence == f"1.2–1.45 rad; smallest sine {np.sin(1.2):.3f}"
 
 
 def test_the_stroke_end_compares_the_fastest_with_the_slowest_motion_at_the_highest_current():
@@ -216,7 +216,7 @@ def test_a_claim_is_said_with_its_numbers_and_what_was_built_in_is_recovered():
     assert (built_in.verdict, built_in.said) == ("agrees", "recovered (built into the virtual damper)")
     assert open_.said == "agrees with the paper on the virtual damper"
     assert real.said == "agrees with the paper on this damper"
-    assert (values.verdict, values.said) == ("not checked", "values beside the paper's (virtual damper)")
+    assert (values.verdict, values.said) == ("not checked", "not decided: the damper is virtual")
     assert (built_in.key, built_in.text, built_in.source, built_in.figure) == (
         "quadratic",
         "the text",

@@ -181,8 +181,8 @@ def test_everything_is_written_and_shown_in_its_place(monkeypatch, tmp_path):
     tables, absent = all_tables(made, (claim,))
     assert page["tables"] == tables
     assert page["claims"] == (claim,)
-    missing = [f"{name} is not made: {why}" for name, why in absent.items()]
-    assert page["notes"] == ("first", "fig09 is not drawn: one motion", *missing)
+    missing = [f"Table {name} is not made: {why}." for name, why in absent.items()]
+    assert page["notes"] == ("first", "Figure fig09 is not drawn: one motion.", *missing)
     assert (page["study"], page["best"], page["synthetic"]) == (made, "one", False)
     assert page["about"].startswith("from rig 1. Reference")
     times = (tmp_path / "out" / "tables" / "seconds.csv").read_text(encoding="utf-8").splitlines()

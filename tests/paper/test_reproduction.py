@@ -78,7 +78,7 @@ def test_every_claim_is_judged_with_numbers_and_its_threshold_printed(study):
     assert claims["quadratic"].verdict == "agrees"
     # Built into the virtual rig: recovered, never confirmed.
     assert {claims[key].said for key in ("gas series", "stroke end")} == {"recovered (built into the virtual damper)"}
-    assert claims["phase"].said == "values beside the paper's (virtual damper)"
+    assert claims["phase"].said == "not decided: the damper is virtual"
     assert claims["accuracy"].said == "differs from the paper on the virtual damper"
     # Without the comparators, claims that need them say so.
     assert claims["few parameters"].verdict == "cannot be checked"
@@ -133,7 +133,7 @@ def test_the_study_is_written_whole_every_figure_under_its_number_with_its_conte
         assert list(csv.DictReader(text.splitlines())), name
         assert f"Table {name[5:]}. {title}." in html.unescape(page)
     assert list(NUMBERED) == [f"table{n}" for n in range(1, 6)]
-    assert "seeds is not made" in page
+    assert "Table seeds is not made: no noise seeds were asked for" in page
 
 
 def test_tables_1_and_2_hold_the_two_amplitudes_and_table_4_every_current(study):
@@ -233,9 +233,8 @@ def test_the_same_study_runs_on_real_data_whose_gas_spring_is_unknown(bundled, q
     assert any("the gas spring is unknown: k1 =" in note for note in found.notes)
     assert all(c.said.endswith(" on this damper") or c.said == "cannot be checked" for c in check_claims(found))
     write_reproduction(found, tmp_path / "out")
-    assert "fig03 is not drawn: the data hold no friction test" in (tmp_path / "out" / "reproduction.html").read_text(
-        encoding="utf-8"
-    )
+    page = (tmp_path / "out" / "reproduction.html").read_text(encoding="utf-8")
+    assert "Figure fig03 is not drawn: the data hold no friction test." in page
 
 
 @pytest.mark.parametrize(
@@ -264,7 +263,7 @@ def test_thin_data_give_what_they_allow_and_say_why_the_rest_is_missing(
         assert "nan" not in text.lower().replace("nanm", ""), path.name
     if not held:
         assert "There are no validation runs, so the prediction error is not known." in page
-        assert "errors is not made: there is no validation run" in page
+        assert "Table errors is not made: there is no validation run." in page
         assert found.best is None
         (generalisation,) = [c for c in unjudged if c.key == "generalisation"]
         assert "there is no validation run" in generalisation.evidence

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
+from mrdamper.report.plots.drawing import DrawnText
 from mrdamper.report.plots.figure import Axis, Figure
 from mrdamper.report.plots.style import current_colours, picture_of
 
@@ -73,11 +74,23 @@ def test_ticks_are_fewer_where_their_texts_would_touch():
     assert len(axis.ticks((-0.1, 0.1), 8.0)[0]) < len(axis.ticks((-0.1, 0.1))[0])
 
 
+def test_the_name_of_an_axis_is_clear_of_its_numbers_in_a_wide_type():
+    axes = Figure(1, 1, 2.0).axes[0]
+    axes.plot([0.0, 1.0], [-200.0, 0.0])
+    axes.label("", "m (kg)")
+    texts = [part for part in axes.drawn("", (500.0, 150.0)) if isinstance(part, DrawnText)]
+    name = next(text for text in texts if text.turned)
+    number = next(text for text in texts if text.text == "−200")
+    wide = (0.84 + 3 * 0.64) * number.size  # the minus and the digits of DejaVu Sans
+    assert number.x - wide - name.x > 0.35 * name.size  # its letters descend by a quarter
+
+
 def test_a_logarithmic_axis_has_ticks_at_powers_of_ten_and_between_few_of_them():
     axis = Axis()
     axis.log = True
     assert axis.ticks((0.9, 30.0))[1] == ["1", "2", "5", "10", "20"]
     assert axis.ticks((1e-6, 1.0))[1][0] == "10⁻⁶"
+    assert axis.ticks((9e5, 6e6))[1] == ["10⁶", "2·10⁶", "5·10⁶"]
     assert axis.share([1.0, 10.0, 100.0], (1.0, 100.0)) == pytest.approx([0, 0.5, 1])
     axis.most = 6
     assert axis.ticks((0.85, 1.8))[1] == ["1.0", "1.2", "1.4", "1.6", "1.8"]  # one power of ten is no scale

@@ -29,13 +29,14 @@ def number(value: float | None, digits: int = 4, beside: float | None = None, si
 
 
 def span(low: float, high: float, unit: str = "", digits: int = 3, to: str = "–") -> str:
-    """Write a range and its unit: one number where both ends are written alike.
+    """Write a range and its unit: one number where both ends are written alike, and "to" beside a negative end.
 
     Examples
     --------
-    >>> span(0.5, 4, "Hz"), span(11.99, 12.01, "mm")
-    ('0.5–4 Hz', '12 mm')
+    >>> span(0.5, 4, "Hz"), span(11.99, 12.01, "mm"), span(-543, 2, "kg")
+    ('0.5–4 Hz', '12 mm', '-543 to 2 kg')
     """
+    to = " to " if low < 0 else to
     return f"{to.join(dict.fromkeys((number(low, digits), number(high, digits))))} {unit}".strip()
 
 

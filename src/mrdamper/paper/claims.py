@@ -45,8 +45,8 @@ class ClaimLimit:
     def text(self) -> str:
         """The limit in words."""
         sign = "≤" if self.sense == "below" else "≥"
-        wider = "" if self.near == self.holds else f" (in part: {sign} {self.near:g})"
-        return f"{self.value} {sign} {self.holds:g}{wider}"
+        wider = "" if self.near == self.holds else f" (in part: {sign} {number(self.near)})"
+        return f"{self.value} {sign} {number(self.holds)}{wider}"
 
 
 def _below(value: str, holds: float, near: float | None = None, *, alone: bool = True) -> ClaimLimit:
@@ -212,7 +212,7 @@ def in_words(verdict: Verdict, kind: Kind, *, virtual: bool) -> str:
     if verdict not in _RECOVERED:
         return verdict
     if virtual and kind == "damper":
-        return "values beside the paper's (virtual damper)"
+        return "not decided: the damper is virtual"
     if virtual and kind == "built in":
         return f"{_RECOVERED[verdict]} (built into the virtual damper)"
     preposition = "from" if verdict == "differs" else "with"

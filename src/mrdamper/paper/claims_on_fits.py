@@ -33,7 +33,7 @@ def mass(study: Reproduction) -> Measured:
     if fit is None or not fit.function.form.startswith("mass") or not np.ptp(literal):
         return unknown("m is held, or the runs determine no function of current and frequency for it")
     truth = f"; true {study.rig.mass:g} kg" if study.rig else ""
-    evidence = f"closed form {span(literal.min(), literal.max(), 'kg', to='…')}{truth}"
+    evidence = f"closed form {span(literal.min(), literal.max(), 'kg')}{truth}"
     return Measured.of(fit.r2, amplitude_spread(study.conditions, literal), literal.min(), evidence=evidence)
 
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from mrdamper.data import Condition, Floats, Run, same_motion
-from mrdamper.data.wording import span
+from mrdamper.data.wording import number, span
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.paper.options import CONSISTENT
@@ -94,7 +94,7 @@ def quadratic(study: Reproduction) -> Measured:
             f"none of {len(groups)} motions was tested at 4 currents or more: a quadratic through three points would "
             "prove nothing"
         )
-    return Measured.of(min(fits), evidence=f"up to {max(fits):.4f} over {len(fits)} motions")
+    return Measured.of(min(fits), evidence=f"largest {number(max(fits), 3)} over {len(fits)} motions")
 
 
 def speed_shift(study: Reproduction) -> Measured:

@@ -43,6 +43,7 @@ from mrdamper.statistics.functions.fitting import fit_function
 from mrdamper.statistics.functions.forms import ParameterFunction, features
 from mrdamper.statistics.metrics import explained_variance
 
+NO_SEEDS = "no noise seeds were asked for, or the data are not of the virtual rig (mrdamper reproduce --seeds 10)"
 _MOST_LOOPS = 9  # in one panel
 _LINE, _SMALL = 0.9, 7  # width of a line, size of the letters of a legend [pt]
 _POINTS = {"mark": "o", "ms": 3.5, "lw": _LINE}
@@ -283,7 +284,7 @@ def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> 
             shares[motion_name(conditions[0]).replace(", ", "\n")] = fit.r2
     if not shares:
         return "too few currents at every motion"
-    figure, panel = _figure(axes, 2.6)
+    figure, panel = _figure(axes, 2.7, bottom=0.6)
     panel.plot(range(len(shares)), list(shares.values()), label="R²", color=MEASURED, ls=":", **_POINTS)
     panel.x.places, panel.x.texts, panel.y.low = range(len(shares)), list(shares), min(0.0, *shares.values())
     return figure
@@ -378,7 +379,7 @@ def _genetic(study: Reproduction, axes: Texts) -> Drawing:
 
 def _seeds(study: Reproduction, axes: Texts) -> Drawing:
     if not study.seed_errors:
-        return "noise seeds need a virtual rig"
+        return NO_SEEDS
     figure, panel = _figure(axes, 2.4, left=2.2)
     for row, errors in enumerate(study.seed_errors.values()):
         panel.plot(100 * errors, np.full(errors.size, -row), "|", ms=9, color=PALETTE[1])

@@ -22,7 +22,7 @@ from mrdamper.identification.harmonic_balance import SineRecord
 from mrdamper.models import Model, model_type
 from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.paper.claims import Claim, check_claims
-from mrdamper.paper.figures import FIGURES, caption, pictures
+from mrdamper.paper.figures import FIGURES, NO_SEEDS, caption, pictures
 from mrdamper.paper.options import ALI, CONSISTENT, DIRECT, LITERAL, TRADITIONAL
 from mrdamper.paper.results import Reproduction, cost_per_run, rate_rows
 from mrdamper.report.page import made_from, render_page
@@ -53,8 +53,8 @@ def write_reproduction(
     for part in processes.map(draw, [names[n::parts] for n in range(parts)], progress):
         drawn |= part
     tables, absent = all_tables(study, claims)
-    notes = [f"{name} is not drawn: {drawn[name]}" for name in names if isinstance(drawn[name], str)]
-    notes += [f"{name} is not made: {why}" for name, why in absent.items()]
+    notes = [f"Figure {name} is not drawn: {drawn[name]}." for name in names if isinstance(drawn[name], str)]
+    notes += [f"Table {name} is not made: {why}." for name, why in absent.items()]
 
     def fill(work: Path) -> None:
         for part in ("figures", "tables"):
@@ -259,14 +259,14 @@ NUMBERED = MappingProxyType({
     "table1": "Identified parameters at the smaller amplitude",
     "table2": "Identified parameters at the larger amplitude",
     "table3": "Parameter values at the prediction motion, from the functions",
-    "table4": "Mean relative error (Eq. 44) of the predictions at every current; the mean of the Ali-type model beside",
+    "table4": "Mean relative error (Eq. 44) of the predictions at every current, in %",
     "table5": "The modified model beside the models the paper names",
 })  # fmt: skip
 _NEED_VALIDATION = dict.fromkeys(("table3", "table4", "rate", "parameters", "errors"), "there is no validation run")
 _REASONS = {
     "genetic": "no genetic search was made",
     "genetic_runs": "no genetic search was made",
-    "seeds": "noise seeds need the virtual rig",
+    "seeds": NO_SEEDS,
     "virtual_rig": "the data are not of the virtual rig",
 }
 _TABLES: Mapping[str, Callable[[Reproduction], Rows]] = MappingProxyType({

@@ -77,7 +77,7 @@ class DrawnText:
 
 def text_width(text: str, size: float) -> float:
     """Width of a line of text [pt], in a common sans-serif type."""
-    narrow, wide, capital = "ijlft.,:;'|!()[] I/", "mwMW%@–→", "ABCDEFGHKNOPQRSUVXYZ"
+    narrow, wide, capital = "ijlft.,:;'|!()[] I/", "mwMW%@–−→", "ABCDEFGHKNOPQRSUVXYZ"
     units = sum(0.3 if c in narrow else 0.86 if c in wide else 0.69 if c in capital else 0.56 for c in text)
     return units * size
 

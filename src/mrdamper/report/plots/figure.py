@@ -23,6 +23,7 @@ _GRID = "#e3e3e3"
 _FRAME = 0.7  # width of axes and ticks [pt]
 _TICK, _GAP = 3.5, 3.5  # length of a tick, distance between a tick and its text [pt]
 _SPACED = 1.4  # width of a tick's text and the gap to the next one, over the text in a narrow type
+_WIDE_TYPE = 1.1  # width of a text in a wide type over that in a common one
 _MARGIN = 0.05  # share of the range left free beside the data
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # distances of ticks in a decade
 _MAX_LABELLED_DECADES = 2.5  # of a logarithmic axis with ticks at 2 and 5, too
@@ -108,7 +109,12 @@ def _decades(low: float, high: float) -> tuple[Floats, list[str]]:
     places = np.array([s * 10.0**k for k in range(first, last + 1, every) for s in within])
     places = places[(places >= low * (1 - 1e-9)) & (places <= high * (1 + 1e-9))]
     plain = low > 1e-4 and high < 1e5
-    return places, [f"{p:g}" if plain else raised(f"10^{round(np.log10(p))}") for p in places]
+    return places, [f"{p:g}" if plain else _with_power_of_ten(p) for p in places]
+
+
+def _with_power_of_ten(value: float) -> str:
+    digit, power = f"{value:.0e}".split("e")
+    return raised(f"{'' if digit == '1' else f'{digit}·'}10^{int(power)}")
 
 
 @dataclass(eq=False)
@@ -239,7 +245,7 @@ class Axes:
         rows = max((text.count("\n") + 1 for text in self.x.texts or ()), default=1)
         middle = self.left + self.width / 2, self.top + self.height / 2
         yield DrawnText(middle[0], down + (1.2 * rows + 0.95) * size, self.x.name, self.size, "middle")
-        aside = self.left - _TICK - _GAP - widest - 0.6 * self.size
+        aside = self.left - _TICK - _GAP - _WIDE_TYPE * widest - 0.6 * self.size
         yield DrawnText(aside, middle[1], self.y.name, self.size, "middle", turned=True)
 
     def _listed(self, whole: tuple[float, float], curves: Sequence[Floats]) -> Iterator[DrawnPath | DrawnText]:
@@ -296,8 +302,8 @@ class Axes:
 
 
 def room_beside(texts: Iterable[str]) -> float:
-    """Return the margin for the texts of a vertical axis [inch]; a wide type needs a tenth more than `_SMALL`."""
-    return 0.2 + 1.1 * max(text_width(text, _SMALL) for text in texts) / INCH
+    """Return the margin for the texts of a vertical axis [inch]."""
+    return 0.2 + _WIDE_TYPE * max(text_width(text, _SMALL) for text in texts) / INCH
 
 
 class Figure:
