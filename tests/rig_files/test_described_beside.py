@@ -242,6 +242,33 @@ def test_levels_schemes_and_plans_state_the_currents_and_specimens_of_names(tmp_
     assert [record.provenance.get("specimen") for record in by_force] == [*(specimens or [None] * 2)] * 3
 
 
+@pytest.mark.parametrize(
+    ("head", "starts", "ends"),
+    [
+        ("Record,Start (s),End (s)", (0.5, 4.0), (2.5, 6.0)),
+        ("Record,First row,Last row", (102, 802), (502, 1202)),
+    ],
+)
+def test_starts_and_ends_that_a_plan_states_for_each_file_cut_its_record_into_tests(tmp_path, head, starts, ends):
+    plan = f"{head},Current (A)\n"
+    for name, levels in (("am", (0.0, 0.2)), ("pm", (0.9, 0.5))):
+        time, rows = np.arange(0.0, 7.0, 0.005), ""
+        for t in time:
+            level = levels[int(t > 3.2)]
+            speed = 0.0 if 2.8 < t < 3.6 else np.cos(2 * np.pi * t)
+            x = 0.0 if 2.8 < t < 3.6 else 12 * np.sin(2 * np.pi * t)
+            rows += f"{t:.3f},{x:.5f},{200 * speed + (90 + 800 * level) * np.tanh(20 * speed):.4f}\n"
+        (tmp_path / f"{name}.csv").write_text(UNITS + rows)
+        plan += "".join(f"{name}.csv,{a},{b},{i}\n" for a, b, i in zip(starts, ends, levels, strict=True))
+    (tmp_path / "plan.csv").write_text(plan)
+    result = import_files([tmp_path])
+    assert not [str(refusal.error) for refusal in result.refusals]
+    assert [r.id for r in result.records] == ["am_1", "am_2", "pm_1", "pm_2"]
+    assert [float(r.current[0]) for r in result.records] == [0.0, 0.2, 0.9, 0.5]
+    assert [round(r.time[0], 2) for r in result.records] == [0.5, 4.0] * 2
+    assert not result.left_out
+
+
 def test_a_remark_in_brackets_behind_a_legend_may_have_a_comma(tmp_path):
     write(tmp_path, UNITS)
     (tmp_path / "README.txt").write_text("Codes: m07 = 0.2 A, m08 = 0.9 A, m09 = 0 A (coil current, held constant)\n")

@@ -28,6 +28,7 @@ from mrdamper.rig_files.mapping.plans import (
     currents_beside,
     currents_listed,
     cut_to_windows,
+    cut_at_ranges,
     discarded_tests,
     misfit_of_plan,
     named_tests,
@@ -417,14 +418,14 @@ class _Intake:
         A list or a supply's current counts only where no table or legend states the coil's, and no other such file
         states others.
         """
-        candidates: list[tuple[Path, Results | None, _Tests, _Tests, _Tests, list[tuple[float, str]]]] = []
+        candidates: list[tuple[Path, Results | None, _Tests, _Tests, Sequence[Any], list[tuple[float, str]]]] = []
         own = ((path, self._results(path)) for path in paths)
         linked = (
             (path, joined) for path in paths if (results := self._results(path)) for other in paths
             if other != path and (joined := results.joined(short_lines(other)))
         )  # fmt: skip
         for path, results in chain(own, linked):
-            every = self._numbered(results) if results else self._pending
+            every = cut_at_ranges(self._numbered(results), results) if results else self._pending
             open_tests = [t for t in every if results and results.lacks_current(t[0], t[1].id)]
             cut = [test for test in every if any(finding.code == "W_CUT" for finding in test[1].findings)]
             if results and cut and len({file for file, _ in every}) == 1 and not results.ranges[1]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -110,13 +110,25 @@ def currents_beside(path: Path, results: Results | None, tests: _Tests) -> list[
 def _by_rows(results: Results, tests: _Tests) -> Iterator[Mapping[int, float]]:
     """Yield the current [A] of tests, by their place, by each way in which the rows of a table may name them."""
     called, folders = _called(tests), [file.parent.name for file, _ in tests]
-    ranges = results.rows_in_range([(record.time, record.lines) for _, record in tests])
-    yield {i: results.current[row] for i, (row, _) in ranges.items()}
+
+    def by_range(rows: Results, own: Sequence[int]) -> dict[int, float]:
+        ranges = rows.rows_in_range([(tests[i][1].time, tests[i][1].lines) for i in own])
+        return {own[i]: rows.current[row] for i, (row, _) in ranges.items()}
+
+    def in_groups(groups: Sequence[str], stated: Callable[[Results, Sequence[int]], dict[int, float]]):
+        for rows_of in results.apart({*groups}):
+            own = {group: [i for i, its in enumerate(groups) if its == group] for group in rows_of}
+            yield {i: current for group, rows in rows_of.items() for i, current in stated(rows, own[group]).items()}
+
+    def by_name(rows: Results, own: Sequence[int]) -> dict[int, float]:
+        return {own[i]: current for i, current in rows.by_test([called[i] for i in own]).items()}
+
+    yield by_range(results, range(len(tests)))
+    yield from in_groups([file.name for file, _ in tests], by_range)
     yield results.by_test(called)
     if len({*folders}) == len(tests):
         yield results.by_test([(folder,) for folder in folders], by_number=False)
-    yield results.by_folder(folders, called)
-    yield results.by_level(called)
+    yield from in_groups(folders, by_name)
 
 
 def _by_legend(lines: Sequence[str], tests: _Tests) -> list[tuple[float, str]]:
@@ -366,11 +378,25 @@ def _meant(key: str, files: Collection[str]) -> list[str]:
     return [f"{code[1].casefold()}{number}" for number in range(int(code[2]), int(code[3] or code[2]) + 1)]
 
 
-def within_ranges(tests: _Tests, results: Results | None) -> list[tuple[Path, Record]]:
+def within_ranges(tests: _Tests, results: Results | None) -> _Tests:
     """Return the tests that have a row in a table of results, between the starts and ends it states, if it does."""
     rows = results.rows_in_range([(record.time, record.lines) for _, record in tests]) if results else {}
     parts = [(file, part_of_record(record, rows[i][1])) for i, (file, record) in enumerate(tests) if i in rows]
-    return parts or [*tests]
+    return parts or tests
+
+
+def cut_at_ranges(tests: _Tests, results: Results) -> list[tuple[Path, Record]]:
+    """Return the tests; a record is cut into those whose starts and ends a table of results states for its file."""
+    files, parts = [file for file, _ in tests], list[tuple[Path, Record]]()
+    for file, record in tests:
+        tables = [rows[file.name] for rows in results.apart({file.name})] or [results] * (len(tests) == 1)
+        cuts = (rows.windows_in(record.time, record.lines) for rows in tables if files.count(file) == 1)
+        windows = next(filter(None, cuts), [])
+        cut = Finding("W_CUT", f"cut at the starts and ends that a plan states: {len(windows)} of this file")
+        ids = [f"{record.id}_{n}" if len(windows) > 1 else record.id for n in range(1, len(windows) + 1)]
+        own = [part_of_record(record, of, name).noticed(cut) for of, name in zip(windows, ids, strict=True)]
+        parts += [(file, part) for part in own or [record]]
+    return parts
 
 
 def _called(tests: _Tests) -> list[tuple[str, ...]]:

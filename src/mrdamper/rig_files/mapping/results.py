@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,6 @@ _LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: .
     r"(?:\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até)\b)\s*(?:[^\W\d_]{1,30}[\s_.#]*)?(?P<last>[0-9]{1,6}))?\s*[:=;,\t)]"
 )
 _LABELLED = re.compile(r"(?<![^\W\d_])([^\W\d_]+)[ _.-]?([0-9]+)")
-_LEVEL = re.compile(r"(?<![^\W\d_])([^\W\d_]+)[ _.=-]?([0-9]+(?:[.,][0-9]+)?)")
 _CLOCK = re.compile(r"[0-2][0-9]:[0-5][0-9](?::[0-5][0-9])?")
 _MEASURED = tuple(words("measured"))
 _STARTS, _ENDS, _ROWS = words("start"), words("end"), words("row")
@@ -84,21 +84,28 @@ class Results:
     def _by_labels(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
         """Return the current [A] of each test by the numbers in its name behind the beginnings of headings: S1_T02.
 
-        Empty unless every test has one row, no row two tests, and no such beginning is that of two headings.
+        Empty unless every test has one row, no row two tests but by whole headings, as Level 2 of level2_1Hz and
+        level2_3Hz, and no such beginning is that of two headings.
         """
-        heads = ["" if split_name(key).unit else split_name(key).name.casefold() for key in self.keys]
-        rows: dict[int, int] = {}
+        headers = map(split_name, self.keys)
+        heads = ["" if header.unit not in ("", "%") else header.name.casefold() for header in headers]
+        rows, labels = dict[int, int](), set[str]()
         for test, texts in enumerate(tests):
             fitting = {*range(len(self.cells))}
-            for label, number in {(label.casefold(), n) for text in texts for label, n in _LABELLED.findall(text)}:
-                columns = [i for i, head in enumerate(heads) if head.startswith(label)]
+            pairs = {(label.casefold(), n, "\\" in text) for text in texts for label, n in _LABELLED.findall(text)}
+            for label, number, of_path in pairs:
+                columns = [
+                    i for i, head in enumerate(heads) if head == label or (head.startswith(label) and not of_path)
+                ]
                 if len(columns) > 1:
                     return {}
                 fitting = {row for row in fitting if all(_key(self.cells[row][i]) == _key(number) for i in columns)}
+                labels |= {label} if columns else set()
             if len(fitting) != 1:
                 return {}
             rows[test] = fitting.pop()
-        return {i: self.current[row] for i, row in rows.items()} if len({*rows.values()}) == len(rows) else {}
+        alone = len({*rows.values()}) == len(rows) or (labels and labels <= {*heads})
+        return {i: self.current[row] for i, row in rows.items()} if alone else {}
 
     def joined(self, lines: Sequence[str]) -> Results | None:
         """Return the rows of another table, each with the current of the row of this one whose key it states.
@@ -118,41 +125,20 @@ class Results:
                     tables.append(replace(self, current=current, cells=cells, keys=("", *heads), pauses=()))
         return tables[0] if len(tables) == 1 else None
 
-    def by_folder(self, folders: Sequence[str], tests: Sequence[Iterable[str]]) -> dict[int, float]:
-        """Return the current [A] of each test by its number, where one column names its folder and another itself.
+    def apart(self, groups: Collection[str]) -> Iterator[Mapping[str, Results]]:
+        """Yield the rows of each group of tests, a file or a folder, by each column that names all of them.
 
         A column Day with 1 names the folder day1, and one with 14.3.2023 the folder 2023-03-14.
         """
         for key, column in list(zip(self.keys, zip(*self.cells, strict=True), strict=True))[1:]:
-            cells, currents = [_day_names(cell) | _day_names(f"{key} {cell}") for cell in column], dict[int, float]()
-            for folder in dict.fromkeys(folders):
-                rows = [row for row, names in enumerate(cells) if names & _day_names(folder)]
-                current, its_cells = (tuple(of[row] for row in rows) for of in (self.current, self.cells))
-                own = [i for i, its in enumerate(folders) if its == folder]
-                by_test = (
-                    replace(self, current=current, cells=its_cells).by_test([tests[i] for i in own]) if rows else {}
-                )
-                currents |= {own[i]: value for i, value in by_test.items()}
-            if len(currents) == len(tests):
-                return currents
-        return {}
+            names = [_group_names(cell) | _group_names(f"{key} {cell}") for cell in column]
+            rows = {group: [row for row, own in enumerate(names) if own & _group_names(group)] for group in groups}
+            if all(rows.values()):
+                yield {group: self._picked(own) for group, own in rows.items()}
 
-    def by_level(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
-        """Return the current [A] of each test by a heading and a cell together in its names: of Level 2 by level2_1Hz.
-
-        A row may have several tests; empty unless all columns that name every test so agree.
-        """
-        stated = []
-        for key, column in list(zip(self.keys, zip(*self.cells, strict=True), strict=True))[1:]:
-            header, rows = split_name(key), {_key(cell): row for row, cell in enumerate(column)}
-            if len(rows) < len(column) or (header.dimension and header.unit != "%"):
-                continue
-            label = header.name.casefold()
-            pairs = [{m for text in texts for m in _LEVEL.findall(text.casefold())} for texts in tests]
-            places = [{rows.get(_key(number)) for word, number in own if word == label} for own in pairs]
-            if all(len(own) == 1 and None not in own for own in places):
-                stated.append([self.current[row] for (row,) in places if row is not None])
-        return dict(enumerate(stated[0])) if stated and all(of == stated[0] for of in stated) else {}
+    def _picked(self, rows: Sequence[int]) -> Results:
+        current, cells = (tuple(of[row] for row in rows) for of in (self.current, self.cells))
+        return replace(self, current=current, cells=cells)
 
     def misfit(self, tests: Sequence[Iterable[str]]) -> str:
         """Tell what the column that names most tests, and more than half, has twice, or which of them it lacks."""
@@ -206,6 +192,18 @@ class Results:
             rows |= {test: (own[0], inside[own[0]])} if len(own) == 1 else {}
         different = len({row for row, _ in rows.values()})
         return rows if different == len(rows) and different in (len(clocks), len(self.cells)) else {}
+
+    def windows_in(self, time: Floats, lines: np.ndarray | None) -> list[slice]:
+        """Return the samples of each row's test in a record between whose ends all rows have theirs, one after another.
+
+        Empty where they have not.
+        """
+        by_rows, windows = self.ranges
+        clock, windows = lines if by_rows else time, sorted(windows)
+        if clock is None or not windows or windows[0][0] < (0 if by_rows else clock[0]) or windows[-1][1] > clock[-1]:
+            return []
+        apart = all(start < end <= after for (start, end), (after, _) in pairwise([*windows, (np.inf, np.inf)]))
+        return [slice(*np.searchsorted(clock, window)) for window in windows] if apart else []
 
     def on_clock(self, clocks: Sequence[tuple[Floats, np.ndarray | None]]) -> bool:
         """Tell if the rows state different ranges, one of them within a test or in another order than that of time."""
@@ -467,11 +465,11 @@ def _key(text: str) -> str:
     return str(int(text)) if text.isascii() and text.isdigit() else text
 
 
-def _day_names(text: str) -> set[str]:
-    """Return a name of a folder as it is compared: without marks and leading zeros, and as a date where it is one."""
-    day = day_in(text)
+def _group_names(text: str) -> set[str]:
+    """Return names of a file or folder as they are compared: without marks and leading zeros, or as a date if it is."""
+    iso, written = day_in(text) or ("", "")
     plain = re.sub(r"(?<![0-9])0+(?=[0-9])", "", re.sub(r"[\W_]+", "", text.casefold()))
-    return {_key(text), plain, day[0].replace("-", "") if day else ""} - {""}
+    return {_key(text), plain, iso.replace("-", "") if written == text.strip() else ""} - {""}
 
 
 def _match(column: Sequence[str], names: Sequence[tuple[set[str], set[str]]], exact: bool) -> dict[int, int] | None:
