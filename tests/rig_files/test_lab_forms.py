@@ -428,13 +428,15 @@ def test_groups_of_other_length_or_of_another_current_are_not_joined(cut, ampere
     assert f"{error.code}: {error.found}".startswith(problem.format(T.size, T.size - cut))
 
 
-def test_structs_of_tests_by_current_and_frequency_are_tests(tmp_path):
+@pytest.mark.parametrize("key", ["current_A", "Current"])
+def test_structs_of_tests_by_current_and_frequency_are_tests(tmp_path, key):
     from scipy.io import savemat
 
     tests = np.empty((3, 2), object)
     for i, k in np.ndindex(3, 2):
         time = T / (1 + k)
-        tests[i, k] = {"time_s": time, "displacement_mm": X, "force_N": (1 + k) * force(i / 2), "current_A": i / 2}
+        tests[i, k] = {"time_s": time, "displacement_mm": X, "force_N": (1 + k) * force(i / 2), key: i / 2}
+        tests[i, k] |= {"CurrentUnit": "A"} if key == "Current" else {}
     savemat(tmp_path / "tests.mat", {"tests": tests})
     assert sorted(currents(import_files([tmp_path]).records)) == [0.0, 0.0, 0.5, 0.5, 1.0, 1.0]
 

@@ -163,9 +163,10 @@ def _with_values_for_all(table: RawTable) -> RawTable:
         lines += [f"{key}: {cell} {unit}" for key, cell in numbers.items() if start and key.startswith(start)]
     sections = _FULL_SCALE.finditer("\n".join(table.remarks))
     lines += [f"{m['name']}: 100 % = {m['full']} {m['unit']}" for m in sections]
-    plain = {match[1]: match[2] for line in table.lines if (match := _KEY.fullmatch(line))}
+    plain = {key: f"{value:g}" for key, value in table.constants.items()}
+    plain |= {match[1]: match[2] for line in table.lines if (match := _KEY.fullmatch(line))}
     numbers = {key: cell for key, cell in plain.items() if looks_numeric(cell)}
-    for end in ("Unit", "_unit", " unit"):
+    for end in ("Unit", "Units", "_unit", "_units", " unit"):
         lines += [f"{key}: {cell} {plain[key + end]}" for key, cell in numbers.items() if key + end in plain]
     lines += [f"DELTA_T: {m['step']} {m['unit']}" for m in map(_ABSCISSA.match, table.remarks) if m]
     lines += [f"DELTA_T: {line[8:].strip()} s" for line in table.remarks if line.startswith("DELTA_T=")]
