@@ -28,7 +28,6 @@ from mrdamper.rig_files.mapping.plans import (
     currents_beside,
     currents_listed,
     cut_to_windows,
-    cut_at_ranges,
     discarded_tests,
     misfit_of_plan,
     named_tests,
@@ -425,7 +424,7 @@ class _Intake:
             if other != path and (joined := results.joined(short_lines(other)))
         )  # fmt: skip
         for path, results in chain(own, linked):
-            every = cut_at_ranges(self._numbered(results), results) if results else self._pending
+            every = self._numbered(results) if results else self._pending
             open_tests = [t for t in every if results and results.lacks_current(t[0], t[1].id)]
             cut = [test for test in every if any(finding.code == "W_CUT" for finding in test[1].findings)]
             if results and cut and len({file for file, _ in every}) == 1 and not results.ranges[1]:
@@ -445,8 +444,8 @@ class _Intake:
         other = other_motions(path, results, tests)
         refused = dict.fromkeys(range(len(tests)), other) if other else discarded_tests(path, results, tests)
         self._pending = [test for test in self._pending if not rests(test[1])]  # a reading of zero
-        self.met += [(file, record.id) for file, record in every]
-        ids = {record.id for _, record in (*tests, *self._pending)}
+        self.met += [(file, record.id) for file, record in (*every, *tests)]
+        ids = {name for _, r in (*tests, *self._pending) for name in (r.id, re.sub("_[0-9]+$", "", r.id))}
         why = f"in no range of {path.name}" if results and results.ranges[1] else "it rests"
         self.omitted |= {Path(record.id): why for _, record in every if record.id not in ids}
         windows = cut_to_windows(path, results, tests)

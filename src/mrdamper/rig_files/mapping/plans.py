@@ -89,9 +89,9 @@ def currents_beside(path: Path, results: Results | None, tests: _Tests) -> list[
 
     The statements are those of its table of results, of a scheme of names and of a legend. None if there is none.
     """
-    clocks = [(record.time, record.lines) for _, record in tests]
+    records = [record for _, record in tests]
     one_record = len({file for file, _ in tests}) == 1 < len(tests)
-    if results and one_record and results.on_clock(clocks) and not results.rows_in_range(clocks):
+    if results and one_record and results.on_clock(records) and not results.rows_in_range(records):
         return None
     stated = next((of for of in _by_rows(results, tests) if len(of) == len(tests)), None) if results else None
     if results and stated is not None:
@@ -109,26 +109,28 @@ def currents_beside(path: Path, results: Results | None, tests: _Tests) -> list[
 
 def _by_rows(results: Results, tests: _Tests) -> Iterator[Mapping[int, float]]:
     """Yield the current [A] of tests, by their place, by each way in which the rows of a table may name them."""
-    called, folders = _called(tests), [file.parent.name for file, _ in tests]
+    called, files, folders = _called(tests), [file.name for file, _ in tests], [file.parent.name for file, _ in tests]
 
     def by_range(rows: Results, own: Sequence[int]) -> dict[int, float]:
-        ranges = rows.rows_in_range([(tests[i][1].time, tests[i][1].lines) for i in own])
-        return {own[i]: rows.current[row] for i, (row, _) in ranges.items()}
-
-    def in_groups(groups: Sequence[str], stated: Callable[[Results, Sequence[int]], dict[int, float]]):
-        for rows_of in results.apart({*groups}):
-            own = {group: [i for i, its in enumerate(groups) if its == group] for group in rows_of}
-            yield {i: current for group, rows in rows_of.items() for i, current in stated(rows, own[group]).items()}
+        ranges = rows.rows_in_range([tests[i][1] for i in own])
+        stated = {own[i]: rows.current[row] for i, row, _ in ranges}
+        return stated if len(stated) == len(ranges) else {}
 
     def by_name(rows: Results, own: Sequence[int]) -> dict[int, float]:
-        return {own[i]: current for i, current in rows.by_test([called[i] for i in own]).items()}
+        one = len(rows.current) == len(own) == 1
+        return (
+            {own[0]: rows.current[0]} if one else {own[i]: c for i, c in rows.by_test([called[i] for i in own]).items()}
+        )
+
+    def by_group(groups: Sequence[str], by: Callable[[Results, Sequence[int]], dict[int, float]]) -> dict[int, float]:
+        every = [{i: c for rows, own in of for i, c in by(rows, own).items()} for of in results.apart(groups)]
+        whole = [of for of in every if len(of) == len(tests)]
+        return whole[0] if whole and all(of == whole[0] for of in whole) else {}
 
     yield by_range(results, range(len(tests)))
-    yield from in_groups([file.name for file, _ in tests], by_range)
+    yield by_group(files, by_range)
     yield results.by_test(called)
-    if len({*folders}) == len(tests):
-        yield results.by_test([(folder,) for folder in folders], by_number=False)
-    yield from in_groups(folders, by_name)
+    yield by_group(folders, by_name)
 
 
 def _by_legend(lines: Sequence[str], tests: _Tests) -> list[tuple[float, str]]:
@@ -379,24 +381,23 @@ def _meant(key: str, files: Collection[str]) -> list[str]:
 
 
 def within_ranges(tests: _Tests, results: Results | None) -> _Tests:
-    """Return the tests that have a row in a table of results, between the starts and ends it states, if it does."""
-    rows = results.rows_in_range([(record.time, record.lines) for _, record in tests]) if results else {}
-    parts = [(file, part_of_record(record, rows[i][1])) for i, (file, record) in enumerate(tests) if i in rows]
-    return parts or tests
+    """Return the tests that have a row in a table of results, between the starts and ends it states, if it does.
 
-
-def cut_at_ranges(tests: _Tests, results: Results) -> list[tuple[Path, Record]]:
-    """Return the tests; a record is cut into those whose starts and ends a table of results states for its file."""
-    files, parts = [file for file, _ in tests], list[tuple[Path, Record]]()
-    for file, record in tests:
-        tables = [rows[file.name] for rows in results.apart({file.name})] or [results] * (len(tests) == 1)
-        cuts = (rows.windows_in(record.time, record.lines) for rows in tables if files.count(file) == 1)
-        windows = next(filter(None, cuts), [])
-        cut = Finding("W_CUT", f"cut at the starts and ends that a plan states: {len(windows)} of this file")
-        ids = [f"{record.id}_{n}" if len(windows) > 1 else record.id for n in range(1, len(windows) + 1)]
-        own = [part_of_record(record, of, name).noticed(cut) for of, name in zip(windows, ids, strict=True)]
-        parts += [(file, part) for part in own or [record]]
-    return parts
+    A record of several rows is cut into a test for each.
+    """
+    if results is None:
+        return tests
+    parts: dict[int, list[slice]] = defaultdict(list)
+    for groups in ([(results, [*range(len(tests))])], *results.apart([file.name for file, _ in tests])):
+        for rows, own in groups if not parts else ():
+            for i, _, samples in rows.rows_in_range([tests[i][1] for i in own]):
+                parts[own[i]].append(samples)
+    cut, records = Finding("W_CUT", "cut at the starts and ends that a plan states"), list[tuple[Path, Record]]()
+    for i, (file, record) in enumerate(tests):
+        for n, samples in enumerate(parts[i], 1):
+            part = part_of_record(record, samples, f"{record.id}_{n}" if len(parts[i]) > 1 else "")
+            records.append((file, part.noticed(cut)))
+    return records or tests
 
 
 def _called(tests: _Tests) -> list[tuple[str, ...]]:

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from mrdamper.data import Floats
 from mrdamper.errors import listed
 from mrdamper.rig_files.column_names import COIL, headers_of, holds, names_condition, split_name, words, words_of
 from mrdamper.rig_files.conditions import contradicts, currents_in, day_in, names_only_currents, quantity_in_cell
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RawTable
+from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.text.layout import cells_of, is_units
 
 _SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
@@ -59,14 +59,14 @@ class Results:
     counts_tests: bool = True  # so that a number in a test's name may be meant; Day 1: 0.5 A counts something else
     pauses: tuple[tuple[str, ...], ...] = ()  # cells of the rows that state no current and no other number
 
-    def by_test(self, tests: Sequence[Iterable[str]], *, by_number: bool = True) -> dict[int, float]:
+    def by_test(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
         """Return the current [A] of each test by its number, where one column of the table tells all of them apart.
 
         Of each test all that it is called is given: its label, its file, the lines above it.
         """
         names = [_names(texts) for texts in tests]
         one_of_several = len(tests) == 1 < len(self.current)  # a number in its name alone may count anything
-        by_number = by_number and self.counts_tests and not one_of_several
+        by_number = self.counts_tests and not one_of_several
         columns, of_row = self._columns_of_names(len(tests))
         for exact in (True,) if not by_number else (True, False):
             matches = [(column, match) for column in columns if (match := _match(column, names, exact))]
@@ -125,20 +125,20 @@ class Results:
                     tables.append(replace(self, current=current, cells=cells, keys=("", *heads), pauses=()))
         return tables[0] if len(tables) == 1 else None
 
-    def apart(self, groups: Collection[str]) -> Iterator[Mapping[str, Results]]:
-        """Yield the rows of each group of tests, a file or a folder, by each column that names all of them.
+    def apart(self, groups: Sequence[str]) -> Iterator[list[tuple[Results, list[int]]]]:
+        """Yield the rows of each group, a file or folder, and the places of its tests, by each column that names all.
 
         A column Day with 1 names the folder day1, and one with 14.3.2023 the folder 2023-03-14.
         """
         for key, column in list(zip(self.keys, zip(*self.cells, strict=True), strict=True))[1:]:
-            names = [_group_names(cell) | _group_names(f"{key} {cell}") for cell in column]
-            rows = {group: [row for row, own in enumerate(names) if own & _group_names(group)] for group in groups}
-            if all(rows.values()):
-                yield {group: self._picked(own) for group, own in rows.items()}
-
-    def _picked(self, rows: Sequence[int]) -> Results:
-        current, cells = (tuple(of[row] for row in rows) for of in (self.current, self.cells))
-        return replace(self, current=current, cells=cells)
+            names, parts = [_group_names(cell) | _group_names(f"{key} {cell}") for cell in column], []
+            for group in dict.fromkeys(groups):
+                rows = [row for row, own in enumerate(names) if own & _group_names(group)]
+                current, cells = (tuple(of[row] for row in rows) for of in (self.current, self.cells))
+                own = [i for i, its in enumerate(groups) if its == group]
+                parts += [(replace(self, current=current, cells=cells), own)]
+            if all(rows.current for rows, _ in parts):
+                yield parts
 
     def misfit(self, tests: Sequence[Iterable[str]]) -> str:
         """Tell what the column that names most tests, and more than half, has twice, or which of them it lacks."""
@@ -175,42 +175,35 @@ class Results:
         names = [column for header, column in zip(headers[1:], columns, strict=True) if header.dimension is None]
         return names, [] if numbered or tests != len(self.current) else [first]
 
-    def rows_in_range(self, clocks: Sequence[tuple[Floats, np.ndarray | None]]) -> dict[int, tuple[int, slice]]:
-        """Return the row of each test by its number, and the samples between the start and the end that it states.
+    def rows_in_range(self, tests: Sequence[Record]) -> list[tuple[int, int, slice]]:
+        """Return each test and row by their numbers, and the samples between the start and the end that the row states.
 
-        Each test has its time and the lines of its samples. Empty unless each test has one row, of which it covers
-        more than half, and no row two tests; or each row one test, and others have none.
+        Empty unless no row is that of two tests, and each test covers more than half of one row's range, or of several
+        after each other; or each row has a test, and others have none.
         """
-        (by_rows, windows), rows = self.ranges, dict[int, tuple[int, slice]]()
-        for test, (time, lines) in enumerate(clocks if windows else ()):
-            clock = lines if by_rows else time
-            inside = [slice(*np.searchsorted(clock, window)) for window in windows if clock is not None]
-            covered = [
-                clock[s.stop - 1] - clock[s.start] if clock is not None and s.stop > s.start else 0 for s in inside
-            ]
+        windows, parts = self.ranges[1], list[tuple[int, int, slice]]()
+        for test, clock in enumerate(self._clocks(tests) if windows else ()):
+            inside = [slice(*np.searchsorted(clock, window)) for window in windows]
+            covered = [clock[s.stop - 1] - clock[s.start] if s.stop > s.start else 0 for s in inside]
             own = [row for row, of in enumerate(covered) if of > 0.5 * (windows[row][1] - windows[row][0]) > 0]
-            rows |= {test: (own[0], inside[own[0]])} if len(own) == 1 else {}
-        different = len({row for row, _ in rows.values()})
-        return rows if different == len(rows) and different in (len(clocks), len(self.cells)) else {}
+            own.sort(key=windows.__getitem__)
+            apart = all(windows[one][1] <= windows[other][0] for one, other in pairwise(own))
+            parts += [(test, row, inside[row]) for row in own if apart]
+        with_row, rows = {test for test, _, _ in parts}, {row for _, row, _ in parts}
+        whole = len(rows) == len(parts) and (len(with_row) == len(tests) or len(rows) == len(self.cells))
+        return parts if whole else []
 
-    def windows_in(self, time: Floats, lines: np.ndarray | None) -> list[slice]:
-        """Return the samples of each row's test in a record between whose ends all rows have theirs, one after another.
-
-        Empty where they have not.
-        """
-        by_rows, windows = self.ranges
-        clock, windows = lines if by_rows else time, sorted(windows)
-        if clock is None or not windows or windows[0][0] < (0 if by_rows else clock[0]) or windows[-1][1] > clock[-1]:
-            return []
-        apart = all(start < end <= after for (start, end), (after, _) in pairwise([*windows, (np.inf, np.inf)]))
-        return [slice(*np.searchsorted(clock, window)) for window in windows] if apart else []
-
-    def on_clock(self, clocks: Sequence[tuple[Floats, np.ndarray | None]]) -> bool:
+    def on_clock(self, tests: Sequence[Record]) -> bool:
         """Tell if the rows state different ranges, one of them within a test or in another order than that of time."""
-        by_rows, windows = self.ranges
-        ends = [(own[0], own[-1]) for time, lines in clocks if (own := lines if by_rows else time) is not None]
+        windows = self.ranges[1]
+        ends = [(clock[0], clock[-1]) for clock in self._clocks(tests) if clock.size]
         within = any(first < end and begin < last for first, last in ends for begin, end in windows)
         return len({*windows}) > 1 and (within or windows != sorted(windows))
+
+    def _clocks(self, tests: Sequence[Record]) -> list[np.ndarray]:
+        """Return what the ranges count in, by test: the lines of its samples, if it has them, or its times."""
+        lines = [np.empty(0) if record.lines is None else record.lines for record in tests]
+        return lines if self.ranges[0] else [record.time for record in tests]
 
     @property
     def ranges(self) -> tuple[bool, list[tuple[float, float]]]:
@@ -469,7 +462,12 @@ def _group_names(text: str) -> set[str]:
     """Return names of a file or folder as they are compared: without marks and leading zeros, or as a date if it is."""
     iso, written = day_in(text) or ("", "")
     plain = re.sub(r"(?<![0-9])0+(?=[0-9])", "", re.sub(r"[\W_]+", "", text.casefold()))
-    return {_key(text), plain, iso.replace("-", "") if written == text.strip() else ""} - {""}
+    return {
+        _key(text),
+        _key(_SPECIMEN.sub("", text)),
+        plain,
+        iso.replace("-", "") if written == text.strip() else "",
+    } - {""}
 
 
 def _match(column: Sequence[str], names: Sequence[tuple[set[str], set[str]]], exact: bool) -> dict[int, int] | None:
