@@ -33,8 +33,11 @@ _ONE_MOTION, _TWO_SENSORS = 0.02, 0.25  # relative RMS difference of two columns
 _Groups = dict[str, dict[str, int]]  # columns by channel, by group
 
 
-def tests_of(table: RawTable, form: FileForm) -> list[RawTable]:
-    """The table of every test that a table holds; the table itself where it is one."""
+def tests_of(table: RawTable, form: FileForm, *, by_name: bool) -> list[RawTable]:
+    """The table of every test that a table holds; the table itself where it is one.
+
+    Without `by_name` the names of pairs of columns, beside one time and without currents, do not make them tests.
+    """
     if form.blocks == "join" and form.run_column is None:
         return [table]
     column = _run_column(table, form)
@@ -42,7 +45,7 @@ def tests_of(table: RawTable, form: FileForm) -> list[RawTable]:
         parts = _by_run(table, column, stated=form.run_column is not None)
         if parts:
             return parts
-    return _groups(table, form) or _shared_motion(table) or [table]
+    return _groups(table, form, by_name) or _shared_motion(table) or [table]
 
 
 def _run_column(table: RawTable, form: FileForm) -> int | None:
@@ -153,7 +156,7 @@ def _title_cells(line: str) -> list[str]:
     return re.split(r"[\t;|]" if re.search(r"[\t;|]", line) else ",", line)
 
 
-def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
+def _groups(table: RawTable, form: FileForm, by_name: bool) -> list[RawTable]:
     """Return groups of columns beside each other, each a test; empty if the table has none.
 
     A group has its own displacement and force. What tells a test from a second sensor is a time of its own, a title
@@ -176,7 +179,7 @@ def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
                 titles |= dict(zip(places, own, strict=True))
                 break
     stated = all(currents_in(title) for title in titles.values())
-    if not (own_time or stated or form.blocks == "split" or _name_tests(table, members, titles)):
+    if not (own_time or stated or form.blocks == "split" or (by_name and _name_tests(table, members, titles))):
         return []
     grouped = {i for roles in members.values() for i in roles.values()}
     alone = [columns[0] for role in ("time", "current") if len(columns := table.columns(role)) == 1]
