@@ -9,6 +9,7 @@ from openpyxl import Workbook
 
 from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.conditions import currents_in, stated_by_lines, stated_quantities, stated_rate, without_currents
+from mrdamper.rig_files.profile import parse_profile
 from mrdamper.rig_files.rig_import import import_files
 
 T = np.arange(0.0, 3.0, 0.002)
@@ -232,6 +233,9 @@ def test_the_name_of_a_sheet_states_the_current_of_each_of_its_tables(tmp_path):
         ("", ["Disp Run{} (mm)", "Force Run{} (N)"], "123", ["run1", "run2", "run3"]),
         ("", ["x{} (mm)", "F{} (N)"], "123", ["1", "2", "3"]),
         (",FL,FL,FR,FR,RL,RL\n", ["Disp (mm)", "Force (N)"], ["", "", ""], ["FL", "FR", "RL"]),
+        (",FL,,FR,,RL\n", ["Disp (mm)", "Force (N)"], ["", "", ""], ["FL", "FR", "RL"]),
+        (",Damper A,,Damper B,,Damper C,\n", ["x (mm)", "F (N)"], "   ", ["Damper_A", "Damper_B", "Damper_C"]),
+        ("Coil,0.5 A\n", ["{} Disp (mm)", "{} Force (N)"], ["FL", "FR", "RL"], ["FL", "FR", "RL"]),
         (
             ",Test 4,Test 4,Test 5,Test 5,Test 6,Test 6\n",
             ["Disp (mm)", "Force (N)"],
@@ -253,7 +257,41 @@ def test_pairs_of_columns_whose_names_state_motion_number_or_corner_are_tests(tm
     assert [r.current[0] for r in result.records] == [0.5] * 3
     for record, rate in zip(result.records, rates, strict=True):
         np.testing.assert_allclose(record.displacement, 0.01 * np.sin(2 * np.pi * rate * T), atol=1e-6)
-        assert record.provenance.get("specimen") == (record.id[-2:] if "FL" in top else None)
+        specimen = (
+            record.id.removeprefix("run_0.5A_").replace("_", " ") if labels and labels[0] in ("FL", "Damper_A") else ""
+        )
+        assert (record.provenance.get("specimen", ""), record.rig) == (specimen, specimen)
+
+
+def test_groups_of_columns_under_merged_headings_are_taken_by_the_columns_a_profile_states(tmp_path):
+    """One that has no group's columns both is read as it says; a second group is not dropped in silence."""
+    book = Workbook()
+    book.active.append(["", "Front left", None, "Front right", None])
+    book.active.append(["Time (s)", "Disp (mm)", "Force (N)", "Disp (mm)", "Force (N)"])
+    for row in zip(T, X, force(0.5), 0.9 * X, 1.1 * force(0.5), strict=True):
+        book.active.append([round(float(value), 5) for value in row])
+    book.active.merge_cells("B1:C1")
+    book.active.merge_cells("D1:E1")
+    book.save(tmp_path / "run_0.5A.xlsx")
+    every = import_files([tmp_path], parse_profile('rig = "axle 3"')).records
+    assert [(r.id, r.rig) for r in every] == [
+        ("run_0.5A_Front_left", "axle 3 Front left"), ("run_0.5A_Front_right", "axle 3 Front right")
+    ]  # fmt: skip
+    for moved, load, name, factors in ((4, 5, "run_0.5A_Front_right", (0.9, 1.1)), (2, 5, "run_0.5A", (1.0, 1.1))):
+        profile = parse_profile(f"[channels.displacement]\ncolumn = {moved}\n[channels.force]\ncolumn = {load}\n")
+        (record,) = import_files([tmp_path], profile).records
+        assert record.id == name
+        np.testing.assert_allclose(record.displacement, 1e-3 * factors[0] * X, atol=1e-7)
+        np.testing.assert_allclose(record.force, factors[1] * force(0.5), atol=1e-4)
+        (note,) = [finding.text for finding in record.findings if finding.code == "W_COLUMN"]
+        assert ("not taken: Front left" if moved == 4 else "Disp (mm) (column 4) and Force (N) (column 3) not") in note
+
+
+def test_a_line_on_all_columns_is_no_title_of_two_tests(tmp_path):
+    names = ["Time (s)", *(f"{name}_{mark}" for mark in ("upper", "lower") for name in ("Disp (mm)", "Force (N)"))]
+    body = rows(T, X, force(0.5), X + 0.02 * np.sin(99 * T), force(0.5) * 1.01)
+    (tmp_path / "run.csv").write_text("Coil current;0.5 A\n" + ";".join(names) + "\n" + body)
+    assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_AMBIGUOUS"}
 
 
 @pytest.mark.parametrize("marks", [("1", "2"), ("upper", "lower"), ("1Hz", "2Hz")])

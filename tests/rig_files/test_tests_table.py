@@ -204,6 +204,31 @@ def test_a_file_read_otherwise_replaces_its_test_with_what_the_table_beside_it_s
     assert {one.rig for one in after} == {"bench 4"}
 
 
+def test_other_columns_of_a_file_and_another_rig_are_other_tests_and_a_corrected_reading_replaces_its_own(tmp_path):
+    plain = rows()
+    table = np.column_stack([plain, 0.8 * plain[:, 1], 0.7 * plain[:, 2]])
+    path = write(tmp_path, "a_0.5A.csv", text(table, ("time [s],Position [mm],Force [N],Position [mm],Force [N]",)))
+
+    def add(displacement, force, rig="", unit="N"):
+        channels = f"[channels.displacement]\ncolumn = {displacement}\n[channels.force]\ncolumn = {force}\n"
+        profile = write(tmp_path, "p.toml", f'rig = "{rig}"\n{channels}unit = "{unit}"\n')
+        more = ["--add"] if (tmp_path / "data").exists() else []
+        done = run("import", path, "--out", tmp_path / "data", "--profile", profile, *more)
+        assert done.exit_code == 0, done.output
+        return done.output
+
+    add(2, 3, "one")
+    assert "added as further tests: a_0.5A_2" in add(4, 5, "two")
+    assert "added as further tests: a_0.5A_3" in add(2, 5, "three")
+    assert "replaced: a_0.5A_2" in add(4, 5, "two", "lbf")
+    assert "added as further tests: a_0.5A_4" in add(4, 5, "four", "kgf")
+    forces = {
+        one.id: (one.rig, round(float(one.force.max() / plain[:, 2].max()), 2))
+        for one in load_dataset(tmp_path / "data")
+    }
+    assert list(forces.values()) == [("one", 1.0), ("two", 3.11), ("three", 0.7), ("four", 6.86)]
+
+
 @pytest.mark.parametrize(
     ("options", "held"),
     [

@@ -156,8 +156,8 @@ def noted_columns(table: RawTable, profile: Profile, assigned: Mapping[str, Assi
         measured = [i for i in alike if holds(table.headers[i].name, _MEASURED)]
         open_role = profile.channel(role).column is None and role not in table.chosen
         if open_role and len(alike) > 1 and measured == [own]:
-            other = next(table.names[i] for i in alike if i != own)
-            text = f"{table.names[own]!r} is taken as the {role}, not {other!r}: its name says it was measured"
+            other = next(table.title(i) for i in alike if i != own)
+            text = f"{table.title(own)!r} is taken as the {role}, not {other!r}: its name says it was measured"
             yield Finding("W_CHOSEN", text)
     named = named_after_currents(table.names)
     others = [table.names[i] for i in named if i != columns["force"]]
@@ -166,10 +166,11 @@ def noted_columns(table: RawTable, profile: Profile, assigned: Mapping[str, Assi
         yield Finding("W_COLUMN", f"{text}to take each, leave [channels.force] column out of the profile")
     both = [role for role in ("displacement", "force") if role in columns and profile.channel(role).column is not None]
     further = [[i for i in table.columns(of, table.headers[columns[of]].dimension) if i != columns[of]] for of in both]
-    if len(both) > 1 and all(further) and not others:
-        text = " and ".join(listed([table.names[i] for i in own], 3) for own in further)
+    noted = len(both) > 1 and all(further) and not others
+    if noted:
+        text = " and ".join(listed([table.title(i) for i in own], 3) for own in further)
         yield Finding("W_COLUMN", f"{text} not taken; if they are further tests, import each with a profile of its own")
-    for role in [role for role in SIGNED if role in assigned]:
+    for role in [role for role in SIGNED if role in assigned and not noted]:
         same = _differing(table, columns[role])
         numbers = ", ".join(str(table.number(i)) for i in same if i != columns[role])
         name = table.headers[columns[role]].name
@@ -300,7 +301,7 @@ def _missing(table: RawTable, columns: Mapping[str, int], profile: Profile) -> l
             'file = "...{run}..." under [channels.displacement] and [channels.force]'
         )
         return [_refusal(UnitError, table, what, remedy, "E_UNITS_MISSING")]
-    shown = ", ".join(name or f"column {table.number(i)}" for i, name in enumerate(table.names))
+    shown = ", ".join(map(table.title, range(len(table.names))))
     shown += "" if any(header.unit for header in table.headers) else ", without units"
     remedy = 'set [channels.{}] column = "..."{} in a profile'
     fixed = {"time": " or, with a fixed rate, [file] sample_rate_Hz = ..."}

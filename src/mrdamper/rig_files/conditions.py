@@ -38,7 +38,7 @@ _IN_NAME = re.compile(
 _BEHIND_DIGITS = re.compile(r"(?<![0-9])([0-9]|1[0-4])_([0-9]+)[ _]?A(?![A-Za-z0-9])")  # MRD-7_0A: 0 or 7.0 A
 _BEFORE = re.compile("([A-Za-z]+)[-_ =]?$")  # letters before a label
 _LEVELS, _RUNS = words("current_level"), words("run")
-CORNERS = words("corner")  # of a vehicle, each with a damper of its own
+_CORNERS, _DAMPERS = words("corner"), words("damper")  # of a vehicle, each with a damper of its own; called by number
 _BEHIND_LABEL = re.compile(  # MRD-7_0.5A: no decimal is written so
     r"(?<![0-9])[0-9]+_[0-9]+(?:[.,xp][0-9]+[ _]?m?|[ _]?m)A(?![A-Za-z0-9])"
 )
@@ -213,8 +213,16 @@ def motions_in(text: str, unit: str) -> set[float]:
 
 
 def names_test(title: str) -> bool:
-    """Tell if a title is that of a corner of a vehicle, of a motion, or of a numbered test."""
-    return title.casefold() in CORNERS or states_motion(title) or numbers_test(title)
+    """Tell if a title is that of a damper, of a motion, or of a numbered test."""
+    return bool(damper_in(title)) or states_motion(title) or numbers_test(title)
+
+
+def damper_in(title: str) -> str:
+    """Return the damper that a title names beside a current, empty if it names none: FL, rear left, Damper A, 0.5 A."""
+    name = without_currents(title).strip(" ,;:@-_/")
+    match = re.fullmatch(r"(?:[^\W\d_]+[ _-])?([^\W\d_]+)[\W_]*(?:[0-9]+|[A-Za-z])", name)
+    numbered = match is not None and match[1].casefold() in _DAMPERS
+    return name if numbered or name.replace("_", " ").casefold() in _CORNERS else ""
 
 
 def states_motion(title: str) -> bool:

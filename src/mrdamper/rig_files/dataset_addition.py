@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,42 +11,59 @@ from mrdamper.data import Dataset, Run
 from mrdamper.errors import OutputError, listed
 from mrdamper.rig_files.record import unique_names
 
+_COLUMN = re.compile(r"(?:displacement|force) = .*?(?= in \S+(?:, [a-z]+ = |$))")  # in the note of a run's columns
 
-def with_tests(old: Dataset, new: Dataset) -> tuple[Dataset, list[str]]:
-    """Return both datasets' runs, told apart by their names, and the names of the old runs that new ones replace.
 
-    A test of the same file replaces one that was read otherwise. Raises `OutputError` if it was read in the same way,
-    or if its file gives another number of tests now.
+def with_tests(old: Dataset, new: Dataset) -> tuple[Dataset, list[str], list[str]]:
+    """Return both datasets' runs, told apart by their names, and the names of two kinds of runs.
+
+    First those of the old runs that new ones replace: of the same file and columns, read otherwise. Then those of the
+    new runs that stay beside old ones of their file: of other columns, or of another rig.
+
+    Raises `OutputError` if a test was read in the same way, or if its file gives another number of tests now.
     """
-    stored, given = _by_file(old), _by_file(new)
+    files = {run.notes["sha256"] for run in old if run.notes.get("sha256")}
     again: dict[str, Run] = {}  # by the name of the run that it replaces
-    for before, now in ((stored[digest], runs) for digest, runs in given.items() if digest in stored):
-        if len(before) != len(now):
+    fresh: list[Run] = []
+    for now in _by_source(new):
+        digest = now[0].notes.get("sha256")
+        before = [run for run in old if digest in files and run.notes.get("sha256") == digest]
+        same = [run.id for run in before if any(_reads_alike(run, other) for other in now)]
+        if same:
+            raise OutputError(
+                f"there already, read in the same way: {listed(same, 5)}",
+                where=f"dataset {old.name}", remedy="give new files only, or a profile that reads these otherwise",
+            )  # fmt: skip
+        before = [run for run in before if _columns(run) == _columns(now[0]) and _may_be_one_rig(run, now[0])]
+        if before and len(before) != len(now):
             raise OutputError(
                 f"{listed([run.id for run in before], 5)} are of the same file, which gives {len(now)} tests now",
-                where=f"dataset {old.name}", remedy="delete them from runs.csv, or import into a new folder",
+                where=f"dataset {old.name}", remedy="import into a new folder",
             )  # fmt: skip
-        again |= {one.id: other for one, other in zip(before, now, strict=True)}
-    same = [run.id for run in old if run.id in again and _reads_alike(run, again[run.id])]
-    if same:
-        raise OutputError(
-            f"there already, read in the same way: {listed(same, 5)}",
-            where=f"dataset {old.name}", remedy="give new files only, or a profile that reads these otherwise",
-        )  # fmt: skip
+        fresh += () if before else now
+        again |= {one.id: other for one, other in zip(before, now, strict=False)}
     kept = [_replaced(run, again[run.id]) if run.id in again else run for run in old]
-    fresh = [run for run in new if run.notes.get("sha256") not in stored]
     names = unique_names((run.id for run in fresh), (run.id for run in old))
-    added = (run if name == run.id else replace(run, id=name) for run, name in zip(fresh, names, strict=True))
-    return Dataset((*kept, *added), old.name), [*again]
+    added = [run if name == run.id else replace(run, id=name) for run, name in zip(fresh, names, strict=True)]
+    return Dataset((*kept, *added), old.name), [*again], [run.id for run in added if run.notes.get("sha256") in files]
 
 
-def _by_file(runs: Dataset) -> dict[str, list[Run]]:
-    """Return runs by the digest of their file, in their order."""
-    files: dict[str, list[Run]] = {}
+def _by_source(runs: Dataset) -> list[list[Run]]:
+    """Return runs apart by their file, its columns and the rig, in their order; those of no file each alone."""
+    sources: dict[tuple[str, ...], list[Run]] = {}
     for run in runs:
-        if digest := run.notes.get("sha256"):
-            files.setdefault(digest, []).append(run)
-    return files
+        digest = run.notes.get("sha256")
+        sources.setdefault((digest, _columns(run), run.rig) if digest else (run.id,), []).append(run)
+    return [*sources.values()]
+
+
+def _columns(run: Run) -> str:
+    """Return the columns of the displacement and the force, whatever their units."""
+    return " ".join(match[0] for match in _COLUMN.finditer(run.notes.get("columns", "")))
+
+
+def _may_be_one_rig(one: Run, other: Run) -> bool:
+    return one.rig == other.rig or not (one.rig and other.rig)
 
 
 def _replaced(before: Run, now: Run) -> Run:

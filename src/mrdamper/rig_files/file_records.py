@@ -121,8 +121,7 @@ def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
     tables = [with_one_clock(table) for table in tables]
     forms = [form_of_tests(table, profile.file) for table in tables]
     stated = {name: channel.column for name, channel in profile.channels.items() if channel.column is not None}
-    by_name = stated.keys().isdisjoint(("displacement", "force"))  # else a profile has chosen from the pairs
-    parts = [part for t, form in zip(tables, forms, strict=True) for part in tests_of(t, form, by_name=by_name)]
+    parts = [part for t, form in zip(tables, forms, strict=True) for part in tests_of(t, form, stated)]
     timed = [with_integrated_velocity(with_unit_of_time(table)) for table in with_results(parts)]
     return [with_channels_by_physics(table, stated) for table in timed]
 

@@ -12,13 +12,13 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from mrdamper.data.arrays import odd_steps
-from mrdamper.errors import InputError
+from mrdamper.errors import InputError, listed
 from mrdamper.rig_files.column_names import DIMENSION, RATING, UNIT_KEYS, is_unit, role_of, split_name, words, words_of
 from mrdamper.rig_files.columns import column_called
-from mrdamper.rig_files.conditions import CORNERS, currents_in, numbers_test, states_motion
+from mrdamper.rig_files.conditions import currents_in, damper_in, numbers_test, states_motion
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable, Words
-from mrdamper.rig_files.record import OPTIONAL, REQUIRED
+from mrdamper.rig_files.record import OPTIONAL, REQUIRED, Finding
 
 MOST_RUNS = 2000
 _FEWEST_ROWS = 5  # of a test, on average
@@ -33,10 +33,10 @@ _ONE_MOTION, _TWO_SENSORS = 0.02, 0.25  # relative RMS difference of two columns
 _Groups = dict[str, dict[str, int]]  # columns by channel, by group
 
 
-def tests_of(table: RawTable, form: FileForm, *, by_name: bool) -> list[RawTable]:
+def tests_of(table: RawTable, form: FileForm, stated: Mapping[str, str | int]) -> list[RawTable]:
     """The table of every test that a table holds; the table itself where it is one.
 
-    Without `by_name` the names of pairs of columns, beside one time and without currents, do not make them tests.
+    Of tests beside each other only those that have the columns which a profile has `stated`, by channel.
     """
     if form.blocks == "join" and form.run_column is None:
         return [table]
@@ -45,7 +45,21 @@ def tests_of(table: RawTable, form: FileForm, *, by_name: bool) -> list[RawTable
         parts = _by_run(table, column, stated=form.run_column is not None)
         if parts:
             return parts
-    return _groups(table, form, by_name) or _shared_motion(table) or [table]
+    return _with_stated(table, _groups(table, form) or _shared_motion(table), stated) or [table]
+
+
+def _with_stated(table: RawTable, tests: list[RawTable], stated: Mapping[str, str | int]) -> list[RawTable]:
+    """Return those of tests beside each other that have the columns stated for the motion and the force, with a note.
+
+    A name that several columns have is that of a column of each test.
+    """
+    own = {role: column for role, column in stated.items() if role in _PAIR}
+    own = {role: c for role, c in own.items() if isinstance(c, int) or table.names.count(c) == 1}
+    numbers = {table.number(column_called(table, column, role)) for role, column in own.items()}
+    chosen = [test for test in tests if numbers <= {*test.numbers}]
+    others = [test.label for test in tests if test not in chosen]
+    text = f"the profile states its columns: tests of other columns are not taken: {listed(others, 5)}"
+    return [test.noted(Finding("W_COLUMN", text)) for test in chosen] if others else chosen
 
 
 def _run_column(table: RawTable, form: FileForm) -> int | None:
@@ -156,7 +170,7 @@ def _title_cells(line: str) -> list[str]:
     return re.split(r"[\t;|]" if re.search(r"[\t;|]", line) else ",", line)
 
 
-def _groups(table: RawTable, form: FileForm, by_name: bool) -> list[RawTable]:
+def _groups(table: RawTable, form: FileForm) -> list[RawTable]:
     """Return groups of columns beside each other, each a test; empty if the table has none.
 
     A group has its own displacement and force. What tells a test from a second sensor is a time of its own, a title
@@ -166,8 +180,10 @@ def _groups(table: RawTable, form: FileForm, by_name: bool) -> list[RawTable]:
     if len(members) < 2:
         return []
     own_time = all("time" in roles for roles in members.values())
-    titles = {key: (table.over[min(roles.values())] if table.over else "") or key for key, roles in members.items()}
-    if not table.over:  # titles whose cells stand askew, by a comma in them: as many as groups, in their order
+    over = {key: table.over[min(roles.values())] if table.over else "" for key, roles in members.items()}
+    over = dict.fromkeys(members, "") if len({*over.values()}) == 1 else over  # a line on all of them
+    titles = {key: over[key] or _as_written(table.names[roles["force"]], key) for key, roles in members.items()}
+    if not any(over.values()):  # titles whose cells stand askew, by a comma in them: as many as groups, in their order
         places = sorted(members, key=lambda key: min(members[key].values()))
         for line in table.remarks:
             cells = [cell.strip(' "#%/') for cell in _title_cells(line)]
@@ -179,7 +195,7 @@ def _groups(table: RawTable, form: FileForm, by_name: bool) -> list[RawTable]:
                 titles |= dict(zip(places, own, strict=True))
                 break
     stated = all(currents_in(title) for title in titles.values())
-    if not (own_time or stated or form.blocks == "split" or (by_name and _name_tests(table, members, titles))):
+    if not (own_time or stated or form.blocks == "split" or _name_tests(table, members, titles)):
         return []
     grouped = {i for roles in members.values() for i in roles.values()}
     alone = [columns[0] for role in ("time", "current") if len(columns := table.columns(role)) == 1]
@@ -187,14 +203,20 @@ def _groups(table: RawTable, form: FileForm, by_name: bool) -> list[RawTable]:
     return _beside(table, [(titles[key], roles, [*roles.values(), *shared]) for key, roles in members.items()])
 
 
+def _as_written(name: str, key: str) -> str:
+    """Return the damper that a part of a column's name names, as it is written there; else the part."""
+    at = name.casefold().find(key)
+    return name[at : at + len(key)] if at >= 0 and damper_in(key) else key
+
+
 def _name_tests(table: RawTable, members: _Groups, titles: Mapping[str, str]) -> bool:
-    """Tell if groups are named after corners of a vehicle, after motions, or by numbers of tests, and are no sensors.
+    """Tell if groups are named after dampers, after motions, or by numbers of tests, and are no sensors.
 
     Two sensors of one test have nearly the same motion and force, two numbered tests have not.
     """
-    firsts = {roles["displacement"]: min(roles.values()) for roles in members.values()}
-    headings = {(*table.names[moved : moved + 1], *table.over[i : i + 1]) for moved, i in firsts.items()}
-    if {*map(str.casefold, titles.values())} <= CORNERS:
+    headings = {(*table.names[i : i + 1], *table.over[i : i + 1]) for i in (m["force"] for m in members.values())}
+    dampers = {*map(damper_in, titles.values())}
+    if all(dampers) and len(dampers) == len(titles):
         return True
     motions = all(map(states_motion, titles.values()))
     if len(headings) == 1 or not (motions or all(title.isdigit() or numbers_test(title) for title in titles.values())):
@@ -230,9 +252,10 @@ def _beside(table: RawTable, tests: Sequence[tuple[str, dict[str, int], list[int
     """Return the table of each test, of its title, its columns by channel, and all that it is given."""
     read = _remembered(table)
     rows = [cache(partial(_filled, table, read, roles, title)) for title, roles, _ in tests]
-    return [
+    parts = [
         _part(table, read, sorted({*columns}), own, title) for (title, _, columns), own in zip(tests, rows, strict=True)
     ]
+    return [replace(part, damper=damper_in(title)) for part, (title, _, _) in zip(parts, tests, strict=True)]
 
 
 def _members(table: RawTable, *, by_order: bool) -> _Groups:

@@ -450,7 +450,7 @@ class _Intake:
         self.omitted |= {Path(record.id): why for _, record in every if record.id not in ids}
         windows = cut_to_windows(path, results, tests)
         for i, ((file, record), (current, whence)) in enumerate(zip(tests, stated, strict=True)):
-            record = windows.get(i, record)
+            record = windows[i] if i in windows else record
             with contextlib.suppress(InputError):  # its doubt stays
                 note = f"its current is the {current:g} A of {whence}"
                 record = with_stated_current(record, current, whence, file.name, note)

@@ -25,7 +25,7 @@ from mrdamper.rig_files.coil_current import (
 )
 from mrdamper.rig_files.column_names import DIMENSION, Unit, role_of, words
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, noted_columns, rate_of
-from mrdamper.rig_files.conditions import CORNERS, day_in, stated_motion, stated_quantities
+from mrdamper.rig_files.conditions import day_in, stated_motion, stated_quantities
 from mrdamper.rig_files.mapping.clocks import past_midnight, refuse_two_rates
 from mrdamper.rig_files.mapping.proposals import integral
 from mrdamper.rig_files.parts import stretches_of_time
@@ -94,6 +94,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         remarks["motion_stated"] = stated_motion(stated_quantities(table.remarks, decimal=table.decimal))
     remarks = {key: text for key, text in remarks.items() if text}
     findings += noted_columns(table, profile, assigned)
+    rig = " ".join(name for name in (profile.rig, table.damper) if name) if table.damper != profile.rig else profile.rig
     records = []
     for number, stretch in enumerate(stretches, 1):
         part = {name: values[stretch] for name, values in channels.items()}
@@ -121,7 +122,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
         records.append(
             Record(
                 id=run,
-                findings=tuple(dict.fromkeys(noticed)), provenance={**remarks, **whence}, rig=profile.rig,
+                findings=tuple(dict.fromkeys(noticed)), provenance={**remarks, **whence}, rig=rig,
                 excitation=profile.excitation, split=profile.split, lines=its_lines, further=others,
                 doubt=doubt, **part,  # type: ignore[arg-type]
             )
@@ -306,12 +307,9 @@ def _remarks(table: RawTable, profile: Profile, assigned: dict[str, Assigned]) -
     session = table.words(sessions[0]).labels if table.words and len(sessions) == 1 else ()
     columns += sessions if len(session) == 1 else []
     ignored = [name for i, name in enumerate(table.names) if name and i not in used and i not in columns]
-    taken = [
-        f"{role} = {table.names[e.column] or f'column {table.number(e.column)}'} in {e.unit}"
-        for role, e in assigned.items()
-    ]
+    taken = [f"{role} = {table.title(e.column)} in {e.unit}" for role, e in assigned.items()]
     remarks = {"columns": ", ".join(taken)} | ({"session": session[0]} if len(session) == 1 else {})
-    remarks |= {"specimen": table.label} if table.label.casefold() in CORNERS else {}
+    remarks |= {"specimen": table.damper} if table.damper else {}
     if ignored:
         remarks["ignored_columns"] = listed(ignored, 20)
     return {

@@ -139,9 +139,12 @@ def _write_dataset(result: ImportResult, profile: Profile, out: Path, add: bool)
     dataset = to_dataset(result.records, out.name)
     if add:
         before = load_dataset(out)
-        dataset, replaced = with_tests(before, dataset)
+        dataset, replaced, beside = with_tests(before, dataset)
         if replaced:
             warn([f"read otherwise than before and replaced: {listed(replaced, 5)}"])
+        if beside:
+            why = "of files that are there already, by other columns or of another rig, and added as further tests"
+            warn([f"{why}: {listed(beside, 5)}"])
         save_dataset(dataset, out, replace=True)
         return len(dataset), len(dataset) - len(before)
     extra = {"rig.toml": profile_text(profile)} if profile != Profile() else None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tempfile
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -140,6 +141,8 @@ class RawTable:
     chosen: Mapping[str, int] = field(default_factory=dict)  # columns by channel that the samples decide on
     calibrated: frozenset[str] = frozenset()  # channels whose scale the profile states
     stated_in: str = ""  # where a constant that was added on that way stands
+    repeated: frozenset[str] = frozenset()  # names that several columns of the file have, some of them left out
+    damper: str = ""  # where columns of several dampers stand beside each other, its name
     numbers: tuple[int, ...] = ()  # of the columns in their file, where others were left out or stood before them
 
     @cached_property
@@ -166,6 +169,13 @@ class RawTable:
     def number(self, column: int) -> int:
         """Return the number of a column in the file, counted from one, whatever was left out before it."""
         return self.numbers[column] if self.numbers else column + 1
+
+    def title(self, column: int) -> str:
+        """Return the name of a column, with its number where that alone tells it from others."""
+        name, number = self.names[column], f"column {self.number(column)}"
+        if name and (name in self.repeated or self.names.count(name) > 1):
+            return f"{name} ({number})"
+        return name or number
 
     def columns(self, role: str | None = None, dimension: str | None = None) -> list[int]:
         """Return the columns whose name stands for a channel, whose unit is of a dimension, or both."""
@@ -199,8 +209,9 @@ class RawTable:
             return tuple(entries[i] for i in columns) if entries else ()
 
         odd, numbers = pick(self.odd), tuple(map(self.number, columns))
+        repeated = self.repeated | {name for name, count in Counter(self.names).items() if count > 1}
         own = {"names": pick(self.names), "units": pick(self.units), "odd": odd, "over": (), "numbers": numbers}
-        return replace(self, words=None, read=read, **own)
+        return replace(self, words=None, read=read, repeated=repeated, **own)
 
     def computed(self, column: int, needs: Sequence[int], make: Callable[[Mapping[int, Floats]], Floats]) -> RawTable:
         """Return the table with a column made of the values of others, of its own among them; the next one is added."""
