@@ -193,7 +193,8 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
     for key, cells in _keyed_cells(table, _LONGEST_CONDITIONS) if width > 2 else ():
         header, stated = split_name(key), [cell for cell in cells if cell and (key or not is_unit(cell))]
         if not key and len(cells) < width and len(stated) > 1 and all(map(names_test, stated)):  # merged over groups
-            cells = [*accumulate([*cells, *[""] * (width - 1 - len(cells))], lambda before, cell: cell or before)]
+            short = width - 1 - len(cells)
+            cells = list(accumulate(cells + [""] * short, lambda before, cell: cell or before))
         merged = not all(table.names) and len(stated) > 1
         titled = {key.casefold(), key.casefold().rstrip("s")} & _TITLES or (not key and (merged or all(cells)))
         if titled and len(cells) == width - 1 and (*cells,) != table.names[1:]:
