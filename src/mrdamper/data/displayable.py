@@ -66,8 +66,9 @@ def _library(name: str) -> Any:
 
 
 def _cell(value: Any) -> str:
-    if isinstance(value, float | np.float32):
-        return number(float(value))
+    value = value.item() if isinstance(value, np.generic) else value
+    if isinstance(value, float):
+        return number(value)
     return "" if value is None else str(value)
 
 

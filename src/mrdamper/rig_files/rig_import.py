@@ -53,7 +53,7 @@ from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, name
 
 _PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")
 _TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
-_Tests = list[tuple[Path, Record]]
+_Tests, _SomeTests = list[tuple[Path, Record]], Sequence[tuple[Path, Record]]
 _LARGEST_LIST = 2**16  # bytes of a plan of tests that states the current of none that was read
 _MAY_BE_PARTS = (
     "E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER", "E_FIELD_COUNT"
@@ -417,7 +417,7 @@ class _Intake:
         A list or a supply's current counts only where no table or legend states the coil's, and no other such file
         states others.
         """
-        candidates: list[tuple[Path, Results | None, _Tests, _Tests, Sequence[Any], list[tuple[float, str]]]] = []
+        candidates: list[tuple[Path, Results | None, _Tests, _Tests, _SomeTests, list[tuple[float, str]]]] = []
         own = ((path, self._results(path)) for path in paths)
         linked = (
             (path, joined) for path in paths if (results := self._results(path)) for other in paths
@@ -449,8 +449,8 @@ class _Intake:
         why = f"in no range of {path.name}" if results and results.ranges[1] else "it rests"
         self.omitted |= {Path(record.id): why for _, record in every if record.id not in ids}
         windows = cut_to_windows(path, results, tests)
+        tests = [(file, windows.get(i, record)) for i, (file, record) in enumerate(tests)]
         for i, ((file, record), (current, whence)) in enumerate(zip(tests, stated, strict=True)):
-            record = windows[i] if i in windows else record
             with contextlib.suppress(InputError):  # its doubt stays
                 note = f"its current is the {current:g} A of {whence}"
                 record = with_stated_current(record, current, whence, file.name, note)
