@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import numbers
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
-
-import numpy as np
 
 from mrdamper.data.wording import number
 from mrdamper.errors import MissingExtraError
@@ -66,9 +65,8 @@ def _library(name: str) -> Any:
 
 
 def _cell(value: Any) -> str:
-    value = value.item() if isinstance(value, np.generic) else value
-    if isinstance(value, float):
-        return number(value)
+    if isinstance(value, numbers.Real) and not isinstance(value, numbers.Integral):
+        return number(float(value))
     return "" if value is None else str(value)
 
 

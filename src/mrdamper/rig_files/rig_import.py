@@ -53,7 +53,8 @@ from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, name
 
 _PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")
 _TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
-_Tests, _SomeTests = list[tuple[Path, Record]], Sequence[tuple[Path, Record]]
+_Tests = list[tuple[Path, Record]]
+_SomeTests = Sequence[tuple[Path, Record]]
 _LARGEST_LIST = 2**16  # bytes of a plan of tests that states the current of none that was read
 _MAY_BE_PARTS = (
     "E_COLUMN", "E_UNITS_MISSING", "E_UNITS_DIMENSION", "E_AMBIGUOUS", "E_NO_DATA", "E_NUMBER", "E_FIELD_COUNT"
