@@ -95,6 +95,7 @@ def test_a_logarithmic_axis_has_ticks_at_powers_of_ten_and_between_few_of_them()
     axis.most = 6
     assert axis.ticks((0.85, 1.8))[1] == ["1.0", "1.2", "1.4", "1.6", "1.8"]  # one power of ten is no scale
     assert len(axis.ticks((2.1, 19.0))[0]) >= 3
+    assert axis.ticks((0.19, 79.0))[1] == ["0.2", "0.5", "1", "2", "5", "10", "20", "50"]
 
 
 @pytest.mark.parametrize("amplitudes", [(12.0, 12.0), (11.99, 12.01)])

@@ -102,6 +102,10 @@ def test_a_report_with_controllers_side_by_side(tmp_path, monkeypatch):
     page = (tmp_path / "out/simulation.html").read_text(encoding="utf-8")
     assert "crossover_Hz 3" in page
     assert "J8" in page
+    assert f'<tr><td>input</td><td class="wrap">{tmp_path / "quake.csv"}</td></tr>' in page
+    assert "of the first 4 of 5 controllers" in page
+    assert '<td class="text">floor1: peak span</td><td class="text">mm</td>' in page
+    assert "ISO 2631" not in page  # a building
     with (tmp_path / "out/measures.csv").open(encoding="utf-8") as file:
         table = {row["measure"]: row for row in csv.DictReader(file)}
     with (tmp_path / "out/figures/spectra.csv").open(encoding="utf-8") as file:
@@ -117,6 +121,7 @@ def test_the_constant_current_and_the_comparison_are_printed(tmp_path):
     save_model(joint_damper(), tmp_path / "model.json")
     ask = ["simulate", "quarter-car", "--input", "bump", "--damper", str(tmp_path / "model.json")]
     assert "passive, constant current 0 A\n" in CliRunner().invoke(application(), ask).output
+    assert "Quarter car, without dampers\n" in CliRunner().invoke(application(), [*ask, "--without-damper"]).output
     given = [*ask, "--current", "0.3", "--compare", "skyhook-continuous", "--out", str(tmp_path / "out")]
     printed = CliRunner().invoke(application(), given).output
     assert "passive, constant current 0.3 A\n" in printed

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from mrdamper.data.atomic import publish
 from mrdamper.data.encoding import csv_text, rows_of
 from mrdamper.data.wording import number
 from mrdamper.report.page import render_page
-from mrdamper.report.plots.simulation import histories, spectra
+from mrdamper.report.plots.simulation import MOST_DRAWN, histories, spectra
 from mrdamper.report.plots.style import save_figure
 from mrdamper.systems.controller_comparison import ControllerComparison
 from mrdamper.systems.measures import benchmark_ratios, measures
@@ -20,15 +21,29 @@ from mrdamper.systems.monte_carlo import LEVELS, Bands
 from mrdamper.systems.result import Simulation
 
 _ROWS = 20_000  # of histories.csv
+# unit and factor by the end of the name of a measure
+_UNITS = {
+    "_m_s2": ("m/s²", 1.0),
+    "_m_s1.75": ("m/s^1.75", 1.0),
+    "_share": ("%", 100.0),
+    "_m": ("mm", 1e3),
+    "_N": ("N", 1.0),
+    "_J": ("J", 1.0),
+    "_A": ("A", 1.0),
+}
 
 
 def write_simulation(
-    done: Simulation, folder: str | Path, beside: ControllerComparison | None = None, bands: Bands | None = None
+    done: Simulation,
+    folder: str | Path,
+    beside: ControllerComparison | None = None,
+    bands: Bands | None = None,
+    facts: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Path]:
     """Write a simulation atomically, and return the files, the page first.
 
-    `beside` contains controllers for comparison, `bands` the ranges over draws of its dampers. The folder is made if
-    missing. Raises `OutputError` if it cannot be written to.
+    `beside` contains controllers for comparison, `bands` the ranges over draws of its dampers, `facts` what the page
+    states on the system and its input. The folder is made if missing. Raises `OutputError` if it cannot be written to.
     """
     runs: dict[str, Simulation] = {type(done.controller).title: done}
     if beside is not None:
@@ -46,11 +61,13 @@ def write_simulation(
         shares = {title: beside.share(title) for title in beside.runs} if beside else {}
         page = render_page(
             "simulation.html.j2",
-            f"{done.system.title or done.system.name}: {type(done.controller).title}",
+            done.headline,
             f"mrdamper {version('mrdamper')}; step {number(1e3 * done.step, 3)} ms",
             done=done,
             columns=columns,
-            names=names,
+            names={name: _readable(name) for name in names},
+            facts=facts,
+            drawn=min(len(runs), MOST_DRAWN),
             shares=shares,
             bands=bands,
             spread=spread,
@@ -78,6 +95,14 @@ def history_rows(done: Simulation) -> list[dict[str, float]]:
             table[f"{link.name}.current_A"] = done.current[:, i]
     every = slice(None, None, -(-done.time.size // _ROWS))
     return rows_of({name: column[every] for name, column in table.items()})
+
+
+def _readable(name: str) -> tuple[str, str, float]:
+    """Return the words, the unit and the factor on SI of a measure, whose name ends in its unit."""
+    for end, (unit, factor) in _UNITS.items():
+        if name.endswith(end):
+            return name.removesuffix(end).replace(".", ": ").replace("_", " "), unit, factor
+    return name.replace(".", ": "), "–", 1.0
 
 
 def _ratios(runs: Mapping[str, Simulation], beside: ControllerComparison | None) -> dict[str, dict[str, float]]:

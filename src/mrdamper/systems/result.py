@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from mrdamper.dampers.streaming import FLAGS
 from mrdamper.data import Floats
+from mrdamper.data.wording import number
 from mrdamper.errors import UnknownNameError, validate_arguments
 from mrdamper.systems.controllers import Controller
+from mrdamper.systems.controllers.passive import Passive
 from mrdamper.systems.structure import Link, System
 
 PART = 4096  # steps per block, whose arrays fit the processor's cache
@@ -43,6 +45,13 @@ class Simulation:
     controller: Controller
     limits: Mapping[str, float]  # largest current [A] of dampers with a force command
     halving: float = math.nan  # largest relative change of a peak against steps twice as long; NaN where not checked
+
+    @property
+    def headline(self) -> str:
+        """System and law, with the current where it is constant, or that there are no dampers."""
+        law = type(self.controller).title if self.dampers else "without dampers"
+        constant = isinstance(self.controller, Passive) and self.dampers
+        return f"{self.system.title}, {law}{f' {number(self.controller.current_A, 3)} A' if constant else ''}"
 
     @property
     def step(self) -> float:

@@ -79,7 +79,10 @@ def simulate(
 
             compared = compare_controllers(done, *given[1:], others, highest, tell) if others else None
             tell("writing", 1.0)
-            paths = write_simulation(done, out, compared, bands)
+            scaled = f", played {time_scale:g} times as fast" if time_scale != 1 else ""
+            facts = {"system": system, "input": f"{source}{scaled}"}
+            facts |= {"damper": str(damper) if damper else "that of the system"} if dampers else {}
+            paths = write_simulation(done, out, compared, bands, facts)
     warn(shortened([f"{path}" for path in paths], 2, verbose))
     if as_json:
         print(json.dumps(_figures(done, dampers) | _banded(bands), indent=1))
@@ -231,10 +234,9 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
 
 def _print_peaks(done: Simulation) -> None:
     from mrdamper.data.wording import number
-    from mrdamper.systems.controllers.passive import Passive
 
-    peaks, law = done.peaks, done.controller
-    typer.echo(f"{done.system.title}, {type(law).title}{f' {law.current_A:.3g} A' if isinstance(law, Passive) else ''}")
+    peaks = done.peaks
+    typer.echo(done.headline)
     for i, name in enumerate(done.system.coordinates):
         typer.echo(
             f"  {name:12} x {1e3 * peaks['displacement_m'][i]:9.3f} mm   a {peaks['acceleration_m_s2'][i]:8.3f} m/s²"

@@ -27,7 +27,7 @@ _WIDE_TYPE = 1.1  # width of a text in a wide type over that in a common one
 _MARGIN = 0.05  # share of the range left free beside the data
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # distances of ticks in a decade
 _MAX_LABELLED_DECADES = 2.5  # of a logarithmic axis with ticks at 2 and 5, too
-_FEWEST_DECADES = 3  # ticks of a logarithmic axis; with fewer they are even numbers, as on a linear axis
+_FEWEST_TICKS = 3  # of a logarithmic axis; with fewer they are even numbers, as on a linear axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +83,12 @@ class Axis:
         if self.places is not None:
             places = np.asarray(self.places, dtype=float)
             return places, self.texts if self.texts is not None else [f"{p:g}" for p in places]
-        if self.log and len((ticks := _decades(*ends))[0]) >= _FEWEST_DECADES:
-            return ticks
+        if self.log:
+            wide = np.log10(ends[1] / ends[0]) >= _MAX_LABELLED_DECADES
+            for steps in ((1.0,), (1.0, 2.0, 5.0)) if wide else ((1.0, 2.0, 5.0),):
+                places, texts = _decades(*ends, steps)
+                if len(places) >= _FEWEST_TICKS:
+                    return places, texts
         for most in range(self.most, 1, -1):
             places, texts = _even(*ends, most)
             if sum(text_width(text, _SPACED) for text in texts) < room:
@@ -102,9 +106,8 @@ def _even(low: float, high: float, most: int) -> tuple[Floats, list[str]]:
     return places, [f"{place + 0.0:.{digits}f}".replace("-", "−") for place in np.round(places, digits)]
 
 
-def _decades(low: float, high: float) -> tuple[Floats, list[str]]:
+def _decades(low: float, high: float, within: Sequence[float]) -> tuple[Floats, list[str]]:
     first, last = int(np.floor(np.log10(low))), int(np.ceil(np.log10(high)))
-    within = (1.0, 2.0, 5.0) if np.log10(high / low) < _MAX_LABELLED_DECADES else (1.0,)
     every = max(1, round((last - first) / 6))
     places = np.array([s * 10.0**k for k in range(first, last + 1, every) for s in within])
     places = places[(places >= low * (1 - 1e-9)) & (places <= high * (1 + 1e-9))]
