@@ -304,3 +304,15 @@ def test_two_sensors_of_a_motion_are_two_tests_only_where_a_profile_splits_them(
     assert all('[file] blocks = "split"' in refusal.error.remedy for refusal in result.refusals)
     (tmp_path / "rig.toml").write_text('[file]\nblocks = "split"\n')
     assert len(import_files([tmp_path / "run_0.5A.csv"], tmp_path / "rig.toml").records) == 2
+
+
+def test_a_first_refusal_of_several_sheets_asks_for_their_currents_too(tmp_path):
+    book = Workbook()
+    for name in ("a", "b"):
+        sheet = book.create_sheet(name)
+        for row in (("p1", "p2", "p3"), *zip(T.tolist(), X.tolist(), force(0.5).tolist(), strict=True)):
+            sheet.append(row)
+    del book["Sheet"]
+    book.save(tmp_path / "a.xlsx")
+    refusals = import_files([tmp_path]).refusals
+    assert "and give the current of each test" in refusals[-1].error.remedy

@@ -70,6 +70,30 @@ def test_a_template_is_written_completed_and_used(rig, tmp_path):
     }
 
 
+def test_a_table_of_tests_and_its_hints_go_with_a_profile(tmp_path):
+    (tmp_path / "rig").mkdir()
+    for number, frequency in enumerate((1.0, 2.5), 1):
+        table = rows(seed=number)
+        table[:, 0] /= frequency
+        write(tmp_path / "rig", f"a{number}.csv", text(table, ("time_s,displacement_mm,Signal",)))
+    profile = write(tmp_path, "my rig.toml", '[channels.force]\ncolumn = "Signal"\nunit = "N"\n')
+    given = ("import", tmp_path / "rig", "--out", tmp_path / "ds", "--profile", profile)
+    hint = " ".join(run(*given).output.split())
+    assert f"FILES --profile '{profile}' --write-tests tests.csv, fill in" in hint
+    assert f"import with --profile '{profile}' --tests tests.csv" in hint
+    template = tmp_path / "table.csv"
+    assert run("import", tmp_path / "rig", "--profile", profile, "--write-tests", template).exit_code == 0
+    assert [note.split(",")[0] for note in pl.read_csv(template)["notes"]] == ["1 Hz", "2.5 Hz"]
+    template.write_text(template.read_text().replace(",,,train", ",0.5,,train"))
+    profile.write_text('[channels.force]\ncolumn = "Signl"\nunit = "N"\n')
+    done = run(*given, "--tests", template)
+    assert "no column 'Signl' for force" in done.output
+    assert f"correct {profile}, which mrdamper import FILE --profile '{profile}'" in " ".join(done.output.split())
+    profile.write_text('[channels.force]\ncolumn = "Signal"\nunit = "N"\n')
+    template.write_text(template.read_text().replace("a2.csv,a2", "a2.csv,a3"))
+    assert "no such test: 'a2.csv a3' (line 3)" in str(run(*given, "--tests", template).exception)
+
+
 def test_a_template_has_the_currents_that_a_plan_states_and_a_number_may_begin_with_its_point(rig, lab, tmp_path):
     (rig / "tests.csv").unlink()
     rows = [f"{n},{test.current}" for n, test in enumerate(lab.tests, 1)]

@@ -17,7 +17,7 @@ from typing import IO
 
 from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import ColumnError, CombinedError, InputError, listed, printable
-from mrdamper.rig_files.coil_current import as_data, with_value_of_name
+from mrdamper.rig_files.coil_current import as_data, ask_current_too, with_value_of_name
 from mrdamper.rig_files.column_names import COMPUTED, holds, words, words_of
 from mrdamper.rig_files.columns import assign, partly_assigned
 from mrdamper.rig_files.mapping.clocks import with_time_stated
@@ -142,7 +142,10 @@ def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawT
         except InputError as error:
             others.append((table, error))
     if not fitting:
-        raise others[0][1] if others else RigFileError("E_NO_DATA", "no table in this file")
+        table, error = others[0] if others else (None, RigFileError("E_NO_DATA", "no table in this file"))
+        if table is not None:
+            ask_current_too(error, table, profile, table.source.path)
+        raise error
     tests = [i for i, (table, _) in enumerate(others) if _resembles_a_test(table, fitting, profile)]
     apart = [table for i, (table, _) in enumerate(others) if table.label and i not in tests]
     parts = [table.label for table in apart if len({*REQUIRED} & {*partly_assigned(table, profile)}) > 1]

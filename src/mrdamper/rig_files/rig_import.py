@@ -170,7 +170,8 @@ def import_files(
         used = intake.join(texts)
         left_out = [path for path in left_out if path not in used]
         if table is not None and (table.path not in beside or table.path.parent in given):  # else some of its tests
-            table.require_found(intake.met)
+            unread = [Path(refusal.file) for refusal in intake.refusals if not refusal.run]
+            table.require_found(intake.met, unread)
         profile.require_matches([*intake.met, *((path, "") for path in files)])
         refusals = intake.refusals or ([] if intake.tests() else intake.notes)
         named = tuple(replace(refusal, file=without_temporary_folder(refusal.file)) for refusal in refusals)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
 from statistics import median
+
+import numpy as np
 
 from mrdamper.data import held_current
 from mrdamper.data.strict_text import content_of
@@ -16,7 +19,7 @@ from mrdamper.errors import CombinedError, InputError, listed
 from mrdamper.rig_files.coil_current import with_decided_current
 from mrdamper.rig_files.column_names import split_name, words
 from mrdamper.rig_files.conditions import CELL, LARGEST_STATED, quantity_in_cell
-from mrdamper.rig_files.quality.view import strokes_of
+from mrdamper.rig_files.quality.view import View, strokes_of
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.text.stream import decoded
 
@@ -75,8 +78,10 @@ class TestsTable:
         """Return the rows of a file's tests."""
         return tuple(row for row in self.rows if _is_file(row.file, path))
 
-    def require_found(self, tests: Iterable[tuple[Path, str]]) -> None:
+    def require_found(self, tests: Iterable[tuple[Path, str]], unread: Collection[Path]) -> None:
         """Refuse rows of files or runs that are not there, and rows of one name that several files have.
+
+        The runs in files that are refused, the `unread`, may be there.
 
         Raises `TestsTableError`, naming every one of them.
         """
@@ -88,12 +93,9 @@ class TestsTable:
                 problem = f"{row.label!r} names tests of {counted(len(fitting), 'file')}: {shown}"
                 remedy = "write the file with its folder, and one row for each"
                 raise TestsTableError(problem, where=f"{self.path.name}, line {row.line}", remedy=remedy)
-        absent = [
-            row
-            for row in self.rows
-            if not any(row.names(path, run) for path, run in tests)
-            and not (row.file and (self.path.parent / row.file).is_file() and not row.run)
-        ]
+        absent = [row for row in self.rows if not any(row.names(path, run) for path, run in tests)]
+        absent = [row for row in absent if not (row.file and any(_is_file(row.file, path) for path in unread))]
+        absent = [row for row in absent if row.run or not row.file or not (self.path.parent / row.file).is_file()]
         if absent:
             shown = listed([f"{row.label!r} (line {row.line})" for row in absent], 10)
             remedy = "correct the names, or remove the rows"
@@ -185,8 +187,11 @@ def tests_text(records: Sequence[Record]) -> str:
 def _description(record: Record) -> str:
     """Return the name of a test's block and its measured motion, by which a reader tells the tests apart."""
     strokes, name = strokes_of(record), record.provenance.get("block", "")
-    motion = f"{1 / strokes.period:.3g} Hz, {500 * median(strokes.lengths):.3g} mm" if strokes.period else ""
-    return ", ".join(filter(None, (name, motion)))
+    motion = (1 / strokes.period, median(strokes.lengths) / 2) if strokes.period else None
+    with suppress(InputError), np.errstate(all="ignore"):  # the record was not checked
+        analysis = View(record).motion
+        motion = (analysis.condition.frequency_Hz, analysis.condition.amplitude_m) if analysis else motion
+    return ", ".join(filter(None, (name, f"{motion[0]:.3g} Hz, {1e3 * motion[1]:.3g} mm" if motion else "")))
 
 
 def _cells(path: Path) -> list[tuple[int, list[str]]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -86,7 +87,7 @@ def import_(
     if as_json:
         print(json.dumps(_summary(result, out if written else None), indent=1, ensure_ascii=False))
     else:
-        _print(result, out if written else None, total, new, dry=dry, verbose=verbose)
+        _print(result, out if written else None, total, new, profile=profile, dry=dry, verbose=verbose)
     if not result.records or (wrong and not dry):
         raise typer.Exit(2)
 
@@ -179,7 +180,9 @@ def _asked(
     return settings, result
 
 
-def _print(result: ImportResult, out: Path | None, total: int, new: int, *, dry: bool, verbose: bool) -> None:
+def _print(
+    result: ImportResult, out: Path | None, total: int, new: int, *, profile: Path | None, dry: bool, verbose: bool
+) -> None:
     from mrdamper.data.wording import counted, number
 
     columns = {record.provenance["columns"] for record in result.records}
@@ -209,17 +212,20 @@ def _print(result: ImportResult, out: Path | None, total: int, new: int, *, dry:
     if result.left_out:
         whys = {name: f" ({reason})" for name, reason in result.reasons.items()}
         print(f"not imported as tests: {listed([name + whys.get(name, '') for name in result.left_out], 5)}")
+    given = "" if profile is None else f" --profile {shlex.quote(str(profile))}"
     if result.refusals and all(refusal.error.remedy.startswith("write the ") for refusal in result.refusals):
         print(
-            "a table takes the current of each test: mrdamper import FILES --write-tests tests.csv, "
-            "fill in current_A, import with --tests tests.csv"
+            f"a table takes the current of each test: mrdamper import FILES{given} --write-tests tests.csv, "
+            f"fill in current_A, import with{given} --tests tests.csv"
         )
     elif any("profile" in refusal.error.remedy for refusal in result.refusals):
+        answer = f"correct {profile}, which mrdamper import FILE{given} --write-profile - shows completed"
+        if profile is None:
+            answer = "mrdamper import FILE --write-profile rig.toml, correct rig.toml, import with --profile rig.toml"
         print(
-            "a profile answers once for all files: mrdamper import FILE --write-profile rig.toml, "
-            "correct rig.toml, import with --profile rig.toml"
+            f"a profile answers once for all files: {answer}"
             + ("; if it is for the refused files only, import the others with --skip-refused, then these on their own "
-               "with --profile rig.toml --add" if result.records else "")
+               "with it and --add" if result.records else "")
         )  # fmt: skip
     tests = {record.provenance.get("file", "") for record in result.records}
     if out is not None:
