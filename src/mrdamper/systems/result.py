@@ -50,8 +50,8 @@ class Simulation:
     def headline(self) -> str:
         """System and law, with the current where it is constant, or that there are no dampers."""
         law = type(self.controller).title if self.dampers else "without dampers"
-        constant = isinstance(self.controller, Passive) and self.dampers
-        return f"{self.system.title}, {law}{f' {number(self.controller.current_A, 3)} A' if constant else ''}"
+        constant = self.controller.current_A if self.dampers and isinstance(self.controller, Passive) else None
+        return f"{self.system.title}, {law}{'' if constant is None else f' {number(constant, 3)} A'}"
 
     @property
     def step(self) -> float:
