@@ -25,6 +25,8 @@ def number(value: float | None, digits: int = 4, beside: float | None = None, si
     rounded = float(f"{value:.{digits}g}")
     size = abs(float(f"{value if beside is None else beside:.{digits}g}"))
     power = 0 if not size or _LEAST <= size < _MOST else 3 * math.floor(math.log10(size) / 3)
+    if power < -300:  # a tenth of which is zero
+        return f"{rounded:{sign}.{digits}g}"
     return f"{rounded / 10.0**power:{sign}z.10g}" + (f"e{power}" if power else "")
 
 

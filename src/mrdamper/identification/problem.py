@@ -137,7 +137,7 @@ class Method(ABC):
     """A method to determine the free parameters."""
 
     name: ClassVar[str]
-    summary: ClassVar[str]
+    summary: ClassVar[str] = ""
 
     @abstractmethod
     def solve(self, problem: Problem) -> Solution:

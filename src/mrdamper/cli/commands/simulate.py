@@ -79,10 +79,8 @@ def simulate(
 
             compared = compare_controllers(done, *given[1:], others, highest, tell) if others else None
             tell("writing", 1.0)
-            scaled = f", played {time_scale:g} times as fast" if time_scale != 1 else ""
-            facts = {"system": system, "input": f"{source}{scaled}"}
-            facts |= {"damper": str(damper) if damper else "that of the system"} if dampers else {}
-            paths = write_simulation(done, out, compared, bands, facts)
+            origin = (damper or "that of the system") if dampers else None
+            paths = write_simulation(done, out, compared, bands, _facts(system, source, time_scale, origin))
     warn(shortened([f"{path}" for path in paths], 2, verbose))
     if as_json:
         print(json.dumps(_figures(done, dampers) | _banded(bands), indent=1))
@@ -91,6 +89,12 @@ def simulate(
     _print_comparison(compared)
     _print_warnings(done)
     _print_bands(done, bands, dampers)
+
+
+def _facts(system: str, source: str, time_scale: float, damper: Path | str | None) -> dict[str, str]:
+    """Name what was simulated."""
+    scaled = f", played {time_scale:g} times as fast" if time_scale != 1 else ""
+    return {"system": system, "input": f"{source}{scaled}"} | ({"damper": str(damper)} if damper else {})
 
 
 def _dampers(loaded: SystemFile, model: Path | None, where: str) -> dict[str, Damper]:
