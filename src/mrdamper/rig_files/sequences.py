@@ -18,7 +18,7 @@ from mrdamper.rig_files.conditions import currents_in, motions_in
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.quality.view import find_strokes, runs_of
 from mrdamper.rig_files.readers.base import RawTable
-from mrdamper.rig_files.record import OPTIONAL, Finding, Record, part_of_record
+from mrdamper.rig_files.record import OPTIONAL, Finding, Record, part_of_record, unique_names
 
 _NUMBERED = re.compile(
     r"(?i)(?P<name>.*?)[ _-]*(?:(?:part|teil|partie|parte|seq|buffer)[ _-]*)?(?<![0-9.,])(?P<n>[0-9]+)"
@@ -26,7 +26,9 @@ _NUMBERED = re.compile(
 _BLOCK_NAME = re.compile(  # Data Acquisition: DAQ_02; no date
     r"[\s#%]*([^\W\d_][^:=\t;]{1,40}?)\s*[:=]\s*\"?(?![0-9]+[:/.-][0-9])([^\t;,\"]*[^\W\d_][^\t;,\"]*)"
 )
-_BLOCK_NUMBER = re.compile(r"[\s#%]*([^\W\d_][^\d:=\t;]{1,40}?)[\W_]*([0-9]+)\W*")  # Test no. 4
+_BLOCK_NUMBER = re.compile(  # Test no. 4; run 2 of 3
+    r"[\s#%]*([^\W\d_][^\d:=\t;]{1,40}?)[\W_]*([0-9]+)(?: *(?:/|of|von|sur|de|di) *[0-9]+)?\W*"
+)
 _RUN, _RUN_NUMBER = words("run"), words("run_number")
 _MOST_STEPS = 3.0  # between the last sample of a file and the first of the next
 MOST_TESTS = 500  # of a record: more is a cut at noise
@@ -68,10 +70,11 @@ def joined(records: list[Record], profile: Profile, tables: list[RawTable]) -> l
 def names_of_blocks(tables: Sequence[RawTable]) -> tuple[list[str], list[str]]:
     """Return the names of a file's blocks by a word for a test, and by all keys above them that name each otherwise."""
     stated = [dict(filter(None, map(_name_in, table.remarks))) for table in tables]
-    keys = [key for key in stated[0] if len({of.get(key, "") for of in stated} - {""}) == len(stated) > 1]
-    of_run = next((key for key in keys if _means_run(key)), None)
-    names = [re.sub(r"[^\w.+=-]+", "_", of[of_run]) for of in stated] if of_run else []
-    return names, ["; ".join(of[key] for key in keys) for of in stated] if keys else []
+    counts = {key: len({of.get(key) for of in stated}) for key in stated[0] if all(of.get(key) for of in stated)}
+    keys = [key for key, count in counts.items() if count == len(stated) > 1]
+    of_run = next((key for key in (*keys, *counts) if counts[key] > 1 and _means_run(key)), None)
+    names = [re.sub(r"[^\w.+=-]+", "_", of[of_run])[:60] for of in stated] if of_run else []
+    return unique_names(names), ["; ".join(of[key] for key in keys) for of in stated] if keys else []
 
 
 def _name_in(line: str) -> tuple[str, str] | None:

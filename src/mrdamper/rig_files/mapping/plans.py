@@ -383,21 +383,35 @@ def _meant(key: str, files: Collection[str]) -> list[str]:
 def within_ranges(tests: _Tests, results: Results | None) -> _Tests:
     """Return the tests that have a row in a table of results, between the starts and ends it states, if it does.
 
-    A record of several rows is cut into a test for each.
+    A record of several rows is cut into a test for each. Where a column names the files, each has to have a row.
     """
     if results is None:
         return tests
-    parts: dict[int, list[slice]] = defaultdict(list)
-    for groups in ([(results, [*range(len(tests))])], *results.apart([file.name for file, _ in tests])):
-        for rows, own in groups if not parts else ():
-            for i, _, samples in rows.rows_in_range([tests[i][1] for i in own]):
-                parts[own[i]].append(samples)
-    cut, records = Finding("W_CUT", "cut at the starts and ends that a plan states"), list[tuple[Path, Record]]()
+
+    def cuts_of(rows: Results, own: Sequence[int]) -> list[tuple[int, slice]]:
+        return [(own[i], samples) for i, _, samples in rows.rows_in_range([tests[i][1] for i in own])]
+
+    groups = results.apart([file.name for file, _ in tests])
+    by_file = ([cut for rows, own in group for cut in cuts_of(rows, own)] for group in groups)
+    whole = (cuts for cuts in by_file if len({i for i, _ in cuts}) == len(tests))
+    cuts, records = cuts_of(results, range(len(tests))) or next(whole, []), list[tuple[Path, Record]]()
     for i, (file, record) in enumerate(tests):
-        for n, samples in enumerate(parts[i], 1):
-            part = part_of_record(record, samples, f"{record.id}_{n}" if len(parts[i]) > 1 else "")
-            records.append((file, part.noticed(cut)))
+        parts = [samples for at, samples in cuts if at == i]
+        for n, samples in enumerate(parts, 1):
+            part = part_of_record(record, samples, f"{record.id}_{n}" if len(parts) > 1 else "")
+            records.append((file, part.noticed(_cut_at(parts, record))))
     return records or tests
+
+
+def _cut_at(parts: Sequence[slice], record: Record) -> Finding:
+    """Return the finding on a cut, with the motion in none of the parts for as long as the shortest of them."""
+    text, least = "cut at the starts and ends that a plan states", min(part.stop - part.start for part in parts)
+    starts, stops = [0, *(part.stop for part in parts)], [*(part.start for part in parts), record.time.size]
+    for start, stop in zip(starts, stops, strict=True):
+        inner = slice(start + (stop - start) // 4, stop - (stop - start) // 4)
+        if stop - start >= least and not rests(part_of_record(record, inner)):
+            text += f"; no row has the motion from {record.time[start]:.4g} to {record.time[stop - 1]:.4g} s"
+    return Finding("W_CUT", text)
 
 
 def _called(tests: _Tests) -> list[tuple[str, ...]]:

@@ -84,14 +84,15 @@ class Results:
     def _by_labels(self, tests: Sequence[Iterable[str]]) -> dict[int, float]:
         """Return the current [A] of each test by the numbers in its name behind the beginnings of headings: S1_T02.
 
-        Empty unless every test has one row, no row two tests but by whole headings, as Level 2 of level2_1Hz and
-        level2_3Hz, and no such beginning is that of two headings.
+        Empty unless every test has one row, no row two tests but by a whole heading that counts no tests, as Level 2 of
+        level2_1Hz and level2_3Hz, and no such beginning is that of two headings.
         """
         headers = map(split_name, self.keys)
         heads = ["" if header.unit not in ("", "%") else header.name.casefold() for header in headers]
-        rows, labels = dict[int, int](), set[str]()
+        rows, whole = dict[int, int](), {head for head in heads if len(head) > 1} - _COUNTED  # no f, A
+        shared = True
         for test, texts in enumerate(tests):
-            fitting = {*range(len(self.cells))}
+            fitting, labels = {*range(len(self.cells))}, set[str]()
             pairs = {(label.casefold(), n, "\\" in text) for text in texts for label, n in _LABELLED.findall(text)}
             for label, number, of_path in pairs:
                 columns = [
@@ -101,11 +102,12 @@ class Results:
                     return {}
                 fitting = {row for row in fitting if all(_key(self.cells[row][i]) == _key(number) for i in columns)}
                 labels |= {label} if columns else set()
+            shared &= bool(labels) and labels <= whole
             if len(fitting) != 1:
                 return {}
             rows[test] = fitting.pop()
-        alone = len({*rows.values()}) == len(rows) or (labels and labels <= {*heads})
-        return {i: self.current[row] for i, row in rows.items()} if alone else {}
+        apart = len({*rows.values()}) == len(rows)
+        return {i: self.current[row] for i, row in rows.items()} if apart or shared else {}
 
     def joined(self, lines: Sequence[str]) -> Results | None:
         """Return the rows of another table, each with the current of the row of this one whose key it states.
@@ -461,7 +463,7 @@ def _key(text: str) -> str:
 def _group_names(text: str) -> set[str]:
     """Return names of a file or folder as they are compared: without marks and leading zeros, or as a date if it is."""
     iso, written = day_in(text) or ("", "")
-    plain = re.sub(r"(?<![0-9])0+(?=[0-9])", "", re.sub(r"[\W_]+", "", text.casefold()))
+    plain = re.sub(r"(?<![0-9.])0+(?=[0-9])", "", re.sub(r"[^\w.]|_", "", text.casefold()))
     return {
         _key(text),
         _key(_SPECIMEN.sub("", text)),
