@@ -23,6 +23,11 @@ from mrdamper.models import model_type
 
 DAMPERS = all_dampers()
 TRANSCENDENTAL = re.compile(r"Math\.(exp|expm1|log|log1p|tan|tanh|atan|atanh|pow)\(")
+HIDDEN_AT_FIRST = """addEventListener("DOMContentLoaded", () => {
+    const main = document.querySelector("main");
+    main.style.display = "none";
+    setTimeout(() => { main.style.display = ""; }, 300);
+});"""
 HOSTILE = [
     "</script><script>alert(1)</script>",
     "🛠️ Prüfstand 名前 \u202egnp",
@@ -263,6 +268,7 @@ def test_a_name_is_text_and_nothing_else(opened, no_compiler):
     assert page.locator("h1").inner_text() == f"Damper of rig {rig}"
     assert page.evaluate("document.scripts.length") == 2
     assert page.evaluate(AUDIT) == []
+    page.wait_for_function("[...document.querySelectorAll('svg')].every((e) => e.viewBox.baseVal.width > 240)")
 
 
 def test_without_scripts_it_says_why_nothing_moves(opened, no_compiler):
@@ -277,7 +283,7 @@ def test_forces_that_differ_are_not_shown_as_good(opened, no_compiler):
 
 @pytest.mark.parametrize(("size", "scheme"), [((360, 740), "dark"), ((1280, 900), "light")], ids=["phone", "desk"])
 def test_it_reads_well_on_a_phone_and_in_the_dark(opened, no_compiler, size, scheme):
-    page = opened(joint_damper(), size=size, color_scheme=scheme, has_touch=size[0] < 500)
+    page = opened(joint_damper(), before=HIDDEN_AT_FIRST, size=size, color_scheme=scheme, has_touch=size[0] < 500)
     page.locator("#wide svg").wait_for()
     assert page.evaluate(AUDIT) == []
 
@@ -362,3 +368,11 @@ def test_without_a_compiler_the_note_says_what_to_install(monkeypatch):
 
 def _joint(model):
     return JointDamper(model, ("alpha",), rig="bench", envelope=joint_damper().envelope)
+
+
+def test_a_damper_with_laws_of_the_current_alone_does_not_follow_the_motion(page_of, no_compiler):
+    damper = modified_damper()
+    functions = {**damper.functions, "yield_force": damper.functions["c"], "k1": damper.functions["f0"]}
+    of_current = replace(damper, parameters=replace(damper.parameters, functions=functions))
+    sentence = b"Its parameters are functions of the current."
+    assert (sentence in page_of(damper), sentence in page_of(of_current)) == (False, True)

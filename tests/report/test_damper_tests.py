@@ -132,6 +132,7 @@ def test_the_report_has_page_print_and_tables(folder, dataset, tmp_path):
     assert "21 °C" in page
     assert "datasets: made, 12 runs; worn, 4 runs" in page
     assert "fastest test of made at each current" in page  # whose loops these are
+    assert "against the given limits: 1 passed, 1 failed, 4 not tested." in page
     for verdict in ("pass", "fail", "not tested"):
         assert f"<strong>{verdict}</strong>" in page
     rows = list(csv.DictReader(io.StringIO((out / "forces.csv").read_text())))

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pytest
 
+from mrdamper.report.plots.comparison import ranking
 from mrdamper.report.plots.drawing import DrawnText
 from mrdamper.report.plots.figure import Axis, Figure
 from mrdamper.report.plots.style import current_colours, picture_of
@@ -107,6 +108,12 @@ def test_marks_are_clear_of_the_frame_where_one_end_of_the_axis_is_given(amplitu
     assert high > 12.5
     axis.low, axis.high = None, 12.0
     assert axis.limits([np.array([0.0, 6.0])]) == (pytest.approx(-0.6), 12.0)
+
+
+def test_a_ranking_without_validation_runs_does_not_list_them():
+    texts = {getattr(part, "text", "") for part in ranking({"one": (0.1, 0.2, np.nan)}).drawn().parts}
+    assert "cross-validation" in texts
+    assert "validation" not in texts
 
 
 def test_colours_rise_in_brightness_with_their_value():

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.dampers import joint_damper
+from support.dampers import joint_damper, modified_damper
 
 from mrdamper.dampers.joint import JointFit, LocalMinimum
 from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition
-from mrdamper.report.limitations import RANGE, limitations
+from mrdamper.report.limitations import RANGE, _explain, limitations
 from mrdamper.statistics.metrics import Scores
 from mrdamper.statistics.stop_reason import StopReason
 from mrdamper.study.recipe import RecipeResult, whole_damper
@@ -71,6 +71,19 @@ def test_a_run_described_far_worse_than_the_others_is_named_by_its_factor():
     assert [s.startswith("d (") for s in known if "one-sided" in s] == [True]  # once
     calm = replace(fit, nrmse_pp=np.array([0.02, 0.02, 0.03]), at_bounds=())
     assert not any("times the median" in s or "bound" in s for s in texts(calm))
+
+
+def test_the_meaning_of_a_parameter_is_no_part_of_a_formula():
+    damper = modified_damper()
+    texts = [["mass not identified: it is part of k1 (a = −ω² x); k1 holds k1 − m ω²", "f0 ended", "m.0 (2 kg)"]]
+    _explain(texts, damper)
+    assert texts == [
+        [
+            "mass not identified: it is part of k1 (stiffness; a = −ω² x); k1 holds k1 − m ω²",
+            "f0 (offset force) ended",
+            "m.0 (equivalent mass; 2 kg)",
+        ]
+    ]
 
 
 def test_limitations_are_grouped_and_the_tested_range_stands_last():

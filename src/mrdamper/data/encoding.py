@@ -26,7 +26,7 @@ _LATEX = str.maketrans(
 )
 _MARKDOWN = str.maketrans({c: f"\\{c}" for c in "!\"#$%&'()*+,-./:;<=>?@[\\]^_`{|}~"})
 _FORMULA = re.compile(r"'*\s*[=+\-@\t\r]")  # characters that begin a formula in a spreadsheet
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_NUMBER = re.compile(r"-|[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)  # reserved by Windows
 _MAX_NAME_PART = 48  # characters; of four bytes each, with prefix, suffix and hash, below 255
 
@@ -61,7 +61,7 @@ def finite(value: float | None) -> float | None:
 def csv_cell(text: str) -> str:
     """Write a cell that a spreadsheet does not evaluate; `csv_value` is the inverse.
 
-    An apostrophe precedes =, +, -, @ and tab, as in spreadsheets; numbers are unchanged.
+    An apostrophe precedes =, +, -, @ and tab, as in spreadsheets; numbers and a single dash are unchanged.
     """
     return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
 

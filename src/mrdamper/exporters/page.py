@@ -22,6 +22,7 @@ from mrdamper.exporters.c import TOLERANCE, c_facts, c_sources, reference_force,
 from mrdamper.exporters.templates import render
 from mrdamper.exporters.toolchain import build_webassembly
 from mrdamper.models import Model
+from mrdamper.statistics.functions.forms import form_named
 from mrdamper.tracing.c_writer import JavaScriptWriter
 
 _VECTORS = 240  # samples of the self-test
@@ -134,7 +135,9 @@ def _words(damper: Damper | Model, stepping: Stream) -> list[str]:
             f"Tested at {', '.join(motion)}, up to {top} mm/s; dashed curves are extrapolated beyond this range."
         )
         if stepping.model is None:
-            sentences.append(_FUNCTIONS)
+            forms = [form_named(function.form) for function in getattr(damper, "functions", {}).values()]
+            of_motion = not forms or any(form.follows_motion for form in forms)
+            sentences.append(_FUNCTIONS if of_motion else "Its parameters are functions of the current.")
         if stepping.band is not None:
             sentences.append(
                 f"Shaded: {100 * stepping.band.level:g} % prediction interval of the force {stepping.band.scope}."

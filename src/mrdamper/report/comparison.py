@@ -15,7 +15,7 @@ from mrdamper.data import Run
 from mrdamper.data.atomic import ResultRecord, publish
 from mrdamper.data.encoding import csv_text, file_names, finite
 from mrdamper.data.progress import Progress, silent
-from mrdamper.data.wording import counted
+from mrdamper.data.wording import counted, number
 from mrdamper.report.page import made_from, render_page
 from mrdamper.report.plots.comparison import overlaid_loops, ranking
 from mrdamper.report.plots.cycle import spread_out
@@ -41,8 +41,8 @@ def write_comparison(
         (work / "figures").mkdir()
         (work / "models").mkdir()
         chapters, parts = [], file_names(rig.rig for rig in comparison.rigs)
-        for number, rig in enumerate(comparison.rigs):
-            progress(f"{rig.rig or 'rig'}: figures", number / len(comparison.rigs))
+        for place, rig in enumerate(comparison.rigs):
+            progress(f"{rig.rig or 'rig'}: figures", place / len(comparison.rigs))
             suffix = f"-{parts[rig.rig]}" if len(comparison.rigs) > 1 else ""
             chapters.append(_chapter(rig, work / "figures", suffix, png))
             for entry in rig.entries:
@@ -116,7 +116,9 @@ def _reason(entry: RecipeResult, entries: Sequence[RecipeResult]) -> str:
     if entry is best:
         text += ": the lowest error"
     else:
-        text += f", {100 * (own / best.cross_validated.median() - 1):.0f} % above the lowest"
+        ratio = own / best.cross_validated.median()
+        text += f", {number(ratio, 2)} times" if ratio >= 2 else f", {100 * (ratio - 1):.0f} % above"
+        text += " the lowest"
     better = [e for e in entries if e.cross_validated.median() <= own]
     leaner = [e for e in better if e.damper.parameter_count < entry.damper.parameter_count]
     if leaner and entry is not best:

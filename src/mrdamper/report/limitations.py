@@ -77,11 +77,13 @@ def _explain(groups: Sequence[list[str]], damper: Damper) -> None:
     parameters = damper.model_at(damper.envelope.middle).parameters()
     meanings = {info.name: info.meaning for info in parameters if info.name not in _WORDS} | _SEARCHED
     for name, meaning in meanings.items():
-        named = re.compile(rf"(?<![\w.^/])(?<!\d ){re.escape(name)}(\.\d+)?(?![\w^])")
+        named = re.compile(rf"(?<![\w.^/])(?<![\d−] )({re.escape(name)}(?:\.\d+)?)(?![\w^]| [−ω])( \()?")
         places = ((texts, i) for texts in groups for i, text in enumerate(texts) if named.search(text))
         if first := next(places, None):
             texts, i = first
-            texts[i] = named.sub(lambda match, meaning=meaning: f"{match[0]} ({meaning})", texts[i], count=1)
+            texts[i] = named.sub(
+                lambda match, text=meaning: f"{match[1]} ({text}{'; ' if match[2] else ')'}", texts[i], count=1
+            )
 
 
 def _design(loops: Sequence[LoopAnalysis], identified: Sequence[str]) -> list[str]:

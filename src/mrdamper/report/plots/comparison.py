@@ -23,7 +23,8 @@ def ranking(scores: Mapping[str, tuple[float, float, float]]) -> Figure:
     )
     for column, (name, mark, colour) in enumerate(marks):
         values = 100 * np.array([entry[column] for entry in scores.values()])
-        axes.plot(values, rows, mark, ms=4.5, color=colour, label=name)
+        if np.isfinite(values).any():
+            axes.plot(values, rows, mark, ms=4.5, color=colour, label=name)
     axes.y.places, axes.y.texts, axes.x.log = rows.tolist(), list(scores), True
     axes.y.low, axes.y.high = -0.7, len(scores) - 0.3
     axes.label("nrmse_pp (%), median over runs", "")
@@ -33,7 +34,7 @@ def ranking(scores: Mapping[str, tuple[float, float, float]]) -> Figure:
 
 def overlaid_loops(runs: Sequence[Run], dampers: Mapping[str, Damper]) -> Figure:
     """Draw the last measured cycle of each run, one per row, with the loops of some dampers."""
-    figure = Figure(len(runs), 2, 0.7 + 2.5 * len(runs))
+    figure = Figure(len(runs), 2, 0.9 + 2.5 * len(runs), top=0.5)
     for row, run in enumerate(runs):
         condition, motion = equivalent_sine(run).condition, centred_motion(run)
         last = last_cycle(run, condition.frequency_Hz)
@@ -44,5 +45,5 @@ def overlaid_loops(runs: Sequence[Run], dampers: Mapping[str, Damper]) -> Figure
             draw_loop(panels, motion.part(last), force, label=title, color=colour, lw=0.9)
         left.label("Displacement (mm)", "Force (N)", str(condition))
         right.label("Velocity (m/s)", "Force (N)")
-    figure.axes[0].legend(size=6.5)
+    figure.axes[0].legend("above", size=6.5, columns=1 + len(dampers))
     return figure
