@@ -431,6 +431,6 @@
     $("drop").classList.remove("over");
     if (e.dataTransfer.files[0]) take(e.dataTransfer.files[0]);
   });
-  new ResizeObserver(draw).observe($("wide")); // its width may be known after the first drawing only
+  window.addEventListener("resize", draw);
   draw();
 })();
