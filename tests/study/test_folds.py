@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mrdamper.data import Condition, Run
+from mrdamper.data import Condition, Dataset, Run
 from mrdamper.errors import IdentificationError
-from mrdamper.physics.motion import sine
+from mrdamper.physics.motion import random_motion, sine
 from mrdamper.study.cross_validation import (
     all_folds,
     condition_folds,
@@ -15,6 +15,7 @@ from mrdamper.study.cross_validation import (
     folds_by_kind,
     stretches,
 )
+from mrdamper.study.split import hold_out
 
 MOTIONS = ((0.5, 0.02), (1.0, 0.02), (2.0, 0.008))
 
@@ -68,6 +69,15 @@ def test_a_current_either_way_is_one_level():
 )
 def test_a_kind_that_would_leave_too_little_is_absent(runs, absent):
     assert not absent & set(folds_by_kind(runs))
+
+
+def test_a_record_that_is_no_sine_is_no_condition_of_a_split():
+    motion = random_motion(np.random.default_rng(1), 20.0, 0.004, (0.5, 3.0))
+    rough = Run("rough", motion.time, motion.displacement, 100 * motion.velocity, 0.4)
+    split = hold_out(Dataset((*rig_tests((0.0, 0.4, 1.0)), rough)))
+    assert split.shown["rough"] == "no sine"
+    assert split.held_out
+    assert "rough" not in split.held_out
 
 
 def test_records_with_a_current_that_changes_are_omitted_together():

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from mrdamper.data import Condition, Dataset, Run, same_condition
 from mrdamper.errors import InputError, UnknownNameError
-from mrdamper.physics.motion import equivalent_sine
+from mrdamper.physics.motion.sines import sine_condition
 
 SHARE = 0.2  # of the conditions, by default
 _MIN_CONDITIONS = 2  # conditions to identify from
@@ -98,7 +98,7 @@ def hold_out(
 
 def _condition(run: Run) -> Condition | None:
     try:
-        return None if run.current_changes else equivalent_sine(run).condition
+        return sine_condition(run)
     except InputError:
         return None
 
