@@ -25,6 +25,7 @@ from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Floats, Run
 from mrdamper.errors import InputError
 from mrdamper.physics.motion import Excitation
+from mrdamper.statistics.linear import positive
 
 CHI_SQUARED_95 = 3.84  # fall of twice the logarithm at which a 95 % interval ends: chi squared of one
 _MEMORY_SAMPLES = 20  # samples before the scored ones, which contain a reversal
@@ -115,12 +116,6 @@ class Likelihood:
         picked = np.concatenate([p.picked + b for p, b in zip(self.parts, begins, strict=True)])
         whole = concatenate(motions)
         return whole, picked, whole.part(picked)
-
-
-def positive(matrix: Floats) -> Floats:
-    """Return a covariance made symmetric, and positive where rounding left it singular."""
-    even = (matrix + matrix.T) / 2
-    return even + 1e-12 * np.diag(np.diag(even))
 
 
 def _coordinates(bounds: tuple[float, float], log: bool) -> tuple[float, float]:

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.dampers.likelihood import Likelihood, positive
+from mrdamper.dampers.likelihood import Likelihood
 from mrdamper.data import Floats
 from mrdamper.data.wording import counted
 from mrdamper.errors import InputError, MissingExtraError
+from mrdamper.statistics.linear import positive
 
 _SEED = 1
 _PROPOSAL_DOF = 5.0  # degrees of freedom of the proposals

@@ -19,7 +19,7 @@ from mrdamper.physics.motion import analyse_motion
 
 HIGHEST_CURRENT, HIGHEST_FREQUENCY = 2.0, 2.0  # of the paper's tests [A], [Hz]
 _TOLERANCE = 1.05  # relative, of a measured current or frequency against its nominal value
-_SAME_LEVEL = 0.08  # relative difference within which two amplitudes or frequencies are one level
+SAME = 0.08  # relative difference within which two amplitudes or frequencies are one level
 
 # Function, levels it takes: currents, frequencies, amplitudes, products of frequency and amplitude.
 _FUNCTIONS = (
@@ -115,6 +115,6 @@ def _levels(conditions: Sequence[Condition]) -> tuple[int, int, int, int]:
     frequency, amplitude = (np.log([getattr(c, name) for c in conditions]) for name in ("frequency_Hz", "amplitude_m"))
 
     def count(logs: Floats) -> int:
-        return 1 + int(np.count_nonzero(np.diff(np.sort(logs)) > _SAME_LEVEL))
+        return 1 + int(np.count_nonzero(np.diff(np.sort(logs)) > SAME))
 
     return currents, count(frequency), count(amplitude), count(frequency + amplitude)

@@ -12,8 +12,9 @@ from mrdamper.data import Condition, Floats, Run, same_motion
 from mrdamper.data.wording import number, span
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.harmonic_balance import SineRecord
+from mrdamper.paper.assumptions import SAME
 from mrdamper.paper.options import CONSISTENT
-from mrdamper.paper.results import SAME, Measured, Reproduction, motions, unknown, values
+from mrdamper.paper.results import Measured, Reproduction, motions, unknown, values
 from mrdamper.physics.motion import equivalent_sine, measured_motion
 from mrdamper.statistics.functions.fitting import fit_function
 

@@ -19,9 +19,10 @@ from mrdamper.data.progress import Progress
 from mrdamper.data.wording import number
 from mrdamper.errors import IdentificationError
 from mrdamper.identification.loop_analysis import dynamic_ranges
+from mrdamper.paper.assumptions import SAME
 from mrdamper.paper.claims_on_tests import friction_along
 from mrdamper.paper.options import CONSISTENT, LITERAL, TRADITIONAL
-from mrdamper.paper.results import SAME, Reproduction, function_of, motions, rate_rows, values
+from mrdamper.paper.results import Reproduction, function_of, motions, rate_rows, values
 from mrdamper.physics.motion import equivalent_sine, measured_motion
 from mrdamper.physics.simulation import simulate
 from mrdamper.report.plots.comparison import overlaid_loops

@@ -13,6 +13,7 @@ from mrdamper.data import Condition, Dataset, Floats, Run, same_motion
 from mrdamper.identification import Identification
 from mrdamper.identification.harmonic_balance import ForceReading
 from mrdamper.identification.loop_analysis import LoopAnalysis
+from mrdamper.paper.assumptions import SAME
 from mrdamper.paper.genetic import GeneticMinimum
 from mrdamper.paper.options import ALI, DIRECT, LITERAL, TRADITIONAL, PaperOptions
 from mrdamper.paper.sensitivity import OneAtATime, Sobol
@@ -22,7 +23,6 @@ from mrdamper.statistics.functions.fitting import FunctionFit
 from mrdamper.study.recipe import RecipeResult
 
 SAME_CURRENT = 0.02  # difference within which two runs have one current [A]
-SAME = 0.08  # relative tolerance within which two runs have one motion
 
 
 @dataclass(frozen=True)

@@ -130,6 +130,12 @@ def _inverse(normal: Floats) -> Floats | None:
     return inverse if pivots.min(initial=1.0) > _WELL_APART else None
 
 
+def positive(matrix: Floats) -> Floats:
+    """Return a covariance made symmetric, and positive where rounding left it singular."""
+    even = (matrix + matrix.T) / 2
+    return even + 1e-12 * np.diag(np.diag(even))
+
+
 @dataclass(frozen=True, eq=False)
 class FixedColumns:
     """Constant columns of problems with one further column, factored once."""

@@ -21,7 +21,7 @@ from mrdamper.data.progress import Progress, silent
 from mrdamper.errors import IdentificationError, InputError, validate_arguments
 from mrdamper.identification import Identification
 from mrdamper.identification.basis import Basis
-from mrdamper.physics.motion import analyse_motion
+from mrdamper.physics.motion.sines import pure_sines
 from mrdamper.study.parallel import follow_each, identify_each
 from mrdamper.study.processes import several
 from mrdamper.study.recipe import IdentificationCache, Recipe, RecipeResult, StudyMethod, recipes
@@ -147,7 +147,7 @@ def _usable(rig: Dataset) -> UsableRuns:
 
 def _completed(chosen: Sequence[Recipe], rig: UsableRuns) -> tuple[list[Recipe], dict[str, str]]:
     """Complete the recipes for a rig, with the reasons why its runs do not allow some."""
-    pure = [run for run in rig.train if analyse_motion(run).is_sine]
+    pure = pure_sines(rig.train)
     recipes_of_rig, refused = list[Recipe](), dict[str, str]()
     for recipe in chosen:
         try:

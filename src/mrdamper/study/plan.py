@@ -24,6 +24,7 @@ from mrdamper.data.progress import Progress, silent
 from mrdamper.errors import InputError, UnknownNameError, numbers, validate_arguments
 from mrdamper.identification.intervals import student
 from mrdamper.physics.motion import sine
+from mrdamper.statistics.linear import positive
 from mrdamper.study.limits import Limits
 from mrdamper.study.proposal import Proposal
 
@@ -131,7 +132,6 @@ class ExperimentDesign:
         logs = [damper.fitted_parameters[name].log for name in names]
         covariance = np.diag(np.where(logs, _PRIOR_LOG_DEVIATION**2, 1 / np.maximum(np.diag(goal), 1e-12)))
         covariance[: len(uncertainty.names), : len(uncertainty.names)] = uncertainty.covariance
-        covariance += 1e-12 * np.diag(np.diag(covariance))
         if isinstance(about, str):
             if about not in names:
                 raise UnknownNameError.of("number to plan for", about, names)
@@ -145,7 +145,8 @@ class ExperimentDesign:
         mean = np.mean(doubt[..., len(names) :] ** 2, axis=(0, 1, 2))
         beside = float(mean @ [uncertainty.total_gain**2, uncertainty.total_offset**2]) + uncertainty.force**2
         words = about if isinstance(about, str) else f"at {about}" if about else "over the envelope"
-        return cls(limits, conditions, names, np.linalg.inv(covariance), goal, grams, session, words, beside)
+        precision = np.asarray(np.linalg.inv(positive(covariance)), dtype=float)
+        return cls(limits, conditions, names, precision, goal, grams, session, words, beside)
 
     @cached_property
     def minutes(self) -> Floats:
@@ -249,7 +250,7 @@ def _slopes(damper: Damper, uncertainty: Uncertainty, names: Sequence[str], cond
     estimate.
     """
     rng = np.random.default_rng(_SEED)
-    root = np.linalg.cholesky(uncertainty.covariance + 1e-12 * np.diag(np.diag(uncertainty.covariance)))
+    root = np.linalg.cholesky(positive(uncertainty.covariance))
     slopes: list[Floats] = []
     for draw in range(_DRAWS + 1):
         shift = 0.5 * root @ rng.standard_normal(len(uncertainty.names)) * (draw > 0)

@@ -31,7 +31,7 @@ from mrdamper.identification.basis import Basis
 from mrdamper.identification.methods import values_of_fields
 from mrdamper.models import Scale, all_models, model_type
 from mrdamper.physics.gas_spring import GasSpring
-from mrdamper.physics.motion import analyse_motion
+from mrdamper.physics.motion.sines import pure_sines
 from mrdamper.study.cross_validation import all_folds, cross_validate, cross_validate_by_kind, stretches
 from mrdamper.study.fit_result import FitResult
 from mrdamper.study.validation import Validation, validate
@@ -180,7 +180,7 @@ def fit_and_score_all(
             progress(f"{recipe.name}, {what}", (number + share) / len(steps))
 
         try:
-            followed = [run for run in runs if analyse_motion(run).is_sine] if recipe.pure else runs
+            followed = pure_sines(runs) if recipe.pure else runs
             identifications, spent = identified(
                 recipe.basis, followed, cache, lambda what, share: tell(what, 0.5 * share)
             )
@@ -343,6 +343,33 @@ def recipes(names: Sequence[str] = (), genetic: bool = False, method: StudyMetho
         if name not in by_name:
             raise UnknownNameError.of("model", name, by_name)
     return [by_name[name] for name in (names or by_name) if names or genetic or not by_name[name].on_request]
+
+
+def recipes_of_study(
+    train: Sequence[Run], everything: Sequence[Run], method: StudyMethod | None, model: str | None
+) -> list[tuple[Recipe, Sequence[Run]]]:
+    """Return the recipes of a study, and the runs each is followed on: sines run by run, everything at once.
+
+    With fewer than two sines, laws of the current alone are fitted to the records of constant current.
+    """
+    pure = pure_sines(train)
+    if method is not None:
+        return [(method.recipe(pure), train), *((modified(name), train) for name in STUDIED)]
+    steps: list[tuple[Recipe, Sequence[Run]]] = []
+    named = [
+        recipe for name, recipe in catalogue().items()
+        if name not in WHOLE_DAMPER and (model == name or (model == recipe.model and not recipe.on_request))
+    ]  # fmt: skip
+    if len(train) > 1:
+        steps += [(make(name), train) for name in STUDIED for make in (modified, jointly, current_only)]
+        there = {recipe.name for recipe, _ in steps}
+        steps += [(recipe, train) for recipe in named if recipe.basis is not None and recipe.name not in there]
+    elif len(held := [run for run in everything if not run.current_changes]) > 1:
+        steps += [(current_only(name), held) for name in STUDIED]
+    if len(pure) > 2:
+        steps += [(cls().beside_others().recipe(pure), train) for cls in study_methods().values()]
+    steps += [(recipe, everything) for recipe in named if recipe.basis is None]
+    return [*steps, *((whole_damper(name), everything) for name in WHOLE_DAMPER)]
 
 
 def _closed_shapes() -> list[str]:

@@ -27,7 +27,6 @@ from mrdamper.data.progress import Progress, silent
 from mrdamper.data.wording import counted
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError, validate_arguments
 from mrdamper.identification.loop_analysis import DynamicRange, LoopAnalysis, analyse_loop, at_levels, dynamic_ranges
-from mrdamper.physics.motion import analyse_motion
 from mrdamper.statistics.functions.selection import mean_error, smaller_wins
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.contradictions import Contradiction
@@ -35,18 +34,12 @@ from mrdamper.study.cross_validation import NO_CURRENT
 from mrdamper.study.dissipation import gains_energy
 from mrdamper.study.processes import IN_PROCESS, Processes
 from mrdamper.study.recipe import (
-    STUDIED,
-    WHOLE_DAMPER,
-    Recipe,
     RecipeResult,
     StudyMethod,
     catalogue,
-    current_only,
     fit_and_score_all,
-    jointly,
-    modified,
+    recipes_of_study,
     study_methods,
-    whole_damper,
 )
 from mrdamper.study.usable_runs import UsableRuns
 from mrdamper.study.validation import RunScore, Validation, validate
@@ -271,7 +264,7 @@ def study_rig(
     loops = at_levels([analyse_loop(run) for run in runs.sines])
     _require_runs(train, everything, runs.unusable, f"rig {rig}" if rig else dataset.name)
     candidates, impossible = fit_and_score_all(
-        _steps(train, everything, method, model if method is None else None),
+        recipes_of_study(train, everything, method, model if method is None else None),
         runs.held_out,
         lambda what, share: progress(f"{rig or 'rig'}: {what}", share),
         kinds=True,
@@ -400,30 +393,3 @@ def _runs(candidate: RecipeResult, kind: str) -> Sequence[RunScore]:
     if kind == CONDITION:
         return candidate.cross_validated.runs
     return candidate.by_kind[kind].runs if kind in candidate.by_kind else ()
-
-
-def _steps(
-    train: Sequence[Run], everything: Sequence[Run], method: StudyMethod | None, model: str | None
-) -> list[tuple[Recipe, Sequence[Run]]]:
-    """Return the recipes of a study, and the runs each is followed on: sines run by run, everything at once.
-
-    With fewer than two sines, laws of the current alone are fitted to the records of constant current.
-    """
-    pure = [run for run in train if analyse_motion(run).is_sine]  # published methods take no other
-    if method is not None:
-        return [(method.recipe(pure), train), *((modified(name), train) for name in STUDIED)]
-    steps: list[tuple[Recipe, Sequence[Run]]] = []
-    named = [
-        recipe for name, recipe in catalogue().items()
-        if name not in WHOLE_DAMPER and (model == name or (model == recipe.model and not recipe.on_request))
-    ]  # fmt: skip
-    if len(train) > 1:
-        steps += [(make(name), train) for name in STUDIED for make in (modified, jointly, current_only)]
-        there = {recipe.name for recipe, _ in steps}
-        steps += [(recipe, train) for recipe in named if recipe.basis is not None and recipe.name not in there]
-    elif len(held := [run for run in everything if not run.current_changes]) > 1:
-        steps += [(current_only(name), held) for name in STUDIED]
-    if len(pure) > 2:
-        steps += [(cls().beside_others().recipe(pure), train) for cls in study_methods().values()]
-    steps += [(recipe, everything) for recipe in named if recipe.basis is None]
-    return [*steps, *((whole_damper(name), everything) for name in WHOLE_DAMPER)]

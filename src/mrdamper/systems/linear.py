@@ -59,7 +59,7 @@ def linear_system(system: System, dampers: Sequence[Link]) -> LinearSystem:
     """Linearise about rest, dampers as forces, tyres on the ground, stops out of reach."""
     n = len(system.coordinates)
     inverse = np.linalg.inv(system.M)
-    rows = np.array([system.span(link.above, link.below)[0] for link in dampers]).reshape(len(dampers), n)
+    rows, _ = system.extensions(dampers)
     a, b = -inverse @ np.hstack([system.K, system.C]), -inverse @ rows.T
     if system.ground is not None:
         e = -system.ground[:, None]

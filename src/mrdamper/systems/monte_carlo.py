@@ -96,11 +96,8 @@ def _numbers_drawn(damper: Damper, count: int, rng: np.random.Generator) -> list
     values, vectors = np.linalg.eigh(uncertainty.covariance / np.outer(size, size))
     nudges = rng.standard_normal((count, scale.size)) @ (vectors * np.sqrt(np.maximum(values, 0.0))).T * scale
     nudges *= _student(rng, float(np.min(uncertainty.dof)), count)
-    columns = []
-    for name, log, nudge in zip(uncertainty.names, uncertainty.logs, nudges.T, strict=True):
-        moved = own[name].value * np.exp(nudge) if log else own[name].value + nudge
-        columns.append(np.clip(moved, *own[name].bounds).tolist())
-    return [dict(zip(uncertainty.names, row, strict=True)) for row in zip(*columns, strict=True)]
+    pairs = [zip(uncertainty.names, row, strict=True) for row in nudges.tolist()]
+    return [{name: own[name].moved(nudge) for name, nudge in row} for row in pairs]
 
 
 def _student(rng: np.random.Generator, dof: float, count: int) -> Floats:

@@ -74,23 +74,15 @@ class Simulation:
         return [i for i, link in enumerate(self.links) if link.role == "damper"]
 
     @cached_property
-    def _ways(self) -> tuple[Floats, Floats]:
-        """Strokes of the links by coordinate (E, n) and by channel of the road (E, q)."""
-        spans = [self.system.span(link.above, link.below) for link in self.links]
-        shapes = ((len(spans), width) for width in (self.x.shape[1], self.road.shape[1]))
-        B, D = (np.array([s[k] for s in spans]).reshape(shape) for k, shape in enumerate(shapes))
-        return B, D
-
-    @cached_property
     def stroke(self) -> Floats:
         """(N, E) relative displacement of each link [m]."""
-        B, D = self._ways
+        B, D = self.system.extensions(self.links)
         return self.x @ B.T + self.road @ D.T
 
     @cached_property
     def stroke_rate(self) -> Floats:
         """(N, E) relative velocity of each link [m/s]."""
-        B, D = self._ways
+        B, D = self.system.extensions(self.links)
         return self.v @ B.T + self.road_rate @ D.T
 
     @property
@@ -158,7 +150,7 @@ class Simulation:
         By the trapezoidal rule, as in the time integration.
         """
         system, names = self.system, [link.name for link in self.links]
-        (B, D), series = self._ways, np.zeros((3 + len(names), self.time.size))
+        (B, D), series = self.system.extensions(self.links), np.zeros((3 + len(names), self.time.size))
         for begin in range(0, self.time.size - 1, PART):
             part = slice(begin, begin + PART + 1)
             x, v, force, road, load = (a[part] for a in (self.x, self.v, self.force, self.road, self.load))

@@ -129,10 +129,8 @@ class SystemLoop:
             for link in self.links
         ]
         self.numbers = ElementParameters.of(self.stages)
-        rows = [system.span(link.above, link.below) for link in self.links]
         self.dampers = dict(dampers)
-        self.B = np.array([row for row, _ in rows]).reshape(len(rows), len(system.coordinates))
-        self.D = np.array([road for _, road in rows]).reshape(len(rows), len(system.channels))
+        self.B, self.D = system.extensions(self.links)
         self.control = controller.prepare(system, self.links, dampers, PERIOD, highest)
         self._walks: dict[bool, Any] = {}
 

@@ -115,6 +115,13 @@ class System:
         (a, road_a), (b, road_b) = self.point(above), self.point(below)
         return a - b, road_a - road_b
 
+    def extensions(self, links: Sequence[Link]) -> tuple[Floats, Floats]:
+        """Return the extensions of links by coordinate (E, n) and by height of a channel (E, q)."""
+        spans = [self.span(link.above, link.below) for link in links]
+        widths = len(self.coordinates), len(self.channels)
+        rows, roads = (np.array([s[k] for s in spans]).reshape(len(spans), w) for k, w in enumerate(widths))
+        return rows, roads
+
     def frequencies_Hz(self) -> Floats:
         """(n,) undamped natural frequencies without links, lowest first."""
         whitened = np.linalg.inv(np.linalg.cholesky(self.M))

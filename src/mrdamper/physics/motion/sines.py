@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,6 +74,11 @@ def analyse_motion(run: Run) -> MotionAnalysis:
         residual=residual,
         stray=residual / float(np.std(run.displacement)),
     )
+
+
+def pure_sines(runs: Iterable[Run]) -> list[Run]:
+    """Return the runs whose motion harmonic balance may treat as a sine; published methods take no other."""
+    return [run for run in runs if analyse_motion(run).is_sine]
 
 
 @dataclass(frozen=True)
