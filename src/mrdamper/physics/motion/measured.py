@@ -17,7 +17,7 @@ from mrdamper.physics.motion.path import memoize_per_path
 _UNIFORM = 1e-8  # spread of the sampling interval, relative, up to which it counts as one
 _ROUNDING = 4 * float(np.finfo(float).eps)  # of the largest value: a smaller slope per sample is rounding
 _CELLS = 4_000_000  # largest number of values of all windows in memory
-_CACHED_CELLS = 8_000  # the same for the processor's cache
+_CACHED_SAMPLES = 4_000  # samples whose sums fit the processor's cache
 
 
 @once_per_run
@@ -50,16 +50,16 @@ def smooth(time: Floats, signal: Floats, span: float | None = None) -> Floats:
     width = min(2 * half + 1, size)
     uniform = width == 2 * half + 1 and np.ptp(np.diff(time)) < _UNIFORM * spacing
     c = _fits_uniform(signal, half) if uniform else _fits(time, signal, half, width, spacing)
-    slope = c[:, 1]
+    slope = c[1]
     slope[np.abs(slope) <= _ROUNDING * np.max(np.abs(signal), initial=0.0)] = 0.0  # else its sign is rounding
-    return np.stack([signal + c[:, 0], slope / spacing, 2 * c[:, 2] / spacing**2])
+    return np.stack([signal + c[0], slope / spacing, 2 * c[2] / spacing**2])
 
 
 def _fits(time: Floats, signal: Floats, half: int, width: int, spacing: float) -> Floats:
-    """(N, 3) quadratics about each sample, in steps of the spacing, their values less the sample."""
+    """(3, N) quadratics about each sample, in steps of the spacing, their values less the sample."""
     size = signal.size
     windows = np.lib.stride_tricks.sliding_window_view
-    c = np.empty((size, 3))
+    c = np.empty((3, size))
     for rows in blocks(size, _CELLS // width):
         start = np.clip(np.arange(size)[rows] - half, 0, size - width)
         tau = (windows(time, width)[start] - time[rows, None]) / spacing
@@ -67,7 +67,7 @@ def _fits(time: Floats, signal: Floats, half: int, width: int, spacing: float) -
         moments = [np.ones_like(tau), tau, tau * tau]
         normal = np.stack([[np.sum(p * q, axis=1) for q in moments] for p in moments])
         right = np.stack([np.sum(p * values, axis=1) for p in moments])
-        c[rows] = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0]
+        c[:, rows] = np.linalg.solve(normal.transpose(2, 0, 1), right.T[..., None])[..., 0].T
     return c
 
 
@@ -88,24 +88,32 @@ def whole_clock(time: Floats) -> Floats:
 def _fits_uniform(signal: Floats, half: int) -> Floats:
     """Fit equal windows (Savitzky and Golay).
 
-    Windows are taken relative to their sample and the two sides in pairs, so that a signal at rest, or
+    Samples are taken relative to the middle and the two sides in pairs, so that a signal at rest, or
     one that turns symmetrically about a sample, has a slope of exactly zero there.
     """
     tau, fit = _quadratic(half)
     last = signal.size - half
-    windows = np.lib.stride_tricks.sliding_window_view
-    after, before = windows(signal[half + 1 :], half), windows(signal[: last - 1], half)[:, ::-1]
-    c, even, odd = np.empty((signal.size, 3)), fit[half + 1 :, ::2].copy(), fit[half + 1 :, 1].copy()
-    for rows in blocks(last - half, _CACHED_CELLS // half):
-        middle = signal[half:last][rows, None]
-        ahead, behind = after[rows] - middle, before[rows] - middle
-        c[half:last][rows, ::2] = (ahead + behind) @ even
-        c[half:last][rows, 1] = (ahead - behind) @ odd
+    c = np.zeros((3, signal.size))
+    for rows in blocks(last - half, _CACHED_SAMPLES):
+        inside = slice(half + rows.start, half + rows.stop)
+        middle, (value, slope, curvature) = signal[inside], c[:, inside]
+        pair, other = np.empty((2, middle.size))
+        for step, (even, odd, bent) in enumerate(fit[half + 1 :].tolist(), start=1):
+            after, before = (
+                signal[inside.start + step : inside.stop + step],
+                signal[inside.start - step : inside.stop - step],
+            )
+            np.subtract(after, before, out=pair)
+            slope += np.multiply(pair, odd, out=pair)
+            np.subtract(after, middle, out=pair)
+            pair += np.subtract(before, middle, out=other)
+            value += np.multiply(pair, even, out=other)
+            curvature += np.multiply(pair, bent, out=pair)
     ends = (signal[: tau.size], slice(0, half)), (signal[-tau.size :], slice(last, None))
     for window, away in ends:
         d0, d1, d2 = ((window - signal[away, None]) @ fit).T  # outside the middle of the window
         at = tau[:half] if away.start == 0 else tau[half + 1 :]
-        c[away] = np.stack([d0 + at * (d1 + at * d2), d1 + 2 * at * d2, d2], axis=1)
+        c[:, away] = d0 + at * (d1 + at * d2), d1 + 2 * at * d2, d2
     return c
 
 
