@@ -10,6 +10,8 @@ from contextlib import redirect_stdout
 import numpy as np
 import pytest
 
+from mrdamper.fleet import job
+from mrdamper.fleet.item import FleetError, Item
 from mrdamper.statistics.linear import on_one_blas_thread, one_blas_thread
 
 FIT = """
@@ -39,17 +41,34 @@ def test_one_and_two_threads_give_the_same_bits():
 
 @pytest.mark.skipif(importlib.util.find_spec("threadpoolctl") is None, reason="threads are held by threadpoolctl")
 def test_the_number_of_threads_is_given_back():
+    np.linalg.inv(np.eye(2))
+    before = _threads()
+    with one_blas_thread():
+        assert set(_threads()) == {1}
+    assert _threads() == before
+    assert set(on_one_blas_thread(_threads)()) == {1}
+
+
+@pytest.mark.skipif(importlib.util.find_spec("threadpoolctl") is None, reason="threads are held by threadpoolctl")
+def test_a_job_of_a_fleet_uses_one_thread(monkeypatch):
+    """Also in a worker of a cluster, whose environment may allow more."""
+    from threadpoolctl import threadpool_limits
+
+    def without_records(item, settings):
+        threads.extend(_threads())
+        raise FleetError("no records", where=item.name, code="E_FLEET_EMPTY", remedy="none")
+
+    threads = []
+    monkeypatch.setattr(job, "read", without_records)
+    with threadpool_limits(2, "blas"):
+        job.attempt(job.as_job(Item("D1"), "", job.Settings(), None))
+    assert set(threads) == {1}
+
+
+def _threads():
     from threadpoolctl import threadpool_info
 
-    def blas():
-        return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
-
-    np.linalg.inv(np.eye(2))
-    before = blas()
-    with one_blas_thread():
-        assert set(blas()) == {1}
-    assert blas() == before
-    assert set(on_one_blas_thread(blas)()) == {1}
+    return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
 
 
 def test_without_the_library_nothing_is_held_and_nothing_fails(monkeypatch):

@@ -22,6 +22,7 @@ from mrdamper.fleet.plan import Plan
 from mrdamper.identification.covariance import spread
 from mrdamper.models import Model
 from mrdamper.physics.motion import equivalent_sine
+from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.usable_runs import accepted_runs, runs_for_global_fit, without_contradictions
 from mrdamper.study.workflow import study_rig
 
@@ -45,6 +46,7 @@ class Settings:
     cold: bool = False  # start every search from the model's start values, not from the plan
 
 
+@on_one_blas_thread
 def measure(job: dict[str, Any]) -> dict[str, Any]:
     """Calculate the row of one damper; `job` holds an item, its digest, settings and the plan, if there is one.
 
