@@ -14,12 +14,13 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
-from itertools import product
+from itertools import chain, product
 from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from mrdamper.data import Floats, current_levels
+from mrdamper.data.arrays import blocks
 from mrdamper.statistics.linear import inverse_of_triangle
 from mrdamper.study.contradictions.tracks import Track
 
@@ -327,34 +328,35 @@ class Evidence:
 
     def products(self, tracks: Sequence[Track]) -> list[RowProducts]:
         """Products of the rows of runs."""
+        return _of_each_kind(tracks, lambda t: (t.time.size, t.rows.size, t.current_changes), self._of_alike)
+
+    def _of_alike(self, tracks: Sequence[Track]) -> Iterable[RowProducts]:
+        parts = blocks(len(tracks), _TRACKS_PER_BLOCK)
+        return chain.from_iterable(self._of_rows(tracks[part]) for part in parts)
+
+    def _of_rows(self, tracks: Sequence[Track]) -> Iterable[RowProducts]:
+        """Products of runs of one number of samples, whose rows are the same."""
         yields = np.array([*_YIELDS, *(length for length, _ in _LEAKY)]) * self.amplitude
         velocities = np.array([*(0.0 for _ in _YIELDS), *(velocity for _, velocity in _LEAKY)]) * self._velocity
-        products: list[RowProducts] = []
-        for start in range(0, len(tracks), _TRACKS_PER_BLOCK):
-            block = tracks[start : start + _TRACKS_PER_BLOCK]
-            stops = stop_operators(block, yields, velocities / yields)
-            pairs = [(track, stop[track.rows] / yields) for track, stop in zip(block, stops, strict=True)]
-            products += _of_each_kind(pairs, lambda pair: (len(pair[1]), pair[0].current_changes), self._of_rows)
-        return products
-
-    def _of_rows(self, tracks: Sequence[tuple[Track, Floats]]) -> Iterable[RowProducts]:
-        """Products of runs of one number of rows, with their stop operators there."""
-        channels = [(t.displacement, t.velocity, t.acceleration, t.force) for t, _ in tracks]
-        rows = np.array([[own[t.rows] for own in of] for (t, _), of in zip(tracks, channels, strict=True)])
+        rows = tracks[0].rows
+        stops = stop_operators(tracks, yields, velocities / yields)[rows].swapaxes(0, 1) / yields
+        channels = np.array(
+            [(t.displacement[rows], t.velocity[rows], t.acceleration[rows], t.force[rows]) for t in tracks]
+        )
         scales = np.array([self.amplitude, self._velocity, self._acceleration, self.force])
-        x, v, a, y = rows.swapaxes(0, 1) / scales[:, None, None]
+        x, v, a, y = channels.swapaxes(0, 1) / scales[:, None, None]
         friction = [np.tanh(v / scale) for scale in _VELOCITIES]
         led = [np.tanh((v + lead * x) / _VELOCITIES[1]) for lead in _LEADS]
         columns = [np.ones_like(x), x, x * x, v, a, *friction, *led, np.abs(v), np.abs(friction[1])]
-        table = np.concatenate([np.stack(columns, axis=-1), [stops for _, stops in tracks]], axis=-1)
+        table = np.concatenate([np.stack(columns, axis=-1), stops], axis=-1)
         np.clip(table, -_MAX_ELEMENT, _MAX_ELEMENT, out=table)
-        overs = [None if t.current_changes else self.share(float(t.current[0])) for t, _ in tracks]
+        overs = [None if t.current_changes else self.share(float(t.current[0])) for t in tracks]
         if overs[0] is None:
-            shares = np.array([self.shares(t.current[t.rows]) for t, _ in tracks])
+            shares = np.array([self.shares(t.current[rows]) for t in tracks])
             table = (shares[..., :, None] * table[..., None, :]).reshape(*x.shape, -1)
         across = table.swapaxes(1, 2)
         sums = across @ table, _times(across, y), np.sum(y * y, axis=1).tolist()
-        sizes = [t.half_range / self.force for t, _ in tracks]
+        sizes = [t.half_range / self.force for t in tracks]
         return map(RowProducts, *sums, [x.shape[1]] * len(tracks), sizes, overs)
 
     def share(self, current: float) -> Floats:
@@ -401,32 +403,29 @@ def _along_nodes(matrix: Floats, array: Floats) -> Floats:
     return product.reshape(*product.shape[:-2], *array.shape[-2:])
 
 
-def stop_operators(tracks: Sequence[Track], yields: Floats, rates: Floats) -> list[Floats]:
-    """(L, Y) outputs [m] of elastic-plastic elements of some yield displacements [m], some of which leak.
+def stop_operators(tracks: Sequence[Track], yields: Floats, rates: Floats) -> Floats:
+    """(L, M, Y) outputs [m] of elastic-plastic elements along runs of L samples.
 
-    The rates of the leaks [1/s] are zero for the first elements.
+    `yields`, `rates`: (Y,) yield displacements [m], and rates at which they leak [1/s].
     """
-    longest, first = max(track.displacement.size for track in tracks), int(np.argmax(rates > 0))
-    moved, leaks = np.zeros((longest, len(tracks))), dict[bytes, tuple[Floats, Floats]]()
-    kept = np.ones((longest, len(tracks), yields.size))
-    share = np.ones_like(kept[..., first:])
-    for i, track in enumerate(tracks):
-        size, time = track.time.size, track.time.tobytes()  # which several versions of a run may have
-        if time not in leaks:
-            leak = np.diff(track.time, prepend=track.time[:1])[:, None] * rates[first:]
-            lost = -np.expm1(-leak)
-            leaks[time] = 1 - lost, np.divide(lost, leak, out=np.ones_like(leak), where=leak > 0)
-        kept[:size, i, first:], share[:size, i] = leaks[time]
-        moved[1:size, i] = np.diff(track.displacement)
-    outputs = np.repeat(moved[:, :, None], yields.size, axis=2)
-    outputs[..., first:] *= share
-    (state, before), least = np.zeros((2, len(tracks), yields.size)), -yields
+    times = {id(track.time): track.time for track in tracks}  # which several versions of a run have
+    place = {key: k for k, key in enumerate(times)}
+    time, x = np.array(list(times.values())).T.copy(), np.array([track.displacement for track in tracks]).T.copy()
+    leak = np.diff(time, axis=0, prepend=time[:1])[:, :, None] * -rates
+    kept, each = np.expm1(leak), [place[id(track.time)] for track in tracks]
+    share = np.divide(kept, leak, out=np.ones_like(leak), where=leak < 0)
+    kept += 1
+    kept, outputs = np.take(kept, each, axis=1), np.take(share, each, axis=1)
+    outputs *= np.diff(x, axis=0, prepend=x[:1])[:, :, None]
+    state, before = np.zeros((2, len(tracks), yields.size))
+    most = np.tile(yields, (len(tracks), 1))
+    least = -most
     for row, held in zip(outputs, kept, strict=True):  # a row is the step before it is the output
         np.multiply(state, held, out=before)
         np.add(row, before, out=row)
-        np.minimum(row, yields, out=row)
+        np.minimum(row, most, out=row)
         state = np.maximum(row, least, out=row)
-    return [outputs[: track.displacement.size, i] for i, track in enumerate(tracks)]
+    return outputs
 
 
 def _nodes(tracks: Sequence[Track]) -> Floats:

@@ -50,7 +50,7 @@ class Track:
         """Return the same test with displacement and time multiplied by factors; a negative one inverts the motion."""
         return replace(
             self,
-            time=self.time * time,
+            time=self.time if time == 1.0 else self.time * time,
             displacement=self.displacement * motion,
             velocity=self.velocity * (motion / time),
             acceleration=self.acceleration * (motion / time**2),
