@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from mrdamper.data.wording import number
 from mrdamper.errors import UnknownNameError
 from mrdamper.paper.claims import ROWS, ClaimLimit, _above, _below, steadiness, thresholds, verdict_on
 
@@ -54,7 +55,7 @@ def test_a_claim_holds_at_its_limits_and_not_beyond_the_wider_ones(key):
     assert verdict_on(key, numbers(key, lambda x: math.nan)) == "cannot be checked"
     for limit in LIMITS[key]:
         assert limit.text in thresholds(key)
-        assert f"{limit.holds:g}" in thresholds(key)
+        assert number(limit.holds) in thresholds(key)
 
 
 @pytest.mark.parametrize(("key", "place"), [(key, i) for key, limits in LIMITS.items() for i in range(len(limits))])

@@ -1006,8 +1006,7 @@ def test_columns_of_one_name_below_their_conditions_are_tests_and_a_number_leave
     numbers = "[channels.displacement]\ncolumn = 2\n[channels.force]\ncolumn = 3\n[current]\nvalue = 0.0"
     (record,) = import_files([tmp_path], parse_profile(numbers)).records
     told = [f.text for f in record.findings]
-    assert any("of 2 columns called 'F' one is taken as the force, not 5;" in text for text in told)
-    assert any("of 2 columns called 'x' one is taken as the displacement, not 4;" in text for text in told)
+    assert any("x_mm (column 4) and F_N (column 5) not taken;" in text for text in told)
 
 
 @pytest.mark.parametrize(("sense", "sign"), [("extension (tension)", 1), ("compression", -1)])

@@ -71,16 +71,15 @@ def simulate(
     drawn = None if draws is None else draw(dampers, draws, seed)
     with progress_soon(f"{loaded.system.title}, time step halved until peaks converge") as tell:
         done = simulate_system(*given, controller, step, highest)
-        bands, compared, paths = None, None, []
-        if drawn is not None:
-            bands = monte_carlo(SystemLoop(*given, controller, highest, free=True), drawn, done, tell)
+        free, compared, paths = SystemLoop(*given, controller, highest, free=True), None, []
+        bands = None if drawn is None else monte_carlo(free, drawn, done, tell)
         if out is not None:
             from mrdamper.report.simulation import write_simulation
 
             compared = compare_controllers(done, *given[1:], others, highest, tell) if others else None
             tell("writing", 1.0)
-            origin = (damper or "that of the system") if dampers else None
-            paths = write_simulation(done, out, compared, bands, _facts(system, source, time_scale, origin))
+            facts = _facts(system, source, time_scale, (damper or "that of the system") if dampers else "")
+            paths = write_simulation(done, out, compared, bands, facts)
     warn(shortened([f"{path}" for path in paths], 2, verbose))
     if as_json:
         print(json.dumps(_figures(done, dampers) | _banded(bands), indent=1))
@@ -91,7 +90,7 @@ def simulate(
     _print_bands(done, bands, dampers)
 
 
-def _facts(system: str, source: str, time_scale: float, damper: Path | str | None) -> dict[str, str]:
+def _facts(system: str, source: str, time_scale: float, damper: Path | str) -> dict[str, str]:
     """Name what was simulated."""
     scaled = f", played {time_scale:g} times as fast" if time_scale != 1 else ""
     return {"system": system, "input": f"{source}{scaled}"} | ({"damper": str(damper)} if damper else {})

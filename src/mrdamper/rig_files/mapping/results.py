@@ -185,7 +185,7 @@ class Results:
         """
         windows, parts = self.ranges[1], list[tuple[int, int, slice]]()
         for test, clock in enumerate(self._clocks(tests) if windows else ()):
-            inside = [slice(*np.searchsorted(clock, window)) for window in windows]
+            inside = [slice(np.searchsorted(clock, a), np.searchsorted(clock, b, side="right")) for a, b in windows]
             covered = [clock[s.stop - 1] - clock[s.start] if s.stop > s.start else 0 for s in inside]
             own = [row for row, of in enumerate(covered) if of > 0.5 * (windows[row][1] - windows[row][0]) > 0]
             own.sort(key=windows.__getitem__)
@@ -203,9 +203,16 @@ class Results:
         return len({*windows}) > 1 and (within or windows != sorted(windows))
 
     def _clocks(self, tests: Sequence[Record]) -> list[np.ndarray]:
-        """Return what the ranges count in, by test: the lines of its samples, if it has them, or its times."""
+        """Return what the ranges count in, by test: its times, or the lines of its samples, if it has them.
+
+        A range that begins before the first sample's line counts the samples.
+        """
+        by_rows, windows = self.ranges
+        if not by_rows:
+            return [record.time for record in tests]
         lines = [np.empty(0) if record.lines is None else record.lines for record in tests]
-        return lines if self.ranges[0] else [record.time for record in tests]
+        first = min((of[0] for of in lines if of.size), default=1)
+        return [of - (first - 1) if min(windows)[0] < first else of for of in lines]
 
     @property
     def ranges(self) -> tuple[bool, list[tuple[float, float]]]:
