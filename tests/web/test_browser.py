@@ -314,6 +314,8 @@ def test_the_bundled_tests_come_with_models_and_every_view_shows_something(page,
         open_tab(page, tab)
         page.locator(sight).first.wait_for(state="attached")
     assert page.locator("#export-damper optgroup").count() == 2
+    names = page.locator("#export-damper option").all_inner_texts()
+    assert len(names) == len(set(names))  # of two rigs with one model
     open_tab(page, "Model")
     for typed in ("90", "1e9", "-1", "0.4"):  # far outside, impossible twice, inside
         type_number(page, "current_A", typed)

@@ -66,8 +66,9 @@ export class App {
 
   /** Options of a list of dampers, by rig; the error stands before the name, which may be cut. */
   damperOptions() {
-    const option = (d) => [d.key, `${d.error === null ? "" : `${percent(d.error)} · `}${d.title}${d.selected ? " · selected" : ""}`];
     const rigs = [...new Set(this.dampers.map((d) => d.rig))];
+    const name = (d) => (rigs.length > 1 && d.rig ? `${d.rig}: ${d.title}` : d.title); // a closed list shows no group
+    const option = (d) => [d.key, `${d.error === null ? "" : `${percent(d.error)} · `}${name(d)}${d.selected ? " · selected" : ""}`];
     return rigs.map((rig) => h("optgroup", { label: rig || "rig without name" }, options(this.dampers.filter((d) => d.rig === rig).map(option))));
   }
 
