@@ -5,7 +5,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support.rig_files import NAMES, channels, rows, text, write
+from typer.testing import CliRunner
 
+from mrdamper.cli import application
 from mrdamper.errors import InputError
 from mrdamper.rig_files.preview import guess_profile
 from mrdamper.rig_files.profile import (
@@ -20,7 +22,8 @@ from mrdamper.rig_files.profile import (
     profile_hash,
     profile_text,
 )
-from mrdamper.rig_files.rig_import import read_run
+from mrdamper.rig_files.profile_template import profile_template
+from mrdamper.rig_files.rig_import import import_files, read_run
 
 NAME = st.text(min_size=1, max_size=20)
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -271,3 +274,30 @@ def test_the_guess_of_a_file_that_says_too_little_is_there_to_be_completed(tmp_p
         guess = guess.replace(f"[channels.{channel}]\n", f'[channels.{channel}]\nunit = "{unit}"\n{place}')
     record = read_run(path, parse_profile(guess))
     np.testing.assert_allclose(record.force, channels()["force"], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "pattern"), [("run_{}/{}.csv", "{{run}}/{}.csv"), ("{1}_{0}.csv", "{}_{{run}}.csv")])
+def test_a_profile_is_written_for_tests_of_several_files(name, pattern, tmp_path):
+    for number in (1, 2):
+        time, moved, load = rows(seed=number).T
+        for kind, heading, columns in (
+            ("axis", "time_s,position", (time, moved)),
+            ("wrench", "time_s,force.x,force.y,force.z", (time, 0 * load, load, 0.5 * load)),
+            ("coil_current", "time_s,data", (time, np.full(time.size, 0.5))),
+        ):
+            path = tmp_path / "in" / name.format(number, kind)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write(path.parent, path.name, text(np.column_stack(columns), (heading,)))
+    files = [pattern.format(kind) for kind in ("axis", "coil_current", "wrench")]
+    refused = CliRunner().invoke(application(), ["import", str(tmp_path / "in")])
+    assert f"every test has 3 files, {', '.join(files)}; " in " ".join(refused.output.split())
+    written, problems = profile_template([tmp_path / "in"], Profile())
+    assert 1 <= len(problems) <= 3
+    of_channels = {role: channel.file for role, channel in parse_profile(written).channels.items()}
+    assert of_channels == {"time": None, "displacement": files[0], "current": files[1], "force": files[2]}
+    for role, more in (("displacement", 'unit = "mm"'), ("current", 'unit = "A"'), ("force", 'column = 3\nunit = "N"')):
+        written = written.replace(f"[channels.{role}]", f"[channels.{role}]\n{more}")
+    records = import_files([tmp_path / "in"], parse_profile(written)).records
+    assert len(records) == 2
+    for number, record in enumerate(records, 1):
+        np.testing.assert_allclose(record.force, rows(seed=number)[:, 2], atol=1e-4)

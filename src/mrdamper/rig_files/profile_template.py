@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from glob import escape
 from itertools import chain
@@ -11,7 +12,9 @@ from pathlib import Path
 
 from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.errors import InputError
+from mrdamper.rig_files.channel_files import files_by_kind, headings_of, with_files
 from mrdamper.rig_files.coil_current import CURRENT_TOO
+from mrdamper.rig_files.column_names import Header
 from mrdamper.rig_files.file_records import files_in, unpacked
 from mrdamper.rig_files.mapping.description import is_readme
 from mrdamper.rig_files.preview import columns_of, guess_profile
@@ -24,10 +27,17 @@ def profile_template(paths: Sequence[str | Path], profile: Profile) -> tuple[str
 
     Raises `InputError` if the form of the file cannot be found.
     """
-    with _file_for_profile(paths, profile) as first:
+    with _file_for_profile(paths, profile) as (first, refused):
         guess = guess_profile(first, profile)
         columns = columns_of(first, profile)
-        text = profile_text(guess) + _alternatives(columns) + _missing_currents(paths, guess, columns)
+        kinds = {kind: headings_of(path, profile) for kind, path in files_by_kind(refused, profile).items()}
+        guess = with_files(guess, kinds) if kinds else guess
+        text = profile_text(guess) + _alternatives(columns, kinds)
+        text += "" if kinds else _missing_currents(paths, guess, columns)
+        if kinds:
+            errors = [refusal.error for refusal in import_files(paths, guess).refusals]
+            alike = {re.sub("[0-9]+", "#", e.found): f"{e.found}; {e.remedy} [{e.code}]" for e in reversed(errors)}
+            return text, [*alike.values()][::-1]
         try:
             read_runs(first, guess)
         except InputError as error:
@@ -36,19 +46,19 @@ def profile_template(paths: Sequence[str | Path], profile: Profile) -> tuple[str
 
 
 @contextlib.contextmanager
-def _file_for_profile(paths: Sequence[str | Path], profile: Profile) -> Iterator[Path]:
-    """Yield the first refused file among files, folders and archives, for as long as the block goes.
+def _file_for_profile(paths: Sequence[str | Path], profile: Profile) -> Iterator[tuple[Path, list[Path]]]:
+    """Yield the first refused file among files, folders and archives, and all refused, for as long as the block goes.
 
-    Where none is refused it is the first that holds a test, else the first that is no README.
+    Where none is refused the first is that which holds a test, else the first that is no README.
     """
     with unpacked(paths) as given:
         files = [file for file in files_in(given)[0] if not is_readme(file)] or files_in(given)[0]
         result = import_files(given, profile) if len(files) > 1 else ImportResult(())
         refused = {r.file.removesuffix(f": {r.run}") for r in result.refusals if r.error.code != "E_NO_DATA"}
-        first = (file for file in files if without_temporary_folder(str(file)) in refused)
+        first = [file for file in files if without_temporary_folder(str(file)) in refused]
         names = {Path(record.provenance["file"]).name for record in result.records}
         tests = (file for file in files if file.name in names or (not names and file.name not in result.left_out))
-        yield next(chain(first, tests), files[0])
+        yield next(chain(first, tests), files[0]), first
 
 
 def _missing_currents(paths: Sequence[str | Path], guess: Profile, columns: Mapping[int, str]) -> str:
@@ -77,12 +87,19 @@ def _missing_currents(paths: Sequence[str | Path], guess: Profile, columns: Mapp
     return "\n".join(["", *lines, ""])
 
 
-def _alternatives(columns: Mapping[int, str]) -> str:
-    """List the columns and the most used keys of a profile as comments."""
-    named = [f"#   {number}  {json.dumps(name, ensure_ascii=False)}" for number, name in columns.items() if name]
+def _alternatives(columns: Mapping[int, str], kinds: Mapping[str, Mapping[int, tuple[str, Header]]]) -> str:
+    """List the columns of the file, or of each kind of file, and the most used keys of a profile as comments."""
+
+    def named(names: Mapping[int, str]) -> list[str]:
+        return [f"#   {number}  {json.dumps(name, ensure_ascii=False)}" for number, name in names.items() if name]
+
+    several = "# Every test has several files; give each channel its column, its unit, and its file, of which {run} is"
+    lines = [several, "# the name of the test. Columns:"] if kinds else []
+    for kind, headings in kinds.items():
+        lines += [f"#  of {kind}", *named({number: name for number, (name, _) in headings.items()})]
     return "\n".join(
         [
-            "", "# Columns of the file, for column = \"...\" or column = NUMBER:", *named,
+            "", *(lines or ["# Columns of the file, for column = \"...\" or column = NUMBER:", *named(columns)]),
             "# One current for all files ([current] value), or one in their names or folders:",
             '# pattern = "*_{current}A_*" or "*/{current}A/*"; {run}, {frequency}, {amplitude} stand for other numbers',
             '# Files and tables that are no tests: [file] leave_out = ["warmup*"]', "",

@@ -184,6 +184,8 @@ def _print(
     result: ImportResult, out: Path | None, total: int, new: int, *, profile: Path | None, dry: bool, verbose: bool
 ) -> None:
     from mrdamper.data.wording import counted, number
+    from mrdamper.rig_files.channel_files import files_by_kind
+    from mrdamper.rig_files.profile import Profile
 
     columns = {record.provenance["columns"] for record in result.records}
     if dry and result.records:
@@ -222,6 +224,9 @@ def _print(
         answer = f"correct {profile}, which mrdamper import FILE{given} --write-profile - shows completed"
         if profile is None:
             answer = "mrdamper import FILE --write-profile rig.toml, correct rig.toml, import with --profile rig.toml"
+        kinds = files_by_kind([Path(refusal.file) for refusal in result.refusals if not refusal.run], Profile())
+        if kinds:
+            print(f"every test has {len(kinds)} files, {', '.join(kinds)}; the profile states that of each channel")
         print(
             f"a profile answers once for all files: {answer}"
             + ("; if it is for the refused files only, import the others with --skip-refused, then these on their own "
