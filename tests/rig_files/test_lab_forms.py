@@ -1006,7 +1006,7 @@ def test_columns_of_one_name_below_their_conditions_are_tests_and_a_number_leave
     numbers = "[channels.displacement]\ncolumn = 2\n[channels.force]\ncolumn = 3\n[current]\nvalue = 0.0"
     (record,) = import_files([tmp_path], parse_profile(numbers)).records
     (told,) = [finding.text for finding in record.findings if finding.code == "W_COLUMN"]
-    assert told.startswith("x_mm (column 4) and F_N (column 5) not taken; if they are further tests, import each with a")
+    assert told.startswith("x_mm (column 4) and F_N (column 5) not taken; if they are further tests, ")
 
 
 @pytest.mark.parametrize(("sense", "sign"), [("extension (tension)", 1), ("compression", -1)])
