@@ -184,8 +184,6 @@ def _print(
     result: ImportResult, out: Path | None, total: int, new: int, *, profile: Path | None, dry: bool, verbose: bool
 ) -> None:
     from mrdamper.data.wording import counted, number
-    from mrdamper.rig_files.channel_files import files_by_kind
-    from mrdamper.rig_files.profile import Profile
 
     columns = {record.provenance["columns"] for record in result.records}
     if dry and result.records:
@@ -214,6 +212,23 @@ def _print(
     if result.left_out:
         whys = {name: f" ({reason})" for name, reason in result.reasons.items()}
         print(f"not imported as tests: {listed([name + whys.get(name, '') for name in result.left_out], 5)}")
+    _print_next_step(result, profile)
+    tests = {record.provenance.get("file", "") for record in result.records}
+    if out is not None:
+        whence = f", {new} of them new" if total > new else f" from {counted(len(tests), 'file')}"
+        print(f"dataset: {out} ({counted(total, 'run')}{whence})")
+    elif dry:
+        would = counted(len(result.records), "test")
+        print(f"{would} would be written, {_refused_tests(result.refusals)} refused; --out DATASET writes")
+    else:
+        print("nothing written; correct or leave out the refused files, or give --skip-refused")
+
+
+def _print_next_step(result: ImportResult, profile: Path | None) -> None:
+    """Print the command that answers what the refusals ask for, with the profile in use."""
+    from mrdamper.rig_files.channel_files import files_by_kind
+    from mrdamper.rig_files.profile import Profile
+
     given = "" if profile is None else f" --profile {shlex.quote(str(profile))}"
     if result.refusals and all(refusal.error.remedy.startswith("write the ") for refusal in result.refusals):
         print(
@@ -232,15 +247,6 @@ def _print(
             + ("; if it is for the refused files only, import the others with --skip-refused, then these on their own "
                "with it and --add" if result.records else "")
         )  # fmt: skip
-    tests = {record.provenance.get("file", "") for record in result.records}
-    if out is not None:
-        whence = f", {new} of them new" if total > new else f" from {counted(len(tests), 'file')}"
-        print(f"dataset: {out} ({counted(total, 'run')}{whence})")
-    elif dry:
-        would = counted(len(result.records), "test")
-        print(f"{would} would be written, {_refused_tests(result.refusals)} refused; --out DATASET writes")
-    else:
-        print("nothing written; correct or leave out the refused files, or give --skip-refused")
 
 
 def _refused_lines(all_refused: Sequence[Refusal]) -> list[str]:
