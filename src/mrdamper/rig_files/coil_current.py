@@ -64,10 +64,9 @@ def current_of(
         places = [path.name, table.label, f"{path.name}/{table.label}", f"{path.as_posix()}/{table.label}".rstrip("/")]
         current = next((v for place in places if place and (v := current_in_name(place, profile)) is not None), None)
         if current is None and channel is None:
-            raise ColumnError(
-                printable(f"the pattern {source.pattern!r} does not match {places[2].rstrip('/')!r}"), where=where,
-                remedy="correct [current] pattern of the profile", code="E_CURRENT_MISSING",
-            )  # fmt: skip
+            problem = printable(f"the pattern {source.pattern!r} does not match {places[2].rstrip('/')!r}")
+            remedy = "correct [current] pattern of the profile"
+            raise ColumnError(problem, where=where, remedy=remedy, code="E_CURRENT_MISSING")
         statements = [] if current is None else [Statement(current, "name by the profile's pattern")]
     elif not statements and channel is None:
         lines = [line for line in table.remarks if line not in table.titles]
@@ -139,10 +138,9 @@ def with_value_of_name(record: Record, path: Path, profile: Profile) -> Record:
     value = values[patterns[0]]
     other = next((pattern for pattern in patterns if values[pattern] != value), None)
     if other is not None:
-        raise ColumnError(
-            printable(f"{patterns[0]!r} and {other!r} give {record.id} {value:g} and {values[other]:g} A"), where=where,
-            remedy="correct [current.values] of the profile", code="E_AMBIGUOUS",
-        )  # fmt: skip
+        problem = printable(f"{patterns[0]!r} and {other!r} give {record.id} {value:g} and {values[other]:g} A")
+        remedy = "correct [current.values] of the profile"
+        raise ColumnError(problem, where=where, remedy=remedy, code="E_AMBIGUOUS")
     return with_stated_current(replace(record, doubt=None), value, "profile", where)
 
 
@@ -182,11 +180,8 @@ def ask_current_too(error: InputError, table: RawTable, profile: Profile, path: 
     """Add to a refusal of units or columns that the file states no current either: one answer gives both."""
     last = getattr(error, "errors", (error,))[-1]
     channel = table.columns("current") or table.columns(dimension="current")
-    if (
-        channel
-        or profile.current
-        or not last.code.startswith(("E_UNITS", "E_AMBIGUOUS", "E_DUPLICATE_COLUMN", "E_COLUMN"))
-    ):
+    codes = ("E_UNITS", "E_AMBIGUOUS", "E_DUPLICATE_COLUMN", "E_COLUMN")
+    if channel or profile.current or not last.code.startswith(codes):
         return
     with contextlib.suppress(InputError):
         if current_of(table, profile, path, None, slice(None))[0] is None:
@@ -330,9 +325,7 @@ def held_current_of(table: RawTable, unit: str = "") -> float | None:
 
     A number without a unit counts in the one that a profile gives it.
     """
-    headers = {
-        name: header if (header := split_name(name)).unit else split_name(name, unit) for name in table.constants
-    }
+    headers = {name: own if (own := split_name(name)).unit else split_name(name, unit) for name in table.constants}
     named = [(headers[name], value) for name, value in table.constants.items() if np.isfinite(value)]
     named = [(header, value) for header, value in named if names_condition(header.name, "current")]
     measured = [(header, value) for header, value in named if header.role == "current"]

@@ -51,9 +51,7 @@ _LINE = re.compile(
     r"^[\s#%/\"]*(?P<key>[^:=;\t]{1,60}?)[\s\"]*(?:[:=;\t]|(?<![0-9]),|,(?![0-9]+(?![0-9.])))[\s:=;,\t\"]*(?P<number>[+-]?(?:\.[0-9]+|[0-9]+(?:[.,][0-9]+)?)(?:[eE][+-]?[0-9]{1,2})?)"
     r"[\s;,\t\"]*[\[(]?(?P<unit>(?:1/)?(?:[^\W\d_]|/){0,11}(?:-1)?)[\])]?[\s;,\t\"]*$"
 )
-CELL = re.compile(
-    r"\s*([+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+))\s*((?:[^\W\d_]|°){0,8})\s*"
-)  # a number, and a unit behind it
+CELL = re.compile(r"\s*([+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+))\s*((?:[^\W\d_]|°){0,8})\s*")  # with a unit
 LONGEST_LINE, _MOST_PARTS = 300, 20
 _TOLERANCE = re.compile(r"\s*(?:\+\s?/?\s?[-−]|±)\s*[0-9]+(?:[.,][0-9]+)?\s*%?")
 FULL_SCALES = ("100", "1000", "255", "1023", "4095", "16383", "32767", "65535")  # largest numbers of converters
@@ -67,9 +65,8 @@ _SCALE = re.compile(  # 60 mV = 10 A, 1 A per V, 0.5 A/V * U - 0.2 A, 2 A corres
     r"|=\s*(?:\([A-Za-z]\w* ?[-−–+] ?[0-9.,]+\)|[A-Za-z]\w*) ?[/*×·] ?[0-9]"
     r"|\b(?:[Tt]ype?|[Mm]odel)\b[ :=]*[A-Za-z]+-[0-9.,]+ ?m?A\b"
 )
-_CURRENTS = words("currents") | {
-    w.casefold() for of in ("channels", "symbols") for w, m in meanings(of).items() if m == "current"
-}
+_NAMES = (*meanings("channels").items(), *meanings("symbols").items())
+_CURRENTS = words("currents") | {word.casefold() for word, meaning in _NAMES if meaning == "current"}
 _AROUND_CURRENTS = words("around_currents") | COIL
 _NUMBER = r"[0-9]+(?:[.,xp][0-9]+)?"
 _LISTED = re.compile(  # 0, 1, 2 A; 0 to 2 A; 0-2A; 0.5-2A: of 3-2A, 3 may be the number of a test
@@ -206,10 +203,8 @@ def current_behind_label(name: str, names: Collection[str]) -> float | None:
 
 def motions_in(text: str, unit: str) -> set[float]:
     """Frequencies in Hz or lengths in mm that a title or a name states: 0p5Hz, 500 mHz, 10mm."""
-    return {
-        float(re.sub("[,xp]", ".", number.lower())) * (1e-3 if milli else 1.0)
-        for number, milli in _MOTIONS[unit].findall(text)
-    }
+    stated = [(re.sub("[,xp]", ".", number.lower()), milli) for number, milli in _MOTIONS[unit].findall(text)]
+    return {float(number) * (1e-3 if milli else 1.0) for number, milli in stated}
 
 
 def names_test(title: str) -> bool:

@@ -95,11 +95,9 @@ def _of_text(source: Source, path: Path) -> dict[str, Channels]:
     except (pl.exceptions.PolarsError, OSError, UnicodeDecodeError, csv.Error) as error:
         raise DatasetError(first_line(error), where=str(path), remedy="write the file again") from error
     ids = words_in(table["run_id"])
-    channels = {
-        name: table[name].cast(pl.Float64).fill_null(float("nan")).to_numpy()
-        for name in table.columns
-        if name != "run_id" and (table.schema[name].is_numeric() or refuse_text(name, path))
-    }
+    names = [name for name in table.columns if name != "run_id"]
+    names = [name for name in names if table.schema[name].is_numeric() or refuse_text(name, path)]
+    channels = {name: table[name].cast(pl.Float64).fill_null(float("nan")).to_numpy() for name in names}
     return _by_run(ids.codes, ids.labels, channels)
 
 
@@ -112,9 +110,8 @@ def _require(names: list[str], path: Path) -> None:
 def refuse_text(name: str, path: Path) -> bool:
     """Further columns may hold text, and are left out."""
     if name in (*REQUIRED, *OPTIONAL):
-        raise ColumnError(
-            f"column {name} holds text", where=str(path), remedy="write plain numbers with a decimal point"
-        )
+        remedy = "write plain numbers with a decimal point"
+        raise ColumnError(f"column {name} holds text", where=str(path), remedy=remedy)
     return False
 
 
@@ -133,10 +130,8 @@ def _by_run(codes: np.ndarray, labels: tuple[str, ...], channels: Channels) -> d
     if np.any(np.diff(order) != 1):  # else nothing is copied
         channels = {name: values[order] for name, values in channels.items()}
     bounds = pairwise([0, *np.cumsum(np.bincount(codes, minlength=len(labels)))])
-    return {
-        label: {name: values[start:stop] for name, values in channels.items()}
-        for label, (start, stop) in zip(labels, bounds, strict=True)
-    }
+    runs = zip(labels, bounds, strict=True)
+    return {label: {name: of[start:stop] for name, of in channels.items()} for label, (start, stop) in runs}
 
 
 def missing_column(column: str, present: list[str], path: Path) -> ColumnError | UnitError:

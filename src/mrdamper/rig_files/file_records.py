@@ -173,12 +173,9 @@ def _rows(table: RawTable, column: int) -> int:
 def _incomplete(table: RawTable, error: InputError) -> InputError:
     """Return the refusal of one of a file's tests, with its table named."""
     label = json.dumps(table.label, ensure_ascii=False)
-    return ColumnError(
-        error.found,
-        where=f"{printable(table.source.name)}, table {printable(table.label)}",
-        remedy=f"give it the channels of the other tables, or set [file] leave_out = [{label}] in a profile",
-        code=error.code,
-    )
+    where = f"{printable(table.source.name)}, table {printable(table.label)}"
+    remedy = f"give it the channels of the other tables, or set [file] leave_out = [{label}] in a profile"
+    return ColumnError(error.found, where=where, remedy=remedy, code=error.code)
 
 
 def _without_computed(tables: list[RawTable]) -> tuple[list[RawTable], list[str]]:
@@ -209,12 +206,8 @@ def files_in(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
         if not path.is_dir():
             files.append(path)
             continue
-        inside = [
-            Path(folder) / name
-            for folder, _, names in os.walk(path)
-            for name in names
-            if not name.startswith((".", "~$")) and name != TESTS
-        ]
+        every = (Path(folder) / name for folder, _, names in os.walk(path) for name in names)
+        inside = [file for file in every if not file.name.startswith((".", "~$")) and file.name != TESTS]
         inside.sort(key=_by_number)
         inside = [file for file in inside if file.is_file() and not _is_packed_folder(file)]  # no pipes
         recognised = [file for file in inside if file.suffix.lower() in suffixes()]

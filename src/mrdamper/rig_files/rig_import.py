@@ -21,24 +21,10 @@ from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
 from mrdamper.rig_files.coil_current import as_data, require_current, with_current_behind_label, with_stated_current
 from mrdamper.rig_files.file_records import files_in, records_of_file, unpacked
+from mrdamper.rig_files.mapping import plans
 from mrdamper.rig_files.mapping.companions import holds_channels, is_helper, is_list, joined_files, number_of, part_of
 from mrdamper.rig_files.mapping.comparisons import contradictions, repeated, stated_as_amplitudes
 from mrdamper.rig_files.mapping.description import SHORT_TEXTS, is_description, is_readme, short_lines
-from mrdamper.rig_files.mapping.plans import (
-    currents_beside,
-    currents_listed,
-    cut_to_windows,
-    discarded_tests,
-    misfit_of_plan,
-    named_tests,
-    other_motions,
-    remarks_of,
-    rests,
-    results_of,
-    specimens_of,
-    tests_by,
-    within_ranges,
-)
 from mrdamper.rig_files.mapping.proposals import is_integrated
 from mrdamper.rig_files.mapping.results import WITHIN, Results
 from mrdamper.rig_files.profile import Profile, profile_of
@@ -199,7 +185,7 @@ class _Intake:
         self.met: list[tuple[Path, str]] = []
         self._given: set[Path] = set()
         self._shares: dict[Path, tuple[str, Profile]] = {}  # files of some channels each, by the profile
-        self._results = cache(results_of)  # the table of results that a file holds
+        self._results = cache(plans.results_of)  # the table of results that a file holds
         self._plan: Path | None = None  # which gave tests their current
 
     def read(self, path: Path, *, given: bool) -> None:
@@ -290,10 +276,10 @@ class _Intake:
                 self.notes += [refusal for refusal in self.refusals if Path(refusal.file) == path][:1]
                 self._drop_refusals({path})
         for path in [path for path, of in whence.items() if of.startswith(WITHIN)]:
-            self._compare(path, results_of(path, self._profile.file))
-        if self._table and (windows := remarks_of(self._table.path)):
+            self._compare(path, plans.results_of(path, self._profile.file))
+        if self._table and (windows := plans.remarks_of(self._table.path)):
             tests = self.tests()
-            self._cut(self._table.path, windows, [tests[i] for i in named_tests(windows, tests)])
+            self._cut(self._table.path, windows, [tests[i] for i in plans.named_tests(windows, tests)])
         tests = self.tests()
         again = repeated([record for _, record in tests])
         self.omitted |= {path: "the same samples as another" for i, (path, _) in enumerate(tests) if i in again}
@@ -327,17 +313,17 @@ class _Intake:
         Tell if it states currents of tests that move as it says.
         """
         tests = [(i, test) for i, test in enumerate(self.tests()) if test[0] == path] or [*enumerate(self.tests())]
-        own, remarks = [test for _, test in tests], results or remarks_of(path)
-        if currents_beside(path, remarks, own) is None:  # of some tests, by their names
-            tests = [tests[i] for i in named_tests(remarks, own)]
+        own, remarks = [test for _, test in tests], results or plans.remarks_of(path)
+        if plans.currents_beside(path, remarks, own) is None:  # of some tests, by their names
+            tests = [tests[i] for i in plans.named_tests(remarks, own)]
             own = [test for _, test in tests]
-        specimens = dict(zip((id(record) for _, record in own), specimens_of(path, remarks, own), strict=False))
+        specimens = dict(zip((id(record) for _, record in own), plans.specimens_of(path, remarks, own), strict=False))
         notes = [{"specimen": as_data(specimens[id(r)])} if id(r) in specimens else {} for _, r in self._found]
         pairs = zip(self._found, notes, strict=True)
         self._found = [(p, replace(r, provenance={**note, **r.provenance})) for (p, r), note in pairs]
         own = [self.tests()[i] for i, _ in tests]
-        stated, other = currents_beside(path, results, own), other_motions(path, results, own)
-        refused = discarded_tests(path, remarks, own)
+        stated, other = plans.currents_beside(path, results, own), plans.other_motions(path, results, own)
+        refused = plans.discarded_tests(path, remarks, own)
         if other is not None:
             refused = dict.fromkeys(range(len(own)), other) if own[0][0] == path else {}
         answers = [self._table.path.name] if self._table else []
@@ -351,9 +337,8 @@ class _Intake:
                     self._found = [(p, r.noticed(note) if r is record else r) for p, r in self._found]
                 else:
                     refused[i] = error
-                    self.unchecked = [
-                        (p, replace(r, doubt=error) if r.id == record.id else r) for p, r in self.unchecked
-                    ]
+                    doubtful = replace(record, doubt=error)
+                    self.unchecked = [(p, doubtful if r.id == record.id else r) for p, r in self.unchecked]
         self._refuse({tests[i][0]: error for i, error in refused.items()})
         if path != self._plan:
             self._cut(path, remarks, [test for i, test in enumerate(own) if i not in refused])
@@ -362,7 +347,7 @@ class _Intake:
     def _cut(self, path: Path, results: Results | None, tests: _Tests) -> None:
         """Check tests again that a plan gives a start and an end, cut to these."""
         whole = [next(of for of in self.unchecked if (of[0], of[1].id) == (p, r.id)) for p, r in tests]
-        for i, part in cut_to_windows(path, results, whole).items():
+        for i, part in plans.cut_to_windows(path, results, whole).items():
             self.unchecked.remove(whole[i])
             self._found = [of for of in self._found if (of[0], of[1].id) != (whole[i][0], part.id)]
             self._check(whole[i][0], part, several=True)
@@ -409,7 +394,7 @@ class _Intake:
         paths = [path for path in (*others, *notes, *texts) if self._pending and path not in used]
         used |= self._join_currents(paths)
         open_tests = [test for test in self._pending if test[1].current is None]
-        gaps = tuple(filter(None, (misfit_of_plan(path, self._results(path), open_tests) for path in paths)))
+        gaps = tuple(filter(None, (plans.misfit_of_plan(path, self._results(path), open_tests) for path in paths)))
         self._pending = [(path, r.noticed(*gaps) if r.current is None else r) for path, r in self._pending] + doubtful
         return used
 
@@ -430,27 +415,27 @@ class _Intake:
             open_tests = [t for t in every if results and results.lacks_current(t[0], t[1].id)]
             cut = [test for test in every if any(finding.code == "W_CUT" for finding in test[1].findings)]
             if results and cut and len({file for file, _ in every}) == 1 and not results.ranges[1]:
-                moving = [test for test in cut if test in open_tests and not rests(test[1])]
+                moving = [test for test in cut if test in open_tests and not plans.rests(test[1])]
                 if moving or len(results.cells) > len(every):
                     continue  # its rows count the rests between the tests, too
-            tests = within_ranges([test for test in every if test not in open_tests], results)
-            stated = currents_beside(path, results, tests)
+            tests = plans.within_ranges([test for test in every if test not in open_tests], results)
+            stated = plans.currents_beside(path, results, tests)
             if stated and not (results and results.of_supply):
                 candidates = [(path, results, every, open_tests, tests, stated)]
                 break
-            stated = stated or currents_listed(path, tests)
+            stated = stated or plans.currents_listed(path, tests)
             candidates += [(path, results, every, open_tests, tests, stated)] if stated else []
         if len({tuple(current for current, _ in stated) for *_, stated in candidates}) != 1:
             return set()
         path, results, every, self._pending, tests, stated = candidates[0]
-        other = other_motions(path, results, tests)
-        refused = dict.fromkeys(range(len(tests)), other) if other else discarded_tests(path, results, tests)
-        self._pending = [test for test in self._pending if not rests(test[1])]  # a reading of zero
+        other = plans.other_motions(path, results, tests)
+        refused = dict.fromkeys(range(len(tests)), other) if other else plans.discarded_tests(path, results, tests)
+        self._pending = [test for test in self._pending if not plans.rests(test[1])]  # a reading of zero
         self.met += [(file, record.id) for file, record in (*every, *tests)]
         ids = {name for _, r in (*tests, *self._pending) for name in (r.id, re.sub("_[0-9]+$", "", r.id))}
         why = f"in no range of {path.name}" if results and results.ranges[1] else "it rests"
         self.omitted |= {Path(record.id): why for _, record in every if record.id not in ids}
-        windows = cut_to_windows(path, results, tests)
+        windows = plans.cut_to_windows(path, results, tests)
         tests = [(file, windows.get(i, record)) for i, (file, record) in enumerate(tests)]
         for i, ((file, record), (current, whence)) in enumerate(zip(tests, stated, strict=True)):
             with contextlib.suppress(InputError):  # its doubt stays
@@ -469,21 +454,18 @@ class _Intake:
         """Return the tests without a current, apart for those of a file that a column numbers as results do."""
         tests: list[tuple[Path, Record]] = []
         for path in dict.fromkeys(path for path, _ in self._pending):
-            numbered = tests_by(path, results, self._profile.of_file(path)[1])
-            tests += [(path, applied(test, path, self._table)) for test in numbered] or [
-                test for test in self._pending if test[0] == path
-            ]
+            numbered = plans.tests_by(path, results, self._profile.of_file(path)[1])
+            own = [test for test in self._pending if test[0] == path]
+            tests += [(path, applied(test, path, self._table)) for test in numbered] or own
         return tests
 
     def _refuse_names_without_point(self) -> None:
         """Refuse currents of two digits in names, where another name of the set begins such a number with a zero."""
         if not any(_PADDED.search(path.name) for path in self._order):
             return
-        error = ColumnError(
-            "a current of two digits, beside names such as 05A: is the decimal point left out?",
-            remedy="write the currents into tests.csv (--write-tests)",
-            code="E_AMBIGUOUS",
-        )
+        problem = "a current of two digits, beside names such as 05A: is the decimal point left out?"
+        remedy = "write the currents into tests.csv (--write-tests)"
+        error = ColumnError(problem, remedy=remedy, code="E_AMBIGUOUS")
         self._refuse({i: error for i, (file, _) in enumerate(self.tests()) if _TWO_DIGITS.search(file.name)})
 
     def tests(self) -> list[tuple[Path, Record]]:

@@ -14,15 +14,7 @@ from mrdamper.data.arrays import chunks, rescale
 from mrdamper.data.wording import counted
 from mrdamper.errors import ColumnError, CombinedError, InputError, listed, printable
 from mrdamper.physics.motion.measured import smooth
-from mrdamper.rig_files.coil_current import (
-    NO_CHANNEL,
-    as_data,
-    ask_current_too,
-    constant,
-    current_by_resistance,
-    current_of,
-    without_gaps,
-)
+from mrdamper.rig_files import coil_current
 from mrdamper.rig_files.column_names import DIMENSION, Unit, role_of, words
 from mrdamper.rig_files.columns import Assigned, assign, index_of_samples, noted_columns, rate_of
 from mrdamper.rig_files.conditions import day_in, stated_motion, stated_quantities
@@ -72,7 +64,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
     try:
         assigned = assign(table, profile)
     except InputError as error:
-        ask_current_too(error, table, profile, path)
+        coil_current.ask_current_too(error, table, profile, path)
         raise
     raw, findings, lines = _read(table, assigned, profile)
     channels = {name: rescale(raw[of.column], of.factor, of.offset) for name, of in assigned.items()}
@@ -107,18 +99,18 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
             part["force"], remarks["force_correction"] = corrected_force(part, profile.correction)
         noticed = findings
         if "current" in part:
-            part["current"], slow = without_gaps(part["current"])
+            part["current"], slow = coil_current.without_gaps(part["current"])
             noticed = [*findings, *slow]
-        doubt = None
+        doubt, channel, force = None, part.get("current"), assigned["force"].column
         try:
-            current, whence = current_of(table, profile, path, part.get("current"), stretch, assigned["force"].column)
+            current, whence = coil_current.current_of(table, profile, path, channel, stretch, force)
         except ColumnError as error:
             current, whence, doubt = None, dict[str, str](), error
         if current is not None:
-            part["current"] = constant(current, part["time"])
-            noticed = [f for f in findings if not f.text.startswith(NO_CHANNEL)]
+            part["current"] = coil_current.constant(current, part["time"])
+            noticed = [f for f in findings if not f.text.startswith(coil_current.NO_CHANNEL)]
         run = _run_id(table, path) + (f"_{number}" if len(stretches) > 1 else "")
-        noticed = [*noticed, *current_by_resistance(table, run)] if "current" not in part else noticed
+        noticed = [*noticed, *coil_current.current_by_resistance(table, run)] if "current" not in part else noticed
         records.append(
             Record(
                 id=run,
@@ -287,10 +279,8 @@ def _aligned(channels: dict[str, Floats], assigned: dict[str, Assigned], lines):
     time = channels["time"]
     if not delays or not (finite := np.isfinite(time)).any():
         return channels, lines
-    shifted = {
-        name: np.interp(time + delay, time[finite], channels[name][finite], left=np.nan, right=np.nan)
-        for name, delay in delays.items()
-    }
+    present, ends = {name: channels[name][finite] for name in delays}, {"left": np.nan, "right": np.nan}
+    shifted = {name: np.interp(time + delay, time[finite], present[name], **ends) for name, delay in delays.items()}
     late, early = max(0.0, *delays.values()), min(0.0, *delays.values())
     keep = np.flatnonzero((time + late <= np.nanmax(time)) & (time + early >= np.nanmin(time)))
     if not keep.size:
@@ -314,7 +304,7 @@ def _remarks(table: RawTable, profile: Profile, assigned: dict[str, Assigned]) -
         remarks["ignored_columns"] = listed(ignored, 20)
     return {
         **recording_time(table.remarks),
-        **{key: as_data(text) for key, text in remarks.items()},
+        **{key: coil_current.as_data(text) for key, text in remarks.items()},
         "sign_changed": ", ".join(role for role, entry in assigned.items() if entry.sign < 0),
         "scaled": ", ".join(f"{r} = {scale:g}" for r in assigned if (scale := profile.channel(r).scale)),
     }

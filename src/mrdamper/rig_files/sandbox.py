@@ -54,10 +54,8 @@ def guarded_tables(source: Source, reader: Reader, form: FileForm) -> Iterator[l
         sandbox = stack.enter_context(taken(reader.name))
         # The child keeps the folder it was started in; this process may stand in another by now.
         request = {"reader": reader.name, "path": str(path.absolute()), "name": source.name, "suffix": source.suffix}
-        limits = {
-            "seconds": _SECONDS + reader.seconds_per_byte * source.size,
-            "bytes": _BYTES + _BYTES_PER_BYTE * source.size,
-        }
+        seconds = _SECONDS + reader.seconds_per_byte * source.size
+        limits = {"seconds": seconds, "bytes": _BYTES + _BYTES_PER_BYTE * source.size}
         patience = limits["seconds"] * _PATIENCE + 30
 
         def ask(request: dict[str, Any]) -> dict[str, Any]:

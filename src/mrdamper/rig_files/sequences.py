@@ -20,9 +20,7 @@ from mrdamper.rig_files.quality.view import find_strokes, runs_of
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import OPTIONAL, Finding, Record, part_of_record, unique_names
 
-_NUMBERED = re.compile(
-    r"(?i)(?P<name>.*?)[ _-]*(?:(?:part|teil|partie|parte|seq|buffer)[ _-]*)?(?<![0-9.,])(?P<n>[0-9]+)"
-)
+_NUMBERED = re.compile(r"(?i)(?P<name>.*?)[ _-]*(?:(?:part|teil|partie|parte|seq|buffer)[ _-]*)?(?<![\d.,])(?P<n>\d+)")
 _BLOCK_NAME = re.compile(  # Data Acquisition: DAQ_02; no date
     r"[\s#%]*([^\W\d_][^:=\t;]{1,40}?)\s*[:=]\s*\"?(?![0-9]+[:/.-][0-9])([^\t;,\"]*[^\W\d_][^\t;,\"]*)"
 )
@@ -134,11 +132,8 @@ def _tests_of(records: Sequence[Record]) -> list[Record]:
     stretches = stretches_of_session(record.time, record.displacement, record.current)
     if len(stretches) == 1:
         return [record]
-    text = f"cut at rests or steps of the current into {len(stretches)} tests"
-    return [
-        part_of_record(record, s, f"{record.id}_{n}").noticed(Finding("W_CUT", text))
-        for n, s in enumerate(stretches, 1)
-    ]
+    cut = Finding("W_CUT", f"cut at rests or steps of the current into {len(stretches)} tests")
+    return [part_of_record(record, s, f"{record.id}_{n}").noticed(cut) for n, s in enumerate(stretches, 1)]
 
 
 def _concatenated(records: Sequence[Record]) -> Record:

@@ -206,9 +206,8 @@ def _cells(path: Path) -> list[tuple[int, list[str]]]:
         raise TestsTableError(str(error), where=path.name, remedy="save it as CSV again") from error
     if len(rows) > _MOST_ROWS + 1:
         problem = f"{len(rows) - 1} rows; a table of tests has at most {_MOST_ROWS}"
-        raise TestsTableError(
-            problem, where=path.name, remedy="is this a table of tests, or of samples? Import in parts"
-        )
+        remedy = "is this a table of tests, or of samples? Import in parts"
+        raise TestsTableError(problem, where=path.name, remedy=remedy)
     if len(rows) < 2:
         raise TestsTableError("no rows", where=path.name, remedy=f"write one row a test: {', '.join(COLUMNS)}")
     return rows
@@ -246,9 +245,8 @@ def _row(line: int, cells: list[str], names: list[str], keys: list[str], wrong: 
         wrong(line, f"split is {split!r}", "write train or validate")
     if "temperature" in says:
         notes["temperature_C"] = f"{says['temperature']:g}"
-    return StatedTest(
-        line, says.get("file", ""), says.get("run", ""), says.get("current"), split, says.get("rig"), notes
-    )
+    file, run = says.get("file", ""), says.get("run", "")
+    return StatedTest(line, file, run, says.get("current"), split, says.get("rig"), notes)
 
 
 def _quantity(line: int, key: str, name: str, cell: str, wrong: _Wrong) -> float | None:

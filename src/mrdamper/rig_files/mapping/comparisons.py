@@ -68,14 +68,10 @@ def stated_as_amplitudes(records: Sequence[Record]) -> dict[int, Finding]:
     agreeing = sum(abs(1e3 * point[1] / stated[i] - 1) < _ALIKE for i, point in points.items())
     if agreeing < _FEWEST_AGREEING * len(halves):
         return {}
-    return {
-        i: Finding(
-            "W_NAME",
-            f"the name or heading states {stated[i]:g} mm and the record has an amplitude of {1e3 * points[i][1]:.3g} "
-            f"mm, where {agreeing} other tests have what theirs state: check the unit of displacement, or the name",
-        )
-        for i in halves
-    }
+    text = "the name or heading states {:g} mm and the record has an amplitude of {:.3g} mm"
+    rest = f"where {agreeing} other tests have what theirs state: check the unit of displacement, or the name"
+    texts = {i: text.format(stated[i], 1e3 * points[i][1]) for i in halves}
+    return {i: Finding("W_NAME", f"{text}, {rest}") for i, text in texts.items()}
 
 
 def _copies(records: Sequence[Record], points: Mapping[int, _Point]) -> dict[int, QualityError]:
@@ -87,12 +83,10 @@ def _copies(records: Sequence[Record], points: Mapping[int, _Point]) -> dict[int
             others = [records[j].id for j, its in currents.items() if abs(its - current) > _ALIKE_A]
             if not others:
                 continue
-            refused[i] = QualityError(
-                f"has the same samples as {others[0]} and another current: {current:.3g} A",
-                where=records[i].provenance.get("file", records[i].id),
-                remedy="one of them is a copy under a wrong name: leave it out, or export the test again",
-                code="E_CONDITIONS",
-            )
+            problem = f"has the same samples as {others[0]} and another current: {current:.3g} A"
+            where = records[i].provenance.get("file", records[i].id)
+            remedy = "one of them is a copy under a wrong name: leave it out, or export the test again"
+            refused[i] = QualityError(problem, where=where, remedy=remedy, code="E_CONDITIONS")
     return refused
 
 

@@ -29,17 +29,8 @@ from mrdamper.rig_files.column_names import (
     words_of,
 )
 from mrdamper.rig_files.conditions import LONGEST_LINE, currents_in, named_after_currents, names_test, without_currents
+from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
-from mrdamper.rig_files.mapping.scales import (
-    SCALE,
-    scaled,
-    scales_in,
-    senses_in,
-    with_counts,
-    with_scales,
-    with_sense,
-    with_stated_signs,
-)
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.layout import LISTED, X_VALUE, cells_of
@@ -112,8 +103,8 @@ def completed(table: RawTable) -> RawTable:
     table = _with_explained_names(table)
     table = _with_titles(_with_heading_of_currents(_with_keyed_lines(table)))
     table = _with_name_by_file(_with_listed_units(with_axis_as_time(table)))
-    table = with_stated_signs(_with_si_units(with_epoch(_with_clocks_and_weights(table))))
-    return with_sense(with_scales(with_counts(table)))
+    table = scales.with_stated_signs(_with_si_units(with_epoch(_with_clocks_and_weights(table))))
+    return scales.with_sense(scales.with_scales(scales.with_counts(table)))
 
 
 def _without_shared_path(table: RawTable) -> RawTable:
@@ -241,7 +232,7 @@ def _with_listed_names(table: RawTable) -> RawTable:
         scale = number(text.strip(), ".")
         if i in width and scale is not None and np.isfinite(scale) and scale not in (0.0, 1.0):
             note = f"column {table.names[i - 1]!r} is scaled by {scale:g} as the file states"
-            table = scaled(table, i - 1, table.names[i - 1], table.units[i - 1], scale, note)
+            table = scales.scaled(table, i - 1, table.names[i - 1], table.units[i - 1], scale, note)
     return table
 
 
@@ -323,8 +314,8 @@ def _with_explained_names(table: RawTable) -> RawTable:
         called = {name.casefold(), header.name.casefold()} - {""}
         own = [cells[1:] for cells in lines if header.role is None and cells[0].casefold() in called]
         cells = own[0] if own and own.count(own[0]) == len(own) else []
-        named = [cell for cell in cells if split_name(cell).role and not senses_in(cell)]
-        units = [] if any(map(scales_in, cells)) else [cell for cell in cells if is_unit(cell.strip("[]()"))]
+        named = [cell for cell in cells if split_name(cell).role and not scales.senses_in(cell)]
+        units = [] if any(map(scales.scales_in, cells)) else [cell for cell in cells if is_unit(cell.strip("[]()"))]
         if len({split_name(cell).role for cell in named}) == 1 and len(units) < 2:
             headings[i] = named[0], (header.unit, *units, "")[0 if header.unit else 1].strip("[]()")
     return table.named(headings) if len(headings) > 1 else table
@@ -357,8 +348,8 @@ def _with_titles(table: RawTable) -> RawTable:
         if header.dimension == "time" and header.role not in ("time", None) and len(header.name) <= 2:
             names[i] = f"{split_name(title).name} time" if title else "time"
             units[i] = units[i] or header.unit
-        elif title and header.role is None and header.dimension == "voltage" and scales_in(title):
-            names[i], units[i] = SCALE.sub("", title).strip(" ,;:@-_/()[]"), header.unit
+        elif title and header.role is None and header.dimension == "voltage" and scales.scales_in(title):
+            names[i], units[i] = scales.SCALE.sub("", title).strip(" ,;:@-_/()[]"), header.unit
         elif title and header.role is None and (bare := split_name(without_currents(title))).role is not None:
             if header.dimension == "time" and bare.role != "time":
                 names[i], units[i] = f"{bare.name} time", units[i] or header.unit  # an x column of its own
@@ -399,13 +390,9 @@ def _with_listed_units(table: RawTable) -> RawTable:
             role = (role_of(names[i]) or header.role or "") if i in names else ""
             fits = role_of(meaning) in (role, None) and header.dimension == DIMENSION.get(role, "voltage")
             row = "," in meaning and i in names and role_of(names[i]) is None  # Step, Type, Current [A]
-            if (
-                i is None
-                or row
-                or not fits
-                or re.search(rf"[0-9]\s*(?:[|;\t]\s*|,)?{re.escape(header.unit)}\W*$", text)
-            ):
-                continue  # load cell, 25 kN: a value
+            value = re.search(rf"[0-9]\s*(?:[|;\t]\s*|,)?{re.escape(header.unit)}\W*$", text)  # load cell, 25 kN
+            if i is None or row or not fits or value:
+                continue
             headings = " ".join(part.partition(": ")[0] for part in (line, whole))
             doubt = RATING.search(f"{headings} {meaning}") or _FIGURE.search(line) or re.search("[0-9]", meaning)
             (doubtful if doubt else behind).setdefault(i, set()).add(header.unit)
@@ -415,7 +402,7 @@ def _with_listed_units(table: RawTable) -> RawTable:
         if match and len(times) == 1 and times[0] in bare and split_name("", match["unit"]).dimension == "time":
             behind.setdefault(times[0], set()).add(match["unit"])
         named = [wanted.get(cell, wanted[cell.casefold()]) for cell in cells if cell.casefold() in wanted]
-        if len(named) == 1 and not any(map(scales_in, cells)):
+        if len(named) == 1 and not any(map(scales.scales_in, cells)):
             role = role_of(names[named[0]])
             units = [bare_cell for cell in cells if is_unit(bare_cell := cell.strip("[]()"))]
             units = [unit for unit in units if role is None or split_name("", unit).dimension == DIMENSION[role]]

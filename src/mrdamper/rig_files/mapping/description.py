@@ -30,17 +30,9 @@ from mrdamper.rig_files.column_names import (
 )
 from mrdamper.rig_files.columns import units_in
 from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines
+from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, said_of_file, states_si, states_volts
 from mrdamper.rig_files.mapping.results import numbered_tests
-from mrdamper.rig_files.mapping.scales import (
-    NUMBER_IS,
-    heads_senses,
-    scaled_columns,
-    scales_in,
-    states_scale,
-    states_shift,
-    states_sign,
-)
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding
@@ -77,9 +69,7 @@ _OTHER_RATES = re.compile(  # than that of the rows
     r"|(?:temper|thermo|\bpress)[^.,;]{0,30}(?:sampl|record|acqui|logg|tast)|sampl\w* (?:of )?(?:temper|thermo|press)"
 )
 _DEVICE_BEFORE = re.compile(rf"(?i)(?:{OTHER_DEVICE.pattern})\w*,?[^.;,]*$")  # Camera, scan rate 300 Hz
-_DEVICE_BEHIND = re.compile(
-    rf"(?i)[^.;,]{{0,30}}(?:{OTHER_DEVICE.pattern})(?![^.;,]*[0-9] ?k?Hz)"
-)  # 100 samples per second moving average
+_DEVICE_BEHIND = re.compile(rf"(?i)[^.;,]{{0,30}}(?:{OTHER_DEVICE.pattern})(?![^.;,]*[0-9] ?k?Hz)")  # moving average
 _LABEL = re.compile(r"([^.;,:]+):\s*$")
 _RECORDER = re.compile(
     rf"(?i)daq|logg|acqui|record|erfass|mess|data|daten|\badc\b|system|channel|kan[aä]l|rate|{'|'.join(words('sampling'))}"
@@ -106,7 +96,7 @@ _PLACES = ("column", "number", "index", "no", "position", "channel")  # of a col
 
 def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Add what short texts beside the file state of signs, and of names, units and scales where they lack."""
-    lacking = bool(scaled_columns(table)) or _lacks_names_or_units(table)
+    lacking = bool(scales.scaled_columns(table)) or _lacks_names_or_units(table)
     readme, structures, listing = _texts_in(path.parent, path.parent.stat().st_mtime_ns)
     above = _texts_in(path.parent.parent, path.parent.parent.stat().st_mtime_ns)
     texts, listing = (readme, listing) if readme else (above[0], [*listing, *above[2]])
@@ -115,12 +105,12 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(*p.parts)]
     lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
     names = {header.name.casefold() for header in table.headers}
-    counted = {line: {match["name"].casefold() for match in NUMBER_IS.finditer(line)} for line in lines}
+    counted = {line: {match["name"].casefold() for match in scales.NUMBER_IS.finditer(line)} for line in lines}
     stated = [
         (lacking and _of_channels(line))
         or (
             line
-            if states_sign(line) or names & counted[line] or units_in(line) or said_of_file(line, path.name)
+            if scales.states_sign(line) or names & counted[line] or units_in(line) or said_of_file(line, path.name)
             else ""
         )
         for line in lines
@@ -181,12 +171,13 @@ def _lacks_names_or_units(table: RawTable) -> bool:
 def _of_channels(line: str) -> str:
     """Return what a line states of channels: a scale, a unit, or as "channel 2: load N" what a number stands for."""
     cells = [cell.strip().strip('"') for cell in re.split(r"[,;\t|]", line.strip(" |"))]
-    if len(cells) > 2 and cells[0].isascii() and cells[0].isdigit() and (parse_unit(cells[-1]) or scales_in(cells[-1])):
+    numbered = len(cells) > 2 and cells[0].isascii() and cells[0].isdigit()
+    if numbered and (parse_unit(cells[-1]) or scales.scales_in(cells[-1])):
         return f"channel {cells[0]}: {' '.join(cells[1:])}"
     if len(cells) > 1 and split_name(cells[0]).role and all(c.isascii() and c.isdigit() for c in cells[1:]):
         return f"channel {cells[1]}: {cells[0]}"  # a tag with its index, and its type
     units = [item_of(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]
-    stated = states_scale(line) or states_shift(line) or states_si(line) or states_volts(line)
+    stated = scales.states_scale(line) or scales.states_shift(line) or states_si(line) or states_volts(line)
     return line if stated or (any(map(is_unit, units)) and not stated_by_lines([line], ".")) else ""
 
 
@@ -215,9 +206,7 @@ def is_description(path: Path) -> bool:
     if sum(bool(line.strip()) for line in lines) >= _FEWEST_ROWS or numbered_tests(lines):
         return False
     listed = [re.split(r"[,;\t|]", of) for line in lines if (of := _of_channels(line))]
-    listed = [
-        cells for cells in listed if cells[0].startswith("channel ") or any(split_name(c).role for c in cells[1:])
-    ]
+    listed = [of for of in listed if of[0].startswith("channel ") or any(split_name(cell).role for cell in of[1:])]
     return len(listed) > 1 or bool(stated_by_lines(lines, "."))
 
 
@@ -267,7 +256,7 @@ def _by_headings(lines: list[str]) -> list[str]:
     sense, width, place = "", 0, 0  # heading above the senses in which channels count, cells of its line, its place
     for line in lines:
         cells = [cell.strip(' "') for cell in re.split(r"[,;\t|]", line.strip(" ").removeprefix("|").removesuffix("|"))]
-        at = next((i for i, cell in enumerate(cells) if len(cells) > 2 and heads_senses(cell)), None)
+        at = next((i for i, cell in enumerate(cells) if len(cells) > 2 and scales.heads_senses(cell)), None)
         if at is not None or not line.strip():
             sense, width, place = (cells[at], len(cells), at) if at is not None else ("", 0, 0)
         elif sense and len(cells) == width and cells[place]:
@@ -279,11 +268,8 @@ def _by_headings(lines: list[str]) -> list[str]:
             heads, number, unit = cells, of, its
         elif len(cells) == len(heads) and split_name("", cells[unit]).dimension in _MEASURED:
             head, per = heads[number], _PER.search(heads[number])
-            rest = [
-                f"{key} {cell}" if _SHIFT.search(key) else cell
-                for i, (key, cell) in enumerate(zip(heads, cells, strict=True))
-                if i not in (number, unit)
-            ]
+            others = [of for i, of in enumerate(zip(heads, cells, strict=True)) if i not in (number, unit)]
+            rest = [f"{key} {cell}" if _SHIFT.search(key) else cell for key, cell in others]
             more = [word for word in words_of(head) if word.casefold() not in _VALUE]
             if len(more) < len(words_of(head)):  # a value; what else is said may tell that it is that of no test
                 texts = [cell for cell in rest if cell and not cell.isdigit()]
@@ -352,9 +338,8 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
     """Yield what a node states as lines: "current: 400 mA", "x; displacement; mm", "time: s", rows of a table."""
     units = units or {}
     if isinstance(node, list) and len(node) >= _FEWEST_TESTS and all(isinstance(item, dict) for item in node):
-        inner = [
-            [(f"{k} {n}", v) for k, of in item.items() if isinstance(of, dict) for n, v in of.items()] for item in node
-        ]
+        nested = [[(k, of) for k, of in item.items() if isinstance(of, dict)] for item in node]
+        inner = [[(f"{k} {n}", v) for k, of in item for n, v in of.items()] for item in nested]
         node = [{**item, **dict(pairs)} for item, pairs in zip(node, inner, strict=True)]
         plain = [name for name in node[0] if all(isinstance(item.get(name), (str, int, float)) for item in node)]
         yield "\t".join(f"{name} [{units[name]}]" if isinstance(units.get(name), str) else name for name in plain)
@@ -383,11 +368,8 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
             yield from _stated(value, whole, own, depth + 1)
         elif not unit and not isinstance(value, np.ndarray):
             stated = own.get(name) if isinstance(own.get(name), str) and own is not node else None
-            yield (
-                f"{whole}: {value:g} {stated or ''}".rstrip()
-                if isinstance(value, (int, float))
-                else f"{whole}: {value}"
-            )
+            text = f"{value:g} {stated or ''}".rstrip() if isinstance(value, (int, float)) else value
+            yield f"{whole}: {text}"
 
 
 def _channels(items: list[dict[str, Any]]) -> Iterator[str]:

@@ -35,9 +35,7 @@ _LEGEND = re.compile(  # I1 = 0.3 A, cur0.8 = coil current 0.8 A (as set)
 _DECIMAL_CODE = re.compile(r"(?<![a-z])[a-z]{1,6}[0-9]+\.[0-9]+(?![0-9])")
 _SCHEME = re.compile(r"[\w.,+=-]*(?:<[^<>]{1,60}>[\w.,+=-]*)+")  # MRD_A<amplitude in mm>_I<coil current in A>.csv
 _ATTACHED, _JOINED = re.compile(r"(?<=\w)[(\[{]([^()\[\]{}<>]{1,60})[)\]}]"), re.compile(r"\w[(\[{][^_]*[)\]}]_")
-_PLACE = re.compile(
-    r"[\s*`-]*([^\W\d_]{1,12})`?(?:\s*[=:]|\s+[-–]\s|\s{2,})\s*([^\s<>][^<>]{0,58}[^\s<>])\s*$"
-)  # in a name
+_PLACE = re.compile(r"[\s*`-]*([^\W\d_]{1,12})`?(?:\s*[=:]|\s+[-–]\s|\s{2,})\s*([^\s<>][^<>]{0,58}[^\s<>])\s*$")
 _SCHEME_NUMBER = re.compile(r"[0-9]+(?:[.,xp][0-9]+)?")
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
 _DISCARDED, _DISCARDED_FLAG, _NOT_DISCARDED = (
@@ -73,11 +71,8 @@ def results_of(path: Path, form: FileForm | None = None) -> Results | None:
     if len({(of.keys, of.title, of.of_supply) for _, of in sheets}) != 1:
         return None
     shared = set.intersection(*({*label.split()} for label, _ in sheets))  # Damper FL, Damper RR: FL, RR
-    rows = [
-        (" ".join(word for word in label.split() if word not in shared), *cells[1:], current)
-        for label, of in sheets
-        for cells, current in zip(of.cells, of.current, strict=True)
-    ]
+    named = [(" ".join(word for word in label.split() if word not in shared), of) for label, of in sheets]
+    rows = [(name, *row[1:], current) for name, of in named for row, current in zip(of.cells, of.current, strict=True)]
     every, cells = tuple(row[-1] for row in rows), tuple((str(n), *row[:-1]) for n, row in enumerate(rows, 1))
     first = sheets[0][1]
     several = replace(first, current=every, cells=cells, keys=("", "", *first.keys[1:]), pauses=())
@@ -95,9 +90,7 @@ def currents_beside(path: Path, results: Results | None, tests: _Tests) -> list[
         return None
     stated = next((of for of in _by_rows(results, tests) if len(of) == len(tests)), None) if results else None
     if results and stated is not None:
-        grow = results.of_supply and forces_grow(
-            [(tests[i][1], current) for i, current in stated.items()], repeated=True
-        )
+        grow = results.of_supply and forces_grow([(tests[i][1], of) for i, of in stated.items()], repeated=True)
         titled = [(stated[i], f"{path.name}, {results.title}") for i in range(len(tests))]
         return titled if grow or not results.of_supply else None
     lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
@@ -118,9 +111,8 @@ def _by_rows(results: Results, tests: _Tests) -> Iterator[Mapping[int, float]]:
 
     def by_name(rows: Results, own: Sequence[int]) -> dict[int, float]:
         one = len(rows.current) == len(own) == 1
-        return (
-            {own[0]: rows.current[0]} if one else {own[i]: c for i, c in rows.by_test([called[i] for i in own]).items()}
-        )
+        stated = {0: rows.current[0]} if one else rows.by_test([called[i] for i in own])
+        return {own[i]: current for i, current in stated.items()}
 
     def by_group(groups: Sequence[str], by: Callable[[Results, Sequence[int]], dict[int, float]]) -> dict[int, float]:
         every = [{i: c for rows, own in of for i, c in by(rows, own).items()} for of in results.apart(groups)]
@@ -307,9 +299,8 @@ def currents_listed(path: Path, tests: _Tests) -> list[tuple[float, str]] | None
     None unless the names of the tests, or of those of each file, count as many, alike in motion, and their forces grow
     as the currents.
     """
-    listed = {
-        of for line in (short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []) if (of := series_in(line))
-    }
+    lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
+    listed = {of for line in lines if (of := series_in(line))}
     files = [file if len(listed) == 1 and len(tests) > len(min(listed)) else path for file, _ in tests]
     stated: dict[int, float] = {}
     for file in dict.fromkeys(files) if len(listed) == 1 else ():

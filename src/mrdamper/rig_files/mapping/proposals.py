@@ -87,9 +87,8 @@ def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -
     if all(len(columns) == 1 for columns in open_roles.values()) or not all(open_roles.values()):
         return table
     values = table.peek(*sorted({column for columns in open_roles.values() for column in columns}))
-    tried = [
-        columns for columns in list(product(*open_roles.values()))[: _MOST_TRIED + 1] if len({*columns}) == len(columns)
-    ]
+    choices = list(product(*open_roles.values()))[: _MOST_TRIED + 1]
+    tried = [columns for columns in choices if len({*columns}) == len(columns)]
     if values is None or len(tried) > _MOST_TRIED:
         return table
     scores = {columns: damping_share(*(values[column] for column in columns)) for columns in tried}

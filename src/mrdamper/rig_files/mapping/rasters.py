@@ -81,18 +81,16 @@ def _rows(table: RawTable) -> int:
 def _named(table: RawTable) -> RawTable:
     """Return a table of one channel with the name of its group, where its own name names nothing."""
     title = table.label.rpartition("/")[2]
-    names = [
-        title if split_name(name).role is None and split_name(title).role is not None else name for name in table.names
-    ]
+    named = split_name(title).role is not None
+    names = [title if named and split_name(name).role is None else name for name in table.names]
     return replace(table, names=tuple(names)) if len(table.names) <= 2 else table
 
 
 def _joined(label: str, tables: Sequence[RawTable], *, one_clock: bool) -> RawTable:
     """Return one table of several, the time of each before its channels; channels of one clock have one length."""
     clocks = [table.columns("time")[:1] for table in tables]
-    orders = [
-        sorted(range(len(t.names)), key=lambda i, of=of: i not in of) for t, of in zip(tables, clocks, strict=True)
-    ]
+    pairs = zip(tables, clocks, strict=True)
+    orders = [sorted(range(len(table.names)), key=lambda i, of=of: i not in of) for table, of in pairs]
     places = [(_named(table), i) for table, order in zip(tables, orders, strict=True) for i in order]
 
     def load(column: int) -> Floats:

@@ -71,9 +71,8 @@ class Results:
         for exact in (True,) if not by_number else (True, False):
             matches = [(column, match) for column in columns if (match := _match(column, names, exact))]
             texts = any(not all(map(NUMBER.fullmatch, column)) for column, _ in matches)  # surer than the row's number
-            matches += [
-                (row, match) for row in of_row if not (exact and texts) and (match := _match(row, names, exact))
-            ]
+            rows = () if exact and texts else of_row
+            matches += [(row, match) for row in rows if (match := _match(row, names, exact))]
             currents = [{i: self.current[row] for i, row in match.items()} for _, match in matches]
             if currents and all(other == currents[0] for other in currents):
                 return currents[0]
@@ -95,9 +94,7 @@ class Results:
             fitting, labels = {*range(len(self.cells))}, set[str]()
             pairs = {(label.casefold(), n, "\\" in text) for text in texts for label, n in _LABELLED.findall(text)}
             for label, number, of_path in pairs:
-                columns = [
-                    i for i, head in enumerate(heads) if head == label or (head.startswith(label) and not of_path)
-                ]
+                columns = [i for i, of in enumerate(heads) if of == label or (of.startswith(label) and not of_path)]
                 if len(columns) > 1:
                     return {}
                 fitting = {row for row in fitting if all(_key(self.cells[row][i]) == _key(number) for i in columns)}
@@ -167,11 +164,9 @@ class Results:
         numeric = [all(map(NUMBER.fullmatch, column)) for column in columns]
         keys = [{word.casefold() for word in words_of(header.name)} for header in headers[1:]]
         numbered = any(key & _NUMBERED for key, numbers in zip(keys, numeric, strict=True) if numbers)
-        times = [
-            np.diff([float(cell.replace(",", ".")) for cell in column])
-            for header, column, numbers in zip(headers[1:], columns, numeric, strict=True)
-            if numbers and header.role == "time"
-        ]
+        every = zip(headers[1:], columns, numeric, strict=True)
+        timed = [column for header, column, numbers in every if numbers and header.role == "time"]
+        times = [np.diff([float(cell.replace(",", ".")) for cell in column]) for column in timed]
         if any(steps.size and np.all(steps > 0) for steps in times) and not numbered:  # samples over time
             return [column for column, numbers in zip(columns, numeric, strict=True) if not numbers], []
         names = [column for header, column in zip(headers[1:], columns, strict=True) if header.dimension is None]
@@ -290,9 +285,8 @@ def _numbered_tests(lines: Iterable[str], *, of_supply: bool = False) -> Results
     numbers = {(name.casefold(), int(number)) for name, number, *_ in rows}
     if len(numbers) < _FEWEST_ROWS or len(numbers) < len(rows) or len({name for name, _ in numbers}) > 1:
         return None
-    cells = tuple(
-        (str(i), f"{name.split()[-1]}{number}", number, text) for i, (name, number, _, text) in enumerate(rows, 1)
-    )
+    numbered = enumerate(rows, 1)
+    cells = tuple((str(i), f"{name.split()[-1]}{number}", number, text) for i, (name, number, _, text) in numbered)
     counts = any({word.casefold(), word.casefold().rstrip("s")} & _COUNTED for word in words_of(rows[0][0]))
     currents, keys = tuple(row[2] for row in rows), ("", "", rows[0][0], "remark")
     return Results(currents, cells, "a line for each test", keys, of_supply, counts_tests=counts)
@@ -361,9 +355,8 @@ def _last_lines(table: RawTable, shared: set[str]) -> list[str]:
 
 def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
     wide = separator == "  "
-    split = [
-        re.split(r" {2,}", t.strip()) if wide else cells_of(t, separator) for t in (x[:_LONGEST_LINE] for x in lines)
-    ]
+    cut = [line[:_LONGEST_LINE] for line in lines]
+    split = [re.split(r" {2,}", line.strip()) if wide else cells_of(line, separator) for line in cut]
     rows = [_headings([c.strip('"').strip() for c in cells]) for cells in split if not _RULE.fullmatch("".join(cells))]
     for at, row in enumerate(rows):
         if sum(map(bool, row)) < 2:  # most lines are one cell where another character separates them
@@ -371,9 +364,7 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
         columns = [i for i, cell in enumerate(row) if cell and not NUMBER.fullmatch(cell) and _is_current(cell)]
         below = rows[at + 1] if at + 1 < len(rows) else []
         supply = [] if columns else [i for i, cell in enumerate(row) if _is_of_supply(cell, *below[i : i + 1])]
-        columns = (
-            columns or supply or [i for i, cell in enumerate(row) if holds(cell, COIL) and cell.isalpha()]
-        )  # above 0.5 A
+        columns = columns or supply or [i for i, cell in enumerate(row) if holds(cell, COIL) and cell.isalpha()]
         if not columns:
             continue
         below = at + 1
@@ -471,12 +462,8 @@ def _group_names(text: str) -> set[str]:
     """Return names of a file or folder as they are compared: without marks and leading zeros, or as a date if it is."""
     iso, written = day_in(text) or ("", "")
     plain = re.sub(r"(?<![0-9.])0+(?=[0-9])", "", re.sub(r"[^\w.]|_", "", text.casefold()))
-    return {
-        _key(text),
-        _key(_SPECIMEN.sub("", text)),
-        plain,
-        iso.replace("-", "") if written == text.strip() else "",
-    } - {""}
+    day = iso.replace("-", "") if written == text.strip() else ""
+    return {_key(text), _key(_SPECIMEN.sub("", text)), plain, day} - {""}
 
 
 def _match(column: Sequence[str], names: Sequence[tuple[set[str], set[str]]], exact: bool) -> dict[int, int] | None:

@@ -86,13 +86,10 @@ def motion_is_one(view: View) -> Iterator[Finding]:
     what = "the displacement is disturbed: check the sensor's cable and supply"
     if line is not None:
         stroke = line.amplitude / (2 * np.pi * line.frequency)
-        what = (
-            f"another motion of {line.frequency:.4g} Hz and {1e3 * stroke:.2g} mm runs on the displacement (mains hum, "
-            "if 50 or 60 Hz): shield the sensor's cable"
-        )
-    spectrum = (
-        f"{100 * share:.2g} % of the velocity's power is no part of the periodic motion, which moves the damping by "
-    )
+        other = f"another motion of {line.frequency:.4g} Hz and {1e3 * stroke:.2g} mm runs on the displacement"
+        what = f"{other} (mains hum, if 50 or 60 Hz): shield the sensor's cable"
+    effect = "is no part of the periodic motion, which moves the damping by"
+    spectrum = f"{100 * share:.2g} % of the velocity's power {effect} "
     if share > REFUSED:
         raise view.refused("E_DISTURBED", spectrum + f"{percent(share)}: {what}", "record again, or smooth the channel")
     yield Finding("W_DISTURBED", spectrum + f"{percent(share)}; {what}")
@@ -128,11 +125,9 @@ def force_lines(view: View) -> Iterator[Finding]:
         return
     line = max(strong, key=lambda line: line.amplitude)
     if line.amplitude > _LINE * half:
-        yield Finding(
-            "W_DISTURBED",
-            f"a line of {line.frequency:.4g} Hz and {number(line.amplitude, 3)} N runs on the force and is no answer "
-            f"to the motion (mains hum, if 50 or 60 Hz): it moves the peak force by {percent(line.amplitude / half)}",
-        )
+        text = f"a line of {line.frequency:.4g} Hz and {number(line.amplitude, 3)} N runs on the force and is no answer"
+        more = f"to the motion (mains hum, if 50 or 60 Hz): it moves the peak force by {percent(line.amplitude / half)}"
+        yield Finding("W_DISTURBED", f"{text} {more}")
 
 
 def strongest_line(time: Floats, rest: Floats, above: float) -> Line | None:
@@ -167,11 +162,8 @@ def force_is_fine(view: View) -> Iterator[Finding]:
         return
     noise = view.force_noise / cycles.force.span
     if noise > _NOISE:
-        yield Finding(
-            "W_NOISE",
-            f"noise of the force {100 * noise:.2g} % of its peak-to-peak value: single samples exceed the peak force "
-            f"by {percent(_EXTREME * noise)}; filter before sampling, or use a finer range",
-        )
+        text = f"noise of the force {100 * noise:.2g} % of its peak-to-peak value: single samples exceed the peak force"
+        yield Finding("W_NOISE", f"{text} by {percent(_EXTREME * noise)}; filter before sampling, or use a finer range")
 
 
 def channels_are_unfiltered(view: View) -> Iterator[Finding]:

@@ -63,11 +63,8 @@ def clipped(view: View) -> Iterator[Finding]:
         if tops:
             levels = " and ".join(shown(name, level, ".5g") for level in tops)
             first = min(int(top[0, 0]) for top in tops.values())
-            yield Finding(
-                "W_CLIPPED",
-                f"{name} is cut off at {levels}: {sum(map(_samples, tops.values()))} samples in flat tops, "
-                f"the first {view.place(first)}; identification leaves the record out",
-            )
+            text = f"{name} is cut off at {levels}: {sum(map(_samples, tops.values()))} samples in flat tops, the first"
+            yield Finding("W_CLIPPED", f"{text} {view.place(first)}; identification leaves the record out")
 
 
 def frozen(view: View) -> Iterator[Finding]:
@@ -75,11 +72,9 @@ def frozen(view: View) -> Iterator[Finding]:
     for name, other in _OTHER.items():
         stretches = frozen_stretches(view, name)
         if len(stretches):
-            yield Finding(
-                "W_FROZEN",
-                f"{name} stands still in {counted(len(stretches), 'place')} while {other} goes on: "
-                f"{_samples(stretches)} samples, the first {view.place(int(stretches[0, 0]))}",
-            )
+            text = f"{name} stands still in {counted(len(stretches), 'place')} while {other} goes on:"
+            more = f"{_samples(stretches)} samples, the first {view.place(int(stretches[0, 0]))}"
+            yield Finding("W_FROZEN", f"{text} {more}")
 
 
 def _samples(stretches: np.ndarray) -> int:
@@ -94,10 +89,8 @@ def flat_tops(view: View, name: str) -> dict[float, np.ndarray]:
     for level in (channel.high, channel.low):
         at = channel.equal[(channel.values[channel.equal[:, 0]] == level) & ~channel.leaps(channel.equal)]
         inner = (at[:, 0] > 0) & (at[:, 1] < channel.values.size)
-        at = at[
-            channel.odd(at, kinks and channel.mostly_at_its_ends, kinks)
-            | (inner & channel.piled_up(level) if len(at) else inner)
-        ]
+        piled_up = inner & channel.piled_up(level) if len(at) else inner
+        at = at[channel.odd(at, kinks and channel.mostly_at_its_ends, kinks) | piled_up]
         if len(at):
             tops[level] = at
     return tops
@@ -121,9 +114,8 @@ def frozen_stretches(view: View, name: str) -> np.ndarray:
     stretches, spread = stretches[high - low > 0], (high - low)[high - low > 0]
     # The other channel went through a third of its range, for longer than a reversal takes.
     period = np.inf if view.strokes.period is None else view.strokes.period
-    long_while = (time[stretches[:, 1] - 1] - time[stretches[:, 0]] > period / 6) & (
-        spread > (np.nanmax(other) - np.nanmin(other)) / 3
-    )
+    third = (np.nanmax(other) - np.nanmin(other)) / 3
+    long_while = (time[stretches[:, 1] - 1] - time[stretches[:, 0]] > period / 6) & (spread > third)
     return stretches[channel.odd(stretches, long_while)]
 
 
@@ -246,10 +238,8 @@ class _Channel:
         if not chances or self.values.size * max(chances) ** (stop - start - 1) >= _CHANCE:
             return False
         # Below the resolution, a slow plateau of a coarse channel is as quiet.
-        return all(
-            sample_noise(side) > max(self.level, 0.02 * float(np.median(np.abs(step))), _ROUNDING * self.span)
-            for side, step in zip(sides, steps, strict=True)
-        )
+        limits = [max(self.level, 0.02 * float(np.median(np.abs(step))), _ROUNDING * self.span) for step in steps]
+        return all(sample_noise(side) > limit for side, limit in zip(sides, limits, strict=True))
 
 
 def _equal_stretches(values: Floats) -> np.ndarray:
@@ -321,11 +311,9 @@ def _finding(name: str, span: float, tops: list[Top]) -> Iterator[Finding]:
     if tops:
         levels = " and ".join(shown(name, top.level) for top in tops)
         beyond = max(top.beyond for top in tops)
-        yield Finding(
-            "W_CLIPPED",
-            f"{name} is cut off near {levels}, before noise was added or a filter acted: {percent(2 * beyond / span)} "
-            "of its amplitude is missing; identification leaves the record out",
-        )
+        text = f"{name} is cut off near {levels}, before noise was added or a filter acted:"
+        more = f"{percent(2 * beyond / span)} of its amplitude is missing; identification leaves the record out"
+        yield Finding("W_CLIPPED", f"{text} {more}")
 
 
 def ends_of(channel: CycleChannel, count: int, noise: float) -> tuple[Top, ...]:

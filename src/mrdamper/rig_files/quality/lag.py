@@ -210,11 +210,8 @@ def force_channel(view: View) -> Iterator[Finding]:
     if lag is not None and lag.is_clear:
         moved = effect_on(cycles, lag.cycle)
         if max(moved) > (WARNED if lag.best.constant else 0):
-            yield Finding(
-                "W_LAG",
-                f"{_description(lag, cycles)}, which moves {percent_of(*moved)}; filter both channels alike, and if "
-                "the delay is known, set delay_ms in [channels.force] of a profile",
-            )
+            text = f"{_description(lag, cycles)}, which moves {percent_of(*moved)}; filter both channels alike, and if"
+            yield Finding("W_LAG", f"{text} the delay is known, set delay_ms in [channels.force] of a profile")
         return
     share, mass = _negative_spring(view, cycles)
     if share > _LEAD and mass > _MASS:

@@ -182,11 +182,9 @@ def repeats(view: View) -> Iterator[Finding]:
     scatter, noise = repeatability(view) or (0.0, 0.0)
     beyond = float(np.sqrt(max(scatter**2 - noise**2, 0.0)))
     if beyond > POOR_REPEATABILITY and not current_changes(view):
-        yield Finding(
-            "W_REPEATABILITY",
-            f"the force differs from cycle to cycle by {100 * scatter:.1f} % of its peak-to-peak value "
-            f"(limit {100 * POOR_REPEATABILITY:g} % beyond noise): warm the damper up, or check the rig for play",
-        )
+        text = f"the force differs from cycle to cycle by {100 * scatter:.1f} % of its peak-to-peak value (limit"
+        more = f"{100 * POOR_REPEATABILITY:g} % beyond noise): warm the damper up, or check the rig for play"
+        yield Finding("W_REPEATABILITY", f"{text} {more}")
 
 
 def repeatability(view: View) -> tuple[float, float] | None:
@@ -234,10 +232,8 @@ def force_follows(view: View) -> None:
     scatter, _ = repeatability(view) or (0.0, 0.0)
     if scatter < _UNLIKE or view.noticed("W_FROZEN") or current_changes(view):
         return
-    problem = (
-        f"the force differs from cycle to cycle by {100 * scatter:.0f} % of its peak-to-peak value: it does not "
-        "follow the motion"
-    )
+    differs = f"the force differs from cycle to cycle by {100 * scatter:.0f} % of its peak-to-peak value"
+    problem = f"{differs}: it does not follow the motion"
     remedy = "check that force and displacement are of the same test, and that the load cell does not drift"
     raise view.refused("E_UNRELATED", problem, remedy)
 

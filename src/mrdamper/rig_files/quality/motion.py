@@ -69,10 +69,8 @@ def is_a_sine(view: View) -> Iterator[Finding]:
     """Report a record shorter than a cycle, which has no frequency, and a motion that is no sine."""
     motion, use = view.motion, "only identification in time can use it"
     if cycles_of(view) < LEAST_CYCLES:
-        text = (
-            "the record holds less than one cycle: no frequency or amplitude is stated, nothing is identified from it"
-        )
-        yield Finding("W_SHORT", text)
+        text = "the record holds less than one cycle: no frequency or amplitude is stated"
+        yield Finding("W_SHORT", f"{text}, nothing is identified from it")
     elif motion is None:
         yield Finding("W_NOT_SINE", f"the motion has no period: {use}")
     elif motion.distortion > SINE_DISTORTION_LIMIT:
@@ -89,11 +87,8 @@ def drifts(view: View) -> Iterator[Finding]:
     mean, size = drift_of(view)
     for what, drift in (("mean position", mean), ("amplitude", size)):
         if abs(drift) > limit:
-            yield Finding(
-                "W_DRIFT",
-                f"the {what} drifts by {number(1e3 * drift, 3, sign='+')} mm over the record, "
-                f"{100 * abs(drift) / amplitude:.0f} % of the amplitude",
-            )
+            text = f"the {what} drifts by {number(1e3 * drift, 3, sign='+')} mm over the record,"
+            yield Finding("W_DRIFT", f"{text} {100 * abs(drift) / amplitude:.0f} % of the amplitude")
 
 
 def drift_of(view: View) -> tuple[float, float]:
@@ -218,9 +213,8 @@ def unusual(view: View) -> Iterator[Finding]:
         levels = np.unique(values[: _MANY * FEWEST_LEVELS]).size
         levels = levels if levels >= FEWEST_LEVELS else np.unique(values).size
         if levels < FEWEST_LEVELS and view.run.time.size > _MANY * levels:
-            yield Finding(
-                "W_COARSE", f"{name} has {levels} different values only: a sensor of so few steps hides the loop"
-            )
+            text = f"{name} has {levels} different values only: a sensor of so few steps hides the loop"
+            yield Finding("W_COARSE", text)
 
 
 def stated_motion(record: Record, unit: str) -> float | None:

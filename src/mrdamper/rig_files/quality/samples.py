@@ -55,11 +55,9 @@ def changes_at_every_sample(view: View) -> Iterator[Finding]:
         even = np.mean(apart % usual == 0) > 0.9 and np.mean(apart == usual) > 0.6
         late = 0.5 * (usual - 1) * view.step * motion.condition.frequency_Hz
         if usual >= _HELD and even and late > _HELD_LATE:
-            yield Finding(
-                "W_HELD",
-                f"the {name} changes at every {usual}th sample only: it was recorded at a slower rate and is late by "
-                f"{number(1e3 * late / motion.condition.frequency_Hz, 3)} ms, {100 * late:.2g} % of the period",
-            )
+            text = f"the {name} changes at every {usual}th sample only: it was recorded at a slower rate and is late by"
+            more = f"{number(1e3 * late / motion.condition.frequency_Hz, 3)} ms, {100 * late:.2g} % of the period"
+            yield Finding("W_HELD", f"{text} {more}")
 
 
 def is_not_stored_on_change(view: View) -> Iterator[Finding]:
@@ -80,11 +78,8 @@ def is_not_stored_on_change(view: View) -> Iterator[Finding]:
         slopes = np.unique(np.round(steps[1:][on_line] / (_SLOPE * span))).size
         many = slopes >= _SLOPES * lines.size and lines.size > _BENDS * motion.cycles
         if many and float(np.std(lines)) > _UNEVEN * float(np.mean(lines)):
-            yield Finding(
-                "W_HELD",
-                f"{100 * straight:.2g} % of the {name} lies on straight lines of uneven length: it was stored on "
-                "change only; export the samples as they were recorded",
-            )
+            text = f"{100 * straight:.2g} % of the {name} lies on straight lines of uneven length: it was stored on"
+            yield Finding("W_HELD", f"{text} change only; export the samples as they were recorded")
 
 
 def no_bit_is_stuck(view: View) -> Iterator[Finding]:
@@ -98,11 +93,8 @@ def no_bit_is_stuck(view: View) -> Iterator[Finding]:
     levels = np.unique(force)
     width = _every_second_band(levels, least) or _crossed_in_motion(view, levels, least, len(cycles.starts))
     if width:
-        yield Finding(
-            "W_COARSE",
-            f"the force leaps by about {number(width, 3)} N in full motion, over levels that no sample has or for a "
-            "single sample: a bit of its converter is stuck or flips",
-        )
+        text = f"the force leaps by about {number(width, 3)} N in full motion, over levels that no sample has or for a"
+        yield Finding("W_COARSE", f"{text} single sample: a bit of its converter is stuck or flips")
 
 
 def _every_second_band(levels: Floats, least: float) -> float:

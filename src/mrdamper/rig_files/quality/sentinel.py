@@ -198,12 +198,9 @@ def wraps(view: View) -> None:
         leaps = [i for i in leaps_in(values, _OF_RANGE[name], against=name == "force") if i + 1 not in starts]
         if leaps:
             size = shown(name, abs(float(values[leaps[0] + 1] - values[leaps[0]])))
-            raise view.refused(
-                "E_LEAP",
-                f"{name} leaps by {size} {view.place(int(leaps[0]) + 1)}: a counter that wraps, or a channel set to "
-                "zero while it was recorded",
-                "export it with a wider number format, or cut the record there",
-            )
+            reason = "a counter that wraps, or a channel set to zero while it was recorded"
+            problem = f"{name} leaps by {size} {view.place(int(leaps[0]) + 1)}: {reason}"
+            raise view.refused("E_LEAP", problem, "export it with a wider number format, or cut the record there")
 
 
 def leaps_in(values: Floats, of_range: float, *, against: bool) -> np.ndarray:

@@ -101,9 +101,7 @@ def with_findings(run: Run) -> Run:
 def row(quality: Quality) -> dict[str, Any]:
     """Return a verdict as a row of numbers and words, in engineers' units; None where there is no figure."""
     figures = {name: value for name, value in quality.figures.items() if np.isfinite(value)}
-    shown = {
-        name: float(f"{figures[name]:{form}}") + 0.0 if name in figures else None for name, form in FIGURES.items()
-    }
+    shown = {key: float(f"{figures[key]:{form}}") + 0.0 if key in figures else None for key, form in FIGURES.items()}
     names = {"run_id": quality.record.id, "rig": quality.record.rig}
     return {**names, **shown, "verdict": quality.verdict, "findings": " ".join(quality.codes)}
 

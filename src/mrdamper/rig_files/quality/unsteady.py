@@ -40,11 +40,9 @@ def stroke_steps(view: View) -> Iterator[Finding]:
             continue
         change = float(np.mean(forces[-after.size :]) / np.mean(forces[:at])) - 1
         if abs(change) < _FOLLOWS * abs(step):
-            yield Finding(
-                "W_UNSTEADY",
-                f"the stroke changes by {100 * step:+.3g} % at {view.run.time[strokes.reversals[at]]:.4g} s and "
-                f"the force does not: damping is uncertain by {percent(abs(step))}; check the displacement sensor",
-            )
+            text = f"the stroke changes by {100 * step:+.3g} % at {view.run.time[strokes.reversals[at]]:.4g} s and the"
+            more = f"force does not: damping is uncertain by {percent(abs(step))}; check the displacement sensor"
+            yield Finding("W_UNSTEADY", f"{text} {more}")
         return
 
 
