@@ -13,11 +13,11 @@ from mrdamper.dampers.calibration import (
     Growth,
     ModelError,
     PredictedRun,
-    StandardizedErrors,
     _squared_errors,
     measured_peak,
     model_error,
     scatter_between_sessions,
+    standardized,
 )
 from mrdamper.dampers.distance import Distance
 from mrdamper.data import Run
@@ -31,7 +31,7 @@ def run(name, error=0.0, session=None, peak=1.0, energy=1.0):
 
 
 def scored(force, peak=1.0, energy=1.0):
-    return StandardizedErrors(np.atleast_1d(force), np.atleast_1d(peak), np.atleast_1d(energy))
+    return {"force": np.atleast_1d(force), "peak": np.atleast_1d(peak), "energy": np.atleast_1d(energy)}
 
 
 def calibrated(scores, sessions=None):
@@ -267,7 +267,7 @@ def test_what_a_unit_is_called_and_how_long_a_run_is_changes_nothing():
     scores = [scored(np.abs(rng.standard_normal(50)), *np.abs(rng.standard_normal(2))) for _ in range(20)]
     plain = calibrated(scores)
     assert alike(calibrated(scores[::-1]), plain)
-    longer = [replace(s, force=np.tile(s.force, 7)) if i % 2 else s for i, s in enumerate(scores)]
+    longer = [{**s, "force": np.tile(s["force"], 7)} if i % 2 else s for i, s in enumerate(scores)]
     assert alike(calibrated(longer), plain)
     # Every run twice in a session: units of two alike are units of one.
     names = [f"day {i}" for i in range(20)] * 2
@@ -316,12 +316,12 @@ def test_coverage_of_few_units_is_at_the_level_that_the_others_reach():
 
 def test_errors_are_over_their_standard_deviations():
     at = run("r", error=np.where(TIME < 0.5, 6.0, -3.0), session="a", peak=0.9, energy=1.3)
-    found = StandardizedErrors.of(at, np.full(TIME.size, 2.0), 0.05, 0.1)
-    assert found.force == pytest.approx(np.where(TIME < 0.5, 3.0, 1.5))
-    assert (found.peak, found.energy) == (pytest.approx([2.0]), pytest.approx([3.0]))
-    exact = StandardizedErrors.of(run("r"), np.zeros(TIME.size), 0.0, 0.0)
-    assert not np.any([*exact.force, *exact.peak, *exact.energy])
-    assert np.isinf(StandardizedErrors.of(run("r", energy=np.inf), np.ones(TIME.size), 1.0, 1.0).energy).all()
+    found = standardized(at, np.full(TIME.size, 2.0), 0.05, 0.1)
+    assert found["force"] == pytest.approx(np.where(TIME < 0.5, 3.0, 1.5))
+    assert (found["peak"], found["energy"]) == (pytest.approx([2.0]), pytest.approx([3.0]))
+    exact = standardized(run("r"), np.zeros(TIME.size), 0.0, 0.0)
+    assert not np.any(np.concatenate([*exact.values()]))
+    assert np.isinf(standardized(run("r", energy=np.inf), np.ones(TIME.size), 1.0, 1.0)["energy"]).all()
 
 
 @pytest.mark.parametrize(("gain", "offset"), [(0.0, 0.0), (0.05, 7.0)])

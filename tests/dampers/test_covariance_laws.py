@@ -9,7 +9,7 @@ from scipy.linalg import sqrtm
 from support.dampers import joint_damper
 
 from mrdamper.dampers.bands import band
-from mrdamper.dampers.calibration import Calibration, PredictedRun, StandardizedErrors, model_error
+from mrdamper.dampers.calibration import Calibration, PredictedRun, model_error, standardized
 from mrdamper.dampers.concatenated_runs import JointResiduals
 from mrdamper.dampers.covariance import _determined, _Spread, _within, estimate_uncertainty
 from mrdamper.dampers.distance import Distance
@@ -470,7 +470,7 @@ def test_cross_validated_errors_are_over_the_whole_error_model():
         offset, half = 2 / 3 * known.offset**2 + form * known.run_offset**2, prediction.half
         force = np.sqrt(gain * prediction.predicted**2 + offset + (share + form * known.force**2) * half**2)
         peak, energy = (np.sqrt(v + gain + form * e**2) for v, e in ((of_peak, known.peak), (of_energy, known.energy)))
-        scores.append(StandardizedErrors.of(prediction, force, peak, energy))
+        scores.append(standardized(prediction, force, peak, energy))
     expected = Calibration.of(seen, scores)
     for name in ("force", "peak", "energy", "coverage"):
         assert getattr(known.calibration, name) == pytest.approx(getattr(expected, name), rel=1e-6)

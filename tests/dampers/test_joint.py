@@ -273,9 +273,9 @@ def test_scales_and_ranges_are_those_of_the_runs(runs, problem):
 
 
 def test_starts_are_tried_on_six_runs_and_a_single_start_is_taken_as_it_is(runs, problem, monkeypatch):
-    assert len(problem._few.concatenated.parts) == 6
+    assert len(problem._few.parts) == 6
     few = JointProblem(problem.runs, "play-bypass", parts=problem.parts[:4])
-    assert len(few._few.concatenated.parts) == 4
+    assert len(few._few.parts) == 4
     monkeypatch.setattr(JointProblem, "_downhill", lambda self, u: pytest.fail("one start needs no trial"))
     held = problem.with_free((), {"d": 3e-4, "cb": 3e4})
     (start,) = held.promising

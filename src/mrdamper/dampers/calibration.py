@@ -33,6 +33,7 @@ from mrdamper.statistics.metrics import dissipated_power, peak_force
 
 Quantity = Literal["force", "peak", "energy"]
 QUANTITIES: tuple[Quantity, ...] = ("force", "peak", "energy")
+StandardizedErrors = dict[Quantity, Floats]  # of samples, peaks and energies of a run, magnitudes
 LEVELS = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.975, 0.99)  # at which factors are stored
 REPORTED_LEVEL = 0.9  # of the coverage that a study states
 _MAX_SAMPLES = 400  # of a run
@@ -330,28 +331,16 @@ class Calibration:
         return cls(whole.unit, whole.units, whole.force, whole.peak, whole.energy, coverage)  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True, eq=False)
-class StandardizedErrors:
-    """Errors of one run over their standard deviations, magnitudes: of samples (N,), of the peak, of the energy."""
+def standardized(run: PredictedRun, force: Floats, peak: float, energy: float) -> StandardizedErrors:
+    """Return the errors of a run over standard deviations of the force (N,) [N], and of peak and energy, relative."""
 
-    force: Floats
-    peak: Floats
-    energy: Floats
+    def over(error: Floats, deviation: Floats | float) -> Floats:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.atleast_1d(np.abs(error) / deviation)
+        return np.nan_to_num(ratio, nan=0.0, posinf=np.inf)
 
-    def samples(self, quantity: Quantity) -> Floats:
-        """Return the errors of one quantity."""
-        return getattr(self, quantity)
-
-    @classmethod
-    def of(cls, run: PredictedRun, force: Floats, peak: float, energy: float) -> StandardizedErrors:
-        """By standard deviations of the force (N,) [N], and of peak and energy, relative."""
-
-        def over(error: Floats | float, deviation: Floats | float) -> Floats:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                ratio = np.atleast_1d(np.abs(error) / deviation)
-            return np.nan_to_num(ratio, nan=0.0, posinf=np.inf)
-
-        return cls(over(run.measured - run.predicted, force), over(run.peak - 1, peak), over(run.energy - 1, energy))
+    errors = run.measured - run.predicted, run.peak - 1, run.energy - 1
+    return dict(zip(QUANTITIES, map(over, errors, (force, peak, energy)), strict=True))
 
 
 def _factors(units: Sequence[Sequence[StandardizedErrors]], quantity: Quantity) -> tuple[float, ...]:
@@ -371,8 +360,9 @@ def _quantile(units: Sequence[Sequence[StandardizedErrors]], quantity: Quantity,
     larger one alone covers up to 1 / (n + 1) more than the level [Beran and Hall 1993]. Samples, and peaks and energies
     of the loops of long records, are pooled.
     """
-    scores = [scored.samples(quantity) for unit in units for scored in unit]
-    weights = [np.full(s.samples(quantity).size, 1 / s.samples(quantity).size / len(u)) for u in units for s in u]
+    scores = [scored[quantity] for unit in units for scored in unit]
+    sizes = [len(unit) for unit in units for _ in unit]
+    weights = [np.full(s.size, 1 / s.size / size) for s, size in zip(scores, sizes, strict=True)]
     values, weight = np.concatenate(scores), np.concatenate(weights)
     order = np.argsort(values)
     reached = np.cumsum(weight[order])
@@ -398,5 +388,5 @@ def _covered(
     for unit, rest in zip(units, others, strict=True):
         reached = min(level, len(rest) / (len(rest) + 1)) if rest else 0.0
         most = _quantile(rest, quantity, reached) if rest else np.inf
-        shares.append(float(np.mean([np.mean(scored.samples(quantity) <= most) for scored in unit])))
+        shares.append(float(np.mean([np.mean(scored[quantity] <= most) for scored in unit])))
     return float(np.mean(shares))

@@ -40,36 +40,15 @@ class LinearSolution:
     columns: Floats  # (N, K) weighted, of the others
 
 
-class ConcatenatedRuns:
-    """Motions of some runs, concatenated into one motion."""
-
-    def __init__(self, parts: Sequence[RunRows]):
-        self.parts = parts
-        self.begins = np.cumsum([0, *(len(part.motion) for part in parts)])[:-1]
-        self.measured = concatenate(part.motion for part in parts)
-        self.measured.path  # noqa: B018  cut into strokes once, for every current that is laid along
-        self._lagged_motion: tuple[Coil | None, Excitation] = (
-            None,
-            self.measured.with_current(np.abs(self.measured.current)),
-        )
-
-    def with_field_current(self, coil: Coil | None) -> Excitation:
-        """Return the motion with the current of the field; cached for one coil."""
-        if self._lagged_motion[0] != coil:
-            current = np.abs(self.measured.current)
-            for part, begin in zip(self.parts, self.begins, strict=True):
-                if coil is not None and part.changes:
-                    current[begin : begin + len(part.motion)] = coil.along(part.motion.time, part.motion.current)
-            self._lagged_motion = coil, self.measured.with_current(current)
-        return self._lagged_motion[1]
-
-
 class JointResiduals:
     """Residuals of concatenated runs, with the weight of each run."""
 
     def __init__(self, space: SearchSpace, parts: Sequence[RunRows]):
-        self.space, self.concatenated = space, ConcatenatedRuns(parts)
-        begins = self.concatenated.begins
+        self.space, self.parts = space, parts
+        begins = np.cumsum([0, *(len(part.motion) for part in parts)])[:-1]
+        measured = concatenate(part.motion for part in parts)
+        measured.path  # noqa: B018  cut into strokes once, for every current that is laid along
+        self._lagged: tuple[Coil | None, Excitation] = None, measured.with_current(np.abs(measured.current))
         self.picked = np.concatenate([part.picked + at for part, at in zip(parts, begins, strict=True)])
         self.target = np.concatenate([part.target for part in parts])
         self.owner = np.repeat(np.arange(len(parts)), [part.target.size for part in parts])
@@ -96,6 +75,21 @@ class JointResiduals:
             table._columns_at = point, reduced, base[kept], columns[kept]
         return table
 
+    def _motion(self, point: Floats) -> Excitation:
+        """Return all runs as one motion with the current of the field at a point; cached for the last coil."""
+        coil = self.space.coil_at(point)
+        if self._lagged[0] != coil:
+            current = np.concatenate(
+                [
+                    coil.along(part.motion.time, part.motion.current)
+                    if coil is not None and part.changes
+                    else np.abs(part.motion.current)
+                    for part in self.parts
+                ]
+            )
+            self._lagged = coil, self._lagged[1].with_current(current)
+        return self._lagged[1]
+
     def weigh(self, errors: Floats) -> None:
         """Robust weights: the sum of the errors counts, not of their squares; long records by their information."""
         self._set_weights(self.information * robust_weights(errors, MIN_ERROR_PP))
@@ -107,7 +101,7 @@ class JointResiduals:
 
     def _followed(self, model: Model, point: Floats) -> tuple[Excitation, Floats]:
         """Motion and state of a model at the samples."""
-        motion = self.concatenated.with_field_current(self.space.coil_at(point))
+        motion = self._motion(point)
         if self._seen is None or self._seen[0] is not motion:
             self._seen = motion, motion.part(self.picked)
         return self._seen[1], model.state(motion)[self.picked]
@@ -124,7 +118,7 @@ class JointResiduals:
 
     def _linear_table(self, reduced: Model, point: Floats) -> tuple[Floats, Floats]:
         """Force of a model without linear parameters, and the force per unit of each, in one pass if possible."""
-        motion, linear = self.concatenated.with_field_current(self.space.coil_at(point)), self.space.linear
+        motion, linear = self._motion(point), self.space.linear
         names = [info.name for info in type(reduced).parameters() if info.linear]  # one program for all problems
         rows = force_tangents(reduced, motion, names, self.picked)
         if rows is None:
@@ -182,7 +176,7 @@ class JointResiduals:
 
         Exact in one pass where the model gives tangents, else by forward differences.
         """
-        motion = self.concatenated.with_field_current(self.space.coil_at(point))
+        motion = self._motion(point)
         if (slopes := force_slopes(self.space, point, model, motion, self.picked)) is not None:
             return np.multiply(slopes, self.factor[:, None], out=slopes)
         weights = self.weights[self.owner]
@@ -191,7 +185,7 @@ class JointResiduals:
     def residual(self, point: Floats, model: Model) -> Floats:
         """(N,) of the linear parameters of a model at a point; its squares sum to each run's nrmse_pp²."""
         moved = self.space.with_linear_of(model, point)
-        motion = self.concatenated.with_field_current(self.space.coil_at(point))
+        motion = self._motion(point)
         values = force_tangents(moved, motion, (), self.picked)
         force = moved.force(*self._followed(moved, point)) if values is None else values[0]
         return (force - self.target) * self.unit

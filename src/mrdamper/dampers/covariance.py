@@ -17,6 +17,7 @@ from mrdamper.dampers.calibration import (
     StandardizedErrors,
     model_error,
     scatter_between_sessions,
+    standardized,
 )
 from mrdamper.dampers.curvature import growth_by_curvature
 from mrdamper.dampers.random_effects import Draws, Effects, GainsAndOffsets
@@ -376,5 +377,5 @@ def _with_model_error(
         gain, offset = (form[f"run_{name}"] + of_sessions[name] for name in ("gain", "offset"))
         force = gain * run.predicted**2 + offset + (grown["force"] + form["force"]) * run.half**2
         peak, energy = (np.sqrt(grown[q] + gain + form[q]) for q in ("peak", "energy"))
-        scores.append(StandardizedErrors.of(run, np.sqrt(force), float(peak), float(energy)))
+        scores.append(standardized(run, np.sqrt(force), float(peak), float(energy)))
     return replace(uncertainty, calibration=Calibration.of(cross_validated, scores))
