@@ -302,7 +302,7 @@ def test_a_study_method_has_its_options_from_text_and_the_gas_that_is_known():
 
 
 def test_steps_tell_how_far_they_are_and_take_pure_sines_where_they_must(monkeypatch):
-    monkeypatch.setattr(sines, "analyse_motion", lambda run: SimpleNamespace(is_sine=run.id != "sweep"))
+    monkeypatch.setattr(recipes, "pure_sines", lambda runs: [run for run in runs if run.id != "sweep"])
     told, found, given = [], {}, []
     zero = FitResult(Zero(), lambda rows: Zero())
 
