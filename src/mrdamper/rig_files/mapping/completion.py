@@ -28,7 +28,14 @@ from mrdamper.rig_files.column_names import (
     words,
     words_of,
 )
-from mrdamper.rig_files.conditions import LONGEST_LINE, currents_in, named_after_currents, names_test, without_currents
+from mrdamper.rig_files.conditions import (
+    LONGEST_LINE,
+    currents_in,
+    damper_in,
+    named_after_currents,
+    names_test,
+    without_currents,
+)
 from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
 from mrdamper.rig_files.readers.base import RawTable
@@ -183,7 +190,8 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
     width = len(table.names)
     for key, cells in _keyed_cells(table, _LONGEST_CONDITIONS) if width > 2 else ():
         header, stated = split_name(key), [cell for cell in cells if cell and (key or not is_unit(cell))]
-        if not key and len(cells) < width and len(stated) > 1 and all(map(names_test, stated)):  # merged over groups
+        one_time = not key and len(cells) < width and len(table.columns("time")) < 2  # of groups with none of their own
+        if one_time and len(stated) > 1 and all(map(damper_in, stated)):  # merged over groups
             short = width - 1 - len(cells)
             cells = list(accumulate(cells + [""] * short, lambda before, cell: cell or before))
         merged = not all(table.names) and len(stated) > 1
