@@ -259,3 +259,47 @@ def test_refused_tests_of_one_file_are_told_with_the_line_and_the_text_of_the_fi
         "the first of them, line 52: 1 fields where the other rows have 2: 'retry'"
         in run(tmp_path, "--profile", profile).output
     )
+
+
+def test_the_profile_of_refused_files_lists_what_to_fill_in_where_it_stands(tmp_path):
+    for level in (0, 1):
+        for n in (1, 2):
+            table = [*rows(seed=10 * level + n)[:, 1:].T, rows(seed=3)[:, 2] / 1000]
+            heads = ("stroke [mm],cell 1 [N],cell 2",)
+            write(tmp_path, f"knob{level}_test{n}.csv", text(np.column_stack(table), heads))
+    profile = run(tmp_path, "--write-profile", "-").stdout
+    assert "sign = 1\n" not in profile
+    assert re.search(r"\[file\]\n(?:.+\n)*#sample_rate_Hz = ", profile)
+    profile = re.sub("#sample_rate_Hz = .*", "sample_rate_Hz = 500", profile)
+    levels = profile.replace("#[current.values]", "[current.values]")
+    levels = levels.replace('#"knob0_*" =', '"knob0_*" = 0.0').replace('#"knob1_*" =', '"knob1_*" = 0.5')
+    path = write(tmp_path, "rig.toml", levels)
+    assert run(tmp_path, "--profile", path, "--out", tmp_path / "out").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("heads", "line", "answer"),
+    [
+        ("time_s,displacement,force_N", '#unit =   # "mm" or "m" or "in" or "cm"', 'unit = "mm"'),
+        ("time_s,displacement_mm,cell 1", '#column =   # "cell 1"\n#unit =   # "N"', 'column = "cell 1"\nunit = "N" #'),
+        ("time_s,displacement_mm,compression load (N)", "#sign = -1  # if it counts compression positive", "sign = 1"),
+    ],
+)
+def test_what_a_refusal_asks_for_stands_with_its_values_in_the_section_of_its_channel(tmp_path, heads, line, answer):
+    write(tmp_path, "a_0.5A.csv", text(header=(heads,)))
+    profile = run(tmp_path, "--write-profile", "-").stdout
+    assert line in profile
+    before, section, after = profile.partition(
+        "[channels.displacement]" if "displacement," in heads else "[channels.force]"
+    )
+    path = write(tmp_path, "rig.toml", before + section + after.replace(line, answer, 1))
+    assert run(tmp_path / "a_0.5A.csv", "--profile", path, "--out", tmp_path / "out").exit_code == 0
+
+
+def test_a_test_that_a_plan_discards_stands_in_the_profile_to_be_left_out(tmp_path):
+    for n in (1, 2):
+        write(tmp_path, f"run_{n}.csv", text(rows(seed=n)))
+    write(tmp_path, "plan.csv", "Run,Current [A],Remark\nrun_1,0.5,\nrun_2,0.5,do not use\n")
+    profile = run(tmp_path, "--write-profile", "-").stdout
+    path = write(tmp_path, "rig.toml", profile.replace('#leave_out = ["run_2.csv"]', 'leave_out = ["run_2.csv"]'))
+    assert run(tmp_path, "--profile", path, "--out", tmp_path / "out").exit_code == 0

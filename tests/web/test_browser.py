@@ -610,7 +610,7 @@ def test_a_refused_file_is_mended_by_its_profile(page, small_rig, shoot):
     page.get_by_text("Rig profile as text").click()
     profile = page.get_by_label("Rig profile, TOML")
     before, force, after = profile.input_value().partition("[channels.force]")
-    profile.fill(before + force + after.replace("sign = 1", "sign = -1", 1))
+    profile.fill(before + force + after.replace("#sign = -1", "sign = -1", 1))
     page.get_by_role("button", name="Read the refused file").click()
     page.locator(".cell").nth(1).wait_for()
     assert page.locator(".message.bad").count() == 0

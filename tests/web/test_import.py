@@ -126,7 +126,7 @@ def test_a_refused_file_is_mended_while_the_others_stay(drop, small_rig):
     assert (found.verdicts[0].name, found.verdicts[0].state) == (f"day 2/{second.id}.csv", "refused")
     assert found.verdicts[0].findings[0][0] == "E_DISSIPATION_SIGN"
     before, force, after = found.profile.partition("[channels.force]")
-    mended = read_upload(drop, before + force + after.replace("sign = 1", "sign = -1", 1), refused_only=True)
+    mended = read_upload(drop, before + force + after.replace("#sign = -1", "sign = -1", 1), refused_only=True)
     assert {v.state for v in mended.verdicts} <= {"taken", "noted"}
     assert len(mended.dataset) == 2
     for run, there in zip((first, second), mended.dataset, strict=True):

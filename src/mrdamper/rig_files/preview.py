@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -12,16 +12,28 @@ from typing import Any
 
 from mrdamper.errors import InputError, listed
 from mrdamper.rig_files.coil_current import held_current_of
-from mrdamper.rig_files.column_names import DIMENSION, Header, names_compression
+from mrdamper.rig_files.column_names import DIMENSION, Header, names_compression, split_name
 from mrdamper.rig_files.columns import assign, column_called, propose, rate_of, sign_of
 from mrdamper.rig_files.file_records import described, files_in, tables_of_tests, test_tables, unpacked
-from mrdamper.rig_files.profile import Channel, Profile, current_pattern, profile_of
+from mrdamper.rig_files.profile import Channel, Profile, current_pattern, profile_of, toml
 from mrdamper.rig_files.readers import ask_tables, raw_tables
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED
 
 _ROWS_SHOWN, _MOST_SHOWN = 6, 30  # rows and columns of a preview
 _MOST_COLUMNS, _MOST_REMARKS, _MOST_NAMES = 40, 6, 3  # of a tree that is shown
+_SECTIONS = re.compile(r"\[((?:channels\.\w+)|file)\]((?:(?!\[(?:channels|file|current)).)*)")
+_KEYS = {
+    "file": ("sample_rate_Hz", "leave_out", "blocks"),
+    "channels": ("column", "unit", "scale", "sign", "file"),
+}
+_MEANT = {
+    "sample_rate_Hz": "  # if the rows are samples at a fixed rate",
+    "scale": "  # of 1 in the file, in that unit",
+    "file": '  # "{run}_force.csv": what names the test, and the channel',
+    "blocks": '"split"  # if each group is a test',
+    "sign": "-1  # if it counts compression positive",
+}
 _ROLE = re.compile(r"\[channels\.(\w+)\]")
 _UNITS = {
     "time": ("s", "ms", "us"),
@@ -73,6 +85,9 @@ def preview(path: str | Path, profile: Profile | str | Path | None = None) -> di
             name: {"column": _place(table, channel.column), "unit": channel.unit or "", "sign": channel.sign}
             for name, channel in channels.items()
         }
+        for name in SIGNED:
+            if names_compression(str(channels[name].column)) and "sign" not in channels[name].model_fields_set:
+                places[name]["sign"] = -1
     rows = [[column[i] if i < len(column) else "" for column in cells] for i in range(_ROWS_SHOWN)]
     names, units = table.names[:_MOST_SHOWN], table.units[:_MOST_SHOWN]
     numbers = [*map(table.number, range(len(names)))]
@@ -104,9 +119,7 @@ def _guess_channels(tables: list[RawTable], profile: Profile) -> tuple[RawTable,
         if column is not None:
             header = table.names[column]
             says["column"] = header if header and table.names.count(header) == 1 else table.number(column)
-            sign = sign_of(table, profile, name)
-            sign = (-1 if name in SIGNED and names_compression(header) else 1) if sign is None else sign
-            says |= {"sign": sign} if sign else {}
+            says |= {"sign": -1} if sign_of(table, profile, name) == -1 else {}
         stated = profile.channel(name).model_dump(exclude_unset=True, exclude_none=True)
         channels[name] = Channel(**{**says, **stated})
     return table, channels
@@ -155,6 +168,33 @@ def columns_of(path: str | Path, profile: Profile | str | Path | None = None) ->
         return {table.number(i): name for i, name in enumerate(table.names)}
 
     return ask_tables(path, numbered, {}, profile.file)
+
+
+def unset_keys(
+    errors: Iterable[InputError], columns: Mapping[int, str] = MappingProxyType({}), taken: Collection[Any] = ()
+) -> dict[str, list[str]]:
+    """Return by section the lines of keys of a profile that refusals ask for, with values that each may have behind #.
+
+    The columns are those of the refused file by their numbers; those that are taken are not offered.
+    """
+    keys: dict[str, dict[str, list[str]]] = {f"channels.{role}": {"sign": []} for role in SIGNED}
+    for remedy in dict.fromkeys(error.remedy for error in errors):
+        for section, text in _SECTIONS.findall(remedy):
+            for key in _KEYS.get(section, _KEYS["channels"]):
+                stated = re.findall(rf"\b{key} = \[([^\]]*)\]", text)
+                if re.search(rf"\b{key}\b", text):
+                    keys.setdefault(section, {}).setdefault(key, []).extend(stated)
+    lines = {section: list[str]() for section in keys}
+    names = [*columns.values()]
+    places = [name if names.count(name) == 1 else number for number, name in columns.items()]
+    for section, key, stated in ((section, *entry) for section, asked in keys.items() for entry in asked.items()):
+        dimension = DIMENSION.get(section.removeprefix("channels."), "")
+        free = [place for place in places if place not in taken]
+        free.sort(key=lambda place, own=dimension: split_name(str(place)).dimension != own)
+        values = {"column": free, "unit": _UNITS.get(dimension, ())}.get(key, ())
+        value = f"[{', '.join(dict.fromkeys(stated))}]" if stated else _MEANT.get(key, "  # ")
+        lines[section].append(f"{key} = {value}{' or '.join(map(toml, values))}")
+    return lines
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, field_validator, model_validator
@@ -227,9 +228,9 @@ def parse_profile(text: str, where: str = "profile") -> Profile:
     return parse_toml(text, Profile, ProfileError, _HELP, where)
 
 
-def profile_text(profile: Profile) -> str:
-    """Return the profile as TOML that reads back equal."""
-    lines = [f"{key} = {_toml(getattr(profile, key))}" for key in ("rig", "excitation", "split")]
+def profile_text(profile: Profile, unset: Mapping[str, Sequence[str]] = MappingProxyType({})) -> str:
+    """Return the profile as TOML that reads back equal, with keys that are unset as comments, by section."""
+    lines = [f"{key} = {toml(getattr(profile, key))}" for key in ("rig", "excitation", "split")]
     sections = {"file": profile.file.model_dump(exclude_none=True, exclude_defaults=True)}
     for name, channel in profile.channels.items():
         says = channel.model_dump(exclude_none=True, exclude_defaults=True)
@@ -239,8 +240,9 @@ def profile_text(profile: Profile) -> str:
         sections[name] = {} if table is None else table.model_dump(exclude_none=True, exclude_unset=True)
     sections["current.values"] = sections["current"].pop("values", {})
     for name, section in sections.items():
-        if section or name.startswith("channels."):
-            lines += ["", f"[{name}]", *(f"{_key(key)} = {_toml(value)}" for key, value in section.items())]
+        if section or name in unset or name.startswith("channels."):
+            lines += ["", f"[{name}]", *(f"{_key(key)} = {toml(value)}" for key, value in section.items())]
+            lines += [f"#{line}" for line in unset.get(name, ()) if line.partition(" ")[0] not in section]
     return "\n".join(lines) + "\n"
 
 
@@ -303,12 +305,13 @@ def _as_expression(pattern: str) -> str:
 
 
 def _key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_]+", key) else _toml(key)
+    return key if re.fullmatch(r"[A-Za-z0-9_]+", key) else toml(key)
 
 
-def _toml(value: Any) -> str:
+def toml(value: Any) -> str:
+    """Return a value as TOML."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, (tuple, list)):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
+        return "[" + ", ".join(toml(item) for item in value) + "]"
     return repr(value)

@@ -17,9 +17,13 @@ from mrdamper.rig_files.coil_current import CURRENT_TOO
 from mrdamper.rig_files.column_names import Header
 from mrdamper.rig_files.file_records import files_in, unpacked
 from mrdamper.rig_files.mapping.description import is_readme
-from mrdamper.rig_files.preview import columns_of, guess_profile
+from mrdamper.rig_files.preview import columns_of, guess_profile, unset_keys
 from mrdamper.rig_files.profile import Profile, profile_text
+from mrdamper.rig_files.record import Refusal
 from mrdamper.rig_files.rig_import import ImportResult, import_files, read_runs
+
+_OF_MOTION = re.compile(r"(?i)0[ _]?m?(?:hz|mm)|(?<![a-z])(?:f|freq|hz|a|amp|x|run|test|t|n|no|nr)[ _=-]*0")
+_OF_CURRENT = re.compile(r"(?i)(?<![a-z])(?:i|cur\w*|amps?|coil)[ _=-]*$")
 
 
 def profile_template(paths: Sequence[str | Path], profile: Profile) -> tuple[str, list[str]]:
@@ -27,22 +31,26 @@ def profile_template(paths: Sequence[str | Path], profile: Profile) -> tuple[str
 
     Raises `InputError` if the form of the file cannot be found.
     """
+    problems: Sequence[InputError] = ()
     with _file_for_profile(paths, profile) as (first, refused):
         guess = guess_profile(first, profile)
         columns = columns_of(first, profile)
         kinds = {kind: headings_of(path, profile) for kind, path in files_by_kind(refused, profile).items()}
-        guess = with_files(guess, kinds) if kinds else guess
-        text = profile_text(guess) + _alternatives(columns, kinds)
-        text += "" if kinds else _missing_currents(paths, guess, columns)
         if kinds:
+            guess = with_files(guess, kinds)
             errors = [refusal.error for refusal in import_files(paths, guess).refusals]
             alike = {re.sub("[0-9]+", "#", e.found): f"{e.found}; {e.remedy} [{e.code}]" for e in reversed(errors)}
-            return text, [*alike.values()][::-1]
+            return profile_text(guess) + _alternatives(columns, kinds), [*alike.values()][::-1]
         try:
             read_runs(first, guess)
         except InputError as error:
-            return text, list(dict.fromkeys(str(problem) for problem in getattr(error, "errors", (error,))))
-    return text, []
+            problems = getattr(error, "errors", (error,))
+    refusals = import_files(paths, guess).refusals
+    taken = [channel.column for channel in guess.channels.values()]
+    unset = unset_keys([*problems, *(refusal.error for refusal in refusals)], columns, taken)
+    missing = _missing_currents(refusals if guess.current is None else (), columns)
+    text = profile_text(guess, unset) + _alternatives(columns, {}) + missing
+    return text, list(dict.fromkeys(map(str, problems)))
 
 
 @contextlib.contextmanager
@@ -61,9 +69,8 @@ def _file_for_profile(paths: Sequence[str | Path], profile: Profile) -> Iterator
         yield next(chain(first, tests), files[0]), first
 
 
-def _missing_currents(paths: Sequence[str | Path], guess: Profile, columns: Mapping[int, str]) -> str:
+def _missing_currents(refusals: Sequence[Refusal], columns: Mapping[int, str]) -> str:
     """List what a person fills in for tests without a current, as comments: their currents, or a column's scale."""
-    refusals = import_files(paths, guess).refusals if guess.current is None else ()
     missing = [r for r in refusals if r.error.code == "E_CURRENT_MISSING" or CURRENT_TOO in r.error.remedy]
     if not missing:
         return ""
@@ -81,10 +88,27 @@ def _missing_currents(paths: Sequence[str | Path], guess: Profile, columns: Mapp
         escape(run) if runs.count(run) == 1 else "*/" + escape("/".join(Path(r.file).parts[-2:]).replace(": ", "/"))
         for run, r in zip(runs, missing, strict=True)
     ]
-    lines += ["# Tests without a current: remove the #, and write each current [A] behind its =:", "#[current.values]"]
+    heading = '# Tests without a current: remove the #, write each current [A] behind its =, or "*" = ... for all:'
+    lines += [heading, "#[current.values]"]
     whys = [f"  # {text}" if text and not text.startswith("no coil current") else "" for text in reasons]
-    lines += [f"#{json.dumps(name, ensure_ascii=False)} ={why}" for name, why in zip(names, whys, strict=True)]
+    stated = dict(zip(_by_level(names), whys, strict=True))
+    lines += [f"#{json.dumps(name, ensure_ascii=False)} ={why}" for name, why in stated.items()]
     return "\n".join(["", *lines, ""])
+
+
+def _by_level(names: Sequence[str]) -> Sequence[str]:
+    """Return the pattern of each name's level, duty20_*, where only one number that several names have may be that."""
+    parts = [re.split(r"([0-9]+(?:[.,][0-9]+)?)", name) for name in names]
+    if len({tuple(own[::2]) for own in parts}) > 1:
+        return names
+    shared = [i for i in range(1, len(parts[0]), 2) if 1 < len({own[i] for own in parts}) < len(names)]
+    levels = [i for i in shared if not _OF_MOTION.search(f"{parts[0][i - 1]}0{parts[0][i + 1]}")]
+    levels = [i for i in levels if _OF_CURRENT.search(parts[0][i - 1])] or levels
+    if len(levels) != 1:
+        return names
+    (i,) = levels
+    first, behind = "*" * (i > 1) + parts[0][i - 1], parts[0][i + 1][:1]
+    return [f"{first}{own[i]}{behind}{'*' * bool(behind)}" for own in parts]
 
 
 def _alternatives(columns: Mapping[int, str], kinds: Mapping[str, Mapping[int, tuple[str, Header]]]) -> str:

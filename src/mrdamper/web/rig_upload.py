@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 
 from mrdamper.data import Dataset
 from mrdamper.errors import InputError
-from mrdamper.rig_files.preview import guess_profile
+from mrdamper.rig_files.preview import guess_profile, unset_keys
 from mrdamper.rig_files.profile import Profile, parse_profile, profile_text
 from mrdamper.rig_files.record import Refusal
 from mrdamper.rig_files.rig_import import ImportResult, import_files, to_dataset, with_unique_ids
@@ -108,7 +108,7 @@ def _guessed_profile(paths: Sequence[Path]) -> str:
     """Return the profile of the first file whose format can be guessed; an empty one where none can."""
     for path in paths[:_MAX_GUESSES]:
         try:
-            return profile_text(guess_profile(path))
+            return profile_text(guess_profile(path), unset_keys(()))
         except InputError:
             continue
     return profile_text(parse_profile(""))
