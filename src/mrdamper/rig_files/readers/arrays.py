@@ -303,9 +303,8 @@ def damaged(source: Source, title: str, why: str) -> RigFileError:
     early = any(word in why.lower() for word in _EARLY_END)
     why = re.sub(r"'?<[^<>]*>'?( is)? ?", "", why)  # objects of the library's own
     reason = "".join(c if c.isprintable() else " " for c in (why.strip().splitlines() or ["unreadable"])[0])[:120]
-    return source.refuse(
-        "E_TRUNCATED" if early else "E_FORMAT", f"damaged {title} ({reason})", "copy or export the file again"
-    )
+    code = "E_TRUNCATED" if early else "E_FORMAT"
+    return source.refuse(code, f"damaged {title} ({reason})", "copy or export the file again")
 
 
 def _seconds(array: np.ndarray) -> Floats:

@@ -221,9 +221,8 @@ class RawTable:
             if column not in columns:
                 return inner(columns)
             content = inner(list(dict.fromkeys([*needs, *(i for i in columns if i != column)])))
-            return replace(
-                content, values={i: make(content.values) if i == column else content.values[i] for i in columns}
-            )
+            values = {i: make(content.values) if i == column else content.values[i] for i in columns}
+            return replace(content, values=values)
 
         if column < len(self.names):
             return replace(self, read=read)

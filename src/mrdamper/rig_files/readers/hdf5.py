@@ -182,9 +182,8 @@ def _frame(items: Mapping[str, Any]) -> dict[str, Any]:
         return {}
     index = items["axis1"]
     name = text_of(index.attrs.get("name"))
-    framed: dict[str, Any] = {
-        "index" if name in ("", "N.") else name: Stored(index.shape, index.dtype, index.__array__)
-    }
+    name = "index" if name in ("", "N.") else name
+    framed: dict[str, Any] = {name: Stored(index.shape, index.dtype, index.__array__)}
     for key, block in items.items():
         if re.fullmatch(r"block[0-9]+_values", key) and key.replace("values", "items") in items:
             for i, item in enumerate(texts_in(items[key.replace("values", "items")][()])):

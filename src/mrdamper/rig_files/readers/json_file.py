@@ -66,9 +66,8 @@ def _parsed(source: Source, content: bytes) -> Any:
     except UnicodeDecodeError as error:
         raise source.refuse("E_ENCODING", "bytes that are no UTF-8", "save it as UTF-8") from error
     except (RecursionError, ValueError) as error:  # or a whole number of thousands of digits
-        raise source.refuse(
-            "E_FORMAT", "nested too deeply, or a number without end", "export the samples as lists"
-        ) from error
+        problem = "nested too deeply, or a number without end"
+        raise source.refuse("E_FORMAT", problem, "export the samples as lists") from error
 
 
 def _of_figure(tree: Any) -> Any:

@@ -52,9 +52,8 @@ def _plain(head: bytes) -> bytes:
 def _of_cells(source: Source, sheets: Sheets, form: FileForm) -> list[RawTable]:
     texts = [(name, as_text(source, name, rows)) for name, rows in sheets if any(map(any, rows))]
     if not texts:
-        raise NoTableError(
-            "E_FORMAT", "a page or workbook without a table", file=source.name, remedy="export it as CSV"
-        )
+        problem = "a page or workbook without a table"
+        raise NoTableError("E_FORMAT", problem, file=source.name, remedy="export it as CSV")
     return tables_of_sheets(source, texts, form)
 
 

@@ -33,9 +33,8 @@ class Mdf(Reader):
             file = asammdf.MDF(source.path)
             source.keep.callback(file.close)
             groups = {f"group_{i + 1}": _channels(file, i) for i in range(len(file.groups))}
-        check_unpacked(
-            source, max((8 * channels[0]["data"].size for channels in groups.values() if channels), default=0)
-        )
+        sizes = (8 * channels[0]["data"].size for channels in groups.values() if channels)
+        check_unpacked(source, max(sizes, default=0))
         notes = [getattr(group.channel_group, "comment", "") for group in file.groups]
         tree = {
             name: {"channels": channels, **({"comment": str(note)} if note else {})}

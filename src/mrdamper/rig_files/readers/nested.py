@@ -142,9 +142,8 @@ def _stated_units(tree: Mapping[str, Any]) -> dict[str, str]:
 def _matrices_of_tests(tree: Mapping[str, Any]) -> list[str]:
     """Return the keys of matrices that hold a test each: several, each a column a channel, whose names tell none."""
     shapes = {k: sorted(v.shape) for k, v in tree.items() if isinstance(v, Array) and v.ndim == 2}
-    of_tests = {
-        key: shape[0] for key, shape in shapes.items() if shape[0] in range(3, 21) and shape[1] >= FEWEST_SAMPLES
-    }
+    long = {key: shape[0] for key, shape in shapes.items() if shape[1] >= FEWEST_SAMPLES}
+    of_tests = {key: channels for key, channels in long.items() if channels in range(3, 21)}
     alone = len(of_tests) > 1 and len({*of_tests.values()}) == 1 and not any(split_name(key).role for key in of_tests)
     return list(of_tests) if alone else []
 

@@ -50,9 +50,8 @@ def _variables(lines: list[str]) -> Iterator[tuple[str, str, list[str]]]:
 
 def _value(kind: str, lines: list[str]) -> Any:
     """Return a number, a matrix or a text; None of another type. ValueError if it is not whole."""
-    stated = {
-        key[1:].strip(): number for key, colon, number in (x.partition(":") for x in lines if x[:1] == "#") if colon
-    }
+    keyed = (line.partition(":") for line in lines if line[:1] == "#")
+    stated = {key[1:].strip(): number for key, colon, number in keyed if colon}
     body = [line for line in lines if line.strip() and not line.startswith("#")]
     if kind == "scalar":
         return float(body[0]) if body else None

@@ -36,9 +36,8 @@ _TEXT = bytes(b for b in range(256) if b >= 32 or b in b"\t\n\r\f\v")
 _CTRL_Z = b"\x1a"
 _BLANK = b" \t\r\n\xef\xbb\xbf\xff\xfe" + _CTRL_Z  # and marks of the order of bytes
 _SEGMENT = re.compile(r"(?:Channels|Samples|Date|Time|Y_Unit_Label|X_Dimension|X0|Delta_X|\*{3}End_of_Header)\b")
-_STATED = re.compile(
-    rb"(?m)^[ \t]*(?:[#%\"A-Za-z]|//)[^\n]*[0-9] ?(?:m?A|amp)[^\n]*"
-)  # a line that may state a current
+# A line that may state a current.
+_STATED = re.compile(rb"(?m)^[ \t]*(?:[#%\"A-Za-z]|//)[^\n]*[0-9] ?(?:m?A|amp)[^\n]*")
 _WORD = re.compile(r"[^\W\d_]{2,}")
 _NUMBERS = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)*")
 _TITLE_LINES = 20  # among which rows follow such a line
@@ -156,9 +155,8 @@ def _encoding(source: Source, head: bytes, form: FileForm) -> tuple[str, int]:
         try:
             return codecs.lookup(form.encoding).name, 0
         except LookupError as error:
-            raise source.refuse(
-                "E_PROFILE", f"no encoding is called {form.encoding!r}", "use utf-8, utf-16 or cp1252"
-            ) from error
+            problem = f"no encoding is called {form.encoding!r}"
+            raise source.refuse("E_PROFILE", problem, "use utf-8, utf-16 or cp1252") from error
     return _detected(head), 0
 
 
@@ -248,9 +246,8 @@ def find_blocks(stream: TextStream, layout: Layout, start: int, stop: int) -> li
     """Return the blocks between two places of a text; one where the header is not repeated."""
     if not layout.header.strip():
         return _cut_at_currents(stream, layout, Block(start, stop, layout.data_line))
-    repeated = re.compile(
-        rb"(?m)^[ \t]*" + re.escape(layout.header.strip().encode(stream.encoding, "ignore")) + rb"\s*?$"
-    )
+    header = re.escape(layout.header.strip().encode(stream.encoding, "ignore"))
+    repeated = re.compile(rb"(?m)^[ \t]*" + header + rb"\s*?$")
     blocks: list[Block] = []
     begin, begin_line = start, layout.data_line
     tail, worded = b"", False
