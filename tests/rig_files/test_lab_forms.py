@@ -1268,12 +1268,12 @@ def test_a_plan_of_the_ranges_of_one_record_gives_each_test_the_current_of_its_r
             "plan.csv",
             "File,Start row,End row,Current (A)\nrun_1.csv,1,500,0.25\nrun_2.csv,1,800,0.5\n",
             HEAD,
-            [500, 800],
+            [498, 798],
         ),
-        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,1,4,0.5\n", HEAD, [401, 600]),
-        ("plan.csv", "Test,Start (s),End (s)\n1,1,3\n2,1,4\n", "# coil current: {} A\n" + HEAD, [401, 600]),
+        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,1,4,0.5\n", HEAD, [400, 600]),
+        ("plan.csv", "Test,Start (s),End (s)\n1,1,3\n2,1,4\n", "# coil current: {} A\n" + HEAD, [400, 600]),
         ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,11,13,0.5\n", HEAD, [800, 800]),
-        ("tests.csv", "file,current_A,start_s,end_s\nrun_1.csv,0.25,1,3\nrun_2.csv,0.5,1,4\n", HEAD, [401, 600]),
+        ("tests.csv", "file,current_A,start_s,end_s\nrun_1.csv,0.25,1,3\nrun_2.csv,0.5,1,4\n", HEAD, [400, 600]),
     ],
 )
 def test_each_test_is_cut_to_its_start_and_end_in_a_plan_if_they_are_on_its_own_clock(
@@ -1526,3 +1526,12 @@ def test_names_and_units_in_persian_and_a_rate_in_russian_are_read(tmp_path):
         "Частота опроса, Гц: 200\n\nПеремещение, мм\tУсилие, Н\n" + rows(X, force(0.25), separator="\t")
     )
     assert currents(import_files([tmp_path]).records) == [0.25, 0.5]
+
+
+@pytest.mark.parametrize(("heads", "count"), [(("1Hz", "2Hz"), 2), (("A", "B"), 0)])
+def test_groups_of_columns_named_after_motions_are_tests_though_they_share_the_time(tmp_path, heads, count):
+    slow = np.column_stack([T, X, force(0.5), 10 * np.sin(4 * np.pi * T), force(0.5)])
+    slow[:, 4] = 300 * np.tanh(6 * np.cos(4 * np.pi * T)) + 100 * np.cos(4 * np.pi * T)
+    line = "Time (s)," + ",".join(f"Disp_{head} (mm),Force_{head} (N)" for head in heads)
+    (tmp_path / "b_0.5A.csv").write_text(f"{line}\n{rows(*slow.T)}")
+    assert len(import_files([tmp_path]).records) == count

@@ -342,9 +342,7 @@ def sign_of(table: RawTable, profile: Profile, role: str) -> int | None:
     return table.senses.get(role) if role not in _DERIVED else sign_of(table, profile, "displacement")
 
 
-def _convert(
-    table: RawTable, role: str, column: int, profile: Profile, *, asks_current: bool = False
-) -> Assigned | None:
+def _convert(table: RawTable, role: str, column: int, profile: Profile, asks_current: bool = False) -> Assigned | None:
     header, channel, sign = table.headers[column], profile.channel(role), sign_of(table, profile, role)
     unit = channel.unit or header.unit
     unit = "degF" if role == "temperature" and (unit or unknown_unit(table.names[column])) == "F" else unit
@@ -374,13 +372,13 @@ def _convert(
 
 def _refuse_volts_beside(table: RawTable, role: str, profile: Profile) -> None:
     """Refuse a unit that only the profile states where a line beside the columns has cells in volts: Y units, V."""
-    cells = {line: [cell.strip(' []()#"') for cell in re.split(r"[,;:=|\t]", line)] for line in table.lines}
-    units = {line: [split_name("", cell).dimension for cell in of if is_unit(cell)] for line, of in cells.items()}
-    line = next((line for line, of in units.items() if {*of} == {"voltage"}), "")
-    if line and (profile.file.names or profile.channel(role).unit) and not table.columns(dimension="voltage"):
-        problem = f"the line {line.strip()[:80]!r} is in volts, and the {role} in the unit of the profile"
-        remedy = f"give the calibration: [channels.{role}] unit and scale (unit per V) in a profile, 1 if it is applied"
-        raise _refusal(UnitError, table, problem, remedy, "E_UNITS_DIMENSION")
+    only_stated = (profile.file.names or profile.channel(role).unit) and not table.columns(dimension="voltage")
+    for line in table.lines if only_stated else ():
+        cells = [cell.strip(' []()#"') for cell in re.split(r"[,;:=|\t]", line)]
+        if {split_name("", cell).dimension for cell in cells if is_unit(cell)} == {"voltage"}:
+            problem = f"the line {line.strip()[:80]!r} is in volts, and the {role} in the unit of the profile"
+            remedy = f"give the calibration: [channels.{role}] unit and scale (unit per V) in a profile, 1 if applied"
+            raise _refusal(UnitError, table, problem, remedy, "E_UNITS_DIMENSION")
 
 
 def _refuse_factor(table: RawTable, role: str, unit: str) -> None:
@@ -393,9 +391,7 @@ def _refuse_factor(table: RawTable, role: str, unit: str) -> None:
         factor = float((behind or before[::-1] or ["1"])[0].replace(",", "."))
         if factor not in (0.0, 1.0):
             problem = f"{line.strip()[:80]!r} may be meant for the {role}"
-            remedy = (
-                f'set [channels.{role}] unit = "{unit}" and scale = {factor:g} in a profile, or scale = 1 if applied'
-            )
+            remedy = f'set [channels.{role}] unit = "{unit}" and scale = {factor:g} in a profile, or 1 if applied'
             raise _refusal(ColumnError, table, problem, remedy, "E_AMBIGUOUS")
 
 
