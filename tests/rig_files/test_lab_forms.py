@@ -1440,8 +1440,8 @@ NS = [f"{1_600_000_000_000_000_000 + round(1e9 * t)}" for t in T]
 FILES_OF_CHANNELS = {  # text beside the folders of the tests, and files of each: what is above the rows, the rows
     "columns by their numbers": (
         "- `Tn_disp.out`: column 1 time (sec), column 2 damper displacement (mm)\n"
-        "- `Tn_force.out`: column 1 time (sec), column 2 damper force (kN)\n\n| Test | Current (A) |\n|---|---|\n"
-        "| T1 | 0.25 |\n| T2 | 0.5 |\n",
+        "- `Tn_force.out`: column 1 time (sec), column 2 damper force (kN)\n\n"
+        "| Test | Freq. (Hz) | Current (A) |\n|---|---|---|\n| T1 | 1 | 0.25 |\n| T2 | 1 | 0.5 |\n",
         {
             "exp/T{n}_disp.out": lambda f: rows(T, X, separator=" "),
             "exp/T{n}_force.out": lambda f: rows(T, f / 1e3, separator=" "),
