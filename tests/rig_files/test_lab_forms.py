@@ -1268,12 +1268,12 @@ def test_a_plan_of_the_ranges_of_one_record_gives_each_test_the_current_of_its_r
             "plan.csv",
             "File,Start row,End row,Current (A)\nrun_1.csv,1,500,0.25\nrun_2.csv,1,800,0.5\n",
             HEAD,
-            [498, 798],
+            [500, 800],
         ),
-        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,1,4,0.5\n", HEAD, [400, 600]),
-        ("plan.csv", "Test,Start (s),End (s)\n1,1,3\n2,1,4\n", "# coil current: {} A\n" + HEAD, [400, 600]),
+        ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,1,4,0.5\n", HEAD, [401, 600]),
+        ("plan.csv", "Test,Start (s),End (s)\n1,1,3\n2,1,4\n", "# coil current: {} A\n" + HEAD, [401, 600]),
         ("plan.csv", "Test,Start (s),End (s),Current (A)\n1,1,3,0.25\n2,11,13,0.5\n", HEAD, [800, 800]),
-        ("tests.csv", "file,current_A,start_s,end_s\nrun_1.csv,0.25,1,3\nrun_2.csv,0.5,1,4\n", HEAD, [400, 600]),
+        ("tests.csv", "file,current_A,start_s,end_s\nrun_1.csv,0.25,1,3\nrun_2.csv,0.5,1,4\n", HEAD, [401, 600]),
     ],
 )
 def test_each_test_is_cut_to_its_start_and_end_in_a_plan_if_they_are_on_its_own_clock(

@@ -118,8 +118,11 @@ def test_what_is_abbreviated_act_may_be_of_the_actuator(tmp_path):
 def test_a_sign_that_is_stated_settles_compression(tmp_path):
     path = write(tmp_path, "a_0.5A.csv", table({"time [s]": T, "compression [mm]": -X, "force [N]": F}))
     profile = guess_profile(path)
-    assert profile.channels["displacement"].sign == -1
-    np.testing.assert_allclose(read_run(path, profile).displacement, 1e-3 * X, atol=1e-8)
+    assert "sign" not in profile.channels["displacement"].model_fields_set
+    with pytest.raises(InputError, match=r"set \[channels.displacement\] sign = -1 in a profile"):
+        read_run(path, profile)
+    stated = parse_profile("[channels.displacement]\nsign = -1\n")
+    np.testing.assert_allclose(read_run(path, stated).displacement, 1e-3 * X, atol=1e-8)
 
 
 def test_a_current_in_per_cent_is_no_current(tmp_path):
