@@ -1,6 +1,7 @@
 """Forms in which laboratories keep what belongs to a record: beside it, in codes, in formulas, in other files."""
 
 import json
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -1535,3 +1536,29 @@ def test_groups_of_columns_named_after_motions_are_tests_though_they_share_the_t
     line = "Time (s)," + ",".join(f"Disp_{head} (mm),Force_{head} (N)" for head in heads)
     (tmp_path / "b_0.5A.csv").write_text(f"{line}\n{rows(*slow.T)}")
     assert len(import_files([tmp_path]).records) == count
+
+
+@pytest.mark.parametrize(("older", "refused"), [((0.25, 0.45), []), ((0.35, 0.45, 0.6), ["run_1", "run_2", "run_3"])])
+def test_two_versions_of_a_plan_are_not_taken_for_one(tmp_path, older, refused):
+    """What differs a little is told; where one test differs by more, the others are of another version, too."""
+    newer = (0.25, 0.5, 1.0)[: len(older)]
+    write_tests(tmp_path, newer)
+    for name, currents_of in (("plan_v1.csv", older), ("plan_v2.csv", newer)):
+        rows_of = "".join(f"run_{n},{current}\n" for n, current in enumerate(currents_of, 1))
+        (tmp_path / name).write_text(f"Test,Current (A)\n{rows_of}")
+    result = import_files([tmp_path])
+    assert sorted(Path(refusal.file).stem for refusal in result.refusals) == refused
+    assert {refusal.error.code for refusal in result.refusals} <= {"E_CURRENT_CONTRADICTS"}
+    told = [finding.text for record in result.records for finding in record.findings]
+    assert any("plan_v2.csv" in text and "gives 0.5 A, run_2 has 0.45 A" in text for text in told) == (not refused)
+
+
+def test_counts_of_a_converter_are_asked_for_their_scale_and_offset(tmp_path):
+    counts = [np.round(4096 + 200 * X), np.round(4096 + 8 * force(0.5))]
+    (tmp_path / "a_0.5A.csv").write_text("t_s,lvdt_adc,load_adc\n" + rows(T, *counts))
+    remedies = [refusal.error.remedy for refusal in import_files([tmp_path]).refusals]
+    assert all("offset = ... (value at zero counts)" in remedy for remedy in remedies)
+    offsets = "[channels.displacement]\ncolumn = 2\nunit = 'mm'\nscale = 0.005\noffset = -20.48\n"
+    offsets += "[channels.force]\ncolumn = 3\nunit = 'N'\nscale = 0.125\noffset = -512\n"
+    (record,) = import_files([tmp_path], parse_profile(offsets)).records
+    np.testing.assert_allclose(record.force, force(0.5), atol=0.1)

@@ -27,6 +27,7 @@ from mrdamper.rig_files.conditions import (
     named_after_currents,
     stated_by_lines,
     stated_in_titles,
+    states_other,
 )
 from mrdamper.rig_files.profile import Profile, current_in_name
 from mrdamper.rig_files.readers.base import RawTable
@@ -248,6 +249,16 @@ def with_stated_current(record: Record, current: float, whence: str, where: str,
     doubt = None if own else record.doubt  # of two statements, one of the user's table among them, this one agrees
     channel = constant(current, record.time)
     return replace(record, current=channel, findings=findings, provenance=provenance, doubt=doubt)
+
+
+def other_statement(record: Record, current: float, whence: str, where: str) -> ColumnError | None:
+    """Return the error for a stated current [A] that is another number than the one stated for the record, or None."""
+    own = record.provenance.get("current_from", "")
+    mean = float(np.mean(record.current)) if own and record.current is not None else current
+    if not states_other(mean, current):
+        return None
+    problem = printable(f"{whence} gives {current:g} A, {record.id} has {mean:g} A ({own})")
+    return ColumnError(problem, where=printable(where), remedy=_DECIDE, code="E_CURRENT_CONTRADICTS")
 
 
 def with_decided_current(record: Record, current: float, table: str, line: int) -> Record:

@@ -46,6 +46,7 @@ _PHASES = (frozenset("UVW"), frozenset("RST"), frozenset(("L1", "L2", "L3")))  #
 _INDEX, _MEASURED = words("sample"), words("measured")
 _AROUND_UNITS = words("around_units")
 _TIMES = re.compile(r"(?i)(?<!\w)multipl(?:y|ie[ds]?|ier|iz|ic|ik)\w*")  # no multiple, no multiplexer
+_CONVERTER = re.compile(r"(?i)(?<![a-z])(?:adc|counts?|raw|cnts?)(?![a-z])")  # of a converter
 _FACTOR = re.compile(r"(?<![\w.,])[0-9]+(?:[.,][0-9]+)?(?!\w)")
 
 
@@ -406,6 +407,8 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
         unit = unit or unknown_unit(table.names[column])
         problem = f"{named} has no unit" if not unit else f"{named} has the unit {unit!r}, which is not known"
         remedy = f'write it into the header, or set [channels.{role}] unit = "..." in a profile'
+        if _CONVERTER.search(table.names[column]):
+            remedy += ", with scale = ... (unit per count) and offset = ... (value at zero counts) of a converter"
         return _refusal(UnitError, table, problem, remedy, "E_UNITS_MISSING")
     if parsed.dimension == DIMENSION[role]:
         return None

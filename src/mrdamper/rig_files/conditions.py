@@ -29,6 +29,7 @@ from mrdamper.rig_files.text.tokens import MONTHS
 
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
 _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it
+_SAME_A, _SAME = 0.01, 0.02  # and two numbers written for one current
 _IN_NAME = re.compile(
     r"(?<![0-9A-Za-z.])(?<![0-9],)"  # 0.5 A,1 A are two
     r"(?:(?:[iI](?:_?(?:[cC]oil|[sS]pule))?|(?:[sS]pulen|[cC]oil)?(?:[sS]trom|[cC]urr(?:ent)?|[cC]ur))(?: ?= ?)?)?"
@@ -422,6 +423,11 @@ def _value(number: str, decimal: str | None) -> float | None:
 def contradicts(one: float, other: float) -> bool:
     """Tell if a nominal and a measured current [A] contradict; a dash before a number may be a sign or none."""
     return abs(abs(one) - abs(other)) > _AGREE_A + _AGREE * min(abs(one), abs(other))
+
+
+def states_other(one: float, other: float) -> bool:
+    """Tell if two statements of a current [A] are of different numbers."""
+    return abs(abs(one) - abs(other)) > _SAME_A + _SAME * min(abs(one), abs(other))
 
 
 def day_in(text: str) -> tuple[str, str] | None:

@@ -25,7 +25,7 @@ _MOST_COLUMNS, _MOST_REMARKS, _MOST_NAMES = 40, 6, 3  # of a tree that is shown
 _SECTIONS = re.compile(r"\[((?:channels\.\w+)|file)\]((?:(?!\[(?:channels|file|current)).)*)")
 _KEYS = {
     "file": ("sample_rate_Hz", "leave_out", "blocks"),
-    "channels": ("column", "unit", "scale", "sign", "file"),
+    "channels": ("column", "unit", "scale", "offset", "sign", "file"),
 }
 _MEANT = {
     "sample_rate_Hz": "  # if the rows are samples at a fixed rate",

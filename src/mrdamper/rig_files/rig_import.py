@@ -19,7 +19,13 @@ from mrdamper.data.displayable import Displayable
 from mrdamper.data.progress import Progress, silent
 from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
-from mrdamper.rig_files.coil_current import as_data, require_current, with_current_behind_label, with_stated_current
+from mrdamper.rig_files.coil_current import (
+    as_data,
+    other_statement,
+    require_current,
+    with_current_behind_label,
+    with_stated_current,
+)
 from mrdamper.rig_files.file_records import files_in, records_of_file, unpacked
 from mrdamper.rig_files.mapping import plans
 from mrdamper.rig_files.mapping.companions import holds_channels, is_helper, is_list, joined_files, number_of, part_of
@@ -328,7 +334,10 @@ class _Intake:
             refused = dict.fromkeys(range(len(own)), other) if own[0][0] == path else {}
         answers = [self._table.path.name] if self._table else []
         answers += ["profile"] if other else []
+        near = dict[int, ColumnError]()
         for i, ((file, record), (current, whence)) in enumerate(zip(own, stated or (), strict=False)):
+            if (error := other_statement(record, current, whence, file.name)) is not None:
+                near[i] = error
             try:
                 with_stated_current(record, current, whence, file.name)
             except InputError as error:
@@ -339,6 +348,11 @@ class _Intake:
                     refused[i] = error
                     doubtful = replace(record, doubt=error)
                     self.unchecked = [(p, doubtful if r.id == record.id else r) for p, r in self.unchecked]
+        if contradicted := [i for i, error in refused.items() if error.code == "E_CURRENT_CONTRADICTS"]:
+            refused = near | refused  # a plan of another version
+        for i in {*near} - {*contradicted}:
+            note = Finding("W_CHOSEN", f"of two statements the first is taken: {near[i].found}")
+            self._found = [(p, r.noticed(note) if r is own[i][1] else r) for p, r in self._found]
         self._refuse({tests[i][0]: error for i, error in refused.items()})
         if path != self._plan:
             self._cut(path, remarks, [test for i, test in enumerate(own) if i not in refused])
