@@ -1562,3 +1562,18 @@ def test_counts_of_a_converter_are_asked_for_their_scale_and_offset(tmp_path):
     offsets += "[channels.force]\ncolumn = 3\nunit = 'N'\nscale = 0.125\noffset = -512\n"
     (record,) = import_files([tmp_path], parse_profile(offsets)).records
     np.testing.assert_allclose(record.force, force(0.5), atol=0.1)
+
+
+@pytest.mark.parametrize("filled", [None, '"', "ditto"])
+def test_a_plan_in_a_workbook_may_merge_cells_or_repeat_by_ditto_marks(tmp_path, filled):
+    write_tests(tmp_path, (0.25, 0.25, 0.5, 0.5), "B-0{}.csv")
+    book = pytest.importorskip("openpyxl").Workbook()
+    sheet = book.active
+    for row in (["Structures Lab"], [], ["Test", "Coil current (A)", "Freq. (Hz)"], ["B-01", 0.25, 1],
+                ["B-02", filled, 1], ["B-03", 0.5, 1], ["B-04", filled, 1]):  # fmt: skip
+        sheet.append(row)
+    if filled is None:
+        for cells in ("A1:C1", "B4:B5", "B6:B7"):
+            sheet.merge_cells(cells)
+    book.save(tmp_path / "log sheet.xlsx")
+    assert by_id(import_files([tmp_path])) == {"B-01": 0.25, "B-02": 0.25, "B-03": 0.5, "B-04": 0.5}

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import datetime
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.profile import FileForm
@@ -16,6 +17,8 @@ from mrdamper.rig_files.readers.delimited import DelimitedText
 
 _COMPOUND = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"  # Excel up to 2003
 _FEWEST = 2  # columns of a test: a displacement and a force
+_DITTO = frozenset(('"', "''", "″", "〃", '-"-', "do.", "ditto", "dto.", "idem"))  # as the cell above
+_Range = tuple[tuple[int, int], tuple[int, int]]  # row and column of the first and of the last cell
 _LARGEST_WHOLE = 1e15  # below, every whole number is a double
 _NOTES = 4096  # bytes of a sheet without a test in which conditions of the others may stand
 _FLAT = str.maketrans({"\t": " ", "\n": " ", "\r": " ", '"': "''", "\0": " "})
@@ -87,12 +90,29 @@ def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
     texts = []
     for name in names if form.sheet is None else [form.sheet]:
         sheet = book.get_sheet_by_name(name)
-        text = replace(as_text(source, name, sheet.iter_rows()), before=sheet.start[1] if sheet.start else 0)
+        start = sheet.start or (0, 0)
+        rows = _filled_down(sheet.iter_rows(), start, sheet.merged_cell_ranges or ())
+        text = replace(as_text(source, name, rows), before=start[1])
         if text.size:
             texts.append((name, text))
     if not texts:
         raise source.refuse("E_NO_DATA", "the sheets are empty", "export the file again")
     return texts
+
+
+def _filled_down(rows: Iterable[list], start: tuple[int, int], merged: Iterable[_Range]) -> Iterator[list]:
+    """Yield rows in which a cell merged with that above, or with a ditto mark, holds what that above holds."""
+    below = {
+        (row, left) for (top, left), (bottom, right) in merged if left == right for row in range(top + 1, bottom + 1)
+    }
+    numbers, above = {row for row, _ in below}, list[Any]()
+    for number, row in enumerate(rows, start[0]):
+        if number in numbers or not _DITTO.isdisjoint(row):
+            for i, cell in enumerate(row[: len(above)]):
+                if (number, start[1] + i) in below or (isinstance(cell, str) and cell in _DITTO):
+                    row[i] = above[i]
+        above = row
+        yield row
 
 
 def as_text(source: Source, title: str, rows: Iterable[list]) -> Source:
