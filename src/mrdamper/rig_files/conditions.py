@@ -16,6 +16,7 @@ from typing import NamedTuple
 from mrdamper.rig_files.column_names import (
     COIL,
     RATING,
+    TABLES,
     Unit,
     holds,
     meanings,
@@ -86,6 +87,11 @@ _MOTIONS = {  # an id has 0_5_Hz of the title 0,5 Hz
     unit: re.compile(rf"(?<![\d.,xX])(?<!\d[pP])(?<!\D0_)(\d{{1,4}}(?:[.,xpXP]\d{{1,4}})?)[ _]?{behind}")
     for unit, behind in (("Hz", "(m?)(?i:hz(?![a-z]))"), ("mm", "(?i:mm)()(?![A-Za-z/]|[ _]?[sS])"))  # MHz: a clock
 }
+_AMPERES = {  # in other scripts; a small letter counts tests: тест 5 а
+    unit: "|".join(f"(?i:{name})" if len(name) > 1 else name.upper() for name in names if not name.isascii())
+    for unit, names in TABLES["unit_names"].items() if unit in ("A", "mA")
+}  # fmt: skip
+_OTHER_SCRIPT = re.compile(rf"(?<=[0-9])\s?(?:(?P<mA>{_AMPERES['mA']})|(?P<A>{_AMPERES['A']}))(?!\w)")
 _SAMPLING = "|".join(words("sampling"))
 _RATE = re.compile(rf"{_SAMPLING}|messrate|^(?:data )?rate$|scan|acquisition|^fs$|^f_s$", re.IGNORECASE)
 OTHER_DEVICE = re.compile("|".join(words("other_device")), re.IGNORECASE)
@@ -144,6 +150,7 @@ def currents_in(text: str) -> tuple[float, ...]:
     none, nor does what stands beside a fuse, a supply or a limit.
     """
     text = unicodedata.normalize("NFKC", text[:255]).replace("−", "-")
+    text = _OTHER_SCRIPT.sub(lambda match: f" {match.lastgroup}", text)
     if behind_digits(text) or _LABELLED_RATING.search(text):
         return ()
     # 04A may be four or 0.4 amperes; 0400mA is padded.
