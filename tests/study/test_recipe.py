@@ -295,6 +295,23 @@ def test_a_recipe_that_depends_on_the_runs_is_completed_by_them():
     assert completed.for_runs("ab").notes == ("a", "b")
 
 
+def test_a_study_follows_the_studied_models_the_published_method_and_the_model_asked_for():
+    def names(train, everything, model=None):
+        return [recipe.name for recipe, _ in recipes.recipes_of_study(train, everything, None, model)]
+
+    studied = [f"{name}{way}" for name in recipes.STUDIED for way in ("", ":joint", ":current")]
+    whole = list(recipes.WHOLE_DAMPER)
+    assert names(TRAIN, TRAIN) == [*studied, "paper", *whole]
+    assert names(TRAIN[:3], TRAIN[:3]) == [*studied, "paper", *whole]
+    assert names(TRAIN[:2], TRAIN[:2]) == [*studied, *whole]
+    assert names(TRAIN, TRAIN, "bouc-wen") == [*studied, "paper", *whole]  # genetic searches are asked for by name
+    assert names(TRAIN, TRAIN, "dahl") == [*studied, "dahl", "dahl:joint", "paper", *whole]
+    assert names(TRAIN, TRAIN, "dahl:joint") == [*studied, "dahl:joint", "paper", *whole]
+    records = [noise_record(15.0), replace(noise_record(15.0), id="other")]
+    assert names([], records) == [f"{name}:current" for name in recipes.STUDIED] + whole
+    assert names([], records[:1]) == whole
+
+
 def test_a_study_method_has_its_options_from_text_and_the_gas_that_is_known():
     gas = GasSpring(1.5e6, 1.5e-4, 3e-4)
     assert recipes.study_method("paper", {"n": "3", "phase": "peaks"}, gas) == PaperOptions(gas, n=3.0, phase="peaks")
