@@ -55,6 +55,6 @@ def test_a_force_that_takes_no_energy_has_no_energy_error():
 
 
 def test_the_share_of_variance_explained_and_none_of_what_does_not_vary():
-    values = np.array([-4.0, 1.0, 3.0])
-    assert metrics.explained_variance(values, values + np.array([0.5, -0.5, 1.0])) == pytest.approx(1 - 1.5 / 26, rel=1e-12)
+    values, errors = np.array([-4.0, 1.0, 3.0]), np.array([0.5, -0.5, 1.0])
+    assert metrics.explained_variance(values, values + errors) == pytest.approx(1 - 1.5 / 26, rel=1e-12)
     assert np.isnan(metrics.explained_variance(np.full(3, -2.0), np.array([-2.0, -1.0, -2.0])))
