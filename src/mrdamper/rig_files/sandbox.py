@@ -36,7 +36,7 @@ from mrdamper.rig_files.readers.base import (
 )
 from mrdamper.rig_files.record import Finding
 
-_SECONDS = 0.6  # processor time of the child for the smallest file; a busy machine makes three of each second
+_SECONDS = 2.0  # processor time of the child for the smallest file: a busy machine counts several seconds for one
 _BYTES, _BYTES_PER_BYTE = 96 * 2**20, 3 * MOST_RATIO  # memory the child may write to beyond what its library holds
 _GLANCE, _GLANCES = 0.15, 4  # seconds between looks at a silent child, looks at which it sleeps until it is ended
 _PATIENCE = 30  # real time over processor time, on a loaded machine
