@@ -180,6 +180,9 @@ def test_bands_by_the_command_line(tmp_path):
     assert set(printed["bands"]["measures"]) == set(printed["measures"])
     assert "95 %" in (tmp_path / "ride/measures.csv").read_text()
     assert "5 draws" in (tmp_path / "ride/simulation.html").read_text()
+    read = CliRunner().invoke(application(), command[:-2]).output.split("draws of the parameters")[1]
+    ends = [1e3 * printed["bands"]["peak_drift_m"][end][0] for end in (0, -1)]
+    assert f"travel       drift {ends[0]:9.3f} to {ends[1]:.3f} mm" in read
 
 
 def test_rise_times_are_those_of_the_coil():

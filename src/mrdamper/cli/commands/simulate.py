@@ -220,6 +220,8 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
             f"  {name:12} x {1e3 * low[x][i]:9.3f} to {1e3 * high[x][i]:.3f} mm   "
             f"a {low[a][i]:8.3f} to {high[a][i]:.3f} m/s²"
         )
+    for i, name in enumerate(done.system.spans):
+        typer.echo(f"  {name:12} drift {1e3 * low['drift_m'][i]:9.3f} to {1e3 * high['drift_m'][i]:.3f} mm")
     for i, link in enumerate(done.dampers):
         typer.echo(f"  {link.name:12} F {low['force_N'][i]:9.1f} to {high['force_N'][i]:.1f} N")
     if bands.step_change > HALVING:

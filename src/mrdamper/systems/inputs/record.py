@@ -85,8 +85,9 @@ def record(
         raise UnitError(f"quantity {quantity!r}", where=where, remedy=f"one of {', '.join(_COLUMNS)}")
     if time.size < 3:
         raise RecordError(counted(time.size, "sample"), where=where, remedy="give at least three")
-    if not (np.isfinite(time).all() and np.isfinite(values).all()):
-        raise RecordError("not every number is finite", where=where, remedy="remove or fill those rows")
+    if (missing := np.flatnonzero(~(np.isfinite(time) & np.isfinite(values)))).size:
+        problem = f"no number in {counted(missing.size, 'sample')}, the first of them sample {missing[0] + 1}"
+        raise RecordError(problem, where=where, remedy="fill them by interpolation: the steps have to be equal")
     if not (np.isfinite(time_scale) and time_scale > 0):
         raise RecordError(f"time scale {time_scale:g}", where=where, remedy="give a positive number")
     steps = np.diff(time)
