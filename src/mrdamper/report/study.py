@@ -177,7 +177,7 @@ def _shown(rig: RigStudy) -> list[Any]:
 def _measured(rig: RigStudy) -> dict[str, Characteristics]:
     """Characterise the tests without a model; empty if no run has a steady cycle."""
     try:
-        return {rig.dataset.name: characterise_usable(rig.dataset)}
+        return {rig.dataset.name: characterise_usable(rig.dataset, compared=True)}
     except IdentificationError:
         return {}
 

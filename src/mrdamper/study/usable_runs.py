@@ -177,9 +177,10 @@ def usable_sines(dataset: Dataset, clipped: bool = False) -> tuple[list[Run], di
     return sines, refused
 
 
-def characterise_usable(dataset: Dataset) -> Characteristics:
+def characterise_usable(dataset: Dataset, compared: bool = False) -> Characteristics:
     """Characterise the sound runs of one damper, those that contradict the others apart; the reasons are kept.
 
+    A dataset that was `compared` before, as that of a study, has none that contradict.
     If runs contradict each other as those of two dampers do, all sound ones count. Raises `IdentificationError` as
     `characterise`.
     """
@@ -190,7 +191,7 @@ def characterise_usable(dataset: Dataset) -> Characteristics:
         except InputError as error:
             refused[run.id] = _reason(error, run)
     with suppress(ContradictionError):
-        refused |= {one.run_id: str(one) for one in compare_runs(kept).contradictions}
+        refused |= {} if compared else {one.run_id: str(one) for one in compare_runs(kept).contradictions}
     measured = characterise([run for run in dataset if run.id not in refused])
     return replace(measured, passed_over={**refused, **measured.passed_over})
 
