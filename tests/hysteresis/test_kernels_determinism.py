@@ -1,6 +1,5 @@
 """The same bits whatever number of threads the linear algebra is given."""
 
-import importlib.util
 import io
 import os
 import subprocess
@@ -8,7 +7,6 @@ import sys
 from contextlib import redirect_stdout
 
 import numpy as np
-import pytest
 
 from mrdamper.fleet import job
 from mrdamper.fleet.item import FleetError, Item
@@ -29,7 +27,6 @@ print(hashlib.sha256(b"".join(np.ascontiguousarray(b).tobytes() for b in bits)).
 """
 
 
-@pytest.mark.skipif(importlib.util.find_spec("threadpoolctl") is None, reason="threads are held by threadpoolctl")
 def test_one_and_two_threads_give_the_same_bits():
     """This process has one: tests/conftest.py."""
     environment = {**os.environ, "OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"}
@@ -39,7 +36,6 @@ def test_one_and_two_threads_give_the_same_bits():
     assert printed.getvalue() == done.stdout
 
 
-@pytest.mark.skipif(importlib.util.find_spec("threadpoolctl") is None, reason="threads are held by threadpoolctl")
 def test_the_number_of_threads_is_given_back():
     np.linalg.inv(np.eye(2))
     before = _threads()
@@ -49,7 +45,6 @@ def test_the_number_of_threads_is_given_back():
     assert set(on_one_blas_thread(_threads)()) == {1}
 
 
-@pytest.mark.skipif(importlib.util.find_spec("threadpoolctl") is None, reason="threads are held by threadpoolctl")
 def test_a_job_of_a_fleet_uses_one_thread(monkeypatch):
     """Also in a worker of a cluster, whose environment may allow more."""
     from threadpoolctl import threadpool_limits

@@ -1,4 +1,4 @@
-"""Classes that a script registers: what they may leave out, what is refused, and studies in one process."""
+"""Classes that a script registers: what they may omit, what is refused, and studies in one process."""
 
 import json
 import subprocess
@@ -47,14 +47,19 @@ def test_a_length_or_a_velocity_is_searched_without_a_word_about_its_limits():
     assert model.fy == pytest.approx(truth.fy, rel=0.05)
 
 
+def refused(cls):
+    with pytest.raises(ParameterError) as caught:
+        identify(recorded(Smooth(c=800.0, fy=300.0, vs=0.004)), cls)
+    return str(caught.value)
+
+
 def test_a_parameter_that_is_neither_linear_nor_limited_is_refused_with_what_to_write():
     @dataclass(frozen=True)
     class Unlimited(Smooth):
         name: ClassVar[str] = "unlimited"
         k: float = param("N/m", "stiffness", default=0.0)
 
-    with pytest.raises(ParameterError, match="k has no limits for a search; mark it linear=True"):
-        identify(recorded(Smooth(c=800.0, fy=300.0, vs=0.004)), Unlimited)
+    assert "k has no limits for a search; mark it linear=True" in refused(Unlimited)
 
 
 def test_a_linear_parameter_has_no_search_axis():
@@ -66,8 +71,7 @@ def test_a_linear_parameter_has_no_search_axis():
         def search_axes(cls, scale: Scale, free):
             return tuple(SearchAxis(name, 1e-3, 1e3, (1.0,), log=True) for name in free)
 
-    with pytest.raises(ParameterError, match="search axes of linear parameters: c, fy"):
-        identify(recorded(Smooth(c=800.0, fy=300.0, vs=0.004)), Twice)
+    assert "search axes of linear parameters: c, fy" in refused(Twice)
 
 
 def test_a_class_without_a_title_is_refused():

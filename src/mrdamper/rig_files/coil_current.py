@@ -238,9 +238,7 @@ def with_stated_current(record: Record, current: float, whence: str, where: str,
     own = record.provenance.get("current_from", "")
     mean = None if record.current is None else contradicted(record.current, current)
     if mean is not None:
-        problem = printable(f"{whence} gives {current:g} A, {record.id} has {mean:g} A ({own or 'current channel'})")
-        remedy = _DECIDE if own else f"correct {whence}; {_CHANNEL_WRONG}"
-        raise ColumnError(problem, where=printable(where), remedy=remedy, code="E_CURRENT_CONTRADICTS")
+        raise _two_statements(record, mean, current, whence, where)
     if record.current is not None and not own:
         return record
     findings = tuple(finding for finding in record.findings if not finding.text.startswith(NO_CHANNEL))
@@ -255,10 +253,15 @@ def other_statement(record: Record, current: float, whence: str, where: str) -> 
     """Return the error for a stated current [A] that is another number than the one stated for the record, or None."""
     own = record.provenance.get("current_from", "")
     mean = float(np.mean(record.current)) if own and record.current is not None else current
-    if not states_other(mean, current):
-        return None
-    problem = printable(f"{whence} gives {current:g} A, {record.id} has {mean:g} A ({own})")
-    return ColumnError(problem, where=printable(where), remedy=_DECIDE, code="E_CURRENT_CONTRADICTS")
+    return _two_statements(record, mean, current, whence, where) if states_other(mean, current) else None
+
+
+def _two_statements(record: Record, mean: float, current: float, whence: str, where: str) -> ColumnError:
+    """Return the error for a stated current where the record has another [A]."""
+    own = record.provenance.get("current_from", "")
+    problem = printable(f"{whence} gives {current:g} A, {record.id} has {mean:g} A ({own or 'current channel'})")
+    remedy = _DECIDE if own else f"correct {whence}; {_CHANNEL_WRONG}"
+    return ColumnError(problem, where=printable(where), remedy=remedy, code="E_CURRENT_CONTRADICTS")
 
 
 def with_decided_current(record: Record, current: float, table: str, line: int) -> Record:

@@ -239,7 +239,7 @@ class _Intake:
     def _check(self, path: Path, record: Record, *, several: bool) -> None:
         """Check a test that the profile does not leave out: only here, as plans count those that it does."""
         if self._profile.leaves_out(*path.parts, record.id):
-            self.omitted[Path(record.id)] = "left out by the profile"
+            self.omitted[Path(record.id)] = "omitted by the profile"
             return
         self.unchecked.append((path, record))
         checked, problems = record, list[InputError]()
@@ -477,7 +477,7 @@ class _Intake:
         """Refuse currents of two digits in names, where another name of the set begins such a number with a zero."""
         if not any(_PADDED.search(path.name) for path in self._order):
             return
-        problem = "a current of two digits, beside names such as 05A: is the decimal point left out?"
+        problem = "a current of two digits, beside names such as 05A: is the decimal point missing?"
         remedy = "write the currents into tests.csv (--write-tests)"
         error = ColumnError(problem, remedy=remedy, code="E_AMBIGUOUS")
         self._refuse({i: error for i, (file, _) in enumerate(self.tests()) if _TWO_DIGITS.search(file.name)})

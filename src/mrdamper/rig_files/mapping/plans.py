@@ -260,14 +260,14 @@ def cut_to_windows(path: Path, results: Results | None, tests: _Tests) -> dict[i
     cut = within_ranges(tests, results)
     if len(cut) == len(tests) and any(own[1] is not other[1] for own, other in zip(cut, tests, strict=True)):
         return {i: part for i, (_, part) in enumerate(cut) if part.time.size < tests[i][1].time.size}
-    by_rows, windows = results.ranges if results and len(cut) == len(tests) else (False, [])
-    numbered = replace(results, current=tuple(map(float, range(len(windows)))), of_supply=False) if results else None
-    rows = [int(row) for row, _ in currents_beside(path, numbered, tests) or ()] if windows else []
-    inside = dict[int, slice]()
-    for i, (row, (_, record)) in enumerate(zip(rows, tests, strict=False)):
-        clock = np.arange(1, record.time.size + 1) if by_rows else record.time
-        if by_rows and record.lines is not None and min(begin for begin, _ in windows) >= record.lines[0]:
-            clock = record.lines
+    if results is None or len(cut) != len(tests) or not (windows := results.ranges[1]):
+        return {}
+    rows, clocks, inside = (
+        rows_beside(path, results, tests),
+        results.clocks([of for _, of in tests]),
+        dict[int, slice](),
+    )
+    for i, (row, clock) in enumerate(zip(rows, clocks, strict=False)):
         (begin, end), slack = windows[row], _SLACK * (clock[-1] - clock[0])
         if clock[0] - slack <= begin < end <= clock[-1] + slack:
             inside[i] = slice(int(np.searchsorted(clock, begin)), int(np.searchsorted(clock, end, side="right")))

@@ -179,7 +179,7 @@ class Results:
         after each other; or each row has a test, and others have none.
         """
         windows, parts = self.ranges[1], list[tuple[int, int, slice]]()
-        for test, clock in enumerate(self._clocks(tests) if windows else ()):
+        for test, clock in enumerate(self.clocks(tests) if windows else ()):
             inside = [slice(np.searchsorted(clock, a), np.searchsorted(clock, b, side="right")) for a, b in windows]
             covered = [clock[s.stop - 1] - clock[s.start] if s.stop > s.start else 0 for s in inside]
             own = [row for row, of in enumerate(covered) if of > 0.5 * (windows[row][1] - windows[row][0]) > 0]
@@ -193,19 +193,19 @@ class Results:
     def on_clock(self, tests: Sequence[Record]) -> bool:
         """Tell if the rows state different ranges, one of them within a test or in another order than that of time."""
         windows = self.ranges[1]
-        ends = [(clock[0], clock[-1]) for clock in self._clocks(tests) if clock.size]
+        ends = [(clock[0], clock[-1]) for clock in self.clocks(tests) if clock.size]
         within = any(first < end and begin < last for first, last in ends for begin, end in windows)
         return len({*windows}) > 1 and (within or windows != sorted(windows))
 
-    def _clocks(self, tests: Sequence[Record]) -> list[np.ndarray]:
-        """Return what the ranges count in, by test: its times, or the lines of its samples, if it has them.
+    def clocks(self, tests: Sequence[Record]) -> list[np.ndarray]:
+        """Return what the ranges count in, by test: its times, or the lines of its samples.
 
-        A range that begins before the first sample's line counts the samples.
+        They count the samples where these have no lines, or a range begins before the first of them.
         """
         by_rows, windows = self.ranges
         if not by_rows:
             return [record.time for record in tests]
-        lines = [np.empty(0) if record.lines is None else record.lines for record in tests]
+        lines = [np.arange(1, r.time.size + 1) if r.lines is None else r.lines for r in tests]
         first = min((of[0] for of in lines if of.size), default=1)
         return [of - (first - 1) if min(windows)[0] < first else of for of in lines]
 

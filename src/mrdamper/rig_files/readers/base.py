@@ -141,9 +141,9 @@ class RawTable:
     chosen: Mapping[str, int] = field(default_factory=dict)  # columns by channel that the samples decide on
     calibrated: frozenset[str] = frozenset()  # channels whose scale the profile states
     stated_in: str = ""  # where a constant that was added on that way stands
-    repeated: frozenset[str] = frozenset()  # names that several columns of the file have, some of them left out
+    repeated: frozenset[str] = frozenset()  # names that several columns of the file have, of which a test may have one
     damper: str = ""  # where columns of several dampers stand beside each other, its name
-    numbers: tuple[int, ...] = ()  # of the columns in their file, where others were left out or stood before them
+    numbers: tuple[int, ...] = ()  # of the columns in their file, where the test has not all of them
 
     @cached_property
     def headers(self) -> tuple[Header, ...]:
@@ -167,7 +167,7 @@ class RawTable:
         return tuple(stated_quantities(self.remarks, self.constants, self.decimal))
 
     def number(self, column: int) -> int:
-        """Return the number of a column in the file, counted from one, whatever was left out before it."""
+        """Return the number of a column in the file, counted from one."""
         return self.numbers[column] if self.numbers else column + 1
 
     def title(self, column: int) -> str:
