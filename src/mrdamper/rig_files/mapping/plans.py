@@ -36,6 +36,7 @@ _DECIMAL_CODE = re.compile(r"(?<![a-z])[a-z]{1,6}[0-9]+\.[0-9]+(?![0-9])")
 _SCHEME = re.compile(r"[\w.,+=-]*(?:<[^<>]{1,60}>[\w.,+=-]*)+")  # MRD_A<amplitude in mm>_I<coil current in A>.csv
 _ATTACHED, _JOINED = re.compile(r"(?<=\w)[(\[{]([^()\[\]{}<>]{1,60})[)\]}]"), re.compile(r"\w[(\[{][^_]*[)\]}]_")
 _PLACE = re.compile(r"[\s*`-]*([^\W\d_]{1,12})`?(?:\s*[=:]|\s+[-–]\s|\s{2,})\s*([^\s<>][^<>]{0,58}[^\s<>])\s*$")
+_NUMBERS = re.compile(r"[\W\d_]*")
 _SCHEME_NUMBER = re.compile(r"[0-9]+(?:[.,xp][0-9]+)?")
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
 _DISCARDED, _DISCARDED_FLAG, _NOT_DISCARDED = (
@@ -134,7 +135,7 @@ def _by_legend(lines: Sequence[str], tests: _Tests) -> list[tuple[float, str]]:
         parts = re.split(r"\s*[;|]\s*|,\s+(?![^()]*\))|[.:]\s+(?=\w+ ?=)", line)
         matches = [m for m in map(_LEGEND.match, parts) if m and (not m[2] or role_of(m[2]) == "current")]
         legends = [(name, amperes(m[3], m[4])) for m in matches for name in _meant(m[1], called)]
-        rating = RATING.search(line) is not None
+        rating = not _NUMBERS.fullmatch(line) and RATING.search(line) is not None  # a record has many rows of numbers
         stated |= {*legends} if not (rating or ratings) else set()
         if line.strip() and not legends:  # a heading: Fuses
             ratings = rating
@@ -357,7 +358,8 @@ def _fields(lines: Sequence[str], tests: _Tests) -> Iterator[tuple[Header, list[
     names = [name for line in lines for name in re.findall(r"\w+_[\w.]+", line) if meant]
     schemes = [re.sub("[^\\W\\d_]+", lambda m: meant.get(m[0], m[0]), name) for name in names]
     schemes += [_ATTACHED.sub(r"<\1>", line) if _JOINED.search(line) else line for line in lines]
-    for parts in (re.split("<([^<>]*)>", m[0].rstrip(".,")) for scheme in schemes for m in _SCHEME.finditer(scheme)):
+    stated = [match[0].rstrip(".,") for scheme in schemes if "<" in scheme for match in _SCHEME.finditer(scheme)]
+    for parts in (re.split("<([^<>]*)>", scheme) for scheme in stated):
         pattern = "".join("([^_]+?)" if i % 2 else re.escape(part) for i, part in enumerate(parts))
         matches = [re.fullmatch(pattern, file.stem) or re.fullmatch(pattern, file.name) for file, _ in tests]
         texts = zip(*(m.groups() for m in matches if m), strict=True) if all(matches) else ()

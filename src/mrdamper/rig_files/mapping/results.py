@@ -406,6 +406,8 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
 
 def _headings(row: list[str]) -> list[str]:
     """Return a row of names whose units in small letters are written as such: coil_current_a."""
+    if not any(cell[-2:-1] == "_" for cell in row):  # of a record nearly every row, and looking up names takes long
+        return row
     headers = headers_of(row, [""] * len(row))
     units = [header.unit if header != split_name(cell) else "" for cell, header in zip(row, headers, strict=True)]
     return [f"{cell[:-2]} [{unit}]" if unit else cell for cell, unit in zip(row, units, strict=True)]
