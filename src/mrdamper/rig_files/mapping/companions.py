@@ -182,14 +182,14 @@ def is_helper(path: Path, files: Collection[Path]) -> bool:
     Nor does a line of it head two of the columns that a record has.
     """
     others = [other for other in files if other != path]
-    called = {re.sub("[0-9]+", "0", other.stem) for other in others}
     lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
-    words = 0 < len(lines) < _FEWEST_ROWS and re.search(r"[^\W\d_]", lines[0]) is not None
-    if not words or not others or re.sub("[0-9]+", "0", path.stem) in called:
+    alike = re.sub("[0-9]+", "0", path.stem) in {re.sub("[0-9]+", "0", other.stem) for other in others}
+    if not others or alike or not 0 < len(lines) < _FEWEST_ROWS or not re.search(r"[^\W\d_]", lines[0]):
         return False
     cells = [[cell.strip() for cell in re.split(r"[,;\t|]", line)] for line in lines]
     roles = [{item_of(cell).role for cell in of if not is_unit(cell)} for of in cells]
-    return all(len(of & {*REQUIRED}) <= 1 for of in roles) and _first_line(path) not in map(_first_line, others)
+    heads = any(len(of & {*REQUIRED}) > 1 for of in roles)
+    return not heads and _first_line(path) not in map(_first_line, others)
 
 
 def _first_line(path: Path) -> bytes:
