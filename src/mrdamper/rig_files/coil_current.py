@@ -170,9 +170,9 @@ def require_current(record: Record, path: Path = Path()) -> Record:
     raise ColumnError(
         (reasons or ["no coil current in a column, or in the name of the file or of its folder"])[0],
         where=Path(record.provenance.get("file", record.id)).name,
-        remedy=f"{first}write the currents into tests.csv (--write-tests), or set [current] "
-        f'pattern = "*_{{current}}A_*" and unit = "A", values = {{{value}}}, [channels.current] column = "..." or, '
-        "if all tests have one, [current] value = 0.5 in a profile",
+        remedy=f"{first}write the currents into tests.csv (--write-tests), or set one in a profile: either "
+        f'[channels.current] column = "...", or [current] pattern = "*_{{current}}A_*" and unit = "A", or [current] '
+        f"values = {{{value}}}, or, if all tests have one, [current] value = 0.5",
         code="E_CURRENT_MISSING",
     )
 
