@@ -408,6 +408,34 @@ def test_columns_without_names_that_a_sentence_lists_and_currents_of_the_names_o
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
 
 
+def test_a_readme_of_the_folder_that_is_read_states_units_and_keys_of_names_of_files_deep_in_it(tmp_path):
+    folder = tmp_path / "campaign" / "data" / "raw"
+    folder.mkdir(parents=True)
+    write(folder, "t,x,F\n")
+    for name, amperes in CURRENTS.items():
+        (folder / f"{name}.csv").rename(folder / f"{name}_I={amperes}_amp=12.0.csv")
+    columns = "Columns: `t` time in s, `x` piston displacement in mm, `F` damper force in N.\n"
+    (tmp_path / "campaign" / "README.md").write_text(f"Names: `I` coil current in A, `amp` amplitude in mm.\n{columns}")
+    require_the_tests(tmp_path / "campaign")
+    assert {refusal.error.code for refusal in import_files([folder]).refusals} == {"E_UNITS_MISSING"}
+
+
+@pytest.mark.parametrize(
+    ("header", "text"),
+    [
+        ("", "  coluna 1: tempo (s)\n  coluna 2: deslocamento (mm)\n  coluna 3: força (N)\n"),
+        ("Active channels: Time,ACT_Disp,ACT_Load\nChannel units: sec,mm,N\n", ""),
+    ],
+)
+def test_columns_without_names_that_lines_name_each_or_by_lists_of_names_and_of_units(tmp_path, header, text):
+    write(tmp_path, header)
+    for path in tmp_path.iterdir():
+        rows = path.read_text().removeprefix(header).replace(",", "\t")
+        path.write_text(header + rows)
+    (tmp_path / "LEIA-ME.txt").write_text(f"{text}m07 = 0.2 A, m08 = 0.9 A, m09 = 0 A\n", encoding="cp1252")
+    require_the_tests(tmp_path)
+
+
 def test_ranges_of_sensors_do_not_name_columns_without_names(tmp_path):
     write(tmp_path, "")
     (tmp_path / "README.md").write_text("Sensor ranges: time (s), displacement (mm), force (kN)\n")

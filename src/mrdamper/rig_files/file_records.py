@@ -22,7 +22,7 @@ from mrdamper.rig_files.column_names import COMPUTED, holds, words, words_of
 from mrdamper.rig_files.columns import assign, partly_assigned
 from mrdamper.rig_files.mapping.clocks import with_time_stated
 from mrdamper.rig_files.mapping.completion import completed
-from mrdamper.rig_files.mapping.description import with_description, with_notes
+from mrdamper.rig_files.mapping.description import READ_FOLDERS, with_description, with_notes
 from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_integrated_velocity, with_unit_of_time
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
 from mrdamper.rig_files.mapping.results import form_of_tests, with_results
@@ -195,6 +195,7 @@ def unpacked(paths: Iterable[str | Path]) -> Iterator[list[Path]]:
             members += [_folder_of(path, stack)] if _is_packed_folder(path) else [path]
             inside = sorted(path.rglob("*")) if path.is_dir() else ()
             members += [_folder_of(archive, stack) for archive in inside if _is_packed_folder(archive)]
+        stack.callback(READ_FOLDERS.reset, READ_FOLDERS.set(members))
         yield members
 
 

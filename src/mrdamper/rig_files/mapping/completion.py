@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import accumulate
 from pathlib import Path
@@ -233,7 +233,9 @@ def _with_listed_names(table: RawTable) -> RawTable:
             texts[what][int(match["number"])] = match["value"]
     width = range(1, len(table.names) + 1)
     if any(i not in texts["name"] or not is_unit(texts["unit"].get(i, "")) for i in width):
-        rows = {row for line in table.lines if (row := _row_of_names(line, len(width)))}
+        lists = [_listed_cells(line) for line in table.lines]
+        units = {(*cells,) for cells in lists if len(cells) == len(width) > 1 and all(map(is_unit, cells))}
+        rows = {row for line in table.lines if (row := _row_of_names(line, len(width), units))}
         return table.named(dict(enumerate(rows.pop()))) if len(rows) == 1 else table
     table = table.named({i - 1: (texts["name"][i], texts["unit"][i]) for i in width})
     for i, text in texts["scal"].items():
@@ -244,12 +246,21 @@ def _with_listed_names(table: RawTable) -> RawTable:
     return table
 
 
-def _row_of_names(line: str, width: int) -> tuple[Header, ...]:
-    """Return the names and units of as many columns that a line lists, columns: time (s), stroke (mm), load (N)."""
-    heading, _, listed = line.rpartition(": ")
-    if RATING.search(heading) or _FIGURE.search(line):
+def _listed_cells(line: str) -> list[str]:
+    """Return what a line lists, behind a colon or as a whole."""
+    return re.split(r"[,;|\t]\s*|\s(?:and|und|et|y|e)\s", line.rpartition(": ")[2].strip(" |"))
+
+
+def _row_of_names(line: str, width: int, units: Collection[Sequence[str]]) -> tuple[Header, ...]:
+    """Return the names and units of as many columns that a line lists, columns: time (s), stroke (mm), load (N).
+
+    Where it lists no unit, they are those of the only other line that lists nothing else.
+    """
+    if RATING.search(line.rpartition(": ")[0]) or _FIGURE.search(line):
         return ()
-    row = tuple(map(item_of, re.split(r"[,;|\t]\s*|\s(?:and|und|et|y|e)\s", listed.strip(" |"))))
+    row = tuple(map(item_of, _listed_cells(line)))
+    if len(units) == 1 and len(row) == width and not any(header.unit for header in row):
+        row = tuple(Header(header.name, unit) for header, unit in zip(row, *units, strict=True))
     roles = {header.role for header in row if header.role and header.dimension == DIMENSION[header.role]}
     return row if len(row) == width == len(roles) and {"displacement", "force"} <= roles else ()
 
@@ -390,6 +401,9 @@ def _with_listed_units(table: RawTable) -> RawTable:
         for text, whole in zip((*cells, *behind_colon, line), (*cells, *cells, line), strict=True):
             header = item_of(text)
             name, meaning = (part.strip("`* ") for part in _BEHIND_NAME.split(header.name, maxsplit=1))
+            first, _, rest = name.partition(" ")
+            if name not in wanted and first in wanted and role_of(rest):  # x piston displacement
+                name, meaning = first, rest
             both = {*map(role_of, name.split())} == {role_of(name)} - {None}  # time t
             own = name.rpartition(" ")[2] if both else name
             i = wanted.get(own, wanted.get(own.casefold()))

@@ -6,8 +6,9 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from contextvars import ContextVar
 from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
@@ -91,15 +92,18 @@ _EU = re.compile(r"(?i)\b(?:EU|units?)\b")  # engineering units, those of the ro
 _PER = re.compile(rf"{_EU.pattern} ?(?:/|per) ?m?V\b|\bm?V ?(?:/|per) ?{_EU.pattern[4:]}")
 _SHIFT = re.compile(r"(?i)offset|zero")
 _MEASURED = {*DIMENSION.values(), "frequency"}
+READ_FOLDERS: ContextVar[Sequence[Path]] = ContextVar("folders that are read, with all texts in them", default=())
 _PLACES = ("column", "number", "index", "no", "position", "channel")  # of a column among the others
 
 
 def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Add what short texts beside the file state of signs, and of names, units and scales where they lack."""
     lacking = bool(scales.scaled_columns(table)) or _lacks_names_or_units(table)
-    readme, structures, listing = _texts_in(path.parent, path.parent.stat().st_mtime_ns)
-    above = _texts_in(path.parent.parent, path.parent.parent.stat().st_mtime_ns)
-    texts, listing = (readme, listing) if readme else (above[0], [*listing, *above[2]])
+    further = (f for f in path.parents[2:] if any(top == f or top in f.parents for top in READ_FOLDERS.get()))
+    folders = [_texts_in(f, f.stat().st_mtime_ns) for f in (path.parent, path.parent.parent, *further)]
+    texts = next((readme for readme, *_ in folders if readme), [])
+    (readme, structures, listing), above = folders[:2]
+    listing = listing if readme else [*listing, *above[2]]
     texts = texts + (structures if lacking or len(structures) <= _FEW_FILES else [])
     texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(*p.parts)]

@@ -364,6 +364,11 @@ def _fields(lines: Sequence[str], tests: _Tests) -> Iterator[tuple[Header, list[
         matches = [re.fullmatch(pattern, file.stem) or re.fullmatch(pattern, file.name) for file, _ in tests]
         texts = zip(*(m.groups() for m in matches if m), strict=True) if all(matches) else ()
         yield from ((split_name(place), list(own)) for place, own in zip(parts[1::2], texts, strict=False))
+    keyed = [dict(part.split("=", 1) for part in file.stem.split("_") if "=" in part) for file, _ in tests]
+    cells = [cell.strip(" `*-.") for line in lines for cell in re.split(r"[,;]\s|: ", line)]
+    for key in set.intersection(*map(set, keyed)) if keyed else ():  # I=0.5_freq=2.csv, I coil current in A
+        stated = {cell.removeprefix(key).strip("` ") for cell in cells if re.match(rf"{re.escape(key)}\W", cell)}
+        yield from ((split_name(text), [own[key] for own in keyed]) for text in (stated if len(stated) == 1 else ()))
 
 
 def _meant(key: str, files: Collection[str]) -> list[str]:

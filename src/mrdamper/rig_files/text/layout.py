@@ -52,7 +52,7 @@ _WORD = re.compile(r"(?:[^\W\d_][- ])?[^\W\d_]{3,}")  # also x-axis, X start
 _NAME_AND_UNIT = re.compile(r"[^\s\[(<{]+(?:\s*\[[^\[\]]*\]|\s*\([^()]*\))?")
 QUANTITY = re.compile(r"([+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)[ \u00a0]?([^\W\d_]\S{0,6}|°\S)")
 LISTED = re.compile(  # a numbered line that names a column and its unit: 1=Time;min, COL 2 FORCE (LBF)
-    r"^[\s\"#%]*(?:ch(?:annel)?|column|col|spalte|kanal)?[\s#._]*(?P<number>[0-9]{1,3})\"?(?:\s*[=:;,\t]\s*|\s+)\"?"
+    rf"^[\s\"#%]*(?:{'|'.join(words('numbered'))})?[\s#._]*(?P<number>[0-9]{{1,3}})\"?(?:\s*[=:;,\t]\s*|\s+)\"?"
     r"(?P<name>[^\d\W][^;,\t\[\](){}=]*?)\"?\s*[;,\t\[({]\s*\"?(?P<unit>[^;,\t\[\](){}\"]{1,12})\"?[\])}]?[\s;,\"]*$",
     re.IGNORECASE,
 )
