@@ -359,6 +359,19 @@ def test_a_column_that_numbers_the_tests_is_joined_with_the_plan_by_its_key(tmp_
     assert "E_CURRENT_MISSING" in {r.error.code for r in result.refusals}
 
 
+def test_the_rest_that_a_column_of_tests_numbers_zero_is_omitted_beside_them(tmp_path):
+    text, noise = (
+        "time (s),test_id,disp (mm),force (N),current (A)\n",
+        1e-4 * np.random.default_rng(0).normal(size=T.size),
+    )
+    for part, number in enumerate((0, 1, 0, 2)):
+        x, f = (X, force(0.5 * number)) if number else (noise, 60 + noise)
+        text += rows(T + 4.0 * part, np.full(T.size, number), x, f, np.full(T.size, 0.5 * number))
+    (tmp_path / "bag.csv").write_text(text)
+    result = import_files([tmp_path])
+    assert (result.refusals, currents(result.records), result.reasons) == ((), [0.5, 1.0], {"bag_0": "it rests"})
+
+
 def test_a_session_is_cut_at_rests_at_steps_of_the_current_and_where_the_logger_was_off(tmp_path):
     x, f, i = [], [], []
     for number, frequency in enumerate((1.0, 2.0)):
@@ -384,6 +397,10 @@ def test_rows_of_a_cell_array_below_their_names_are_tests(tmp_path):
     cells[0] = ["Current (A)", "Time (s)", "Displacement (mm)", "Force (N)"]
     for row, amperes in ((1, 0.0), (2, 0.6)):
         cells[row] = [[amperes, T, X, force(amperes)][i] for i in range(4)]
+    savemat(tmp_path / "results.mat", {"results": cells})
+    assert currents(read_runs(tmp_path / "results.mat")) == [0.0, 0.6]
+    cells = cells[:, :2]
+    cells[:, 1] = ["data: t [s], s [mm], F [N]", *(np.column_stack([T, X, force(i)]) for i in cells[1:, 0])]
     savemat(tmp_path / "results.mat", {"results": cells})
     assert currents(read_runs(tmp_path / "results.mat")) == [0.0, 0.6]
 
@@ -995,6 +1012,9 @@ def test_two_currents_in_a_line_over_one_test_are_asked_about(tmp_path, line):
     (tmp_path / "a.csv").write_text(f"{line}\nTime [s],disp [mm],force [N]\n" + rows(T, X, force(0.5)))
     (refusal,) = import_files([tmp_path]).refusals
     assert refusal.error.code == "E_CURRENT_MISSING"
+    assert (
+        'either [channels.current] column = "...", or [current] pattern' in refusal.error.remedy
+    )  # only one may stand
 
 
 def test_columns_of_one_name_below_their_conditions_are_tests_and_a_number_leaves_none_out_in_silence(tmp_path):

@@ -45,6 +45,7 @@ from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, name
 
 _PADDED = re.compile(r"(?<![0-9.,xpA-Za-z])0[0-9]A(?![A-Za-z0-9])")
 _TWO_DIGITS = re.compile(r"(?<![0-9.,xpA-Za-z])[1-9][0-9]A(?![A-Za-z0-9])")
+_IDLE = re.compile("(?i)_(?:0|idle|pause|rest)$")  # of the tests that a column numbers
 _Tests = list[tuple[Path, Record]]
 _SomeTests = Sequence[tuple[Path, Record]]
 _LARGEST_LIST = 2**16  # bytes of a plan of tests that states the current of none that was read
@@ -228,6 +229,9 @@ class _Intake:
         """Check tests with what the table of tests says of them, or keep them until another file states the current."""
         runs = {row.run for row in (self._table.of_file(path) if self._table else ()) if row.file}
         as_listed = runs <= {"", *(record.id for record in records)}  # else by the numbers of a plan of tests
+        idle = [r for r in records if len(records) > 1 and _IDLE.search(r.id) and plans.rests(r)]
+        self.omitted |= {Path(record.id): "it rests" for record in idle}
+        records = [record for record in records if record not in idle] or records
         for record in records:
             self.met += [(path, record.id)] * as_listed
             record = applied(record, path, self._table) if as_listed else record

@@ -184,7 +184,8 @@ def columns_of(name: str, array: Array, texts: Iterable[Sequence[str]], unit: st
     width = inner[axis]
     if len(inner) > 2 or width > MOST_COLUMNS:
         return []
-    fitting = [words for words in texts if len(words) == width]
+    own = re.split(r"\s*[,;]\s*", name.rpartition(": ")[2])  # data: t [s], s [mm], F [N]
+    fitting = [words for words in (*texts, own) if len(words) == width]
     names = [words for words in fitting if sum(split_name(word).role is not None for word in words) >= _TELLING]
     units = [words for words in fitting if 2 * sum(map(is_unit, words)) >= width and words not in names]
     if not names or any(other != names[0] for other in names):
