@@ -139,6 +139,13 @@ def test_a_force_too_large_has_positive_errors():
     assert score.scores.energy_error == pytest.approx(0.25)
 
 
+def test_noise_of_the_measured_force_is_no_error_of_the_peak():
+    run, rng = made(1.0, 1.0, "one"), np.random.default_rng(3)
+    noises = rng.normal(0.0, 0.01 * np.ptp(run.force), (10, run.force.size))
+    errors = [score_run(Exact(), replace(run, force=run.force + noise)).scores.peak_error for noise in noises]
+    assert np.mean(errors) == pytest.approx(0.0, abs=0.01)  # -0.04 of the raw samples
+
+
 def test_median_and_worst_count_magnitudes_and_refused_runs_stay_apart():
     runs = [made(1.0, 1.0, f"{gain}", gain=gain) for gain in (0.5, 0.9, 1.25)]
     still = replace(runs[0], id="still", force=np.ones(runs[0].time.size))

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from mrdamper.data import Condition, Run
+from mrdamper.identification.characteristics import characterise
 from mrdamper.identification.loop_analysis import analyse_loop, at_levels, damping_share, dynamic_ranges, whole_cycles
+from mrdamper.models.bouc_wen import BoucWen
 from mrdamper.physics.motion import sine
+from mrdamper.physics.simulation import simulate
+from mrdamper.study.validation import measured_peak
 
 
 def run_of(force, condition, name="one"):
@@ -29,6 +33,27 @@ def test_a_dashpot_with_spring_and_offset(condition):
     assert loop.mean_force == pytest.approx(f0, abs=0.1)
     assert (loop.run_id, loop.split) == ("one", "train")
     assert loop.condition.current_A == condition.current_A
+
+
+@pytest.mark.parametrize(("noise", "bias"), [(0.0, 1e-3), (4e-3, 3e-3), (0.03, 0.01)])
+@pytest.mark.parametrize(
+    "shape", [{"c": 200.0, "k1": 2e5, "n": 8.0}, {"c": 2000.0, "k1": 3e4, "n": 1.5}, {"c": 2e4, "k1": 0.0, "n": 2.0}],
+    ids=["sharp at the reversals", "round", "viscous"],
+)  # fmt: skip
+def test_noise_does_not_raise_the_peak_force_and_sharp_peaks_remain(shape, noise, bias):
+    fixed = {"k2": 0.0, "k3": 0.0, "m": 0.0, "f0": 50.0, "asymmetry": -0.3}
+    model = BoucWen.build(fixed | shape | {"yield_force": 800.0, "yield_displacement": 5e-4})
+    force = simulate(model, sine(Condition(0.5, 2.0, 0.01), 4, 1000)).force
+    half = np.ptp(force[1000:]) / 2
+    forces = []
+    for seed in range(20 if noise else 1):
+        noisy = force + np.random.default_rng(seed).normal(0.0, noise * half, force.size)
+        run = run_of(lambda m, noisy=noisy: noisy, Condition(0.5, 2.0, 0.01))
+        (stroke,) = characterise([run]).strokes
+        forces.append((analyse_loop(run).peak_force, measured_peak(run), *np.abs(np.subtract(stroke.peak_force, 50.0))))
+    study, interval, rebound, compression = np.mean(forces, axis=0)
+    assert [study, interval, (rebound + compression) / 2] == pytest.approx(3 * [half], rel=bias)
+    assert rebound == pytest.approx(np.max(force[1000:]) - 50.0, rel=2 * bias)
 
 
 def test_the_damping_share_is_that_of_the_dashpot_beside_spring_offset_and_drift():

@@ -30,6 +30,7 @@ from mrdamper.identification.intervals import student
 from mrdamper.physics.motion.sines import equivalent_sine, sine_condition
 from mrdamper.statistics.linear import nonnegative_least_squares
 from mrdamper.statistics.metrics import dissipated_power, peak_force
+from mrdamper.statistics.peaks import cycle_extremes, cycle_starts, extreme_forces
 
 Quantity = Literal["force", "peak", "energy"]
 QUANTITIES: tuple[Quantity, ...] = ("force", "peak", "energy")
@@ -79,7 +80,8 @@ class PredictedRun:
             session_of(run),
             predicted[at[::step]],
             run.force[at[::step]],
-            _peaks(run) / np.maximum([_peak(predicted[loop], cycles) for loop, cycles in loops], 1e-300),
+            _peaks(run)
+            / np.maximum([_half(cycle_extremes(predicted[loop], cycles)) for loop, cycles in loops], 1e-300),
             np.divide(powers[0], powers[1], out=np.full(len(loops), np.inf), where=powers[1] != 0),
             away,
         )
@@ -130,14 +132,13 @@ def _loops(run: Run) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         moved = [np.ptp(run.displacement[cycle]) for cycle in cycles]
         loops = [c for c, swing in zip(cycles, moved, strict=True) if swing >= sine.condition.amplitude_m] or [at]
     counts = [min(max(int(np.ptp(run.time[loop]) * frequency), 1), loop.size) for loop in loops]
-    cycles = [np.array_split(np.arange(loop.size), count) for loop, count in zip(loops, counts, strict=True)]
-    return [(loop, np.array([part[0] for part in parts])) for loop, parts in zip(loops, cycles, strict=True)]
+    return [(loop, cycle_starts(loop.size, cycles)) for loop, cycles in zip(loops, counts, strict=True)]
 
 
 @once_per_run
 def _peaks(run: Run) -> Floats:
     """(L,) measured peak forces [N] of the loops."""
-    return np.array([_peak(run.force[loop], cycles) for loop, cycles in _loops(run)])
+    return np.array([_half(extreme_forces(run.force[loop], cycles)) for loop, cycles in _loops(run)])
 
 
 def measured_peak(run: Run) -> float:
@@ -149,9 +150,8 @@ def measured_peak(run: Run) -> float:
     return float(peaks[0]) if peaks.size == 1 else peak_force(run.force[run.in_window])
 
 
-def _peak(force: Floats, cycles: NDArray[np.intp]) -> float:
-    """Median over cycles, which begin at some samples, of half their peak-to-peak force [N]."""
-    return float(np.median(np.maximum.reduceat(force, cycles) - np.minimum.reduceat(force, cycles)) / 2)
+def _half(ends: tuple[float, float]) -> float:
+    return (ends[0] - ends[1]) / 2
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ side of positive velocity and force.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from mrdamper.data import Condition, Floats, Run, current_levels, same_motion
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.identification.loop_analysis import analyse_loop, whole_cycles
 from mrdamper.physics.motion import equivalent_sine, measured_motion
+from mrdamper.statistics.peaks import cycle_extremes, cycle_starts, extreme_forces
 
 SIDES = ("rebound", "compression")
 _DEFAULT_VELOCITIES = 6  # number of default velocities
@@ -30,7 +31,7 @@ class Stroke:
     run_id: str
     condition: Condition  # measured, its current rounded to the level of the test matrix
     peak_velocity: tuple[float, float]  # of rebound and compression, both positive [m/s]
-    # largest force in the direction of rebound and of compression, signed, median over the cycles [N]
+    # largest force in the direction of rebound and of compression, signed, without noise, median over the cycles [N]
     peak_force: tuple[float, float]
     mid_force: tuple[float, float]  # force at mid-stroke, moving in rebound and in compression, signed [N]
     # half the width of the force–velocity loop: velocity at which the force less the gas force is zero, mean of
@@ -130,22 +131,19 @@ def _stroke(run: Run, current: float) -> Stroke:
     motion = measured_motion(steady).about(loop.motion.series.mean).part(whole)
     force = steady.force[whole]
     rebound, compression = motion.velocity > 0, motion.velocity < 0
-    cycles = max(1, round(float(np.ptp(motion.time)) * loop.condition.frequency_Hz))
+    starts = cycle_starts(force.size, max(1, round(float(np.ptp(motion.time)) * loop.condition.frequency_Hz)))
+    fastest, slowest = cycle_extremes(motion.velocity, starts)
     mid = tuple(_at_mid_stroke(motion.displacement, force, side) for side in (rebound, compression))
     condition = Condition(current, loop.condition.frequency_Hz, loop.condition.amplitude_m)
     return Stroke(
         run.id,
         condition,
-        (_median_of_cycles(motion.velocity, cycles, np.max), -_median_of_cycles(motion.velocity, cycles, np.min)),
-        (_median_of_cycles(force, cycles, np.max), _median_of_cycles(force, cycles, np.min)),
+        (fastest, -slowest),
+        extreme_forces(force, starts),
         (mid[0], mid[1]),
         _zero_force_velocity(motion.velocity, force - (mid[0] + mid[1]) / 2),
         loop.dissipated_energy,
     )
-
-
-def _median_of_cycles(values: Floats, cycles: int, extreme: Callable[[Floats], float]) -> float:
-    return float(np.median([extreme(part) for part in np.array_split(values, cycles)]))
 
 
 def _at_mid_stroke(displacement: Floats, force: Floats, side: np.ndarray) -> float:

@@ -17,6 +17,7 @@ from mrdamper.physics.motion.measured import measured_motion
 from mrdamper.physics.motion.sines import MotionAnalysis, analyse_motion
 from mrdamper.statistics.linear import solve_linear
 from mrdamper.statistics.metrics import dissipated_power
+from mrdamper.statistics.peaks import cycle_starts, extreme_forces
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class LoopAnalysis:
     run_id: str
     split: str
     motion: MotionAnalysis
-    peak_force: float  # half the peak-to-peak force, median over the cycles [N]
+    peak_force: float  # half the peak-to-peak force without noise, median over the cycles [N]
     mean_force: float  # mean force over whole cycles [N]: gas force, preload, and the load cell's zero
     dissipated_energy: float  # per cycle [J]
     equivalent_damping: float  # of the viscous damper that dissipates as much, W/(π ω X²) [N s/m]
@@ -50,12 +51,12 @@ def analyse_loop(run: Run) -> LoopAnalysis:
     force = steady.force[whole]
     frequency, amplitude = analysis.condition.frequency_Hz, analysis.condition.amplitude_m
     energy = dissipated_power(force, motion.velocity, motion.time) / frequency
-    cycles = np.array_split(force, max(1, round(np.ptp(motion.time) * frequency)))
+    highest, lowest = extreme_forces(force, cycle_starts(force.size, max(1, round(np.ptp(motion.time) * frequency))))
     return LoopAnalysis(
         run_id=run.id,
         split=run.split,
         motion=analysis,
-        peak_force=float(np.median([np.ptp(c) / 2 for c in cycles])),
+        peak_force=(highest - lowest) / 2,
         mean_force=float(np.mean(force)),
         dissipated_energy=energy,
         equivalent_damping=energy / (2 * np.pi**2 * frequency * amplitude**2),

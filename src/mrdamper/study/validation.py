@@ -154,11 +154,15 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> Run
     expected = sessions.expected(RecordingTime.of(run), without=run.id) if sessions else None
     if expected is not None:
         prediction = prediction.corrected(expected.gain, expected.offset)
+    scores = score(run.force[inside], prediction.force[inside], prediction.motion.velocity[inside], run.time[inside])
+    if beside.peak.size == 1:  # of the cycles of a sine, without the noise of the measured force
+        gain = expected.gain if expected else 1.0
+        scores = replace(scores, peak_error=gain / float(beside.peak[0]) - 1)
     return RunScore(
         run.id,
         run.rig,
         prediction.condition,
-        score(run.force[inside], prediction.force[inside], prediction.motion.velocity[inside], run.time[inside]),
+        scores,
         run.repeatability,
         prediction.extrapolation,
         _at_rest(run, prediction),

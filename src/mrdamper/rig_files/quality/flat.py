@@ -26,8 +26,9 @@ import numpy as np
 from mrdamper.data import Floats, once_per_run
 from mrdamper.data.wording import counted
 from mrdamper.rig_files.quality.cycles import NOTED, POINTS, CycleChannel, percent, steady_cycles
-from mrdamper.rig_files.quality.view import View, runs_of, sample_noise, shown
+from mrdamper.rig_files.quality.view import View, runs_of, shown
 from mrdamper.rig_files.record import Finding
+from mrdamper.statistics.peaks import sample_noise
 
 FLAT = 5  # samples in a row that make a flat top or a frozen stretch
 _BEND = 1.5e-4  # of the channel's range: a channel that would have moved less may have stood still

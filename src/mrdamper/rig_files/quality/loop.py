@@ -12,8 +12,9 @@ from mrdamper.errors import QualityError
 from mrdamper.identification.loop_analysis import damping_share as share_of_damping
 from mrdamper.rig_files.quality.cycles import POINTS, every_cycle, steady_cycles
 from mrdamper.rig_files.quality.motion import LEAST_CYCLES, current_changes, cycles_of, steady_window
-from mrdamper.rig_files.quality.view import MOST_SAMPLES, View, longest_run, sample_noise
+from mrdamper.rig_files.quality.view import MOST_SAMPLES, View, longest_run
 from mrdamper.rig_files.record import SIGNED, Finding, SteadyPart
+from mrdamper.statistics.peaks import sample_noise
 
 _SLOW, _FAST = 0.1, 0.5  # of the largest velocity: samples near the reversals, and away from them
 _BELOW = 0.15  # of the range: so far below both strokes is a rectified force at the reversals

@@ -11,8 +11,9 @@ from mrdamper.data import Floats
 from mrdamper.data.arrays import odd_steps
 from mrdamper.data.wording import counted, number
 from mrdamper.rig_files.quality.cycles import REFUSED, percent, steady_cycles
-from mrdamper.rig_files.quality.view import View, longest_run, runs_of, sample_noise
+from mrdamper.rig_files.quality.view import View, longest_run, runs_of
 from mrdamper.rig_files.record import COARSE_CLOCK, Finding
+from mrdamper.statistics.peaks import sample_noise
 
 _HELD = 3  # samples; held for as long all the time, a channel was recorded at a slower rate
 _HELD_LATE = 0.005  # of the period

@@ -19,6 +19,7 @@ from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.measured import measured_motion
 from mrdamper.physics.motion.sines import MotionAnalysis, analyse_motion
 from mrdamper.rig_files.record import Finding, Record
+from mrdamper.statistics.peaks import sample_noise
 
 MOST_SAMPLES = 40_000
 SHORTEST = 5  # samples of a segment; a slope needs as many
@@ -194,20 +195,6 @@ class View:
 def shown(name: str, value: float, form: str = ".4g") -> str:
     """Write a displacement [m], in millimetres, or a force [N] for a message."""
     return f"{1e3 * value:{form}} mm" if name == "displacement" else f"{value:{form}} N"
-
-
-def sample_noise(signal: Floats) -> float:
-    """Return standard deviation of white noise on a smooth signal, from its third differences.
-
-    The median keeps corners of the signal out; 20 is the sum of the squared coefficients
-    1, 3, 3, 1, and 0.6745 the median of a standard normal's size.
-    """
-    third = np.abs(signal[3:] - signal[:-3] - 3 * (signal[2:-1] - signal[1:-2]))
-    third = third[np.isfinite(third)]
-    if not third.size:
-        return 0.0
-    middle = third.size // 2  # of an even number, the upper of the two
-    return float(np.partition(third, middle)[middle]) / 0.6745 / float(np.sqrt(20))
 
 
 def runs_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
