@@ -58,15 +58,15 @@ def address():
 
 
 @contextmanager
-def served(**options):
-    """An app in a thread of its own; options are those of uvicorn."""
+def served(token=None, **options):
+    """An app in a thread of its own, with a token or without; options are those of uvicorn."""
     import uvicorn
 
     from mrdamper.web.server import Connection, _listen
 
     listener = _listen(0)
     port = listener.getsockname()[1]
-    app = create_app([f"127.0.0.1:{port}"], lambda: server.should_exit)
+    app = create_app([f"127.0.0.1:{port}"], lambda: server.should_exit, token=token)
     options = {"http": Connection, "log_level": "error", "access_log": False, "timeout_graceful_shutdown": 1, **options}
     server = uvicorn.Server(uvicorn.Config(app, **options))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)

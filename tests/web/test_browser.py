@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 from support.browser import AUDIT, LOGO
-from web.conftest import WINDOW, watched_page
+from web.conftest import WINDOW, served, watched_page
 from web.rig_files import csv_of
 
 from mrdamper.dampers.covariance import estimate_uncertainty
@@ -349,6 +349,19 @@ def test_a_slow_answer_dims_the_picture_and_extrapolation_is_said(on_model, shoo
     type_number(page, "current_A", "1.2")
     page.locator(".message.warn").filter(has_text="current 1.2 A, tested 0–1 A").wait_for()
     shoot(page, "8-extrapolation")
+
+
+def test_a_link_asks_for_the_token_and_keeps_its_state(profile):
+    with served(token="of-this_app1") as address:
+        page = profile.new_page()
+        page.goto(f"{address}/#s=eJw")
+        for given in ("wrong", f"{address}/?token=of-this_app1"):  # the token alone, or the printed address
+            page.get_by_label("Token").fill(given)
+            with page.expect_navigation():
+                page.get_by_role("button", name="Open").click()
+        page.locator("html[data-ready]").wait_for()
+        assert page.url.startswith(f"{address}/#s=")
+        page.close()
 
 
 def test_a_link_brings_the_state_back(on_model):

@@ -20,7 +20,7 @@ from mrdamper.errors import InputError
 from mrdamper.study.processes import SPAWNED
 
 _MAX_PROCESSES = max(1, os.cpu_count() or 1)  # of all sessions together
-_NICENESS = 15  # of workers: the page has priority
+_NICENESS = 5  # of workers: the page has priority, and other work on the machine leaves them a share
 _REPORT_INTERVAL_S = 0.05
 _FREE = threading.BoundedSemaphore(_MAX_PROCESSES)
 

@@ -26,7 +26,7 @@ def open_session(request: Request) -> dict[str, Any]:
     """Open a session; returns its name and the limits of uploads."""
     token, given = request.app.state.token, request.headers.get("x-app-token", "")
     if token is not None and not secrets.compare_digest(given.encode(), token.encode()):
-        text = "Open the address that the terminal shows: its token is missing or of an earlier start of the app."
+        text = "The token is missing or of an earlier start of the app: open the address in the terminal, or enter it."
         raise HTTPException(403, text)
     session = request.app.state.sessions.open()
     if request.app.state.read_ahead:  # not at the start of the app, where it would delay the page

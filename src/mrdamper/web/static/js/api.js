@@ -102,11 +102,15 @@ export function forgetSession() {
   tabStorage.removeItem(SESSION);
 }
 
+/** Store the token of an address, or one that is given alone, for this tab. */
+export function storeToken(text) {
+  tabStorage.setItem(TOKEN, /[?&]token=([^&#]+)/.exec(text)?.[1] ?? text.trim());
+}
+
 /** The token in the printed address: stored for a reload, and removed from the address. */
 function token() {
-  const given = new URLSearchParams(location.search).get("token");
-  if (given) {
-    tabStorage.setItem(TOKEN, given);
+  if (new URLSearchParams(location.search).has("token")) {
+    storeToken(location.search);
     history.replaceState(history.state, "", location.pathname + location.hash);
   }
   return tabStorage.getItem(TOKEN) ?? "";

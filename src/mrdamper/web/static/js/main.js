@@ -1,7 +1,7 @@
 // The page: opens or continues its session, builds the views, and has the tools of the header.
 
 import { Address } from "./address.js";
-import { ApiError, openSession } from "./api.js";
+import { ApiError, openSession, storeToken } from "./api.js";
 import { App } from "./app.js";
 import { library } from "./chart.js";
 import { arrowKeys, capitalise, errorMessage, h, note, options, render } from "./dom.js";
@@ -154,4 +154,18 @@ async function copyLink(app, address) {
   return undefined;
 }
 
-start().catch((error) => render(document.getElementById("view"), h("div", { class: "empty" }, errorMessage(error))));
+/** Ask for the token, which no link contains; the state of the link is opened with it. */
+function tokenForm() {
+  const field = h("input", { type: "password", id: "token", autocomplete: "off", required: true });
+  const onsubmit = (event) => {
+    event.preventDefault();
+    storeToken(field.value);
+    location.reload();
+  };
+  return h("form", { onsubmit }, h("label", { for: field.id }, "Token, or the whole address in the terminal "), field, h("button", {}, "Open"));
+}
+
+start().catch((error) => {
+  const refused = error.details?.code === "E_403";
+  render(document.getElementById("view"), h("div", { class: "empty" }, errorMessage(error), refused ? tokenForm() : null));
+});
