@@ -45,6 +45,13 @@ def test_rig_files_are_read_with_the_current_of_their_names(drop, small_rig):
     assert {v.state for v in found.verdicts} <= {"taken", "noted"}
 
 
+def test_a_current_behind_a_label_is_told_by_the_other_names(drop, small_rig):
+    run = next(iter(small_rig))
+    for current in ("0", "0.5"):
+        put(drop, f"MR7_{current}A_2Hz.csv", csv_of(run))
+    assert [run.current_A for run in read_upload(drop).dataset] == [0.5, 0.0]
+
+
 def test_the_profile_shown_reads_the_same(drop, small_rig):
     run = next(iter(small_rig))
     put(drop, f"{run.id}.csv", csv_of(run))

@@ -110,6 +110,7 @@ def import_files(
     profile: Profile | str | Path | None = None,
     *,
     tests: str | Path | TestsTable | None = None,
+    other_names: Collection[str] = (),
     progress: Progress = silent,
 ) -> ImportResult:
     """Read and check files and folders of files; a refused file or test does not stop the others.
@@ -122,6 +123,8 @@ def import_files(
         For all of them.
     tests : TestsTable or path, optional
         Table of tests; default: `tests.csv` of the folder, also that of single files.
+    other_names : collection of str
+        Names of further files of these tests, which are not read: they show which digits of a name are its current.
     progress : callable
         Is told the file and the share done.
 
@@ -160,7 +163,7 @@ def import_files(
         for number, path in enumerate(files):
             progress(path.name, number / len(files))
             intake.read(path, given=path in given)
-        used = intake.join(texts)
+        used = intake.join(texts, other_names)
         left_out = [path for path in left_out if path not in used]
         if table is not None and (table.path not in beside or table.path.parent in given):  # else some of its tests
             unread = [Path(refusal.file) for refusal in intake.refusals if not refusal.run]
@@ -259,14 +262,14 @@ class _Intake:
         if not problems:
             self._found.append((path, checked))
 
-    def join(self, texts: Sequence[Path]) -> set[Path]:
+    def join(self, texts: Sequence[Path], other_names: Collection[str] = ()) -> set[Path]:
         """Join tests with what other files and texts state, check and compare them; return the files that were used."""
         self._take_parts()
         others = [Path(refusal.file) for refusal in self.refusals if refusal.error.code in _MAY_BE_PARTS]
         others = [path for path in dict.fromkeys(others) if path.is_file()]
         used = self._join_channels(others, texts)
         counts = Counter(path for path, _ in self._pending)
-        names = {name for path, run in self.met for name in (*path.parts, run)}
+        names = {*other_names, *(name for path, run in self.met for name in (*path.parts, run))}
         met = {*self.met}
         for path, record in self._pending:
             if (path, record.id) not in met:

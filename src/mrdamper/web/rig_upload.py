@@ -61,11 +61,10 @@ def _imported(upload: Upload, path: Path, profile: Profile | None, table: TestsT
     """Read a file with the statements of the uploaded table, and the currents stated on the page."""
     rows = () if table is None else table.of_file(Path(upload.names[path]))
     stated = [StatedTest(0, "", run, current) for (file, run), current in upload.currents.items() if file == path]
-    if not rows and not stated:
-        return import_files([path], profile)
     runs = {row.run for row in stated}
     statements = (*stated, *(replace(row, file="") for row in rows if row.run not in runs))
-    return import_files([path], profile, tests=TestsTable(path.with_name(TESTS), statements))
+    tests = TestsTable(path.with_name(TESTS), statements) if statements else None
+    return import_files([path], profile, tests=tests, other_names=[other.name for other in upload.names])
 
 
 def _verdicts(upload: Upload) -> tuple[Verdict, ...]:
