@@ -166,6 +166,6 @@ function tokenForm() {
 }
 
 start().catch((error) => {
-  const refused = error.details?.code === "E_403";
+  const refused = error.status === 403;
   render(document.getElementById("view"), h("div", { class: "empty" }, errorMessage(error), refused ? tokenForm() : null));
 });
