@@ -489,6 +489,14 @@ def test_a_yaml_file_with_nodes_within_nodes_and_one_that_repeats_itself_without
     assert short_lines(tmp_path / "m07.yaml") == (coil + repeated).splitlines()
 
 
+@pytest.mark.parametrize(("key", "taken"), [("current_a: 0.4", [0.4]), ("current_a: 0.4\ncurrent_b: 0.4", [])])
+def test_a_job_has_its_settings_in_the_folder_of_the_program_that_starts_jobs(tmp_path, key, taken):
+    (tmp_path / ".hydra").mkdir()
+    write(tmp_path, "t,x,f\n")
+    (tmp_path / ".hydra" / "config.yaml").write_text(f"{key}\nunits:\n  t: s\n  x: mm\n  f: N\n")
+    assert [record.current[0] for record in import_files([tmp_path]).records] == taken
+
+
 @pytest.mark.parametrize(
     ("text", "amperes"),
     [

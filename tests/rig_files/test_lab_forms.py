@@ -54,6 +54,8 @@ DUTIES = "| duty | current |\n|---|---|\n| 0 % | 0 A |\n| 50 % | 1.1 A |"
         (["m_0", "m_2"], "names: m_<current>", []),
         (["m_0000_1", "m_0500_2"], "File names: m_iiii_f.csv\n  iiii  coil current in mA\n  f  frequency", [0.0, 0.5]),
         (["m_0000_1", "m_0500_2"], "File names: m_iiii_f.csv\n  iiii  number\n  f  coil current", []),
+        (["0_2", "0.5_2"], "A name is *current_frequency* with current in A, frequency in Hz", [0.0, 0.5]),
+        (["0_2", "0.5_2"], "A name is *current_frequency* with frequency in Hz", []),
         (["m_d00", "m_d50"], f"Names: m_d<duty %>.csv.\n\n{DUTIES}", [0.0, 1.1]),
         (["m_d00", "m_d75"], f"Names: m_d<duty %>.csv.\n\n{DUTIES}", []),
     ],
@@ -61,7 +63,7 @@ DUTIES = "| duty | current |\n|---|---|\n| 0 % | 0 A |\n| 50 % | 1.1 A |"
 def test_a_readme_gives_the_codes_and_the_scheme_of_names(tmp_path, names, text, stated):
     for i, name in enumerate(names):
         (tmp_path / f"{name}.csv").write_text("Time [s],disp [mm],force [N]\n" + rows(T, X, force(i / 2, i)))
-    (tmp_path / "README.md").write_text(text + "\n")
+    (tmp_path / "README.Rmd").write_text(text + "\n")
     result = import_files([tmp_path])
     assert currents(result.records) == stated
     assert len(result.refusals) == (0 if stated else len(names))

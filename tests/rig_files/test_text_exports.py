@@ -41,6 +41,8 @@ EXPORTS = {
     + lines(lambda i, t, x, f: f'"{clock(t):%Y-%m-%d %H:%M:%S.%f}","{f:.4f} N","{x:.6f} mm"'),
     "stamps of seconds with microseconds": "date and time;us;stroke;load\n;;mm;N\n"
     + lines(lambda i, t, x, f: f"{clock(t):%Y-%m-%d %H:%M:%S};{clock(t).microsecond};{x:.6f};{f:.4f}"),
+    "a clock with the name of its unit": "us,stroke [mm],load [N]\n"
+    + lines(lambda i, t, x, f: f"{1e6 * t:.0f},{x:.6f},{f:.4f}"),
     "lines of a key with numbers, and short keys": "サンプリング周波数（Hz）,200\nレンジ,2000,20000,10V\n"
     "校正係数,0.01,0.002,0.5\nオフセット,0,0,0\nCH No.,1-1,1-2,1-3\nCH名称,変位計,荷重計,温度\n単位,mm,N,℃\n\n"
     + lines(lambda i, t, x, f: f"{t:.3f},{x:.6f},{f:.4f},24.0"),

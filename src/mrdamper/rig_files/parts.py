@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache, lru_cache, partial
-from itertools import combinations, pairwise
+from itertools import pairwise, permutations
 
 import numpy as np
 
@@ -212,7 +212,7 @@ def _as_written(name: str, key: str) -> str:
 def _name_tests(table: RawTable, members: _Groups, titles: Mapping[str, str]) -> bool:
     """Tell if groups are named after dampers, after motions, or by numbers of tests, and are no sensors.
 
-    Two sensors of one test have nearly the same motion and force, two numbered tests have not.
+    Every sensor of one test has another with nearly the same motion and force, numbered tests have not.
     """
     headings = {(*table.names[i : i + 1], *table.over[i : i + 1]) for i in (m["force"] for m in members.values())}
     dampers = {*map(damper_in, titles.values())}
@@ -222,10 +222,12 @@ def _name_tests(table: RawTable, members: _Groups, titles: Mapping[str, str]) ->
     if len(headings) == 1 or not (motions or all(title.isdigit() or numbers_test(title) for title in titles.values())):
         return False
     values = table.peek(*(roles[role] for roles in members.values() for role in _PAIR))
-    return values is not None and not any(
-        all(_alike(values[one[role]], values[other[role]], _ONE_MOTION if motions else _TWO_SENSORS) for role in _PAIR)
-        for one, other in combinations(members.values(), 2)
-    )
+    if values is None:
+        return False
+    groups = [[values[roles[role]] for role in _PAIR] for roles in members.values()]
+    limit = _ONE_MOTION if motions else _TWO_SENSORS
+    alike = [all(map(partial(_alike, limit=limit), *pair)) for pair in permutations(groups, 2)]
+    return not np.reshape(alike, (len(groups), -1)).any(axis=1).all()
 
 
 def _alike(one: np.ndarray, other: np.ndarray, limit: float) -> bool:

@@ -459,7 +459,7 @@ def _with_clocks_and_weights(table: RawTable) -> RawTable:
         headings = {i: (_SYMBOL.sub("time", table.names[i]), table.units[i]) for i in clocks}
     for i, header in enumerate(table.headers):
         key = re.sub(r"[\s_()]+", " ", header.name.strip().casefold()).strip()
-        if not header.unit and key in _CLOCKS:
+        if not header.unit and key in _CLOCKS and not (table.columns("time") and is_unit(key)):  # ms of a stamp
             headings[i] = "time", _CLOCKS[key]
         elif header.role == "force" and header.unit in _WEIGHTS and holds(header.name, WEIGHT):
             headings[i] = header.name, _WEIGHTS[header.unit]

@@ -33,20 +33,22 @@ from mrdamper.rig_files.columns import units_in
 from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines
 from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, said_of_file, states_si, states_volts
-from mrdamper.rig_files.mapping.results import numbered_tests
+from mrdamper.rig_files.mapping.results import headings_of, numbered_tests
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding
 from mrdamper.rig_files.text.elements import numbers_in, root_of, tree_of
 from mrdamper.rig_files.text.stream import decoded
 
-SHORT_TEXTS = (".csv", ".txt", ".tsv", ".dat", ".md", ".log", ".json", ".yaml", ".yml")
+_MARKDOWN = (".md", ".rmd", ".qmd")
+SHORT_TEXTS = (".csv", ".txt", ".tsv", ".dat", *_MARKDOWN, ".log", ".json", ".yaml", ".yml")
 _MOST = 200  # lines
 _FEWEST_ROWS = 50  # of a record
 _FEW_FILES = 10  # that describe a folder, not a test each
 _STRUCTURES = (".json", ".yaml", ".yml")
 _NAMED = (*_STRUCTURES, ".xml")  # structures that describe the record of their name
-_READ = (".txt", ".md", ".rst", ".csv", ".tsv", *_STRUCTURES)
+_READ = (".txt", *_MARKDOWN, ".rst", ".csv", ".tsv", *_STRUCTURES)
+_HYDRA = ".hydra/config.yaml"  # beside the record of a job, by the program of that name
 _LARGEST_LIST = 4096  # bytes of a list of channels
 _TEXTS = (".csv", ".txt", ".tsv", ".ini", ".cfg", ".par", ".set")
 _RATE = r"(?P<number>[0-9]+(?:[.,][0-9]+)?) ?(?P<kilo>k?)"
@@ -189,7 +191,7 @@ def with_description(table: RawTable, path: Path, profile: Profile) -> RawTable:
     """Return the table with what the text or structure of its name, or the only other file of its folder, states."""
     other = _only_other(path)
     other = other if other and _may_describe(other, path) and not profile.leaves_out(*other.parts) else None
-    beside = [path.with_suffix(suffix) for suffix in (*_NAMED, *_TEXTS)]
+    beside = [*(path.with_suffix(suffix) for suffix in (*_NAMED, *_TEXTS)), path.parent / _HYDRA]
     named = [p for p in beside if p != path and p.is_file() and not profile.leaves_out(*p.parts)]
     named = [p for p in (*named, *([other] if other else ())) if p.suffix.lower() in _NAMED or is_description(p)]
     lines = short_lines(named[0]) if named else packaged_lines(path)
@@ -246,7 +248,7 @@ def short_lines(path: Path) -> list[str]:
         except (ValueError, RecursionError, SyntaxError, InputError):
             if suffix in (".json", ".xml"):
                 return []
-    text = text.replace("`", "") if suffix == ".md" else text
+    text = text.replace("`", "") if suffix in _MARKDOWN else text
     lines = [line for line in text.splitlines() if "|" not in line or not _RULE.fullmatch(line)]
     return _by_headings(lines) if len(lines) <= _MOST_LISTED else lines
 
@@ -366,8 +368,8 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
         for names in [other for other in lists if other is not its and len(other) == len(its)]:
             yield from (f"{i}={name};{own}" for i, (name, own) in enumerate(zip(names, its, strict=True), 1))
     own = next((lower[name] for name in ("units", "unit") if isinstance(lower.get(name), dict)), units)
-    for name, value in node.items():
-        whole = f"{key} {name}" if OTHER_DEVICE.search(key) else str(name)  # camera: {sample rate: 300 Hz}
+    for (name, value), heading in zip(node.items(), headings_of([*map(str, node)]), strict=True):
+        whole = f"{key} {name}" if OTHER_DEVICE.search(key) else heading  # camera: {sample rate: 300 Hz}
         if isinstance(value, (dict, list)):
             yield from _stated(value, whole, own, depth + 1)
         elif not unit and not isinstance(value, np.ndarray):

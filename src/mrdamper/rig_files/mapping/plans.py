@@ -14,7 +14,16 @@ import numpy as np
 from mrdamper.data.wording import number
 from mrdamper.errors import InputError, QualityError, listed, printable
 from mrdamper.rig_files.coil_current import NO_CHANNEL
-from mrdamper.rig_files.column_names import RATING, Header, names_condition, role_of, split_name, words, words_of
+from mrdamper.rig_files.column_names import (
+    RATING,
+    Header,
+    is_unit,
+    names_condition,
+    role_of,
+    split_name,
+    words,
+    words_of,
+)
 from mrdamper.rig_files.conditions import amperes, series_in
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.mapping.comparisons import forces_grow
@@ -36,6 +45,7 @@ _DECIMAL_CODE = re.compile(r"(?<![a-z])[a-z]{1,6}[0-9]+\.[0-9]+(?![0-9])")
 _SCHEME = re.compile(r"[\w.,+=-]*(?:<[^<>]{1,60}>[\w.,+=-]*)+")  # MRD_A<amplitude in mm>_I<coil current in A>.csv
 _ATTACHED, _JOINED = re.compile(r"(?<=\w)[(\[{]([^()\[\]{}<>]{1,60})[)\]}]"), re.compile(r"\w[(\[{][^_]*[)\]}]_")
 _PLACE = re.compile(r"[\s*`-]*([^\W\d_]{1,12})`?(?:\s*[=:]|\s+[-–]\s|\s{2,})\s*([^\s<>][^<>]{0,58}[^\s<>])\s*$")
+_NAME_IN_UNIT = re.compile(r"\b([^\W\d_]{3,}) in ([^\W\d_]{1,3})\b")
 _NUMBERS = re.compile(r"[\W\d_]*")
 _SCHEME_NUMBER = re.compile(r"[0-9]+(?:[.,xp][0-9]+)?")
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
@@ -352,9 +362,10 @@ def _fields(lines: Sequence[str], tests: _Tests) -> Iterator[tuple[Header, list[
     """Yield the places in the names of files that a scheme of them has, each with what stands there in every name.
 
     Thus MRD_I<coil current in A>_f<Hz> or MRD_I(coil current, A)_f(Hz); what a letter or word stands for, a line of its
-    own may tell: MRD_iiii_ff.csv, iiii: coil current in mA.
+    own may tell, or its own name: MRD_iiii_ff.csv, iiii: coil current in mA; current_frequency with current in A.
     """
-    meant = {m[1]: f"<{m[2]}>" for m in map(_PLACE.match, lines) if m}
+    meant = {m[1]: f"<{m[0]}>" for line in lines for m in _NAME_IN_UNIT.finditer(line) if is_unit(m[2])}
+    meant |= {m[1]: f"<{m[2]}>" for m in map(_PLACE.match, lines) if m}
     names = [name for line in lines for name in re.findall(r"\w+_[\w.]+", line) if meant]
     schemes = [re.sub("[^\\W\\d_]+", lambda m: meant.get(m[0], m[0]), name) for name in names]
     schemes += [_ATTACHED.sub(r"<\1>", line) if _JOINED.search(line) else line for line in lines]
