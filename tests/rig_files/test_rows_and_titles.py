@@ -319,7 +319,7 @@ def test_a_first_refusal_of_several_sheets_asks_for_their_currents_too(tmp_path)
 
 
 def test_numbered_pairs_are_tests_where_one_has_no_second_sensor(tmp_path):
-    names = ["Time (s)", *(f"{name}_{n}" for n in (1, 2, 3) for name in ("Disp (mm)", "Force (N)"))]
+    names = ["Time (s)", *(name.format(n) for n in (1, 2, 3) for name in ("Disp_{} (mm)", "Force_{} (N)"))]
     pairs = (column for amperes in (0.0, 1.0, 1.1) for column in (X, force(amperes)))  # the force saturates
     (tmp_path / "run.csv").write_text(";".join(names) + "\n" + rows(T, *pairs))
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
