@@ -320,6 +320,22 @@ def test_the_records_are_read_back(damper, tmp_path):
     assert isinstance(none.exception, ConditionError)
 
 
+def test_a_motion_planned_without_a_model_has_no_force(tmp_path):
+    limits = "current_A = [0, 2]\nfrequency_Hz = [0.5, 4]\namplitude_mm = [2, 20]\n"
+    for rated, columns in (
+        ("", "time_s,displacement_m,current_A"),
+        ("force_N = 900", "time_s,displacement_m,force_N,current_A"),
+    ):
+        (tmp_path / "limits.toml").write_text(limits + rated)
+        out = tmp_path / f"plan{rated}"
+        asked = ["plan", "--limits", str(tmp_path / "limits.toml"), "--hours", "0.5", "--out", str(out)]
+        got = CliRunner().invoke(application(), asked)
+        assert ("force_N is estimated from the rated force" in got.stdout, "force_N" in got.stdout) == (
+            bool(rated),
+        ) * 2
+        assert {path.read_text().partition("\n")[0] for path in out.glob("plan_*.csv")} == {columns}
+
+
 def test_a_plan_beats_chance_and_the_factorial_grid_by_choosing_its_sessions():
     found = designs(reckoned(1), 2.0, 1)
     for other in ("random records, one session", "factorial grid, one session", "plan that ignores drift"):
@@ -335,12 +351,23 @@ def test_a_record_of_too_many_samples_is_refused_and_the_remedy_works():
     assert replace(LIMITS, sample_rate_Hz=most * LIMITS.frequency_Hz[0] / LIMITS.cycles).sample_rate_Hz > 1e4
 
 
-def test_conditions_of_a_plan_have_three_digits_and_stay_inside_the_limits():
+def test_conditions_of_a_plan_are_set_by_two_or_three_digits_inside_the_limits():
     allowed = replace(LIMITS, current_A=(0.0, 1.6), frequency_Hz=(0.4999998, 4.0000006), amplitude_mm=(5.004, 12.345))
     found = allowed.candidates(2.0)
-    assert {c.current_A for c in found} == {0.0, 0.533, 1.07, 1.6}
+    assert {c.current_A for c in found} == {0.0, 0.53, 1.07, 1.6}
     assert {c.frequency_Hz for c in found} == {0.5, 1.0, 2.0, 4.0}
-    assert {round(1e3 * c.amplitude_m, 9) for c in found} == {5.004, 6.76, 9.14, 12.3}
+    assert {round(1e3 * c.amplitude_m, 9) for c in found} == {5.004, 6.8, 9.1, 12.3}
+    allowed = replace(
+        LIMITS, current_A=(0.0, 2.0), frequency_Hz=(0.5, 4.0), amplitude_mm=(2.0, 20.0), velocity_m_s=0.13
+    )
+    for condition in [item.condition for item in first_matrix(allowed, 2.0)]:
+        values = condition.current_A, condition.frequency_Hz, round(1e3 * condition.amplitude_m, 9)
+        assert [float(f"{value:.2g}") for value in values] == list(values)
+        assert condition.peak_velocity <= 0.13
+    tested = Limits.of(joint_damper())
+    assert all(
+        len(f"{end:g}".strip("0.").replace(".", "")) <= 3 for end in (*tested.frequency_Hz, *tested.amplitude_mm)
+    )
 
 
 def test_the_table_of_a_plan_has_conditions_without_the_digits_of_a_measurement():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from mrdamper.data import Condition
-from mrdamper.study.limits import Limits
+from mrdamper.study.limits import Limits, set_value
 from mrdamper.study.proposal import Proposal
 
 _SESSIONS = 2  # whose repeats show how much they differ
@@ -18,7 +18,8 @@ def first_matrix(limits: Limits, hours: float) -> list[Proposal]:
     """
     limits.candidates(hours)
     (i_low, i_high), (f_low, f_high), (a_low, a_high) = limits.current_A, limits.frequency_Hz, limits.amplitude_mm
-    f_mid, a_mid, i_mid = math.sqrt(f_low * f_high), math.sqrt(a_low * a_high), (i_low + i_high) / 2
+    f_mid, a_mid = set_value(math.sqrt(f_low * f_high)), set_value(math.sqrt(a_low * a_high))
+    i_quarter, i_mid = (set_value(i_low + share * (i_high - i_low)) for share in (0.25, 0.5))
     wanted = [
         (i_low, f_mid, a_mid, "passive: viscous damping, friction and gas without the field"),
         (i_high, f_mid, a_mid, "full field at the same motion: the range of the yield force"),
@@ -28,7 +29,7 @@ def first_matrix(limits: Limits, hours: float) -> list[Proposal]:
         (i_low, f_high, a_mid, "fast and passive: viscous damping and whether it thins"),
         (i_high, f_low, a_high, "long and slow, full field: the plateau of the yield force"),
         (i_high, f_high, a_mid, "fast, full field: damping that grows with current, and lag"),
-        (i_low + 0.25 * (i_high - i_low), f_mid, a_mid, "a quarter of the field: where the yield force begins"),
+        (i_quarter, f_mid, a_mid, "a quarter of the field: where the yield force begins"),
         (i_mid, f_low, a_low, "slow and short: rate dependence before yield, separated from amplitude"),
         (i_mid, f_high, a_low, "fast and short at half the field: frequency and amplitude apart"),
     ]
@@ -39,7 +40,8 @@ def first_matrix(limits: Limits, hours: float) -> list[Proposal]:
         top = limits.velocity_m_s / (2 * math.pi * amplitude * 1e-3)
         if top < f_low:
             return None  # no frequency of the rig is slow enough for this stroke
-        condition = Condition(current, min(frequency, top), amplitude * 1e-3)
+        below = set_value(top) if set_value(top) <= top else set_value(0.98 * top)
+        condition = Condition(current, min(frequency, max(below, f_low)), amplitude * 1e-3)
         return Proposal(session, condition, limits.minutes(condition), reason)
 
     tests, left = list[Proposal](), hours * 60 - limits.opening

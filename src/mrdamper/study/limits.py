@@ -18,6 +18,7 @@ from mrdamper.rig_files.strict_toml import LimitsError, load_part
 _MAX_SAMPLES = 500_000  # of a planned record
 _RANGES = ("current_A", "frequency_Hz", "amplitude_mm")
 _LEVELS = 4  # of each of them on the grid of candidates
+_ROUNDING = 0.02  # largest relative change of a planned value by rounding
 _Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]  # of a file
 _Whole = Annotated[int, Field(strict=True)]
 
@@ -90,9 +91,11 @@ class Limits:
     def of(cls, damper: Damper) -> Limits:
         """Return the tested ranges of a damper."""
         e = damper.envelope
-        amplitudes = 1e3 * e.amplitude_m[0], 1e3 * e.amplitude_m[1]
-        rate = min(cls.sample_rate_Hz, 0.5 * _MAX_SAMPLES * e.frequency_Hz[0] / cls.cycles)
-        return cls(e.current_A, e.frequency_Hz, amplitudes, velocity_m_s=e.peak_velocity_m_s[1], sample_rate_Hz=rate)
+        ends = (e.current_A, e.frequency_Hz, (1e3 * e.amplitude_m[0], 1e3 * e.amplitude_m[1]))
+        current, frequency, amplitude = ((set_value(low), set_value(high)) for low, high in ends)
+        rate = min(cls.sample_rate_Hz, 0.5 * _MAX_SAMPLES * frequency[0] / cls.cycles)
+        fastest = max(e.peak_velocity_m_s[1], Condition(0.0, frequency[0], 1e-3 * amplitude[0]).peak_velocity)
+        return cls(current, frequency, amplitude, velocity_m_s=fastest, sample_rate_Hz=rate)
 
     @property
     def opening(self) -> float:
@@ -126,9 +129,15 @@ class Limits:
         return allowed
 
 
+def set_value(value: float) -> float:
+    """Round a value as an operator sets it: to two digits, or three where two change it by over 2 %."""
+    rounded = float(f"{value:.2g}")
+    return rounded if abs(rounded - value) <= _ROUNDING * abs(value) else float(f"{value:.3g}")
+
+
 def _rounded(levels: Floats) -> Floats:
-    """Levels of three digits, none of them beyond the first and the last one given."""
-    return np.unique(np.clip([float(f"{level:.3g}") for level in levels], levels[0], levels[-1]))
+    """Levels as they are set, none of them beyond the first and the last one given."""
+    return np.unique(np.clip([set_value(float(level)) for level in levels], levels[0], levels[-1]))
 
 
 def bad_limits(problem: str, remedy: str) -> LimitsError:

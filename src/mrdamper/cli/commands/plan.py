@@ -48,6 +48,7 @@ def plan(
     if about is not None and damper is None:
         raise InputError("--about without a model", remedy="give a model.json")
     allowed = Limits.read(limits) if limits else Limits.of(damper)  # type: ignore[arg-type]
+    forces = "the predicted force" if damper else "estimated from the rated force" if allowed.force_N else ""
     rows = []
     with progress_soon("planning") as tell, write_result(out) as folder:
         if damper:
@@ -59,8 +60,9 @@ def plan(
             c = item.condition
             name = f"plan_{number:02d}_{c.current_A:.3g}A_{c.frequency_Hz:.3g}Hz_{1e3 * c.amplitude_m:.3g}mm.csv"
             motion, force = item.record(allowed, damper)
-            table = np.column_stack([motion.time, motion.displacement, force, motion.current])
-            names = "time_s,displacement_m,force_N,current_A"
+            columns = {"time_s": motion.time, "displacement_m": motion.displacement}
+            columns |= ({"force_N": force} if forces else {}) | {"current_A": motion.current}
+            table, names = np.column_stack(list(columns.values())), ",".join(columns)
             np.savetxt(folder / name, table, "%.9g", ",", header=names, comments="", encoding="utf-8")
             rows.append(asdict(PlanRow.of(number, item, name)))
         (folder / "plan.csv").write_text(csv_text(rows), encoding="utf-8")
@@ -68,7 +70,7 @@ def plan(
     minutes = sessions * allowed.opening + sum(item.minutes for item in chosen)
     typer.echo(
         f"{out / 'plan.csv'}\n{counted(len(chosen), 'record')} in {counted(sessions, 'session')}, {minutes:.0f} of "
-        f"{60 * hours:.0f} minutes; force_N is the predicted force"
+        f"{60 * hours:.0f} minutes" + (f"; force_N is {forces}" if forces else "")
     )
     if damper is None or reckoning is None:
         return
