@@ -7,7 +7,7 @@ import polars
 import pytest
 from support.dampers import all_dampers, joint_damper
 
-from mrdamper import identify, plot_force, plot_loop, validate
+from mrdamper import identify, load_input, load_system, plot_force, plot_loop, simulate_system, validate
 from mrdamper.dampers.base import Damper
 from mrdamper.data import Condition
 from mrdamper.errors import InputError
@@ -25,6 +25,7 @@ def shown(bundled):
         "identification": identify(run),
         "prediction": damper.predict(Condition(0.5, 2.0, 0.01)),
         "validation": validate(damper, [run]),
+        "simulation": simulate_system(load_system("quarter-car").system, load_input("bump"), {}, step=1e-3),
         **{f"damper {name}": d for name, d in all_dampers().items() if isinstance(d, Damper)},
     }
 

@@ -79,22 +79,11 @@ def write_simulation(
         for row in rows if bands else []:
             row |= dict(zip((f"{100 * level:g} %" for level in LEVELS), spread[row["measure"]], strict=True))
         (work / "measures.csv").write_text(csv_text(rows), encoding="utf-8")
-        (work / "histories.csv").write_text(csv_text(history_rows(done)), encoding="utf-8")
+        every = slice(None, None, -(-done.time.size // _ROWS))
+        samples = rows_of({name: column[every] for name, column in done.table.items()})
+        (work / "histories.csv").write_text(csv_text(samples), encoding="utf-8")
 
     return publish(folder, "simulation.html", fill)
-
-
-def history_rows(done: Simulation) -> list[dict[str, float]]:
-    """Time histories in SI units, with at most twenty thousand rows."""
-    table = {"time_s": done.time}
-    for i, name in enumerate(done.system.coordinates):
-        table |= {f"{name}.x": done.x[:, i], f"{name}.v": done.v[:, i], f"{name}.a": done.a[:, i]}
-    for i, link in enumerate(done.links):
-        table |= {f"{link.name}.stroke": done.stroke[:, i], f"{link.name}.force": done.force[:, i]}
-        if link.role == "damper":
-            table[f"{link.name}.current_A"] = done.current[:, i]
-    every = slice(None, None, -(-done.time.size // _ROWS))
-    return rows_of({name: column[every] for name, column in table.items()})
 
 
 def _readable(name: str) -> tuple[str, str, float]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.dampers.streaming import FLAGS
-from mrdamper.data import Floats
+from mrdamper.data import Displayable, Floats
 from mrdamper.data.wording import number
 from mrdamper.errors import UnknownNameError, validate_arguments
 from mrdamper.systems.controllers import Controller
@@ -23,8 +23,8 @@ PART = 4096  # steps per block, whose arrays fit the processor's cache
 HALVING = 5e-3  # change of a peak on halving the step up to which it has converged
 
 
-@dataclass(frozen=True, eq=False)
-class Simulation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(Displayable):
     """Result of a system simulation."""
 
     PEAKS: ClassVar = ("displacement_m", "drift_m", "acceleration_m_s2", "force_N")
@@ -52,6 +52,25 @@ class Simulation:
         law = type(self.controller).title if self.dampers else "without dampers"
         constant = self.controller.current_A if self.dampers and isinstance(self.controller, Passive) else None
         return f"{self.system.title}, {law}{'' if constant is None else f' {number(constant, 3)} A'}"
+
+    @property
+    def details(self) -> list[str]:
+        """Duration, step and peaks."""
+        largest = ((name.partition("_"), float(np.max(rows, initial=0.0))) for name, rows in self.peaks.items())
+        peaks = ", ".join(f"{name} {number(value)} {unit.replace('_s2', '/s²')}" for (name, _, unit), value in largest)
+        return [f"{number(float(self.time[-1]))} s in steps of {number(1e3 * self.step, 3)} ms", f"largest {peaks}"]
+
+    @property
+    def table(self) -> dict[str, Floats]:
+        """One row per time step, SI units: motion of the coordinates, stroke, force and current of the links."""
+        columns = {"time_s": self.time}
+        for i, name in enumerate(self.system.coordinates):
+            columns |= {f"{name}.x": self.x[:, i], f"{name}.v": self.v[:, i], f"{name}.a": self.a[:, i]}
+        for i, link in enumerate(self.links):
+            columns |= {f"{link.name}.stroke": self.stroke[:, i], f"{link.name}.force": self.force[:, i]}
+            if link.role == "damper":
+                columns[f"{link.name}.current_A"] = self.current[:, i]
+        return columns
 
     @property
     def step(self) -> float:
