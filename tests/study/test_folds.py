@@ -80,6 +80,20 @@ def test_a_record_that_is_no_sine_is_no_condition_of_a_split():
     assert "rough" not in split.held_out
 
 
+def test_a_split_takes_clipped_runs_by_name_only_and_names_them():
+    tests = rig_tests((0.0, 0.4, 1.0))
+    dataset = Dataset(
+        tuple(replace(run, notes={"findings": "W_CLIPPED"} if i < 3 else {}) for i, run in enumerate(tests))
+    )
+    clipped = [run.id for run in tests[:3]]
+    for chosen in (hold_out(dataset), hold_out(dataset, every=2)):
+        assert chosen.held_out
+        assert not chosen.held_out & {*clipped}
+    split = hold_out(dataset, runs=clipped[:1])
+    assert split.held_out == {clipped[0]}
+    assert split.reason == f"by hand; clipped, so that a study omits them: {clipped[0]}"
+
+
 def test_records_with_a_current_that_changes_are_omitted_together():
     runs = rig_tests((0.0, 0.4, 1.0))
     switched = replace(runs[0], id="switched", current=np.linspace(0.0, 1.0, runs[0].time.size))

@@ -273,9 +273,10 @@ def _parameter_rows(study: Study) -> list[dict[str, Any]]:
 def _scatter(rig: RigStudy) -> str:
     gain, offset = (float(np.std([getattr(one, name) for one in rig.readings])) for name in ("gain", "offset"))
     sessions = (
-        f"the median cross-validated error corrected for the session is {100 * rig.session_known:.2f} %."
+        f"with the gain and offset of each session corrected, the median cross-validated error is "
+        f"{100 * rig.session_known:.2f} %."
         if isinstance(rig.session_known, float)
-        else f"a correction for the session is not possible: {rig.session_known}."
+        else f"what they contribute cannot be estimated: {rig.session_known}."
     )
     omitted = "".join(
         f"Mean error with a {name.removeprefix('cross-validation, ')} omitted in cross-validation: {value}. "
@@ -284,7 +285,7 @@ def _scatter(rig: RigStudy) -> str:
     )
     return omitted + (
         f"Scatter between runs: gain {100 * gain:.1f} %, offset {offset:.0f} N (standard deviations of "
-        f"measured over predicted force). No error is corrected for the session; {sessions}"
+        f"measured over predicted force). All errors stated include the differences between test sessions; {sessions}"
         + (f" {rig.calibration.summary}." if rig.calibration else "")
     )
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mrdamper.data import Condition, Dataset, Run, same_condition
-from mrdamper.errors import InputError, UnknownNameError
+from mrdamper.errors import InputError, UnknownNameError, listed
 from mrdamper.physics.motion.sines import sine_condition
 
 SHARE = 0.2  # of the conditions, by default
@@ -42,6 +42,7 @@ def hold_out(
 ) -> Split:
     """Choose the validation runs; by default a stratified fifth of the conditions.
 
+    Runs with a clipped channel, which a study omits, are chosen by name, current or condition only, and are named then.
     Raises `SplitError` (E_SPLIT) if there are no runs to select, no identification runs would remain, or the dataset
     has a split that is not to be replaced; `UnknownNameError` if a run is not there; `ConditionError` if a condition is
     none.
@@ -81,11 +82,12 @@ def hold_out(
             raise SplitError(f"no run at {wanted}", where=where, remedy="mrdamper check shows the conditions")
         held.update(ids)
         reasons.append(f"all at {wanted}")
+    clipped = {run.id for run in dataset if "W_CLIPPED" in run.findings}
     if every is not None:
-        held.update(run.id for run in dataset.runs[every - 1 :: every])
+        held.update([run.id for run in dataset if run.id not in clipped][every - 1 :: every])
         reasons.append(f"one run in {every}")
     if not reasons and not none:
-        held, reason = _stratified(condition_of, where)
+        held, reason = _stratified({name: c for name, c in condition_of.items() if name not in clipped}, where)
         reasons.append(reason)
     left = [c for name, c in condition_of.items() if name not in held and c is not None]
     if held and len(same_condition(left)) < _MIN_CONDITIONS:
@@ -93,7 +95,8 @@ def hold_out(
             f"{len(same_condition(left))} conditions left to identify from", where=where, remedy="hold fewer runs out"
         )
     shown = {name: "no sine" if c is None else str(c) for name, c in condition_of.items()}
-    return Split(frozenset(held), ", ".join(reasons) or "nothing", shown)
+    omitted = f"; clipped, so that a study omits them: {listed(sorted(held & clipped), 4)}" if held & clipped else ""
+    return Split(frozenset(held), (", ".join(reasons) or "nothing") + omitted, shown)
 
 
 def _condition(run: Run) -> Condition | None:

@@ -79,7 +79,7 @@ def is_a_sine(view: View) -> Iterator[Finding]:
 
 
 def drifts(view: View) -> Iterator[Finding]:
-    """Report a periodic motion whose amplitude or mean drift over the record."""
+    """Report a periodic motion whose amplitude or mean drifts."""
     if view.motion is None:
         return
     amplitude = view.motion.condition.amplitude_m
@@ -87,7 +87,7 @@ def drifts(view: View) -> Iterator[Finding]:
     mean, size = drift_of(view)
     for what, drift in (("mean position", mean), ("amplitude", size)):
         if abs(drift) > limit:
-            text = f"the {what} drifts by {number(1e3 * drift, 3, sign='+')} mm over the record,"
+            text = f"the {what} drifts by {number(1e3 * drift, 3, sign='+')} mm within the steady motion,"
             yield Finding("W_DRIFT", f"{text} {100 * abs(drift) / amplitude:.0f} % of the amplitude")
 
 

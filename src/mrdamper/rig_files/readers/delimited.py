@@ -223,7 +223,7 @@ def _without_footer(form: RowFormat, block: Block) -> tuple[Block, tuple[Finding
         left += [text.strip()[:40]] if text.strip() else []
     if not left:
         return block, ()
-    shown = f"{counted(len(left), 'line')} below the last row left out: {left[-1]!r}"
+    shown = f"{counted(len(left), 'line')} below the last row omitted: {left[-1]!r}"
     return replace(block, stop=stop), (Finding("W_FOOTER", printable(shown)),)
 
 
