@@ -136,7 +136,6 @@ def c_facts(stepping: Stream, name: str, rig: str, language: type[CWriter] = CWr
 def _facts(
     name: str, title: str, writer: CWriter, described: list[dict[str, Any]], starts: list[tuple[str, str]]
 ) -> dict[str, Any]:
-    """Collect the template values of any program, from its description and those of its context."""
     setup, program = writer.setup(), writer.program
     text = setup + "".join(part["body"] + part["results"] for part in described)
     return {

@@ -200,7 +200,6 @@ def all_texts(
 
 
 def _texts(facts: Mapping[str, Any], sources: Mapping[str, str], instance: str, page: str) -> dict[str, bytes]:
-    """Fill the templates of an FMU."""
     name, fmi = facts["name"], facts["fmi"]
     sources = {
         **sources,

@@ -84,7 +84,6 @@ def _token(files: Mapping[str, bytes]) -> list[FmuFinding]:
 
 
 def _binary_for_here(files: Mapping[str, bytes]) -> tuple[dict[str, bytes], list[FmuFinding]]:
-    """Compile the binary for this machine from the sources if it is missing."""
     platform, described = here(), files["modelDescription.xml"]
     if platform is None:
         return {}, [FmuFinding("N_FMU_PLATFORM", "binaries cannot be run on this machine", "note")]
@@ -103,7 +102,6 @@ def _binary_for_here(files: Mapping[str, bytes]) -> tuple[dict[str, bytes], list
 
 
 def _probed(files: Mapping[str, bytes], loadable: bool) -> list[FmuFinding]:
-    """Validate and simulate the unpacked FMU in a separate process; return its findings and exit status."""
     with temporary_folder() as folder:
         unpacked, report = folder / "fmu", folder / "report"
         for name, content in files.items():

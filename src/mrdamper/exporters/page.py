@@ -59,7 +59,6 @@ class PageExporter(Exporter):
 
 
 def _facts(damper: Damper | Model, stepping: Stream, name: str, library: bytes | None) -> dict[str, Any]:
-    """Collect the template values of the page."""
     rig = damper_of(damper).rig
     envelope = stepping.envelope
     computed = {
@@ -105,7 +104,6 @@ def _curve(points: np.ndarray, library: bytes | None) -> dict[str, Any]:
 
 
 def _tested(envelope: Envelope) -> list[dict[str, Any]]:
-    """Describe the tested ranges and the extrapolation."""
     named = [(field, label.lower(), unit, factor) for _, field, label, unit, factor, *_ in _KNOBS]
     named.append(("peak_velocity_m_s", "peak velocity", "mm/s", 1e3))
     return [
@@ -121,7 +119,6 @@ def _tested(envelope: Envelope) -> list[dict[str, Any]]:
 
 
 def _words(damper: Damper | Model, stepping: Stream) -> list[str]:
-    """Describe the origin of the damper and its range of validity, in sentences."""
     sentence = f"{stepping.title[:1].upper()}{stepping.title[1:]}, exported by mrdamper {version('mrdamper')}"
     if count := getattr(damper, "parameter_count", 0):  # a model without tests
         facts = "; ".join(f"{key}: {value}" for key, value in getattr(damper, "provenance", {}).items())
@@ -167,7 +164,6 @@ def _knobs(envelope: Envelope | None) -> list[dict[str, Any]]:
 
 
 def _on(step: float, value: float, least: int = 0) -> float:
-    """Round to the nearest multiple of a slider's step."""
     return max(round(value / step), least) * step
 
 

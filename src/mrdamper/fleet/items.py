@@ -71,7 +71,6 @@ def _in_folder(folder: Path, profile: FleetProfile) -> Iterator[Item]:
 
 
 def _of_loose_files(paths: Sequence[Path], profile: FleetProfile) -> Iterator[Item]:
-    """Group files whose names state the same serial number and session."""
     groups: dict[Item, list[str]] = {}
     for path in paths:
         stem = path.name.split(".")[0]

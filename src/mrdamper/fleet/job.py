@@ -244,7 +244,6 @@ def _stands_for(model: Model, axis: str) -> list[str]:
 
 
 def _study(dataset: Dataset) -> dict[str, Any]:
-    """Run the full study of an outlier, and summarise it."""
     try:
         chosen = study_rig(dataset).chosen
     except InputError as error:
@@ -265,7 +264,6 @@ def _usable(dataset: Dataset) -> list[Run]:
 
 
 def _stands_out(fit: JointFit, away: float, plan: Plan) -> bool:
-    """Tell if a damper is so far from the population that it needs a full study."""
     if plan.draft:
         return False
     poor = float(np.median(fit.nrmse_pp)) > plan.error + _OUTLIER_DEVIATIONS * max(plan.error_spread, 0.1 * plan.error)

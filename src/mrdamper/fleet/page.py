@@ -157,7 +157,6 @@ def _chart(values: Floats, first: Any, ranges: Any, average: Any, about: tuple[s
 
 
 def _worst(table: Path, line: pl.DataFrame, plan: Plan | None) -> dict[str, Any] | None:
-    """Draw the loops farthest from the median of the population over it."""
     import polars as pl
 
     if plan is None or not line.height:

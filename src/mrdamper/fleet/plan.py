@@ -139,7 +139,6 @@ def _middle(values: Floats) -> tuple[float, float]:
 
 
 def _matrix(tests: list[Test], dampers: int) -> tuple[Test, ...]:
-    """List the tests of at least half the dampers, with their median conditions."""
     groups = same_condition([Condition(*test) for test in tests])
     common = [g for g in groups if 2 * len(g) >= dampers] or groups
     return tuple(sorted(_as_test(np.median([tests[i] for i in g], axis=0).tolist()) for g in common))

@@ -197,7 +197,6 @@ class _Line:
             self._journal.keep_plan(key, self.plan.document)
 
     def _under(self, plan: Plan, order: Sequence[int], references: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Return the rows of the reference dampers under a draft of the plan."""
         numbers = [n for n in order if self._items[n].name in references]
         self._measure(numbers, plan)
         rows = [self._journal.result(self._key(n, plan)) for n in numbers]

@@ -137,7 +137,6 @@ def generalisation(study: Reproduction) -> Measured:
 
 
 def _validated(study: Reproduction, *titles: str) -> list[RecipeResult]:
-    """Return the methods of these titles; empty if one of them predicts no validation run."""
     methods = [method for title in titles if (method := study.contender(title)) and method.validation.runs]
     return methods if len(methods) == len(titles) else []
 

@@ -83,7 +83,6 @@ def pictures(
 
 
 def _figure(axes: Texts, height: float, **margins: Any) -> tuple[Figure, *tuple[Axes, ...]]:
-    """Return a figure and its row of panels with these texts of the axes."""
     figure, *panels = new_figure(1, len(axes), height, **margins)
     for panel, texts in zip(panels, axes, strict=True):
         panel.label(*texts)
@@ -91,7 +90,6 @@ def _figure(axes: Texts, height: float, **margins: Any) -> tuple[Figure, *tuple[
 
 
 def _listed_above(panel: Axes) -> None:
-    """Name the curves of a panel above the figure."""
     panel.legend("above", size=_SMALL, columns=min(sum(bool(one.label) for one in panel.series), 4))
 
 
@@ -151,7 +149,6 @@ def _loops_by(vary: str, place: int, study: Reproduction, axes: Texts) -> Drawin
 
 
 def _identified(place: int, study: Reproduction, axes: Texts) -> Drawing:
-    """Draw tested loops with the literal identification of each, at one amplitude."""
     literal = study.contender(LITERAL)
     models = {i.run_id: i.model for i in (literal.identifications if literal else ())}
     runs = [run for run in study.amplitude_group(place) if run.id in models]
@@ -161,7 +158,6 @@ def _identified(place: int, study: Reproduction, axes: Texts) -> Drawing:
 
 
 def _predicted(title: str, study: Reproduction, axes: Texts) -> Drawing:
-    """Draw the loops of the validation runs with the prediction of one method."""
     method = study.contender(title)
     scored = {score.run_id for score in method.validation.runs} if method else set()
     runs = [run for run in study.held_out if run.id in scored]
@@ -194,13 +190,11 @@ def _tested_and_model(axes: Texts, runs: Sequence[Run], forces: Sequence[Floats]
 
 
 def _plot_loop(panels: Sequence[Axes], run: Run, force: Floats, **look: Any) -> None:
-    """Draw the last cycle of a force inside a run's steady window, over displacement and over velocity."""
     last = last_cycle(run, equivalent_sine(run).condition.frequency_Hz)
     draw_loop(panels, measured_motion(run).part(last), force[last], lw=_LINE, **look)
 
 
 def _methods_at_currents(study: Reproduction, axes: Texts) -> Drawing:
-    """Draw validation runs over the currents, measured and predicted by three methods."""
     runs = sorted(study.held_out, key=lambda run: float(np.mean(run.current)))
     dampers = {c.recipe.title: c.damper for c in study.named(LITERAL, CONSISTENT, TRADITIONAL)}
     if not runs or not dampers:
@@ -273,7 +267,6 @@ def _r2(share: float, over: str = "") -> str:
 
 
 def _r2_over_motions(name: str, form: str, study: Reproduction, axes: Texts) -> Drawing:
-    """Draw R² of the function of the current at every motion."""
     values = _parameter(study, name)
     if values.size != len(study.conditions):
         return f"{name} was not identified on every run"

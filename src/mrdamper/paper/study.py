@@ -141,7 +141,6 @@ def reproduce(
 
 
 def _over_seeds(seeds: Sequence[_Seed]) -> dict[str, Any]:
-    """Return errors and verdicts over the noise seeds, as the fields of the study."""
     if not seeds:
         return {}
     return {
@@ -182,7 +181,6 @@ def _tests(
 
 
 def _slow_test(dataset: Dataset) -> Run | None:
-    """Return the quasi-static test without current, where the data hold one [section 2]."""
     for run in dataset:
         travel = np.abs(np.diff(run.displacement[:: max(1, run.time.size // 2000)])).sum()
         speed = float(travel) / max(float(np.ptp(run.time)), 1e-9)
@@ -259,7 +257,6 @@ def _identify_all(run: Run, bases: Sequence[Basis], progress: Progress) -> _Iden
 def _fit_all(
     steps: Steps, held_out: Sequence[Run], cache: IdentificationCache, processes: Processes, progress: Progress
 ) -> tuple[list[RecipeResult], dict[str, str]]:
-    """Fit over conditions and score, one recipe per task; the joint fit takes longest."""
     tasks = [(*step, held_out) for step in sorted(steps, key=lambda step: step[0].title != JOINT)]
     done = follow_each(tasks, cache, processes, progress, leave_out=False)
     scored = {one.recipe.title: one for one in done if isinstance(one, RecipeResult)}
@@ -268,7 +265,6 @@ def _fit_all(
 
 
 def _genetic_ends(searches: Mapping[str, Basis], optimum: Basis | None, cache: _Identified) -> tuple[GeneticEnd, ...]:
-    """Compare the results of the searches with the optimum of the same runs."""
     ends = []
     for run_id, basis in searches.items():
         (one, seconds), (best, _) = cache.runs[basis, run_id], cache.runs.get((optimum, run_id), ("", 0.0))  # type: ignore[arg-type]
@@ -284,7 +280,6 @@ def _genetic_ends(searches: Mapping[str, Basis], optimum: Basis | None, cache: _
 
 
 def _weak_and_strong(train: Sequence[Run]) -> list[tuple[int, Run]]:
-    """Return two runs of different force, with a seed for each."""
     ordered = sorted(train, key=lambda run: float(np.ptp(run.force)))
     places = dict.fromkeys(int(share * (len(ordered) - 1)) for share in (0.3, 0.7))
     return list(enumerate(ordered[i] for i in places))
@@ -293,7 +288,6 @@ def _weak_and_strong(train: Sequence[Run]) -> list[tuple[int, Run]]:
 def _genetic_check(
     assumptions: PaperAssumptions, options: PaperOptions, seed: int, run: Run, progress: Progress
 ) -> GeneticCheck:
-    """Run the genetic search with the paper's settings on a run."""
     progress(f"genetic search, {run.id}", 0.0)
     method = Paper(genetic=GeneticSettings(seed=seed), bounds=options.bounds, explain=False)
     problem, begin = assumptions.basis(method).problem(run), time.perf_counter()

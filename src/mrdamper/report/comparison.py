@@ -110,7 +110,6 @@ def _rows(rig: RigComparison) -> list[dict[str, Any]]:
 
 
 def _reason(entry: RecipeResult, entries: Sequence[RecipeResult]) -> str:
-    """Compare the error and the parameter count of an entry with those of the others."""
     own, best = entry.cross_validated.median(), entries[0]
     text = f"{100 * own:.1f} % in cross-validation with {entry.damper.parameter_count} parameters"
     if entry is best:
@@ -158,7 +157,6 @@ def _chapter(rig: RigComparison, folder: Path, suffix: str, png: bool) -> dict[s
 
 
 def _shown(rig: RigComparison) -> list[Run]:
-    """Select sine runs over the currents, from the validation runs if there are any."""
     entry = rig.entries[0]
     scored = entry.validation.only(rig.sines).runs or entry.train.runs
     ordered = sorted(scored, key=lambda run: (run.condition.current_A, run.condition.peak_velocity))

@@ -87,7 +87,6 @@ def _explain(groups: Sequence[list[str]], damper: Damper) -> None:
 
 
 def _design(loops: Sequence[LoopAnalysis], identified: Sequence[str]) -> list[str]:
-    """List effects that the design of the tests cannot determine."""
     sentences = []
     if 0 < len(identified) < MIN_RUNS:
         sentences.append(
@@ -114,7 +113,6 @@ def _design(loops: Sequence[LoopAnalysis], identified: Sequence[str]) -> list[st
 
 
 def _temperature(runs: Iterable[Run], identified: Collection[str]) -> list[str]:
-    """State the temperatures of the identification runs where they differ."""
     noted = [run.notes.get("temperature_C", "") for run in runs if run.id in identified]
     values = [float(note) for note in noted if re.fullmatch(r"-?[0-9.]+", note)]
     if not values or max(values) - min(values) < _SAME_TEMPERATURE_K:

@@ -306,7 +306,6 @@ class _Writer:
         return [*self._parts(left), *self._parts(right)]
 
     def _part(self, rows: list[list[_Element]]) -> None:
-        """Set rows of cells that fit the width of the page."""
         paper, (size, widths) = self.paper, self._fitted(rows)
         size = max(size, _SMALLEST)
         paper.set_font("text", size=size)

@@ -130,7 +130,6 @@ def _tables(study: Study) -> dict[str, list[dict[str, Any]]]:
 
 
 def _draw(rig: RigStudy, progress: Progress, *, also: tuple[str, ...], limits: tuple[Limit, ...]) -> dict[str, Picture]:
-    """Draw every figure of a rig, by name."""
     figures, pictures = _figures(rig, limits), {}
     for number, (name, figure) in enumerate(figures.items()):
         progress(f"{rig.rig or 'rig'}: figure {name}", number / len(figures))
@@ -175,7 +174,6 @@ def _shown(rig: RigStudy) -> list[Any]:
 
 @once_per_run
 def _measured(rig: RigStudy) -> dict[str, Characteristics]:
-    """Characterise the tests without a model; empty if no run has a steady cycle."""
     try:
         return {rig.dataset.name: characterise_usable(rig.dataset, compared=True)}
     except IdentificationError:

@@ -68,7 +68,6 @@ def score_rows(rig: str, result: RecipeResult, *sets: str) -> list[dict[str, Any
 
 
 def _ends(identification: Identification) -> dict[str, float | None]:
-    """Return ends of the 95 % intervals of the free parameters."""
     columns: dict[str, float | None] = {}
     for name in (info.name for info in identification.model.parameters() if info.name in identification.free):
         columns[f"{name} low 95 %"], columns[f"{name} high 95 %"] = identification.interval(name) or (None, None)

@@ -194,10 +194,8 @@ class Simulation(Displayable):
 
 
 def _largest(series: Iterable[Floats]) -> Floats:
-    """Largest magnitude of each series."""
     return np.array([max(float(one.max()), -float(one.min())) for one in series])
 
 
 def _mean(series: Floats) -> Floats:
-    """Mean of every two successive rows."""
     return 0.5 * (series[1:] + series[:-1])

@@ -172,7 +172,6 @@ class SystemLoop:
         return done
 
     def _at_rest(self, time: Floats) -> Simulation:
-        """Return a simulation at rest."""
         shapes = [(time.size, width) for width in (len(self.system.coordinates), len(self.links))]
         x, v, a, load = (np.zeros(shapes[0]) for _ in range(4))
         force, current = (np.zeros(shapes[1]) for _ in range(2))

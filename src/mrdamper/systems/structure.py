@@ -160,6 +160,5 @@ def building(
 
 
 def _chain(values: Sequence[float]) -> Floats:
-    """Matrix of springs in series from the ground up."""
     k = np.array([*values, 0.0], dtype=float)
     return np.diag(k[:-1] + k[1:]) - np.diag(k[1:-1], 1) - np.diag(k[1:-1], -1)

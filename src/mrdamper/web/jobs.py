@@ -167,7 +167,6 @@ def _end_group(process: Any) -> None:
 
 
 def _work(pipe: Connection, task: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
-    """Run a task and send its reports and result: the worker process."""
     if hasattr(os, "setsid"):
         os.setsid()  # a group of its own, so that cancelling ends the processes of the task too
         os.nice(_NICENESS)

@@ -68,7 +68,6 @@ def _imported(upload: Upload, path: Path, profile: Profile | None, table: TestsT
 
 
 def _verdicts(upload: Upload) -> tuple[Verdict, ...]:
-    """List the result of every file: refused ones first, then those with findings."""
     refused, taken = [], []
     for path in upload.paths_by_name():
         name = upload.names[path]
@@ -95,7 +94,6 @@ def _reason(error: InputError, path: Path) -> str:
 
 
 def _dataset_name(upload: Upload, count: int) -> str:
-    """Return the name of the data: that of their folder, or of the only file."""
     names = [PurePosixPath(name) for name in upload.names.values()]
     tops = {name.parts[0] for name in names if len(name.parts) > 1}
     if len(tops) == 1:
@@ -104,7 +102,6 @@ def _dataset_name(upload: Upload, count: int) -> str:
 
 
 def _guessed_profile(paths: Sequence[Path]) -> str:
-    """Return the profile of the first file whose format can be guessed; an empty one where none can."""
     for path in paths[:_MAX_GUESSES]:
         try:
             return profile_text(guess_profile(path), unset_keys(()))

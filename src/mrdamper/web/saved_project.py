@@ -166,7 +166,6 @@ def _read_data(archive: zipfile.ZipFile, contents: _Contents, parts: list[str], 
 
 
 def _part(archive: zipfile.ZipFile, name: str, limit: int = _TEXT_LIMIT) -> bytes:
-    """Read one part, up to a size."""
     try:
         with archive.open(name) as part:
             content = part.read(limit + 1)

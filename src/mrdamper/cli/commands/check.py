@@ -84,7 +84,6 @@ def _check_fmu(path: Path, as_json: bool) -> None:
 
 
 def _text_table(rows: Rows) -> str:
-    """Columns of a width, the first and the last two to the left."""
     cells = [["–" if row[name] is None else str(row[name]) for name in _HEADINGS] for row in rows]
     lines = aligned([list(_HEADINGS.values()), *cells], (0, len(_HEADINGS) - 2, len(_HEADINGS) - 1))
     return "".join(f"{line}\n" for line in lines)

@@ -91,7 +91,6 @@ def _print(result: Comparison, rows: list[dict[str, Any]], name: str, verbose: b
 
 
 def _ranking(rows: list[dict[str, Any]]) -> list[str]:
-    """Return the lines of the ranking, best first."""
     cells = [["", "model", "per run", "ident.", "CV", "worst", "valid.", "worst", "parameters", "time, s"]]
     for row in rows:
         errors = [row[f"{name}_nrmse_pp"] for name in _ERRORS]

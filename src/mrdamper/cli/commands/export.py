@@ -55,7 +55,6 @@ def export(
 
 
 def _inverse(damper: Damper, name: str, to: str, exporter: Exporter, out: Path) -> tuple[list[Path], tuple[str, ...]]:
-    """Export the current for a required force: written files, and notes."""
     from mrdamper.exporters.c import write_program
     from mrdamper.exporters.fmu import FMUExporter
     from mrdamper.exporters.fmu_program import write_program_fmu

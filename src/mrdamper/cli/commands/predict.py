@@ -157,7 +157,6 @@ def _summary(prediction: Prediction, interval: Band | None) -> dict[str, tuple[f
 
 
 def _in_words(summary: dict[str, tuple[float, float, float]], interval: Band, level: float, where: str) -> str:
-    """Describe peak force, energy and damping with their intervals."""
     from mrdamper.data.wording import number, span
 
     parts = ", ".join(

@@ -80,7 +80,6 @@ def reproduce(
 
 
 def _one_rig(data: Path | None, rig: str | None) -> Dataset | None:
-    """Load the one rig of a dataset; none for the virtual rig."""
     from mrdamper.rig_files.dataset_folder import load_dataset
 
     if data is None:
@@ -95,7 +94,6 @@ def _one_rig(data: Path | None, rig: str | None) -> Dataset | None:
 
 
 def _print(text: dict[str, Any]) -> None:
-    """Print errors and times of the methods, and the verdicts on the paper's claims."""
     rows: list[tuple[str, ...]] = [("validation runs, nrmse_pp", "median", "worst", "time, s")]
     for row, took in zip(text["verdicts"], text["times"], strict=False):
         errors = (math.nan if row[name] is None else row[name] for name in ("nrmse_pp", "worst_nrmse_pp"))

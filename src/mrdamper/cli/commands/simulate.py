@@ -89,7 +89,6 @@ def simulate(
 
 
 def _refuse_no_folder(out: Path | None, compare: list[str] | None) -> None:
-    """Refuse a comparison without a folder, and a folder that cannot be written to."""
     from mrdamper.data.atomic import require_writable
 
     if out is None and compare:
@@ -98,7 +97,6 @@ def _refuse_no_folder(out: Path | None, compare: list[str] | None) -> None:
 
 
 def _facts(system: str, source: str, time_scale: float, damper: Path | str) -> dict[str, str]:
-    """Name what was simulated."""
     scaled = f", played {time_scale:g} times as fast" if time_scale != 1 else ""
     return {"system": system, "input": f"{source}{scaled}"} | ({"damper": str(damper)} if damper else {})
 
@@ -200,7 +198,6 @@ def _figures(done: Simulation, dampers: Mapping[str, Damper]) -> dict[str, Any]:
 
 
 def _banded(bands: Bands | None) -> dict[str, Any]:
-    """Quantiles of every peak and measure, for JSON."""
     if bands is None:
         return {}
     from mrdamper.systems.monte_carlo import LEVELS

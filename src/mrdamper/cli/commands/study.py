@@ -87,7 +87,6 @@ def study(
 
 
 def _model(name: str | None, gas: str | None, setting: list[str]) -> str | StudyMethod | None:
-    """Return the requested model; a published method with its options."""
     from mrdamper.study.recipe import study_method, study_methods
 
     if name in study_methods():

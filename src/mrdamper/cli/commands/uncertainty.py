@@ -74,7 +74,6 @@ def uncertainty(
 
 
 def _write(out: Path, rows: Rows, curves: list[LikelihoodProfile], drawn: Samples | None, level: float) -> None:
-    """Write the table of parameters, and the requested figures."""
     from mrdamper.data.atomic import write_result
     from mrdamper.data.encoding import csv_text
     from mrdamper.report.plots.style import save_figure

@@ -77,7 +77,6 @@ def validate(
 
 
 def _rig(dataset: Dataset, asked: str | None, of_model: str) -> Dataset:
-    """Return the runs of the requested rig, of the model's rig, or of the only one."""
     if asked is None and of_model not in dataset.rigs and len(dataset.rigs) == 1:
         asked = dataset.rigs[0]
         names = [f"rig {rig!r}" if rig else "a rig without a name" for rig in (of_model, asked)]
@@ -104,7 +103,6 @@ def _note_identification_runs(damper: Damper, runs: Sequence[RunScore]) -> None:
 def _print_summary(
     damper: Damper, validation: Validation, rig: str, peaks: Iterable[dict[str, float]], level: float
 ) -> None:
-    """Print the errors over all runs, and how many peak forces lie inside their band."""
     from mrdamper.dampers.sessions import KNOWN
     from mrdamper.data.wording import counted
 

@@ -125,7 +125,6 @@ class Drawing:
         return buffer.getvalue()
 
     def _artist(self, part: DrawnPath | DrawnText, sheet: Any) -> Any:
-        """Convert a part to an artist of matplotlib."""
         from matplotlib.lines import Line2D
         from matplotlib.patches import Polygon
         from matplotlib.text import Text
@@ -188,7 +187,6 @@ def _numbers(points: Floats) -> str:
 
 
 def _outline(mark: str, half: float) -> str:
-    """Return a mark as a path from its middle."""
     if mark not in _MARKS:
         r = half * _DOTS.get(mark, 1.0)
         return f"m{-r:g} 0a{r:g} {r:g} 0 1 0 {2 * r:g} 0a{r:g} {r:g} 0 1 0 {-2 * r:g} 0z"

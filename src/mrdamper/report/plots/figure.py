@@ -222,7 +222,6 @@ class Axes:
             yield from self._listed(whole, curves)
 
     def _ticked(self, x_ends: tuple[float, float], y_ends: tuple[float, float]) -> Iterator[DrawnPath | DrawnText]:
-        """Grid, ticks, their texts and the names of the axes."""
         bottom, right, widest = self.top + self.height, self.left + self.width, 0.0
         grid, edge, size = Look(_GRID, 0.5), Look(INK, _FRAME), self.tick_size
         places, texts = self.x.ticks(x_ends, self.width / size)
@@ -252,7 +251,6 @@ class Axes:
         yield DrawnText(aside, middle[1], self.y.name, self.size, "middle", turned=True)
 
     def _listed(self, whole: tuple[float, float], curves: Sequence[Floats]) -> Iterator[DrawnPath | DrawnText]:
-        """Yield the legend: a piece of each named curve, and its name."""
         assert self._legend is not None
         place, size, columns = self._legend
         named = [one for one in self.series if one.label]
@@ -278,7 +276,6 @@ class Axes:
     def _corner(
         self, place: str, box: tuple[float, float], whole: tuple[float, float], curves: Sequence[Floats]
     ) -> tuple[float, float]:
-        """Upper left corner of the legend [pt]."""
         wide, high = box
         if place == "right":
             return self.left + self.width + 9.0, self.top + (self.height - high) / 2

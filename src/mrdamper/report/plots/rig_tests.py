@@ -106,7 +106,6 @@ def _over_current(loops: Sequence[LoopAnalysis]) -> dict[float, LoopAnalysis]:
 
 
 def _over_motion(loops: Sequence[LoopAnalysis]) -> list[LoopAnalysis]:
-    """Motions at the current with the most tests, slow to fast."""
     steps = levels([loop.condition.current_A for loop in loops])
     common = max(sorted(set(steps)), key=steps.count)
     chosen = [loop for step, loop in zip(steps, loops, strict=True) if step == common]

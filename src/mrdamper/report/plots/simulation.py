@@ -64,7 +64,6 @@ def spectra(runs: Mapping[str, Simulation]) -> Figure:
 
 
 def _drawn(runs: Mapping[str, Simulation]) -> dict[str, Simulation]:
-    """Select the runs that are drawn; all are in the tables."""
     return dict(islice(runs.items(), MOST_DRAWN))
 
 

@@ -244,7 +244,6 @@ class _Channel:
 
 
 def _equal_stretches(values: Floats) -> np.ndarray:
-    """(K, 2) stretches of at least five equal samples."""
     starts, stops = runs_of(values[1:] == values[:-1])
     stretches = np.column_stack([starts, stops + 1])
     return stretches[stretches[:, 1] - starts >= FLAT]

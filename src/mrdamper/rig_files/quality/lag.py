@@ -182,7 +182,6 @@ class ForceLag:
 
 
 def _beyond(misfit: float, noise: float) -> float:
-    """Misfit less the noise."""
     return float(np.sqrt(max(misfit**2 - noise**2, (_LEAST * noise) ** 2)))
 
 
@@ -224,7 +223,6 @@ def force_channel(view: View) -> Iterator[Finding]:
 
 
 def _description(lag: ForceLag, cycles: Cycles) -> str:
-    """Return the best lag, with its intervals, in words."""
     best, parts = lag.best, []
     if best.delay:
         low, high = sorted(abs(1e3 * cycles.period * end) for end in lag.interval("delay"))
@@ -263,7 +261,6 @@ def _negative_spring(view: View, cycles: Cycles) -> tuple[float, float]:
 
 
 def _phases(cycles: Cycles) -> Floats:
-    """(P,) times of the first cycle [s]."""
     return cycles.starts[0] + np.arange(POINTS) / POINTS * cycles.period
 
 

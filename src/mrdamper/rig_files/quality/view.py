@@ -269,7 +269,6 @@ def _reversals(x: Floats) -> np.ndarray:
 def _steady(
     time: Floats, x: Floats, reversals: np.ndarray, lengths: Floats, durations: Floats
 ) -> tuple[int, int] | None:
-    """Find the longest stretch of like strokes, with the part strokes at its ends that belong to it."""
     if lengths.size < 3:
         return None  # too few to tell a ramp from the motion
     length, duration = np.median(lengths), np.median(durations)

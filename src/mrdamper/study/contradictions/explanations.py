@@ -158,7 +158,6 @@ class ExplanationCandidate:
                 candidate._motions = [(trial, next(products)) for trial, _ in of]
 
     def _of_the_force(self, others: Posterior) -> Iterator[Trial]:
-        """Yield a factor or an offset of the force."""
         expected, one = others.at(self.own.over)[0], self.own.constant
         mean = float(one @ self.own.gram @ expected) / self.own.rows
         measured = float(one @ self.own.moment) / self.own.rows
@@ -173,7 +172,6 @@ class ExplanationCandidate:
                     yield Trial("force", factor, unit, _UNIT_ODDS)
 
     def _of_the_current(self, others: Posterior) -> Iterator[Trial]:
-        """Yield another constant current that changes the force."""
         if self.track.current_changes:
             return
         levels: list[float] = self.evidence.nodes.tolist()

@@ -89,7 +89,6 @@ def _displacement(run: Run, e: Trial) -> tuple[str, str]:
 
 
 def _misread(run: Run, channel: str, usual: str, e: Trial) -> tuple[str, str]:
-    """Describe a channel in the usual unit that was read in another, or the reverse."""
     true, read = (usual, e.unit[4:]) if e.unit.startswith("not ") else (e.unit, usual)
     text = f"its {channel} is {number(1 / e.value, 3)} times what the others show, the ratio of {read} to {true}"
     return text, _corrected(run, channel, e.value, true, read=read)
@@ -149,19 +148,16 @@ def _corrected(run: Run, channel: str, factor: float, unit: str = "", *, read: s
 
 
 def _shifted_by(run: Run, channel: str, value: float) -> str:
-    """State how a value in SI units is added to a channel."""
     unit, of = _unit_read(run, channel)
     offset, scale = _sign_read(run, channel) * value / of.factor, _scale_read(run, channel)
     return _own_profile(run, f'[channels.{channel}] unit = "{unit}" and scale = {scale:g} and offset = {offset:.3g}')
 
 
 def _sign_read(run: Run, channel: str) -> int:
-    """Return the sign with which the import read a channel."""
     return -1 if channel in run.notes.get("sign_changed", "").split(", ") else 1
 
 
 def _scale_read(run: Run, channel: str) -> float:
-    """Return the scale with which the import read a channel."""
     return float(dict(part.split(" = ") for part in run.notes.get("scaled", "").split(", ") if part).get(channel, 1.0))
 
 
@@ -196,7 +192,6 @@ def _repeated(run: Run, current: float) -> str:
 
 
 def _is_stated(run: Run) -> bool:
-    """Tell if the current is a stated number: a measured one varies."""
     return float(np.ptp(run.current)) == 0
 
 

@@ -109,7 +109,6 @@ def _undescribed(tracks: Sequence[Track]) -> str:
 
 
 def _beside(validation: Sequence[Track], trusted: Sequence[Track]) -> dict[str, Contradiction]:
-    """Compare further runs with the accepted ones."""
     if not validation or len(trusted) < MIN_RUNS:
         return {}
     search = Search(trusted)
@@ -135,7 +134,6 @@ def _in_amperes(tracks: Sequence[Track], keep: Collection[str]) -> tuple[list[Tr
 
 
 def _parted(train: Sequence[Track], gains: Mapping[int, float]) -> list[dict[str, float]]:
-    """Divide runs where their gains differ most."""
     if not gains:
         return []
     ranked = sorted(gains, key=gains.__getitem__)
@@ -145,7 +143,6 @@ def _parted(train: Sequence[Track], gains: Mapping[int, float]) -> list[dict[str
 
 
 def _differing(train: Sequence[Track], groups: Sequence[Mapping[str, float]]) -> ContradictionError:
-    """Return the refusal of runs whose gains differ too much, with both groups."""
     low, high = (
         f"{', '.join(sorted(group))} ({span(min(group.values()), max(group.values()), 'times', 2, ' to ')}"
         for group in groups
@@ -163,7 +160,6 @@ def _rig(train: Sequence[Track]) -> str:
 
 
 def _disagreement(train: Sequence[Track], contradictions: dict[str, Contradiction]) -> ContradictionError:
-    """Return the refusal, with both groups of runs."""
     rest = [track.run.id for track in train if track.run.id not in contradictions]
     causes = sorted({one.code for one in contradictions.values()})
     first = next(iter(contradictions.values()))

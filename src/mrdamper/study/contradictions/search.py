@@ -180,7 +180,6 @@ class Search:
         return bool(shared) and all(any(e.trial.is_like(one) for one in shared) for e in explanations)
 
     def _shared_trials(self) -> list[Trial]:
-        """Return the causes found that further runs may have as well."""
         return [e.trial for e in self.found.values() if e.cause in _SHARED_CAUSES]
 
     def _agreeing(self, but: Iterable[int] = ()) -> list[int]:
@@ -309,7 +308,6 @@ class Search:
         return _NO_PROPOSAL
 
     def _of_one(self, i: int) -> JointExplanation:
-        """Return the best explanation of a run."""
         others = self.posterior([i])
         alone, named = self._candidates[i].alone(others), self._candidates[i].explanations(others)
         self._options[i] = named
@@ -482,7 +480,6 @@ class Search:
         return any(2 * inside.count(level) > every.count(level) for level in inside)
 
     def _levels(self, runs: Iterable[int]) -> dict[int, float]:
-        """Levels of the runs of one current [A]."""
         constant = [k for k in runs if not self.tracks[k].current_changes]
         return dict(zip(constant, current_levels([float(self.tracks[k].current[0]) for k in constant]), strict=True))
 

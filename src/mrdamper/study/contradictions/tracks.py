@@ -138,7 +138,6 @@ def _track(run: Run) -> Track:
 
 
 def _averaged(signal: Floats, index: np.ndarray) -> Floats:
-    """Means of a signal about samples, over at most the distance between two of them."""
     half = int(np.median(np.diff(index))) // 4 if index.size > 1 else 0
     if half == 0:
         return signal[index]

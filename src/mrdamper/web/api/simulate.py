@@ -128,7 +128,6 @@ def _titled(pairs: list[tuple[str, str]]) -> list[dict[str, str]]:
 
 
 def _thinned(histories: dict[str, Floats]) -> dict[str, Floats]:
-    """Return as many samples as the page shows."""
     return {name: values[:: -(-values.size // _MAX_SAMPLES)].astype("<f4") for name, values in histories.items()}
 
 

@@ -123,7 +123,6 @@ def _channel(profile: Profile, name: str, chosen: ChosenColumn) -> Channel:
 
 
 def _rows(upload: Upload, session: Session) -> list[dict[str, Any]]:
-    """Describe the refused tests, then those taken, in the order of the files."""
     imported = session.imported
     runs = iter(imported.dataset if imported is not None and imported.source == "upload" else ())
     refused, taken = [], []
@@ -158,7 +157,6 @@ def _row(run: Run) -> dict[str, Any]:
 
 
 def _preview(upload: Upload) -> dict[str, Any] | None:
-    """Return the first rows of a file that can be read, refused ones first."""
     profile = _profile(upload)
     for path in sorted(upload.paths_by_name(), key=lambda path: path not in upload.refused):
         try:
