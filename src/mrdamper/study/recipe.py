@@ -23,6 +23,7 @@ from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit, fit_modified, fit_modified_jointly
 from mrdamper.dampers.published import Published, all_published
 from mrdamper.data import Run
+from mrdamper.data.encoding import finite
 from mrdamper.data.progress import Progress, silent
 from mrdamper.discovery import Registry
 from mrdamper.errors import IdentificationError, InputError, UnknownNameError
@@ -95,6 +96,14 @@ class RecipeResult:
     def title(self) -> str:
         """Damper and procedure, for tables."""
         return f"{self.damper.title}, {self.recipe.way}" if self.recipe.way else self.damper.title
+
+    @property
+    def errors(self) -> dict[str, float | None]:
+        """Median and largest nrmse_pp by the columns of tables; None where there are no runs."""
+        errors = {"per_run": self.per_run, "train": self.train.median()}
+        for name, scores in (("cv", self.cross_validated), ("validation", self.validation)):
+            errors |= {name: scores.median(), f"{name}_worst": scores.worst_error()}
+        return {f"{name}_nrmse_pp": finite(error) for name, error in errors.items()}
 
     @property
     def parameters_per_run(self) -> int:

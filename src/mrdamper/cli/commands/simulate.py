@@ -16,6 +16,7 @@ from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
     from mrdamper.dampers.base import Damper
+    from mrdamper.data import Floats
     from mrdamper.systems.controller_comparison import ControllerComparison
     from mrdamper.systems.controllers import Controller
     from mrdamper.systems.monte_carlo import Bands
@@ -218,16 +219,7 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
     quantiles = bands.quantiles()
     low, high = ({name: rows[end] for name, rows in quantiles.items()} for end in (0, -1))
     typer.echo(f"5 to 95 % of {bands.count} draws of the parameters and the session:")
-    for i, name in enumerate(done.system.coordinates):
-        x, a = "displacement_m", "acceleration_m_s2"
-        typer.echo(
-            f"  {name:12} x {1e3 * low[x][i]:9.3f} to {1e3 * high[x][i]:.3f} mm   "
-            f"a {low[a][i]:8.3f} to {high[a][i]:.3f} m/s²"
-        )
-    for i, name in enumerate(done.system.spans):
-        typer.echo(f"  {name:12} drift {1e3 * low['drift_m'][i]:9.3f} to {1e3 * high['drift_m'][i]:.3f} mm")
-    for i, link in enumerate(done.dampers):
-        typer.echo(f"  {link.name:12} F {low['force_N'][i]:9.1f} to {high['force_N'][i]:.1f} N")
+    _print_rows(done, low, high)
     if bands.step_change > HALVING:
         typer.echo(
             f"the step of the draws, {1e3 * bands.step:.3g} ms, moves a peak by {number(100 * bands.step_change, 2)} %",
@@ -241,19 +233,27 @@ def _print_bands(done: Simulation, bands: Bands | None, dampers: Mapping[str, Da
             typer.echo(f"not included: model error of {name}, {number(share, 2)} % of half the peak-to-peak force")
 
 
+def _print_rows(done: Simulation, *ends: Mapping[str, Floats]) -> None:
+    """Print the peaks of every coordinate, span and damper, or the ends of their ranges."""
+
+    def text(kind: str, i: int, width: int, digits: int, factor: float = 1.0) -> str:
+        first, *last = (f"{factor * end[kind][i]:.{digits}f}" for end in ends)
+        return " to ".join([first.rjust(width), *last])
+
+    for i, name in enumerate(done.system.coordinates):
+        x, a = text("displacement_m", i, 9, 3, 1e3), text("acceleration_m_s2", i, 8, 3)
+        typer.echo(f"  {name:12} x {x} mm   a {a} m/s²")
+    for i, name in enumerate(done.system.spans):
+        typer.echo(f"  {name:12} drift {text('drift_m', i, 9, 3, 1e3)} mm")
+    for i, link in enumerate(done.dampers):
+        typer.echo(f"  {link.name:12} F {text('force_N', i, 9, 1)} N")
+
+
 def _print_peaks(done: Simulation) -> None:
     from mrdamper.data.wording import number
 
-    peaks = done.peaks
     typer.echo(done.headline)
-    for i, name in enumerate(done.system.coordinates):
-        typer.echo(
-            f"  {name:12} x {1e3 * peaks['displacement_m'][i]:9.3f} mm   a {peaks['acceleration_m_s2'][i]:8.3f} m/s²"
-        )
-    for name, value in zip(done.system.spans, peaks["drift_m"], strict=True):
-        typer.echo(f"  {name:12} drift {1e3 * value:9.3f} mm")
-    for link, value in zip(done.dampers, peaks["force_N"], strict=True):
-        typer.echo(f"  {link.name:12} F {value:9.1f} N")
+    _print_rows(done, done.peaks)
     typer.echo(
         f"step {1e3 * done.step:.3g} ms; the last halving changed a peak value by {number(100 * done.halving, 2)} %; "
         f"relative error of the energy balance {number(done.energy_gap, 1)}"

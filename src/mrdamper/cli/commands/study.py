@@ -110,17 +110,7 @@ def _summary(result, written: list[str]) -> dict:
         "rigs": {
             rig.dataset.name: {
                 "chosen": rig.chosen.title,
-                "candidates": {
-                    c.title: {
-                        "parameters": c.damper.parameter_count,
-                        "per_run_nrmse_pp": c.per_run if c.identifications else None,
-                        "cv_nrmse_pp": c.cross_validated.median(),
-                        "cv_worst_nrmse_pp": c.cross_validated.worst_error(),
-                        "validation_nrmse_pp": c.validation.median() if c.validation.runs else None,
-                        "validation_worst_nrmse_pp": c.validation.worst_error() if c.validation.runs else None,
-                    }
-                    for c in rig.candidates
-                },
+                "candidates": {c.title: {"parameters": c.damper.parameter_count, **c.errors} for c in rig.candidates},
                 "interval_coverage": rig.interval_coverage,
                 "set_aside": {
                     one.run_id: {"code": one.code, "cause": one.cause, "value": one.value, "message": str(one)}

@@ -117,10 +117,9 @@ def _entry(entry: RecipeResult, key: str, keys: dict[str, str]) -> dict[str, Any
         {"key": keys[run.run_id], "nrmse_pp": finite(run.scores.nrmse_pp), "extrapolation": run.extrapolation}
         for run in entry.validation.runs
     ]
-    medians = {"cross_validation": entry.cross_validated, "validation": entry.validation}
     return {
         "damper": key, "title": entry.title, "source": entry.recipe.source, "seconds": round(entry.seconds, 2),
         "parameter_count": entry.damper.parameter_count, "runs_needed": entry.conditions_needed,
-        **{name: finite(scored.median()) if scored.runs else None for name, scored in medians.items()},
+        "cross_validation": finite(entry.cross_validated.median()), "validation": finite(entry.validation.median()),
         "scores": scores,
     }  # fmt: skip

@@ -149,7 +149,8 @@ def _candidate(candidate: RecipeResult, key: str) -> dict[str, Any]:
     return {
         "damper": key, "title": candidate.title, "parameter_count": candidate.damper.parameter_count,
         "individual_fits": finite(candidate.per_run), "seconds": round(candidate.seconds, 2),
-        "cross_validation": finite(candidate.cross_validated.median()), "validation": _median(candidate.validation),
+        "cross_validation": finite(candidate.cross_validated.median()),
+        "validation": finite(candidate.validation.median()),
     }  # fmt: skip
 
 
@@ -166,7 +167,7 @@ def _conclude_identification(
     if isinstance(scored, RecipeResult):
         note = f"validation {_percent(scored.validation)}" if scored.validation.runs else ""
         result["damper"] = session.add(scored.damper, "identification", note).key
-        result |= {"title": scored.damper.title, "validation": _median(scored.validation)}
+        result |= {"title": scored.damper.title, "validation": finite(scored.validation.median())}
         result["parameter_count"] = scored.damper.parameter_count
     if identifications:
         errors, fitted = [i.scores.nrmse_pp for i in identifications], identifications[0]
@@ -207,10 +208,6 @@ def _joint(scored: RecipeResult, fit: JointFit) -> dict[str, Any]:
         "at_bounds": fit.at_bounds,
         "runs": [{"id": run.run_id, "nrmse_pp": finite(error)} for run, error in errors],
     }
-
-
-def _median(validation: Validation) -> float | None:
-    return finite(validation.median()) if validation.runs else None
 
 
 def _percent(validation: Validation) -> str:
