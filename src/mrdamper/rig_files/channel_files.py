@@ -6,17 +6,14 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from mrdamper.rig_files.column_names import Header, role_of
-from mrdamper.rig_files.file_records import test_tables
+from mrdamper.rig_files.column_names import role_of
+from mrdamper.rig_files.file_records import Heading, headings_of
 from mrdamper.rig_files.mapping.companions import holds_channels
 from mrdamper.rig_files.profile import Channel, Profile
-from mrdamper.rig_files.readers import ask_tables
-from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED
 
 _ROLES = (*REQUIRED[1:], "current")
 _MOST_KINDS = 12
-_Heading = tuple[str, Header]
 
 
 def files_by_kind(files: Sequence[Path], profile: Profile) -> dict[str, Path]:
@@ -52,17 +49,7 @@ def _in_name(path: Path) -> tuple[str, str] | None:
     return f"{path.name[: number.start()]}{{run}}{path.name[number.end() :]}", f"{path.parent}/{number[0]}"
 
 
-def headings_of(path: Path, profile: Profile) -> dict[int, _Heading]:
-    """Return the columns of a file's first table by their numbers: the name as it stands, and apart from its unit."""
-
-    def both(tables: list[RawTable]) -> dict[int, _Heading]:
-        table = test_tables(tables, profile)[0]
-        return {table.number(i): of for i, of in enumerate(zip(table.names, table.headers, strict=True))}
-
-    return ask_tables(path, both, {}, profile.file)
-
-
-def with_files(guess: Profile, columns: Mapping[str, Mapping[int, _Heading]]) -> Profile:
+def with_files(guess: Profile, columns: Mapping[str, Mapping[int, Heading]]) -> Profile:
     """Return a profile with the file of each channel by the columns of each kind of file, as far as they tell it."""
     headings = {kind: [*of.values()] for kind, of in columns.items()}
     channels, free = dict(guess.channels), [*headings]
@@ -83,7 +70,7 @@ def with_files(guess: Profile, columns: Mapping[str, Mapping[int, _Heading]]) ->
     return guess.model_copy(update={"channels": channels})
 
 
-def _channel(kind: str, columns: Sequence[_Heading]) -> Channel:
+def _channel(kind: str, columns: Sequence[Heading]) -> Channel:
     """Return a channel of a file, with the only column of it that is no time."""
     others = [(name, header) for name, header in columns if header.role != "time"]
     if len(others) != 1:

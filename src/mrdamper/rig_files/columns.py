@@ -138,9 +138,8 @@ def rate_of(table: RawTable, profile: Profile) -> float | None:
     try:
         return stated_rate(table.quantities) or rate_in_name(table.source.name)
     except ValueError as error:
-        raise table.source.refuse(
-            "E_AMBIGUOUS", f"two sampling rates: {error}", "set [file] sample_rate_Hz = ... in a profile"
-        ) from error
+        remedy = "set [file] sample_rate_Hz = ... in a profile"
+        raise table.source.refuse("E_AMBIGUOUS", f"two sampling rates: {error}", remedy) from error
 
 
 def index_of_samples(table: RawTable) -> int | None:
@@ -444,9 +443,8 @@ def _refuse_two_units(table: RawTable, role: str, column: int, unit: str) -> Non
     """Refuse a column whose name and row of units, or a line beside the columns, state different units."""
     inner = split_name(table.names[column]) if table.units[column] else None
     other = parse_unit(unit)
-    stated = {
-        of: f"the line {line.strip()[:80]!r}" for line in table.lines for its, of in units_in(line) if its == role
-    }
+    lines = {of: line.strip() for line in table.lines for its, of in units_in(line) if its == role}
+    stated = {of: f"the line {line[:80]!r}" for of, line in lines.items()}
     same = any(parse_unit(of) == other for of in stated)  # what else is stated may be that of other files
     if inner is not None and inner.dimension == DIMENSION[role]:
         stated, same = {inner.unit: "its name"}, inner.known == other
@@ -504,10 +502,9 @@ def _second_clock(table: RawTable, time: Assigned) -> list[InputError]:
 
 def _are_alike(table: RawTable, columns: Sequence[int]) -> bool:
     """Tell if columns hold the same, each in its unit: a load in kgf, and that in N."""
-    values, first = table.try_read(*columns), columns[0]
-    return values is not None and all(
-        _agree(values[i], table.headers[i], values[first], table.headers[first]) for i in columns[1:]
-    )
+    values = table.try_read(*columns)
+    first, *others = [(values[i], table.headers[i]) for i in columns] if values else [()]
+    return values is not None and all(_agree(*other, *first) for other in others)
 
 
 def _agree(a: Floats, one: Header, b: Floats, other: Header) -> bool:

@@ -18,7 +18,7 @@ from typing import IO
 from mrdamper.data.temporary import temporary_folder
 from mrdamper.errors import ColumnError, CombinedError, InputError, listed, printable
 from mrdamper.rig_files.coil_current import as_data, ask_current_too, with_value_of_name
-from mrdamper.rig_files.column_names import COMPUTED, holds, words, words_of
+from mrdamper.rig_files.column_names import COMPUTED, Header, holds, words, words_of
 from mrdamper.rig_files.columns import assign, partly_assigned
 from mrdamper.rig_files.mapping.clocks import with_time_stated
 from mrdamper.rig_files.mapping.completion import completed
@@ -47,6 +47,7 @@ from mrdamper.rig_files.tests_table import NAME as TESTS
 
 _ROWS_OF_A_TEST = 0.25  # share of the rows of another test of the file that a test has at least
 _RAW = words("raw")
+Heading = tuple[str, Header]
 _MOST_MEMBERS = 10_000
 _PIECE = 2**20
 _NESTED = (".zip", ".gz", ".tgz", ".tar", ".bz2", ".xz", ".7z", ".rar")
@@ -124,6 +125,16 @@ def test_tables(tables: list[RawTable], profile: Profile) -> list[RawTable]:
     parts = [part for t, form in zip(tables, forms, strict=True) for part in tests_of(t, form, stated)]
     timed = [with_integrated_velocity(with_unit_of_time(table)) for table in with_results(parts)]
     return [with_channels_by_physics(table, stated) for table in timed]
+
+
+def headings_of(path: str | Path, profile: Profile) -> dict[int, Heading]:
+    """Return the columns of a file's first table by their numbers: the name as it stands, and apart from its unit."""
+
+    def both(tables: list[RawTable]) -> dict[int, Heading]:
+        table = test_tables(tables, profile)[0]
+        return {table.number(i): of for i, of in enumerate(zip(table.names, table.headers, strict=True))}
+
+    return ask_tables(path, both, {}, profile.file)
 
 
 def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawTable], list[InputError]]:

@@ -107,9 +107,8 @@ def _by_run(table: RawTable, column: int, *, stated: bool) -> list[RawTable]:
     if not stated and (len(runs) < 2 or _FEWEST_ROWS * len(runs) > codes.size):
         return []
     if len(runs) > MOST_RUNS:
-        raise table.source.refuse(
-            "E_BLOCKS", f"{len(runs)} runs in column {table.names[column]!r}", f"at most {MOST_RUNS} a file"
-        )
+        problem = f"{len(runs)} runs in column {table.names[column]!r}"
+        raise table.source.refuse("E_BLOCKS", problem, f"at most {MOST_RUNS} a file")
     read = _remembered(table)
     others = [i for i in range(len(table.names)) if i != column]
     tidy = [re.sub(r"^([0-9]+)[.,]0+$", r"\1", label.strip()) or "unnamed" for label in labels]
@@ -254,10 +253,9 @@ def _beside(table: RawTable, tests: Sequence[tuple[str, dict[str, int], list[int
     """Return the table of each test, of its title, its columns by channel, and all that it is given."""
     read = _remembered(table)
     rows = [cache(partial(_filled, table, read, roles, title)) for title, roles, _ in tests]
-    parts = [
-        _part(table, read, sorted({*columns}), own, title) for (title, _, columns), own in zip(tests, rows, strict=True)
-    ]
-    return [replace(part, damper=damper_in(title)) for part, (title, _, _) in zip(parts, tests, strict=True)]
+    every = zip(tests, rows, strict=True)
+    parts = [(title, _part(table, read, sorted({*columns}), own, title)) for (title, _, columns), own in every]
+    return [replace(part, damper=damper_in(title)) for title, part in parts]
 
 
 def _members(table: RawTable, *, by_order: bool) -> _Groups:

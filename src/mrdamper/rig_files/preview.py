@@ -14,9 +14,9 @@ from mrdamper.errors import InputError, listed
 from mrdamper.rig_files.coil_current import held_current_of
 from mrdamper.rig_files.column_names import DIMENSION, Header, names_compression, split_name
 from mrdamper.rig_files.columns import assign, column_called, propose, rate_of, sign_of
-from mrdamper.rig_files.file_records import described, files_in, tables_of_tests, test_tables, unpacked
-from mrdamper.rig_files.profile import Channel, Profile, current_pattern, profile_of, toml
-from mrdamper.rig_files.readers import ask_tables, raw_tables
+from mrdamper.rig_files.file_records import described, files_in, headings_of, tables_of_tests, test_tables, unpacked
+from mrdamper.rig_files.profile import Channel, FileForm, Profile, current_pattern, profile_of, toml
+from mrdamper.rig_files.readers import raw_tables
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED
 
@@ -64,12 +64,8 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
         form["sample_rate_Hz"] = rate
         channels.pop("time", None)
     pattern = None if stated else current_pattern(Path(path).name)
-    update = {
-        "file": type(profile.file)(**form),  # type: ignore[arg-type]
-        "channels": {**profile.channels, **channels},
-        "current": profile.current or pattern,
-    }
-    return profile.model_copy(update=update)
+    update = {"channels": {**profile.channels, **channels}, "current": profile.current or pattern}
+    return profile.model_copy(update={"file": FileForm(**form), **update})  # type: ignore[arg-type]
 
 
 def preview(path: str | Path, profile: Profile | str | Path | None = None) -> dict[str, Any]:
@@ -131,9 +127,7 @@ def tree_lines(paths: Iterable[str | Path], profile: Profile | str | Path | None
     Tables that hold the same columns are one entry with a count.
     """
     profile = profile_of(profile)
-    alike: dict[
-        tuple[tuple[int, Header], ...], tuple[list[str], list[str]]
-    ] = {}  # by columns: tables, lines beside one
+    alike: dict[tuple[tuple[int, Header], ...], tuple[list[str], list[str]]] = {}  # tables, lines beside one
     problems = []
     with unpacked(paths) as given:
         for path in files_in(given)[0]:
@@ -150,9 +144,8 @@ def tree_lines(paths: Iterable[str | Path], profile: Profile | str | Path | None
     for columns, (names, beside) in alike.items():
         shown = listed(names, _MOST_NAMES)
         lines.append(shown if len(names) == 1 else f"{len(names)} tables with the same columns: {shown}")
-        lines += [
-            f"  {i}  {c.name or '(no name)'}{f' [{c.unit}]' if c.unit else ''}" for i, c in columns[:_MOST_COLUMNS]
-        ]
+        called = {i: c.name or "(no name)" for i, c in columns}
+        lines += [f"  {i}  {called[i]}{f' [{c.unit}]' if c.unit else ''}" for i, c in columns[:_MOST_COLUMNS]]
         if columns[_MOST_COLUMNS:]:
             lines.append(f"  ... and {len(columns) - _MOST_COLUMNS} more columns")
         lines += [f"  beside them: {text[:100]}" for text in beside[:_MOST_REMARKS]]
@@ -161,13 +154,7 @@ def tree_lines(paths: Iterable[str | Path], profile: Profile | str | Path | None
 
 def columns_of(path: str | Path, profile: Profile | str | Path | None = None) -> dict[int, str]:
     """Names of the columns of a file's first table, by their numbers; empty if it cannot be opened."""
-    profile = profile_of(profile)
-
-    def numbered(tables: list[RawTable]) -> dict[int, str]:
-        table = test_tables(tables, profile)[0]
-        return {table.number(i): name for i, name in enumerate(table.names)}
-
-    return ask_tables(path, numbered, {}, profile.file)
+    return {number: name for number, (name, _) in headings_of(path, profile_of(profile)).items()}
 
 
 def unset_keys(

@@ -298,11 +298,9 @@ class _Intake:
         self.omitted |= {path: "the same samples as another" for i, (path, _) in enumerate(tests) if i in again}
         self._found = [test for i, test in enumerate(tests) if i not in again]
         self._refuse(contradictions([record for _, record in self.tests()]))
-        tests = self.tests()
-        for i, finding in stated_as_amplitudes([record for _, record in tests]).items():
-            path, record = tests[i]
-            tests[i] = path, replace(record, findings=(*record.findings, finding))
-        self._found = tests
+        records = [record for _, record in self.tests()]
+        for i, finding in stated_as_amplitudes(records).items():
+            self._exchange(records[i], records[i].noticed(finding))
         return used
 
     def reason(self, note: Refusal) -> str:
@@ -330,10 +328,8 @@ class _Intake:
         if plans.currents_beside(path, remarks, own) is None:  # of some tests, by their names
             tests = [tests[i] for i in plans.named_tests(remarks, own)]
             own = [test for _, test in tests]
-        specimens = dict(zip((id(record) for _, record in own), plans.specimens_of(path, remarks, own), strict=False))
-        notes = [{"specimen": as_data(specimens[id(r)])} if id(r) in specimens else {} for _, r in self._found]
-        pairs = zip(self._found, notes, strict=True)
-        self._found = [(p, replace(r, provenance={**note, **r.provenance})) for (p, r), note in pairs]
+        for (_, record), specimen in zip(own, plans.specimens_of(path, remarks, own), strict=False):
+            self._exchange(record, replace(record, provenance={"specimen": as_data(specimen), **record.provenance}))
         own = [self.tests()[i] for i, _ in tests]
         stated, other = plans.currents_beside(path, results, own), plans.other_motions(path, results, own)
         refused = plans.discarded_tests(path, remarks, own)
@@ -349,8 +345,7 @@ class _Intake:
                 with_stated_current(record, current, whence, file.name)
             except InputError as error:
                 if (answer := record.provenance.get("current_from", "")) in answers:
-                    note = Finding("W_CHOSEN", f"{answer} decides: {error.found}")
-                    self._found = [(p, r.noticed(note) if r is record else r) for p, r in self._found]
+                    self._exchange(record, record.noticed(Finding("W_CHOSEN", f"{answer} decides: {error.found}")))
                 else:
                     refused[i] = error
                     doubtful = replace(record, doubt=error)
@@ -358,12 +353,15 @@ class _Intake:
         if contradicted := [i for i, error in refused.items() if error.code == "E_CURRENT_CONTRADICTS"]:
             refused = near | refused  # a plan of another version
         for i in {*near} - {*contradicted}:
-            note = Finding("W_CHOSEN", f"of two statements the first is taken: {near[i].found}")
-            self._found = [(p, r.noticed(note) if r is own[i][1] else r) for p, r in self._found]
+            text = f"of two statements the first is taken: {near[i].found}"
+            self._exchange(own[i][1], own[i][1].noticed(Finding("W_CHOSEN", text)))
         self._refuse({tests[i][0]: error for i, error in refused.items()})
         if path != self._plan:
             self._cut(path, remarks, [test for i, test in enumerate(own) if i not in refused])
         return bool(stated) and other is None
+
+    def _exchange(self, record: Record, other: Record) -> None:
+        self._found = [(path, other if own is record else own) for path, own in self._found]
 
     def _cut(self, path: Path, results: Results | None, tests: _Tests) -> None:
         """Check tests again that a plan gives a start and an end, cut to these."""
@@ -404,11 +402,8 @@ class _Intake:
                 self._take(group[0].path, records)
         for path in [path for path in self._shares if path not in used]:
             problem = f"no other file of test {self._shares[path][0]!r} has the rest of its channels on the same clock"
-            remedy = (
-                'set file = "...{run}..." for each of displacement and force that has a file of its own, or correct it'
-            )
-            error = ColumnError(problem, where=path.name, remedy=remedy)
-            self.refusals.append(Refusal(str(path), error))
+            remedy = 'set file = "...{run}..." for each of displacement and force with a file of its own, or correct it'
+            self.refusals.append(Refusal(str(path), ColumnError(problem, where=path.name, remedy=remedy)))
         doubtful = [test for test in self._pending if test[1].doubt and "current_from" not in test[1].provenance]
         self._pending = [test for test in self._pending if test not in doubtful]
         notes = [Path(note.file) for note in self.notes]

@@ -128,13 +128,10 @@ def _read(table: RawTable, assigned: dict[str, Assigned], profile: Profile):
     raw = dict(content.values)
     for column, values in raw.items():
         if content.lines is not None and thousands_in(values):
-            problem = (
-                f"column {table.names[column] or table.number(column)!r} goes from hundreds to ones with three decimals"
-            )
-            remedy = "export it without separators of thousands"
-            raise table.source.refuse(
-                "E_AMBIGUOUS", f"{problem}: points of thousands?", remedy, column=table.number(column)
-            )
+            number = table.number(column)
+            problem = f"column {table.names[column] or number!r} goes from hundreds to ones with three decimals"
+            text, remedy = f"{problem}: points of thousands?", "export it without separators of thousands"
+            raise table.source.refuse("E_AMBIGUOUS", text, remedy, column=number)
     _refuse_unscaled(table, assigned, raw, profile)
     findings = [*table.findings, *content.findings]
     for name in [name for name in assigned if name in _LENIENT]:
@@ -240,10 +237,8 @@ def _further(table: RawTable, assigned: dict[str, Assigned], size: int) -> dict[
             continue
         bare = re.sub(r"[^A-Za-z0-9]+", "_", header.name).strip("_")[:40].lower() or "column"
         si = _KEPT[unit_of.dimension]
-        name = (
-            f"{bare}_{si}" if f"{bare}_{si}" not in {*taken, *wanted} else f"{bare}_column_{table.number(column)}_{si}"
-        )
-        wanted[name] = (column, unit_of)
+        bare += f"_column_{table.number(column)}" if f"{bare}_{si}" in {*taken, *wanted} else ""
+        wanted[f"{bare}_{si}"] = (column, unit_of)
     columns = [column for column, _ in wanted.values()]
     values = table.try_read(*columns) if columns else {}
     if values is None:  # one of them cannot be read

@@ -274,9 +274,8 @@ def _with_numbered_channels(table: RawTable) -> RawTable:
         for match in _CHANNEL_IS.finditer(line):
             says.setdefault(str(int(match["number"])), set()).add(match["what"].strip())
     meant = [says.get(str(int(number)), set()) if number else set() for number in numbers]
-    if sum(map(bool, numbers)) < min(2, len(list(filter(None, table.names))) - 1) or any(
-        n and len(what) != 1 for n, what in zip(numbers, meant, strict=True)
-    ):
+    unclear = any(number and len(what) != 1 for number, what in zip(numbers, meant, strict=True))
+    if unclear or sum(map(bool, numbers)) < min(2, len(list(filter(None, table.names))) - 1):
         return table
     names = tuple(next(iter(what), name) for name, what in zip(table.names, meant, strict=True))
     return replace(table, names=names)

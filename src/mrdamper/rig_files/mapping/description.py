@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from contextvars import ContextVar
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
@@ -111,16 +111,13 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     texts = [p for p in {*texts} if p.is_file() and p != path and not profile.leaves_out(*p.parts)]
     lines = [line for text in sorted(texts) if len(own := short_lines(text)) <= _MOST for line in own]
     names = {header.name.casefold() for header in table.headers}
-    counted = {line: {match["name"].casefold() for match in scales.NUMBER_IS.finditer(line)} for line in lines}
-    stated = [
-        (lacking and _of_channels(line))
-        or (
-            line
-            if scales.states_sign(line) or names & counted[line] or units_in(line) or said_of_file(line, path.name)
-            else ""
-        )
-        for line in lines
+    about = [
+        scales.states_sign,
+        partial(scales.counts_in, names=names),
+        units_in,
+        partial(said_of_file, name=path.name),
     ]
+    stated = [(lacking and _of_channels(line)) or line * any(tells(line) for tells in about) for line in lines]
     force = profile.channel("force")
     stated += [f"force [{force.unit}]"] if force.unit and force.column is None else []  # heads columns 0 A, 0.5 A, ...
     timed = profile.file.sample_rate_Hz or profile.channel("time").unit

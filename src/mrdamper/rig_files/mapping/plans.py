@@ -273,11 +273,8 @@ def cut_to_windows(path: Path, results: Results | None, tests: _Tests) -> dict[i
         return {i: part for i, (_, part) in enumerate(cut) if part.time.size < tests[i][1].time.size}
     if results is None or len(cut) != len(tests) or not (windows := results.ranges[1]):
         return {}
-    rows, clocks, inside = (
-        rows_beside(path, results, tests),
-        results.clocks([of for _, of in tests]),
-        dict[int, slice](),
-    )
+    rows, inside = rows_beside(path, results, tests), dict[int, slice]()
+    clocks = results.clocks([record for _, record in tests])
     for i, (row, clock) in enumerate(zip(rows, clocks, strict=False)):
         (begin, end), slack = windows[row], _SLACK * (clock[-1] - clock[0])
         if clock[0] - slack <= begin < end <= clock[-1] + slack:

@@ -96,9 +96,8 @@ def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -
     if len(good) != 1 or any(_POOR <= score < _CLEAR for score in scores.values()):
         return table
     chosen = {role: own for own, (role, columns) in zip(good[0], open_roles.items(), strict=True) if len(columns) > 1}
-    named = " and ".join(
-        f"{table.names[own] or f'column {table.number(own)}'} as the {role}" for role, own in chosen.items()
-    )
+    names = {role: table.names[own] or f"column {table.number(own)}" for role, own in chosen.items()}
+    named = " and ".join(f"{name} as the {role}" for role, name in names.items())
     text = f"{named}: only so the force takes energy in phase with the velocity"
     return replace(table, chosen=chosen).noted(Finding("W_CHOSEN", text))
 

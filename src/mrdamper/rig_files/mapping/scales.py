@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise, product
 
@@ -59,7 +59,7 @@ _SIGNAL = re.compile(  # a number of volts or counts, and no end of a range
     r"(?P<before>(?:\.\.|[-−–±]|\b(?:to|bis|à|a)) ?)?(?<![\w.,])(?P<number>[0-9]+(?:[.,][0-9]+)?) ?"
     r"(?P<unit>[A-Za-zµ]{1,6})(?![\w/])"
 )
-NUMBER_IS = re.compile(  # pwm 255 = 1.5 A
+_NUMBER_IS = re.compile(  # pwm 255 = 1.5 A
     r"(?<!\w)(?P<name>[^\W\d]\w{0,20})[ =]+(?P<number>[0-9]{1,5})"
     r"\s*(?:=|->|entspricht)\s*(?P<value>[0-9]+(?:[.,][0-9]+)?)\s*(?P<unit>m?A)(?![\w/])"
 )
@@ -86,7 +86,7 @@ def with_counts(table: RawTable) -> RawTable:
             bare = re.sub(r"[\s_]*(?:counts?|cnts?|raw)$", "", table.headers[i].name, flags=re.IGNORECASE)
             text = f"column {name!r} is scaled as its heading states"
             table = scaled(table, i, bare or table.headers[i].name, match["unit"], factor, text)
-    stated = {m.groups() for line in table.lines for m in NUMBER_IS.finditer(line)}
+    stated = {m.groups() for line in table.lines for m in _NUMBER_IS.finditer(line)}
     for i, header in enumerate(table.headers):
         own = [of for of in stated if of[0].casefold() == header.name.casefold()]  # two: which, or a line through both
         if len(own) == 1 and own[0][1] in FULL_SCALES and not header.unit and _is_whole(table, i):
@@ -119,6 +119,11 @@ def with_scales(table: RawTable) -> RawTable:
         name = name if role_of(name) == role else role
         table = scaled(table, i, name, unit, factor * header.factor, text, zero)
     return table
+
+
+def counts_in(line: str, names: Collection[str]) -> bool:
+    """Tell if a line states a current of a number in one of some columns, by their names in small letters."""
+    return any(match["name"].casefold() in names for match in _NUMBER_IS.finditer(line))
 
 
 def _zero_of(line: str, header: Header) -> float | None:

@@ -261,9 +261,8 @@ def load(library: str, title: str) -> ModuleType:
             warnings.simplefilter("ignore")
             return importlib.import_module(library)
     except ImportError as error:
-        raise MissingExtraError(
-            f"reading {title} needs {error.name or library}", remedy='install it: pip install "mrdamper[rig]"'
-        ) from error
+        problem, remedy = f"reading {title} needs {error.name or library}", 'install it: pip install "mrdamper[rig]"'
+        raise MissingExtraError(problem, remedy=remedy) from error
 
 
 @contextmanager

@@ -34,9 +34,8 @@ class Matlab(Reader):
     def recognises(self, source: Source) -> bool:
         """By the text at the start; version 4 has none, so the name must say it."""
         head = source.head(520)
-        return (
-            head.startswith(b"MATLAB") or head[512:] == HDF5_MARK or (source.suffix == ".mat" and _is_version_4(head))
-        )
+        old = source.suffix == ".mat" and _is_version_4(head)
+        return head.startswith(b"MATLAB") or head[512:] == HDF5_MARK or old
 
     def tables(self, source: Source, form: FileForm) -> list[RawTable]:
         """Return the variables as one table, and one more a struct."""

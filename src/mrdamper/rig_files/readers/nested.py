@@ -415,10 +415,7 @@ def _table(source: Source, node: _Node, title: str) -> RawTable:
 def _one_time(columns: list[_Column]) -> list[_Column]:
     """Return the columns with one time in front, where every channel has the same."""
     times = [column for column in columns if column.over and column.name == "time"]
-    same = len(times) > 1 and all(
-        t.unit == times[0].unit and np.array_equal(np.reshape(t.array, -1), np.reshape(times[0].array, -1))
-        for t in times
-    )
-    if not same:
+    arrays, units = [np.reshape(column.array, -1) for column in times], {column.unit for column in times}
+    if len(times) < 2 or len(units) > 1 or not all(np.array_equal(array, arrays[0]) for array in arrays):
         return columns
     return [replace(c, over="") for c in (times[0], *(c for c in columns if not any(c is t for t in times)))]

@@ -62,11 +62,8 @@ def tables_of_sheets(source: Source, sheets: Sequence[tuple[str, Source]], form:
             first = first or error
             tables = []
         titles = (name,) if len(tables) > 1 else ()  # of each of its tables
-        tables = [
-            replace(t, label=t.label or name, remarks=(*titles, *t.remarks), form={"sheet": name})
-            for t in tables
-            if len(t.names) >= _FEWEST
-        ]
+        tables = [replace(t, label=t.label or name, remarks=(*titles, *t.remarks)) for t in tables]
+        tables = [replace(t, form={"sheet": name}) for t in tables if len(t.names) >= _FEWEST]
         named = [header.channel for table in tables for header in table.headers]
         noted = sheet.size <= _NOTES and all(any(table.odd[:1]) for table in tables) and not any(named)  # quantities
         beside += sheet.head(_NOTES).decode("utf-8", "replace").splitlines() if noted or not tables else ()
@@ -84,9 +81,8 @@ def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
     book = calamine.load_workbook(source.file)
     names = [sheet.name for sheet in book.sheets_metadata if sheet.typ == calamine.SheetTypeEnum.WorkSheet]
     if form.sheet is not None and form.sheet not in names:
-        raise source.refuse(
-            "E_COLUMN", f"no sheet {form.sheet!r} (found {', '.join(names)})", "correct [file] sheet of the profile"
-        )
+        problem = f"no sheet {form.sheet!r} (found {', '.join(names)})"
+        raise source.refuse("E_COLUMN", problem, "correct [file] sheet of the profile")
     texts = []
     for name in names if form.sheet is None else [form.sheet]:
         sheet = book.get_sheet_by_name(name)

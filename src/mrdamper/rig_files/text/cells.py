@@ -111,12 +111,8 @@ def split_rows(texts: Sequence[str], line: int, form: RowFormat, final: bool) ->
     # Where rows name their values (`added`), a line that is no such row is a damaged one.
     goes_on = bool(wrong) and not form.stream.source.added and _goes_on([row[0] for row in rows], form)
     for at, count, text in wrong:
-        if (
-            goes_on
-            and count < width
-            and is_footer(text, form.layout)
-            and not any(map(looks_numeric, split(text, separator)))
-        ):
+        words = goes_on and count < width and is_footer(text, form.layout)
+        if words and not any(map(looks_numeric, split(text, separator))):
             form.messages[at] = text.strip()
         else:
             form.note(field_count(form, count, at, final and at == last, text))

@@ -190,11 +190,8 @@ def _without_keys(above: Sequence[str], separator: str) -> Iterator[str]:
     for line in above:
         pairs = [cell.strip('"').partition(": ") for cell in cells_of(line, separator)]
         keys = {key.strip().casefold() for key, mark, _ in pairs if key or mark}
-        if (
-            len(keys) == 1
-            and sum(mark != "" for _, mark, _ in pairs) > 1
-            and all(mark or not key for key, mark, _ in pairs)
-        ):
+        keyed = [mark for key, mark, _ in pairs if key or mark]
+        if len(keys) == 1 < len(keyed) and all(keyed):
             yield separator.join(cell for *_, cell in pairs) if keys <= _UNIT_KEYS else line * any(map(role_of, keys))
         else:
             yield line
@@ -363,9 +360,8 @@ def _separator(lines: Sequence[str], content: Sequence[tuple[int, str]], source:
     """Return the one under which the last lines at hand split into most numbers, evenly."""
     last = [line for _, line in content[-_SAMPLE:]]
     if not last:
-        raise source.refuse(
-            "E_NO_DATA", f"only remarks in the first {len(lines)} lines", "remove them, or export the data again"
-        )
+        problem = f"only remarks in the first {len(lines)} lines"
+        raise source.refuse("E_NO_DATA", problem, "remove them, or export the data again")
     evenness = {separator: round(_evenness(last, separator), 9) for separator in _SEPARATORS}
     if any(evenness.values()):
         return max(_SEPARATORS, key=evenness.__getitem__)
@@ -521,9 +517,8 @@ def _header_lines(
                 return named[-1], units
             if units == fitting[-2] and not naming:  # above the names
                 return last, units
-        naming = [
-            i for i in naming if 2 * len({*cells[i]}) > width or not all(map(_TYPE.fullmatch, cells[i]))
-        ] or naming
+        varied = [i for i in naming if 2 * len({*cells[i]}) > width or not all(map(_TYPE.fullmatch, cells[i]))]
+        naming = varied or naming
         if units is not None and (units == last or not roles[last]):
             return (naming[-1] if naming else None), units
         last = telling[-1] if telling and not roles[last] else last  # names of sensors or types below the names
@@ -632,7 +627,5 @@ def _mismatch(
     code, remedy = "E_FIELD_COUNT", "export the file again with one name a column"
     if separator == "," and fields > names:
         code = "E_FIELD_COUNT" if fields % names else "E_AMBIGUOUS"
-        remedy = (
-            "decimal commas cannot be distinguished from separating commas: export with semicolons or decimal points"
-        )
+        remedy = "decimal commas look like separating commas: export with semicolons or decimal points"
     return source.refuse(code, f"{fields} fields under {names} names", remedy, line=first + 1)

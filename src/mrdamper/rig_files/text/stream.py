@@ -114,9 +114,8 @@ class TextStream:
             problem = "zero bytes in the text"
             remedy = "export the file again: it was damaged while it was written or copied"
             raise self.source.refuse("E_NUL", problem, remedy, line=line + block.count(b"\n", at, block.index(0)))
-        raise self.source.refuse(
-            "E_ENCODING", f"byte 0x{strange[0]:02X}, which no text holds", "export the file again as text", line=line
-        )
+        problem = f"byte 0x{strange[0]:02X}, which no text holds"
+        raise self.source.refuse("E_ENCODING", problem, "export the file again as text", line=line)
 
 
 def line_feeds(block: bytes) -> int:
