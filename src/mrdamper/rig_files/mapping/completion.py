@@ -40,7 +40,8 @@ from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding
-from mrdamper.rig_files.text.layout import LISTED, X_VALUE, cells_of
+from mrdamper.rig_files.text.layout import LISTED, X_VALUE
+from mrdamper.rig_files.text.row_samples import cells_of
 from mrdamper.rig_files.text.tokens import looks_numeric, number
 
 _SEPARATORS = ("\t", ";", ",", "|")

@@ -17,7 +17,8 @@ from mrdamper.rig_files.conditions import contradicts, currents_in, day_in, name
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Record
-from mrdamper.rig_files.text.layout import cells_of, is_units
+from mrdamper.rig_files.text.layout import is_units
+from mrdamper.rig_files.text.row_samples import cells_of
 
 _SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]+)?|[.,][0-9]+)")

@@ -17,8 +17,9 @@ from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import Content, RawTable, Reader, Source, Words
 from mrdamper.rig_files.record import Finding
 from mrdamper.rig_files.text.cells import LINES, RowFormat, Spool, field_count, read_bulk, read_cells, split_rows
-from mrdamper.rig_files.text.layout import Layout, find_layout, is_comment, is_footer, split_strictly
+from mrdamper.rig_files.text.layout import Layout, find_layout, is_footer
 from mrdamper.rig_files.text.programs import as_plain_table, turned_table
+from mrdamper.rig_files.text.row_samples import is_comment, split_strictly
 from mrdamper.rig_files.text.stream import LONGEST_LINE, Block, TextStream, find_blocks, line_feeds, open_text, too_long
 from mrdamper.rig_files.text.tokens import looks_numeric
 

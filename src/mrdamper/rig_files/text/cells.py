@@ -17,7 +17,8 @@ from mrdamper.data import Floats
 from mrdamper.errors import CombinedError
 from mrdamper.rig_files.column_names import parse_unit
 from mrdamper.rig_files.readers.base import RigFileError, scratch
-from mrdamper.rig_files.text.layout import QUANTITY, SPACES, Layout, is_comment, is_footer, split, split_strictly
+from mrdamper.rig_files.text.layout import Layout, is_footer
+from mrdamper.rig_files.text.row_samples import QUANTITY, SPACES, is_comment, split, split_strictly
 from mrdamper.rig_files.text.stream import LONGEST_LINE, TextStream, too_long
 from mrdamper.rig_files.text.tokens import MISSING, NUMBER, THOUSANDS, looks_numeric, number, stamp
 

@@ -12,7 +12,7 @@ import numpy as np
 from mrdamper.rig_files.column_names import is_unit, split_name
 from mrdamper.rig_files.readers.arrays import array_table
 from mrdamper.rig_files.readers.base import RawTable, Source
-from mrdamper.rig_files.text.layout import cells_of
+from mrdamper.rig_files.text.row_samples import cells_of
 from mrdamper.rig_files.text.tokens import looks_numeric, number
 
 _HEAD = 8192  # bytes

@@ -15,7 +15,8 @@ from mrdamper.rig_files.column_names import role_of
 from mrdamper.rig_files.conditions import stated_by_lines, stated_in_titles
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RigFileError, Source, scratch
-from mrdamper.rig_files.text.layout import SPACES, Layout, cells_of, is_comment, is_footer, is_row, units_in
+from mrdamper.rig_files.text.layout import Layout, is_footer, units_in
+from mrdamper.rig_files.text.row_samples import SPACES, cells_of, is_comment, is_row
 from mrdamper.rig_files.text.tokens import looks_numeric
 
 LONGEST_LINE = 64 * 1024
