@@ -47,7 +47,7 @@ def counts(cells: Iterable[str]) -> bool:
 
 def numbers_columns(rows: Sequence[Sequence[str]]) -> bool:
     """Tell if the first row numbers three columns or more, 0, 1, 2, and others do not."""
-    return len(rows[0]) > TELLING and counts(rows[0]) and "." in "".join(rows[-1])
+    return bool(rows) and len(rows[0]) > TELLING and counts(rows[0]) and "." in "".join(rows[-1])
 
 
 def without_units(lines: Sequence[str]) -> Sequence[str]:
