@@ -598,18 +598,22 @@ def test_every_number_and_axis_follows_the_units_chosen(on_model, shoot):
 
 def test_opening_says_at_once_what_is_being_done(page, shoot):
     held = []
+
+    def continue_(at):
+        for _ in range(500):  # the request may follow the words that announce it
+            if len(held) > at:
+                break
+            page.wait_for_timeout(10)
+        held[at].continue_()
+
     page.route("**/bundled", lambda route: held.append(route))
     page.get_by_role("button", name="Open the bundled tests", exact=True).click()
     page.get_by_role("status").filter(has_text="Opening the bundled tests").wait_for()
     shoot(page, "14-opening")
     page.route("**/data/rigs/0", lambda route: held.append(route))
-    held[0].continue_()
+    continue_(0)
     page.get_by_role("status").filter(has_text="Analysing 34 runs").wait_for()
-    for _ in range(500):  # the request may follow the words that announce it
-        if len(held) > 1:
-            break
-        page.wait_for_timeout(10)
-    held[1].continue_()
+    continue_(1)
     page.locator(".matrix").wait_for()
 
 
