@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.signal
 
 from mrdamper.data import Condition, Run
 from mrdamper.errors import QualityError
@@ -14,7 +15,7 @@ from mrdamper.physics.motion import sine
 from mrdamper.physics.simulation import simulate
 from mrdamper.rig_files.quality.cycles import POINTS, damping, elastic_plastic, steady_cycles
 from mrdamper.rig_files.quality.disturbance import noise_by_octave
-from mrdamper.rig_files.quality.lag import force_lag
+from mrdamper.rig_files.quality.lag import force_channel, force_lag
 from mrdamper.rig_files.quality.motion import agrees_with_its_name
 from mrdamper.rig_files.quality.table import check_run, record_of
 from mrdamper.rig_files.quality.view import View
@@ -189,6 +190,20 @@ def leaking(leak, stiffness, power):
 @pytest.mark.parametrize("power", [1.5, 2.0, 3.0])
 def test_a_yield_force_that_leaks_is_not_early(leak, stiffness, power):
     assert "W_LAG" not in codes_of(sine_record(leaking(leak, stiffness, power), points=200))
+
+
+@pytest.mark.parametrize(
+    ("switched_at", "late"), [(0.1, True), (0.0, False)]
+)  # at 0.0 a lag of either sign explains it
+def test_a_force_that_follows_a_switched_current_is_not_late(switched_at, late):
+    record = sine_record(points=500)
+    velocity = np.gradient(record.displacement, record.time)
+    coil = scipy.signal.lfilter([0.05], [1, -0.95], ((record.time + switched_at) % 1.0 < 0.5) * 1.2)
+    force = record.force + 1000 * coil * np.tanh(velocity / 0.05)
+    stated = (np.full(coil.size, 0.5), coil)
+    views = [View(replace(record, force=force, current=current)) for current in stated]
+    codes = [[finding.code for finding in force_channel(view)] for view in views]
+    assert codes == [["W_LAG"] * late, []]
 
 
 @pytest.mark.parametrize("noise", [0.5, 5.0, 50.0])

@@ -36,6 +36,7 @@ from mrdamper.rig_files.quality.cycles import (
     steady_cycles,
 )
 from mrdamper.rig_files.quality.flat import flagged_samples
+from mrdamper.rig_files.quality.motion import current_changes
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding
 from mrdamper.statistics.linear import on_one_blas_thread
@@ -177,8 +178,9 @@ class ForceLag:
 
     @property
     def is_clear(self) -> bool:
-        """True where the lag explains more than any rate dependence may."""
-        return _is_clear(self.best, *(_beyond(self.tried[lag], self.noise) for lag in (Lag(), self.best)))
+        """True where the lag explains more than any rate dependence may, and none of the other sign nearly as much."""
+        low, high = self.interval("delay")
+        return low * high >= 0 and _is_clear(self.best, *(_beyond(self.tried[lag], self.noise) for lag in (Lag(), self.best)))
 
 
 def _beyond(misfit: float, noise: float) -> float:
@@ -204,6 +206,8 @@ def force_channel(view: View) -> Iterator[Finding]:
     """Report a force that is late or early against the motion."""
     cycles, motion = steady_cycles(view), view.motion
     if cycles is None or motion is None or view.noticed("W_CLIPPED", "W_DRIFT") or _stands_still(view, cycles):
+        return
+    if current_changes(view):  # with it the loop, by more than any lag
         return
     lag = force_lag(view)
     if lag is not None and lag.is_clear:
