@@ -180,7 +180,8 @@ class ForceLag:
     def is_clear(self) -> bool:
         """True where the lag explains more than any rate dependence may, and none of the other sign nearly as much."""
         low, high = self.interval("delay")
-        return low * high >= 0 and _is_clear(self.best, *(_beyond(self.tried[lag], self.noise) for lag in (Lag(), self.best)))
+        without, best = (_beyond(self.tried[lag], self.noise) for lag in (Lag(), self.best))
+        return low * high >= 0 and _is_clear(self.best, without, best)
 
 
 def _beyond(misfit: float, noise: float) -> float:
