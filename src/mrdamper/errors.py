@@ -219,6 +219,13 @@ def series(**given: Any) -> tuple[NDArray[np.float64], ...]:
     return tuple(arrays)
 
 
+def require_positive(kind: type[InputError], where: str = "", **values: object) -> None:
+    """Refuse values that are no positive, finite numbers, by an error of a kind."""
+    for name, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, Real) or not 0 < cast(Any, value) < math.inf:
+            raise kind(f"{name} is {shown(value)}", where=where, remedy="give a positive, finite value in SI units")
+
+
 def shown(value: object) -> str:
     """Whatever a user gave, in the first line of a few characters; a number of thousands of digits has no text."""
     try:

@@ -188,15 +188,12 @@ def all_texts(
     `facts` are for the templates, `instance` and `page` the templates of the FMI functions and of the documentation.
     `time` [s], `given` and `outputs` are the reference, (N,) each.
     """
-
-    def with_token(token: str) -> dict[str, bytes]:
-        return _texts({**facts, "token": token}, sources, instance, page) | tables
-
     tables = {
         "resources/reference_in.csv": csv_text(rows_of({"time": time, **given})).encode(),
         "resources/reference_out.csv": csv_text(rows_of({"time": time, **outputs})).encode(),
     }
-    return with_token(token_of(with_token("")))
+    token = token_of(_texts({**facts, "token": ""}, sources, instance, page) | tables)
+    return _texts({**facts, "token": token}, sources, instance, page) | tables
 
 
 def _texts(facts: Mapping[str, Any], sources: Mapping[str, str], instance: str, page: str) -> dict[str, bytes]:

@@ -242,10 +242,3 @@ def _axis(info: ParameterInfo, scale: Scale, starts: float) -> SearchAxis:
 
 def _limited(value: Any, low: float, high: float) -> Any:
     return min(max(float(value), low), high) if isinstance(value, float) else plain(np.clip(value, low, high))
-
-
-def require_positive(where: str, **values: float) -> None:
-    """Refuse parameters of a publication that are denominators and not positive, by a `ParameterError`."""
-    for name, value in values.items():
-        if not 0 < value < math.inf:
-            raise ParameterError(f"{name} = {value:g}", where=where, remedy="give a positive, finite value in SI units")

@@ -11,8 +11,8 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
-from mrdamper.errors import IdentificationError
-from mrdamper.models.base import GENERAL_FORMS, YIELD_DISPLACEMENTS, Model, Scale, SearchAxis, require_positive
+from mrdamper.errors import IdentificationError, ParameterError, require_positive
+from mrdamper.models.base import GENERAL_FORMS, YIELD_DISPLACEMENTS, Model, Scale, SearchAxis
 from mrdamper.models.recorded import recorded
 from mrdamper.physics.hysteresis import Shape, follow
 from mrdamper.physics.motion import Excitation
@@ -139,7 +139,7 @@ class BoucWen(Model):
         given = dict(values)
         n = given.get("n", 2.0)
         if (length := given.pop("yield_displacement", None)) is not None:
-            require_positive(cls.title, yield_displacement=length, n=n)
+            require_positive(ParameterError, cls.title, yield_displacement=length, n=n)
             if "gamma" in given:
                 given["beta"] = length**-n - given["gamma"]
             elif "beta" in given:
@@ -151,6 +151,6 @@ class BoucWen(Model):
         elif "gamma" not in given:
             given["gamma"] = given["beta"]
         if (force := given.pop("yield_force", None)) is not None:
-            require_positive(cls.title, n=n)
+            require_positive(ParameterError, cls.title, n=n)
             given["alpha"] = plain(force * (given["beta"] + given["gamma"]) ** (1 / n))
         return given

@@ -11,7 +11,8 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
-from mrdamper.models.base import Model, Scale, SearchAxis, axes_of, require_positive
+from mrdamper.errors import ParameterError, require_positive
+from mrdamper.models.base import Model, Scale, SearchAxis, axes_of
 from mrdamper.physics.motion import Excitation
 from mrdamper.tracing import Tape, choose, streamed
 
@@ -80,7 +81,7 @@ class HerschelBulkley(Model):
             If one is not positive.
         """
         given = {"width": width, "height": height, "length": length, "piston_area": piston_area}
-        require_positive(cls.title, **given, yield_stress=yield_stress, K=K, m=m)
+        require_positive(ParameterError, cls.title, **given, yield_stress=yield_stress, K=K, m=m)
         force = 2 * length * piston_area * yield_stress / height
         return cls(fy=force, vc=width * height**2 / (2 * piston_area) * (yield_stress / K) ** (1 / m), m=m)
 

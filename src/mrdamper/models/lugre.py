@@ -10,7 +10,8 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
-from mrdamper.models.base import Model, Scale, SearchAxis, axes_of, require_positive
+from mrdamper.errors import ParameterError, require_positive
+from mrdamper.models.base import Model, Scale, SearchAxis, axes_of
 from mrdamper.physics.integrator import integrate
 from mrdamper.physics.motion import Excitation
 
@@ -77,7 +78,7 @@ class LuGre(Model):
         ParameterError
             Unless sigma0, fc and vs are positive.
         """
-        require_positive(cls.title, sigma0=sigma0, fc=fc, vs=vs)
+        require_positive(ParameterError, cls.title, sigma0=sigma0, fc=fc, vs=vs)
         return cls(fc=fc, presliding=fc / sigma0, stribeck=fs / fc, vs=vs, sigma1=sigma1, sigma2=sigma2)
 
     def state(self, motion: Excitation) -> Floats:

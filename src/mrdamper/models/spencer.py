@@ -10,8 +10,8 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.parameters import param
-from mrdamper.errors import ParameterError
-from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis, axes_of, require_positive
+from mrdamper.errors import ParameterError, require_positive
+from mrdamper.models.base import GENERAL_FORMS, Model, Scale, SearchAxis, axes_of
 from mrdamper.physics.integrator import integrate
 from mrdamper.physics.motion import Excitation
 
@@ -128,7 +128,7 @@ class Spencer(Model):
                 where=cls.title,
                 remedy="c1, A and beta + gamma are positive; gamma, the coefficient of |v|, is not negative",
             )
-        require_positive(cls.title, n=n)
+        require_positive(ParameterError, cls.title, n=n)
         z_max = (A / (beta + gamma)) ** (1 / n)
         return cls(
             c1=c1,
@@ -147,7 +147,7 @@ class Spencer(Model):
 
         x0 is 0 if k1 is zero.
         """
-        require_positive(self.title, A=A)
+        require_positive(ParameterError, self.title, A=A)
         z_max = A * self.yield_displacement
         total = A / z_max**self.n
         return {
@@ -214,7 +214,7 @@ class Spencer(Model):
         """Parameters, from themselves or from `c0` [N s/m], `k0` [N/m], `yield_force` [N] in their place."""
         given = dict(values)
         if given.keys() & {"c0", "k0", "yield_force"}:
-            require_positive(cls.title, c1=given["c1"])
+            require_positive(ParameterError, cls.title, c1=given["c1"])
         for letter, ratio in (("c0", "c0_ratio"), ("k0", "k0_rate"), ("yield_force", "creep")):
             if letter in given:
                 given[ratio] = given.pop(letter) / given["c1"]

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import math
-import numbers
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from mrdamper.data.arrays import Floats
 from mrdamper.data.wording import number
-from mrdamper.errors import ParameterError, shown, validate_arguments
+from mrdamper.errors import ParameterError, require_positive, validate_arguments
 
 Direction = Literal["compression", "extension"]
 AIR = 1.4  # polytropic exponent of a fast change of air or nitrogen
@@ -59,10 +58,10 @@ class GasSpring:
     exponent: float = AIR
 
     def __post_init__(self) -> None:
-        for name in ("pressure", "volume", "rod_area", "exponent"):
-            _require_positive(name, getattr(self, name))
-        if self.force_area is not None:
-            _require_positive("force_area", self.force_area)
+        values = {name: getattr(self, name) for name in self.__slots__}
+        if self.force_area is None:
+            del values["force_area"]
+        require_positive(ParameterError, **{f"gas {name}": value for name, value in values.items()})
 
     @property
     def _force_area(self) -> float:
@@ -111,8 +110,3 @@ class GasSpring:
         x = np.array([-amplitude, amplitude])
         series = k1 * x + k2 * x**2 + k3 * x**3
         return float(np.max(np.abs(series - exact)) / np.max(np.abs(exact))) if amplitude else math.nan
-
-
-def _require_positive(name: str, value: object) -> None:
-    if not (isinstance(value, numbers.Real) and not isinstance(value, bool) and 0 < value < math.inf):  # type: ignore[operator]
-        raise ParameterError(f"gas {name} is {shown(value)}", remedy="give a positive SI value")

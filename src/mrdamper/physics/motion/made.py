@@ -8,7 +8,7 @@ import numpy as np
 
 from mrdamper.data.arrays import Floats
 from mrdamper.data.conditions import Condition
-from mrdamper.errors import ExcitationError, validate_arguments
+from mrdamper.errors import ExcitationError, require_positive, validate_arguments
 from mrdamper.physics.motion.excitation import Excitation
 
 _SAMPLES_PER_CYCLE = 1000
@@ -38,7 +38,9 @@ def sine(condition: Condition, cycles: float = 1.0, samples_per_cycle: int = _SA
     >>> len(motion), round(float(motion.velocity.max()), 4)  # [m/s]
     (2001, 0.1257)
     """
-    _require_positive(frequency_Hz=condition.frequency_Hz, amplitude_m=condition.amplitude_m, cycles=cycles)
+    require_positive(
+        ExcitationError, frequency_Hz=condition.frequency_Hz, amplitude_m=condition.amplitude_m, cycles=cycles
+    )
     _require_samples(cycles * samples_per_cycle if samples_per_cycle < _MAX_SAMPLES else np.inf)
     omega = 2 * np.pi * condition.frequency_Hz
     time = np.arange(round(cycles * samples_per_cycle) + 1) / (samples_per_cycle * condition.frequency_Hz)
@@ -49,7 +51,9 @@ def sine(condition: Condition, cycles: float = 1.0, samples_per_cycle: int = _SA
 
 def triangle(condition: Condition, cycles: float = 1.0, samples_per_cycle: int = _SAMPLES_PER_CYCLE) -> Excitation:
     """Constant speed 4fX between ±X at constant current, as in friction tests."""
-    _require_positive(frequency_Hz=condition.frequency_Hz, amplitude_m=condition.amplitude_m, cycles=cycles)
+    require_positive(
+        ExcitationError, frequency_Hz=condition.frequency_Hz, amplitude_m=condition.amplitude_m, cycles=cycles
+    )
     time = np.arange(round(cycles * samples_per_cycle) + 1) / (samples_per_cycle * condition.frequency_Hz)
     phase = (time * condition.frequency_Hz + 0.25) % 1.0
     rising = phase < 0.5
@@ -93,7 +97,7 @@ def sweep(
     >>> motion.displacement.shape
     (2001,)
     """
-    _require_positive(start_Hz=start_Hz, end_Hz=end_Hz, duration=duration, sample_rate=sample_rate)
+    require_positive(ExcitationError, start_Hz=start_Hz, end_Hz=end_Hz, duration=duration, sample_rate=sample_rate)
     _require_samples(duration * sample_rate)
     time = np.arange(int(duration * sample_rate) + 1) / sample_rate
     frequency = start_Hz + (end_Hz - start_Hz) * time / duration
@@ -120,7 +124,7 @@ def random_motion(
     sample_rate: float = 1000.0,
 ) -> Excitation:
     """Gaussian motion of given RMS [m], flat in displacement over a frequency band [Hz]."""
-    _require_positive(duration=duration, rms=rms, sample_rate=sample_rate)
+    require_positive(ExcitationError, duration=duration, rms=rms, sample_rate=sample_rate)
     size = int(duration * sample_rate) + 1
     frequency = np.fft.rfftfreq(size, 1 / sample_rate)
     inside = (frequency >= band_Hz[0]) & (frequency <= band_Hz[1])
@@ -139,9 +143,3 @@ def _derived(time: Floats, x: Floats, current: float) -> Excitation:
 def _require_samples(count: float) -> None:
     if not 2 <= count <= _MAX_SAMPLES:
         raise ExcitationError(f"a motion of {count:.3g} samples", remedy=f"give between 2 and {_MAX_SAMPLES:.0e}")
-
-
-def _require_positive(**values: float) -> None:
-    for name, value in values.items():
-        if not (np.isfinite(value) and value > 0):
-            raise ExcitationError(f"{name} is {value}", remedy="give a positive number")
