@@ -15,21 +15,6 @@ from mrdamper.errors import InputError
 if TYPE_CHECKING:
     from mrdamper.cli.output import Rows
 
-_HEADINGS = {
-    "run_id": "run",
-    "current_A": "A",
-    "frequency_Hz": "Hz",
-    "amplitude_mm": "mm",
-    "cycles": "cycles",
-    "sample_rate_Hz": "samples/s",
-    "repeatability_percent": "scatter %",
-    "offset_force_N": "offset N",
-    "centre_mm": "centre mm",
-    "drift_mm": "drift mm",
-    "verdict": "verdict",
-    "findings": "findings",
-}
-
 app = typer.Typer()
 
 
@@ -84,6 +69,10 @@ def _check_fmu(path: Path, as_json: bool) -> None:
 
 
 def _text_table(rows: Rows) -> str:
-    cells = [["–" if row[name] is None else str(row[name]) for name in _HEADINGS] for row in rows]
-    lines = aligned([list(_HEADINGS.values()), *cells], (0, len(_HEADINGS) - 2, len(_HEADINGS) - 1))
+    from mrdamper.rig_files.quality.table import FIGURES
+
+    headings = {"run_id": "run"} | {name: text for name, (text, _) in FIGURES.items() if text}
+    headings |= {name: name for name in ("verdict", "findings")}
+    cells = [["–" if row[name] is None else str(row[name]) for name in headings] for row in rows]
+    lines = aligned([list(headings.values()), *cells], (0, len(headings) - 2, len(headings) - 1))
     return "".join(f"{line}\n" for line in lines)

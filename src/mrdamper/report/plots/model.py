@@ -21,9 +21,9 @@ from mrdamper.report.plots.style import (
     PREDICTED,
     current_colours,
     levels,
+    motion_colours,
     motion_name,
     powered,
-    speed_colours,
 )
 from mrdamper.study.validation import Validation
 
@@ -76,20 +76,18 @@ def parameter_curves(fit: ModifiedFit) -> Figure:
     rows = -(-len(names) // 2)
     figure, *axes = new_figure(rows, 2, 2.5 * rows, right=1.75)
     groups = sorted(motions_of(fit), key=lambda g: fit.conditions[g[0]].peak_velocity)
-    speeds = [fit.conditions[g[0]].peak_velocity for g in groups]
-    few = len(groups) <= MOST_NAMED
-    shades = current_colours(speeds) if few else speed_colours(figure, speeds)
+    few, firsts = len(groups) <= MOST_NAMED, [fit.conditions[g[0]] for g in groups]
+    shades = motion_colours(figure, firsts)
     dense = np.linspace(0, fit.damper.envelope.current_A[1], 60)
     middle = fit.conditions[len(fit.conditions) // 2]
-    lines = [fit.conditions[g[0]] for g in groups] if few else [middle]
+    lines = firsts if few else [middle]
     for panel, name in zip(axes, names, strict=False):
         function = fit.functions[name].function
         text, scale = _AXES.get(name, (name, 1.0))
         curves = [scale * function(dense, c.frequency_Hz, c.amplitude_m) for c in lines]
         largest = float(np.max(np.abs([*np.ravel(curves), *np.ravel(scale * np.asarray(fit.values[name]))])))
         text, more = powered(text, 0.0 if function.log else largest)
-        for group in groups:
-            first = fit.conditions[group[0]]
+        for first, group in zip(firsts, groups, strict=True):
             currents = [fit.conditions[i].current_A for i in group]
             values = more * scale * fit.values[name][group]
             panel.plot(currents, values, "o", ms=3.5, color=shades[first.peak_velocity], label=motion_name(first))

@@ -12,7 +12,7 @@ from mrdamper.physics.motion import centred_motion
 from mrdamper.report.plots.cycle import draw_loop, last_cycle, spread_out
 from mrdamper.report.plots.drawing import INCH
 from mrdamper.report.plots.figure import Axes, Figure, new_figure
-from mrdamper.report.plots.style import KN, MM, MOST_NAMED, current_colours, levels, motion_name, speed_colours
+from mrdamper.report.plots.style import KN, MM, MOST_NAMED, current_colours, levels, motion_colours, motion_name
 
 _BESIDE = 0.07  # inches between the marks of two currents
 _MOST_MOTIONS = 5  # of the loops at one current
@@ -74,8 +74,7 @@ def test_analysis(loops: Sequence[LoopAnalysis], ranges: Sequence[DynamicRange])
     ]
     groups = [[loops[i] for i in g] for g in same_motion([loop.condition for loop in loops])]
     groups.sort(key=lambda g: g[0].condition.peak_velocity)
-    speeds = [g[0].condition.peak_velocity for g in groups]
-    shades = current_colours(speeds) if len(groups) <= MOST_NAMED else speed_colours(figure, speeds)
+    shades = motion_colours(figure, [group[0].condition for group in groups])
     for panel, (name, value) in zip(axes, quantities, strict=False):
         for group in groups:
             condition = group[0].condition

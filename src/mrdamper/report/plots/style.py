@@ -44,8 +44,11 @@ def levels(currents: Sequence[float]) -> list[float]:
     return current_levels([abs(current) for current in currents])
 
 
-def speed_colours(figure: Figure, speeds: Sequence[float]) -> dict[float, str]:
-    """Return one colour per peak velocity on a scale in the right margin, for more values than a legend can list."""
+def motion_colours(figure: Figure, conditions: Sequence[Condition]) -> dict[float, str]:
+    """Return one colour per peak velocity of some motions: on a scale in the right margin where they are many."""
+    speeds = [condition.peak_velocity for condition in conditions]
+    if len(speeds) <= MOST_NAMED:
+        return current_colours(speeds)
     low, high = min(speeds), max(speeds)
     high = high if high > low else low + 1
     figure.add_scale("Peak velocity (m/s)", low, high, [_shade(share) for share in np.linspace(0, 1, 64)])

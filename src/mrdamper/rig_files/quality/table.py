@@ -20,17 +20,17 @@ from mrdamper.rig_files.record import FURTHER, Finding, Record
 
 NOT_IDENTIFIED = ("W_CLIPPED", "W_SHORT", "W_CURRENT_VARIES")  # what identification refuses by default
 FIGURES = MappingProxyType(
-    {  # of a record, by columns of the table, and the digits they are shown with
-        "current_A": ".4f",  # magnitude of its mean over the steady window; none where it changes there
-        "frequency_Hz": ".4f",  # none, as of the amplitude and the distortion, for a motion without a period
-        "amplitude_mm": ".4g",
-        "cycles": ".2f",
-        "sample_rate_Hz": ".1f",
-        "repeatability_percent": ".2f",  # scatter of the cycles over the peak-to-peak force; none under two cycles
-        "offset_force_N": ".1f",  # mean over whole cycles; reported, never taken off
-        "centre_mm": ".3f",  # mean displacement over whole cycles; reported, never taken off
-        "drift_mm": ".3f",  # change of the mean displacement over the record
-        "distortion_percent": ".2f",  # THD of the motion
+    {  # of a record, by columns of the table: their headings, and the digits they are shown with
+        "current_A": ("A", ".4f"),  # magnitude of its mean over the steady window; none where it changes there
+        "frequency_Hz": ("Hz", ".4f"),  # none, as of amplitude and distortion, for a motion without a period
+        "amplitude_mm": ("mm", ".4g"),
+        "cycles": ("cycles", ".2f"),
+        "sample_rate_Hz": ("samples/s", ".1f"),
+        "repeatability_percent": ("scatter %", ".2f"),  # of the cycles over the peak-to-peak force; none under two
+        "offset_force_N": ("offset N", ".1f"),  # mean over whole cycles; reported, never taken off
+        "centre_mm": ("centre mm", ".3f"),  # mean displacement over whole cycles; reported, never taken off
+        "drift_mm": ("drift mm", ".3f"),  # change of the mean displacement over the record
+        "distortion_percent": ("", ".2f"),  # THD of the motion
     }
 )
 
@@ -101,7 +101,9 @@ def with_findings(run: Run) -> Run:
 def row(quality: Quality) -> dict[str, Any]:
     """Return a verdict as a row of numbers and words, in engineers' units; None where there is no figure."""
     figures = {name: value for name, value in quality.figures.items() if np.isfinite(value)}
-    shown = {key: float(f"{figures[key]:{form}}") + 0.0 if key in figures else None for key, form in FIGURES.items()}
+    shown = {
+        key: float(f"{figures[key]:{form}}") + 0.0 if key in figures else None for key, (_, form) in FIGURES.items()
+    }
     names = {"run_id": quality.record.id, "rig": quality.record.rig}
     return {**names, **shown, "verdict": quality.verdict, "findings": " ".join(quality.codes)}
 
