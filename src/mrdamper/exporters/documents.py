@@ -25,12 +25,10 @@ class LatexExporter(Exporter):
 
     def export(self, damper: Damper | Model, name: str) -> Written:
         facts = document_facts(damper)
-        escaped = {key: latex(text) for key, text in facts.items() if isinstance(text, str)}
-        rows = [
-            {**row, "meaning": latex(row["meaning"]), "unit": unit_text(row["unit"])} for row in facts["parameters"]
-        ]
-        text = render("equations.tex.j2", **{**facts, **escaped, "parameters": rows})
-        return Written({f"{name}.tex": text.encode()}, _ROUNDED)
+        facts |= {key: latex(text) for key, text in facts.items() if isinstance(text, str)}
+        for row in facts["parameters"]:
+            row |= {"meaning": latex(row["meaning"]), "unit": unit_text(row["unit"])}
+        return Written({f"{name}.tex": render("equations.tex.j2", **facts).encode()}, _ROUNDED)
 
 
 class MarkdownExporter(Exporter):
@@ -43,19 +41,18 @@ class MarkdownExporter(Exporter):
     def export(self, damper: Damper | Model, name: str) -> Written:
         facts = document_facts(damper)
         facts["rig"] = markdown(facts["rig"])
-        rows = [{**row, "meaning": row["meaning"].replace("|", r"\|")} for row in facts["parameters"]]
-        text = render("equations.md.j2", **{**facts, "parameters": rows})
-        return Written({f"{name}.md": text.encode()}, _ROUNDED)
+        for row in facts["parameters"]:
+            row["meaning"] = row["meaning"].replace("|", r"\|")
+        return Written({f"{name}.md": render("equations.md.j2", **facts).encode()}, _ROUNDED)
 
 
 def document_facts(given: Damper | Model) -> dict[str, Any]:
     """Collect the values of a page of equations, for any markup."""
     damper = damper_of(given)
-    infos = damper.one_model.parameters() if damper.one_model else ()
-    values = damper.one_model.values() if damper.one_model else {}
     rows = [
-        {"symbol": info.symbol, "value": number(values[info.name]), "unit": info.unit, "meaning": info.meaning}
-        for info in infos
+        {"symbol": info.symbol, "value": number(value), "unit": info.unit, "meaning": info.meaning}
+        for model in filter(None, [damper.one_model])
+        for info, value in zip(model.parameters(), model.values().values(), strict=True)
     ]
     rows += [
         {"symbol": latex_symbol(name), "value": number(value), "unit": "", "meaning": "SI"}

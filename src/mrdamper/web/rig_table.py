@@ -18,8 +18,8 @@ from mrdamper.identification.loop_analysis import LoopAnalysis, analyse_loop
 from mrdamper.physics.motion import equivalent_sine
 from mrdamper.rig_files.quality.table import Quality, quality_table, record_of
 from mrdamper.study.usable_runs import usable_sines
+from mrdamper.web.curves import MM
 
-MM = 1e3
 _MAX_NEAREST = 3  # measured loops shown with a prediction
 _MAX_DISTANCE = 0.4  # of the nearest run from a condition; relative current, logarithms of frequency and amplitude
 _MAX_DISTANCE_OF_OTHERS = 0.2

@@ -18,6 +18,7 @@ from mrdamper.dampers.prediction import Prediction
 from mrdamper.data import Condition, Floats
 from mrdamper.data.encoding import finite
 from mrdamper.physics.motion import Excitation
+from mrdamper.report.plots.cycle import spread_out
 from mrdamper.statistics.metrics import dissipated_power, peak_force
 from mrdamper.web.curves import screen_arrays
 from mrdamper.web.held_parameters import held_loop, held_model, predict_held, sliders
@@ -131,8 +132,7 @@ def _conditions(damper: Damper, query: PredictionRequest, table: RigTable | None
     conditions = [("now", query.condition)]
     if query.family:  # at the levels of the loaded tests, or the ends of the tested currents
         levels = list(table.currents) if table else list(damper.envelope.current_A)
-        picked = np.linspace(0, len(levels) - 1, min(len(levels), _MAX_FAMILY - 1)).round().astype(int)
-        for i, level in enumerate(sorted({levels[i] for i in picked})):
+        for i, level in enumerate(sorted(set(spread_out(levels, _MAX_FAMILY - 1)))):
             conditions.append((f"family{i}", Condition(level, query.frequency_Hz, query.amplitude_m)))
     return conditions
 

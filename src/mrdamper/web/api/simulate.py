@@ -24,7 +24,7 @@ from mrdamper.systems.inputs import Input, bundled_records, load_input, made_inp
 from mrdamper.systems.measures import cost
 from mrdamper.systems.result import Simulation
 from mrdamper.systems.simulate import SystemLoop, simulate_system
-from mrdamper.systems.structure import System
+from mrdamper.systems.structure import GRAVITY, System
 from mrdamper.systems.system_file import bundled_systems, load_system
 from mrdamper.web.responses import frame
 from mrdamper.web.sessions import OpenSession, shared
@@ -34,7 +34,6 @@ _ROAD_S = 8.0
 _MAX_SAMPLES = 2000  # of a history on the page
 _LOCK = Lock()  # one at a time: each takes seconds
 _FORCE_SHARE = 0.08  # force of the dampers over the weight of the body [-]
-_GRAVITY = 9.81  # acceleration of gravity [m/s²]
 _LOWEST_HZ = 0.2  # slower motion of the ground is not shown
 
 
@@ -106,7 +105,7 @@ def _setup(damper: Damper, system_name: str, source_name: str, scaled: bool) -> 
     system, e, scale = load_system(system_name).system, damper.envelope, 1.0
     capacity = peak_force(damper.predict(replace(e.middle, current_A=e.current_A[1])).force)
     if scaled and _kind(system) == "road":
-        scale = float(f"{capacity * len(system.dampers) / (_FORCE_SHARE * _GRAVITY * system.M[0, 0]):.2g}")
+        scale = float(f"{capacity * len(system.dampers) / (_FORCE_SHARE * GRAVITY * system.M[0, 0]):.2g}")
         system = _scaled(system, scale)
     return system, _source(source_name, system), capacity, scale
 
