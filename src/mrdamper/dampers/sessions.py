@@ -193,7 +193,8 @@ class Sessions:
         _refuse_disorder(runs, when)
         if not session_folds(runs):
             count = len({w.session for w in when} - {None})
-            reason = "every session holds one run" if count >= SESSIONS_NEEDED else counted(count, "known session")
+            reason = f"the runs state {counted(count, 'test session') if count else 'no test session'}"
+            reason = "every session holds one run" if count >= SESSIONS_NEEDED else reason
             raise InputError(
                 f"{reason}: the scatter between sessions cannot be estimated", remedy=_REMEDY, code="E_SESSION"
             )

@@ -270,12 +270,9 @@ def _parameter_rows(study: Study) -> list[dict[str, Any]]:
 
 def _scatter(rig: RigStudy) -> str:
     gain, offset = (float(np.std([getattr(one, name) for one in rig.readings])) for name in ("gain", "offset"))
-    sessions = (
-        f"with the gain and offset of each session corrected, the median cross-validated error is "
-        f"{100 * rig.session_known:.2f} %."
-        if isinstance(rig.session_known, float)
-        else f"what they contribute cannot be estimated: {rig.session_known}."
-    )
+    known = rig.session_known
+    unknown = isinstance(known, str)
+    sessions = f", which are not known ({known})." if unknown else f"; without them the median is {100 * known:.2f} %."
     omitted = "".join(
         f"Mean error with a {name.removeprefix('cross-validation, ')} omitted in cross-validation: {value}. "
         for name, value in rig.damper.provenance.items()
@@ -283,7 +280,8 @@ def _scatter(rig: RigStudy) -> str:
     )
     return omitted + (
         f"Scatter between runs: gain {100 * gain:.1f} %, offset {offset:.0f} N (standard deviations of "
-        f"measured over predicted force). All errors stated include the differences between test sessions; {sessions}"
+        "measured over predicted force). The cross-validated errors include the differences between test sessions"
+        + sessions
         + (f" {rig.calibration.summary}." if rig.calibration else "")
     )
 
