@@ -183,6 +183,7 @@ def test_a_number_before_a_current_makes_no_list(line):
 
 def test_a_tolerance_is_no_current():
     assert [s.amperes for s in stated_by_lines(["Coil current: 1.0 +/- 0.02 A"])] == [1.0]
+    assert [s.amperes for s in stated_by_lines(["جریان سیم\u200cپیچ: ۰٫۵ آمپر"])] == [0.5]
 
 
 def test_free_text_that_says_two_currents_says_none(tmp_path):

@@ -60,10 +60,20 @@ UNITS = "time [s],displacement [mm],force [N]\n"
         ({"plan.csv": "id,frequency,current\nm07,1,0.2\nm08,1,0.9\nm09,1,0\n",
           "codebook.csv": "table,variable,unit\nsignals,force,N\nplan,frequency,Hz\nplan,current,A\n"},
          {}),
+        ({"matrix.csv": "Corner,0.2 A,0.9 A,0 A\nFL,m07,m08,m09\n,,,\n"}, {}),
+        ({"log.csv": "Beginn;Strom (A)\n14:05:00;0,2\n14:11:00;0,9\n14:12:00;0\n"},
+         {"m07": "2023-06-03 14-05-12", "m08": "2023-06-03 14-11-30", "m09": "2023-06-03 14-12-59"}),
+        ({"list.txt": "1. test: coil at 0.2 A, 1 Hz\n2. test: coil at 0.9 A\n3. test: coil at 0 A\n"},
+         {"m07": "test1", "m08": "test2", "m09": "test3"}),
+        ({"note.txt": "T7 se T9 tak : frequency 1 Hz, current 0.2, 0.9, 0 A (isi order mein)\n"},
+         {"m07": "T7", "m08": "T8", "m09": "T9"}),
+        ({"README.md": "| Code | Current (A) |\n|---|---|\n| C1 | 0.2 |\n| C2 | 0.9 |\n| C3 | 0 |\n"},
+         {"m07": "MRD-C1-H1", "m08": "MRD-C2-H1", "m09": "MRD-C3-H1"}),
     ],
     ids=[
         "by an id of another table", "by the word before the number", "by two numbers", "measured beside set",
-        "time of day", ".2", "set point of the supply", "unit in a code book",
+        "time of day", ".2", "set point of the supply", "unit in a code book", "names in columns of currents",
+        "time of day of a sheet", "number before the word", "a range in order", "codes in a table of a README",
     ],
 )  # fmt: skip
 def test_currents_of_a_table_that_names_the_tests_by_keys(tmp_path, tables, names):
@@ -81,8 +91,10 @@ def test_currents_of_a_table_that_names_the_tests_by_keys(tmp_path, tables, name
         {"level.csv": "level,Current (A)\n1,0.2\n1,0.9\n", "test.csv": "test,level\nm07,1\nm08,1\nm09,1\n"},
         {"design.csv": "Mount,Mass,Current (A)\n9,7,0.2\n7,8,0.9\n8,9,0\n"},
         {"plan.csv": "test;Sollstrom (A);Sollstrom 2 (A)\nm07;0,2;0,2\nm08;2,0;0,9\nm09;0;0\n"},
+        {"note.txt": "m07 to m09: coil current 0.2, 0.9 A\n"},
+        {"matrix.csv": "Corner,0.2 A,0.9 A,0 A\nFL,m07,m08,m09\nFR,m08,m07,\n"},
     ],
-    ids=["a key of two rows", "two headings of one letter", "two set currents"],
+    ids=["a key of two rows", "two headings of one letter", "two set currents", "fewer than tests", "a name twice"],
 )
 def test_currents_of_a_table_whose_keys_are_not_unique_are_asked(tmp_path, tables):
     write(tmp_path, UNITS)
@@ -434,6 +446,27 @@ def test_columns_without_names_that_lines_name_each_or_by_lists_of_names_and_of_
         path.write_text(header + rows)
     (tmp_path / "LEIA-ME.txt").write_text(f"{text}m07 = 0.2 A, m08 = 0.9 A, m09 = 0 A\n", encoding="cp1252")
     require_the_tests(tmp_path)
+
+
+@pytest.mark.parametrize("chosen", [None, "bracket", "rod"])
+def test_a_line_of_a_sheet_of_tests_chooses_one_of_two_displacements(tmp_path, chosen):
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.append([f"use {chosen} LVDT for damper stroke." if chosen else "two LVDTs"])
+    for row in ([], ["Test", "I [A]"], *([name.upper(), of] for name, of in CURRENTS.items())):
+        sheet.append(row)
+    for name, amperes in CURRENTS.items():
+        sheet = book.create_sheet(name.upper())
+        sheet.append(["time [s]", "bracket LVDT [mm]", "rod LVDT [mm]", "load [N]"])
+        for row in zip(T, 1.1 * X, X, force(amperes), strict=True):
+            sheet.append(list(map(float, row)))
+    book.save(tmp_path / "tests.xlsx")
+    result = import_files([tmp_path])
+    assert {refusal.error.code for refusal in result.refusals} == (set() if chosen else {"E_AMBIGUOUS"})
+    if chosen:
+        assert [np.ptp(r.displacement) for r in result.records] == pytest.approx(
+            [{"bracket": 0.0264, "rod": 0.024}[chosen]] * 3, rel=1e-3
+        )
 
 
 def test_ranges_of_sensors_do_not_name_columns_without_names(tmp_path):

@@ -361,6 +361,18 @@ def test_a_column_that_numbers_the_tests_is_joined_with_the_plan_by_its_key(tmp_
     assert "E_CURRENT_MISSING" in {r.error.code for r in result.refusals}
 
 
+@pytest.mark.parametrize("gap", [0.0, 9.0])
+def test_parts_of_a_record_without_the_heading_of_the_first_go_on_by_their_clock(tmp_path, gap):
+    for part, inside in enumerate((slice(0, 300), slice(300, 600), slice(600, None)), 1):
+        head = "Tempo (s),Deslocamento (mm),Força (N)\n" if part == 1 else ""
+        table = rows(T[inside] + gap * part, X[inside], force(0.5)[inside])
+        (tmp_path / f"E_0.5A_parte{part}.txt").write_text(head + table, encoding="utf-8")
+    result = import_files([tmp_path])
+    assert [(r.id, r.time.size) for r in result.records] == ([("E_0.5A_parte1", 300)] if gap else [("E_0.5A", T.size)])
+    assert currents(result.records) == [0.5]
+    assert [refusal.error.code for refusal in result.refusals] == ["E_UNITS_MISSING"] * (2 if gap else 0)
+
+
 def test_the_rest_that_a_column_of_tests_numbers_zero_is_omitted_beside_them(tmp_path):
     text, noise = (
         "time (s),test_id,disp (mm),force (N),current (A)\n",

@@ -92,6 +92,10 @@ _AMPERES = {  # in other scripts; a small letter counts tests: тест 5 а
     for unit, names in TABLES["unit_names"].items() if unit in ("A", "mA")
 }  # fmt: skip
 _OTHER_SCRIPT = re.compile(rf"(?<=[0-9])\s?(?:(?P<mA>{_AMPERES['mA']})|(?P<A>{_AMPERES['A']}))(?!\w)")
+CHOICE = re.compile(  # use LVDT 2 for damper stroke
+    r"(?i)\b(?:use|verwende|usar|utiliser|kullan) (?:the )?(?P<name>\S.{0,30}?) (?:for|as|für|als|para|pour)(?: the)? "
+    r"(?P<channel>[^.,;|\t]{2,40})"
+)
 _SAMPLING = "|".join(words("sampling"))
 _RATE = re.compile(rf"{_SAMPLING}|messrate|^(?:data )?rate$|scan|acquisition|^fs$|^f_s$", re.IGNORECASE)
 OTHER_DEVICE = re.compile("|".join(words("other_device")), re.IGNORECASE)
@@ -149,7 +153,7 @@ def currents_in(text: str) -> tuple[float, ...]:
     `1200mA`, `1.2 A`, `0p4A`, `0x25A`, `-0.3A-`, `I0.4A`; 0_5A may be five or half an ampere and states
     none, nor does what stands beside a fuse, a supply or a limit.
     """
-    text = unicodedata.normalize("NFKC", text[:255]).replace("−", "-")
+    text = _in_ascii(text[:255])
     text = _OTHER_SCRIPT.sub(lambda match: f" {match.lastgroup}", text)
     if behind_digits(text) or _LABELLED_RATING.search(text):
         return ()
@@ -162,6 +166,13 @@ def currents_in(text: str) -> tuple[float, ...]:
     listed = _LISTED.search(text)
     currents += [amperes(number, listed[5]) for number in (listed[1] or listed[3], listed[4])] if listed else []
     return tuple(dict.fromkeys(currents))
+
+
+def _in_ascii(text: str) -> str:
+    """Return a text with the digits, colons and signs of numbers as in ASCII: of full width, Persian, a long minus."""
+    text = unicodedata.normalize("NFKC", text)
+    digits = text if text.isascii() else "".join(str(unicodedata.decimal(sign, sign)) for sign in text)
+    return digits.replace("−", "-").replace("٫", ".")
 
 
 def behind_digits(name: str) -> re.Match[str] | None:
@@ -293,9 +304,16 @@ def series_in(line: str) -> tuple[float, ...]:
     series = None if RATING.search(line) or _SCALE.search(line) else _SERIES.search(line[:LONGEST_LINE])
     if series is None or not names_only_currents(line[: series.start()]) or re.search(r"\w", line[series.end() :]):
         return ()
-    listed = [amperes(number, series[2]) for number in re.findall(_NUMBER, series[1])]
-    mixed = {*re.findall("m?A", series[1])} - {series[2]}  # 500 mA, 1 A
-    return tuple(listed) if len({*listed}) == len(listed) and not mixed else ()
+    listed = currents_in_order(series[0])
+    return listed if len({*listed}) == len(listed) else ()
+
+
+def currents_in_order(text: str) -> tuple[float, ...]:
+    """Return the currents [A] of the first list of them in a text: 0, 0.5, 1 A; empty if there is none, or a limit."""
+    series = None if RATING.search(text) or _SCALE.search(text) else _SERIES.search(text[:LONGEST_LINE])
+    if series is None or {*re.findall("m?A", series[1])} - {series[2]}:  # 500 mA, 1 A
+        return ()
+    return tuple(amperes(number, series[2]) for number in re.findall(_NUMBER, series[1]))
 
 
 def names_only_currents(text: str) -> bool:
@@ -400,7 +418,7 @@ def stated_speed(quantities: Iterable[Quantity]) -> float | None:
 
 def _quantities(line: str, decimal: str | None) -> Iterator[Quantity]:
     """Yield what a line states: one quantity, or several behind each other."""
-    line = _TOLERANCE.sub("", unicodedata.normalize("NFKC", line[:LONGEST_LINE]))  # a colon of full width
+    line = _TOLERANCE.sub("", _in_ascii(line[:LONGEST_LINE]))
     match = _LINE.match(line) or _SPACED.match(line)
     parts = [line] if match else re.split(r"[,;|]\s+|[{}\t]|\s{2,}", re.sub(r" *= +", "=", line))
     for part in parts[:_MOST_PARTS]:

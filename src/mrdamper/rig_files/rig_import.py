@@ -26,7 +26,7 @@ from mrdamper.rig_files.coil_current import (
     with_current_behind_label,
     with_stated_current,
 )
-from mrdamper.rig_files.file_records import files_in, records_of_file, unpacked
+from mrdamper.rig_files.file_records import files_in, headings_of, records_of_file, unpacked
 from mrdamper.rig_files.mapping import plans
 from mrdamper.rig_files.mapping.companions import holds_channels, is_helper, is_list, joined_files, number_of, part_of
 from mrdamper.rig_files.mapping.comparisons import contradictions, repeated, stated_as_amplitudes
@@ -39,7 +39,7 @@ from mrdamper.rig_files.quality.table import to_run
 from mrdamper.rig_files.readers import suffixes
 from mrdamper.rig_files.readers.base import NoTableError, RigFileError
 from mrdamper.rig_files.record import Finding, Record, Refusal, unique_names
-from mrdamper.rig_files.sequences import follows, goes_on, tests_of_files
+from mrdamper.rig_files.sequences import follows, goes_on, is_next, tests_of_files
 from mrdamper.rig_files.tests_table import NAME as TESTS
 from mrdamper.rig_files.tests_table import TestsTable, applied, load_tests, names_tests
 
@@ -207,6 +207,8 @@ class _Intake:
             self._shares[path] = run, profile
             return
         records, refusals = _unchecked(path, profile)
+        if refusals and self._parts and is_next(self._parts[-1][0], path):
+            records, refusals = self._without_heading(path, profile) or (records, refusals)
         self.met += [] if records else [(path, "")]
         no_table = not records and not given and [type(refusal.error) for refusal in refusals] == [NoTableError]
         no_table |= not records and not given and is_readme(path) and not holds_channels(path, profile.file)
@@ -218,6 +220,13 @@ class _Intake:
         self._parts.append((path, records))
         if whole:
             self._take_parts()
+
+    def _without_heading(self, path: Path, profile: Profile) -> tuple[list[Record], list[Refusal]] | None:
+        """Return the tests of a part of a record of which the first names the columns; None if it does not go on."""
+        names = [f"{header.name} [{header.unit}]" for _, header in headings_of(self._parts[0][0], profile).values()]
+        form = profile.file.model_copy(update={"names": tuple(names)})
+        records, refusals = _unchecked(path, profile.model_copy(update={"file": form}))
+        return (records, []) if records and not refusals and follows(*self._parts[-1], path, records) else None
 
     def _take_parts(self) -> None:
         """Take the tests of the last file, or those of the files that are parts of one record."""

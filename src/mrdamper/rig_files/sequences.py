@@ -95,10 +95,14 @@ def goes_on(records: Sequence[Record]) -> bool:
 def follows(last: Path, before: Sequence[Record], path: Path, records: Sequence[Record]) -> bool:
     """Tell if a file is the next part of a record: its number, its current, its clock and its motion go on."""
     one, other = before[-1], records[0]
+    return is_next(last, path) and _stated(one) == _stated(other) and _continues(one, other)
+
+
+def is_next(last: Path, path: Path) -> bool:
+    """Tell if a file is called as the next part of a record."""
     old, new = _NUMBERED.fullmatch(last.stem), _NUMBERED.fullmatch(path.stem)
-    if not old or not new or last.parent != path.parent or int(new["n"]) != int(old["n"]) + 1:
-        return False
-    return old["name"] == new["name"] and _stated(one) == _stated(other) and _continues(one, other)
+    named = old and new and (last.parent, old["name"]) == (path.parent, new["name"])
+    return bool(old and new and named and int(new["n"]) == int(old["n"]) + 1)
 
 
 def _continues(one: Record, other: Record) -> bool:

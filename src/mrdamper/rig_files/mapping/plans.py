@@ -76,7 +76,8 @@ def results_of(path: Path, form: FileForm | None = None) -> Results | None:
 
     def results_apart(tables: Sequence[RawTable]) -> list[tuple[str, Results]]:
         every = ((t.label, results_in(lines_of(completed(with_notes(t, path, Profile()))))) for t in tables[:20])
-        return [(label, results) for label, results in every if results]
+        beside = results_in([*dict.fromkeys(line for table in tables for line in table.remarks)])
+        return [(label, of) for label, of in every if of] or ([("", beside)] if beside else [])
 
     sheets = ask_tables(path, results_apart, [])
     if len({(of.keys, of.title, of.of_supply) for _, of in sheets}) != 1:
@@ -106,7 +107,8 @@ def currents_beside(path: Path, results: Results | None, tests: _Tests) -> list[
         return titled if grow or not results.of_supply else None
     lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
     rows = zip(results.cells, results.current, strict=True) if results and not results.of_supply else ()
-    lines += [f"{cells[1]}: {value:g} A" for cells, value in rows if len(cells) > 1]  # Level, Current (A): L1, 0.35
+    named = [([*filter(None, cells[1:])], value) for cells, value in rows]  # Level, Current (A): L1, 0.35
+    lines += [f"{names[0]}: {value:g} A" for names, value in named if names]
     titled = _by_scheme(lines, results, tests) or _by_legend(lines, tests)
     return [(current, f"{path.name}, {title}") for current, title in titled] or None
 

@@ -13,9 +13,9 @@ from scipy.integrate import cumulative_trapezoid
 from mrdamper.data import Floats
 from mrdamper.errors import ExcitationError, InputError
 from mrdamper.physics.motion.measured import smooth
-from mrdamper.rig_files.column_names import split_name
+from mrdamper.rig_files.column_names import role_of, split_name
 from mrdamper.rig_files.columns import candidates_of, column_called
-from mrdamper.rig_files.conditions import BARE_RATE, motions_in, stated_rate
+from mrdamper.rig_files.conditions import BARE_RATE, CHOICE, motions_in, stated_rate
 from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding, Record
@@ -75,8 +75,9 @@ def _with_rate(table: RawTable, moved: int) -> RawTable:
 def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -> RawTable:
     """Return the table with the columns chosen that alone make a damper's loop, where names leave open which they are.
 
-    The columns that are `stated`, by channel, are not open.
+    The columns that are `stated`, by channel, are not open, nor those that a line chooses.
     """
+    table = _with_choices(table)
     try:
         open_roles = {
             role: [column_called(table, stated[role], role)] if role in stated else candidates_of(table, role)
@@ -100,6 +101,18 @@ def with_channels_by_physics(table: RawTable, stated: Mapping[str, str | int]) -
     named = " and ".join(f"{name} as the {role}" for role, name in names.items())
     text = f"{named}: only so the force takes energy in phase with the velocity"
     return replace(table, chosen=chosen).noted(Finding("W_CHOSEN", text))
+
+
+def _with_choices(table: RawTable) -> RawTable:
+    """Return the table with the columns that lines choose for a channel: use LVDT 2 for damper stroke."""
+    chosen: dict[str, set[int]] = {}
+    for match in (match for line in table.lines for match in CHOICE.finditer(line)):
+        role, name = role_of(match["channel"]), match["name"].casefold()
+        own = [i for i in table.columns(role) if table.headers[i].name.casefold() == name] if role else []
+        chosen.setdefault(role or "", set()).update(own)
+    clear = {role: min(own) for role, own in chosen.items() if len(own) == 1}
+    notes = [Finding("W_CHOSEN", f"{table.title(i)!r} is the {role} as a line states") for role, i in clear.items()]
+    return replace(table, chosen={**table.chosen, **clear}).noted(*notes)
 
 
 def damping_share(time: Floats, displacement: Floats, force: Floats) -> float:

@@ -6,19 +6,28 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from pathlib import Path
 
 import numpy as np
 
 from mrdamper.errors import listed
 from mrdamper.rig_files.column_names import COIL, headers_of, holds, names_condition, split_name, words, words_of
-from mrdamper.rig_files.conditions import contradicts, currents_in, day_in, names_only_currents, quantity_in_cell
+from mrdamper.rig_files.conditions import (
+    contradicts,
+    currents_in,
+    currents_in_order,
+    day_in,
+    named_after_currents,
+    names_only_currents,
+    quantity_in_cell,
+)
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Record
 from mrdamper.rig_files.text.layout import is_units
 from mrdamper.rig_files.text.row_samples import cells_of
+from mrdamper.rig_files.text.tokens import looks_numeric
 
 _SEPARATORS = ("\t", ";", ",", "|", "  ")  # the last: two spaces or more
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]+)?|[.,][0-9]+)")
@@ -29,9 +38,10 @@ _SUPPLY = re.compile(r"(?i)\b(?:power[ _-]?)?suppl(?:y|ied)\b|\bpsu\b")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
-_LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: ...
-    r"[\s#%*\"-]*(?P<name>[^\W\d_][^\d:=]{0,30}?)[\s_.#-]*(?P<number>[0-9]{1,6})"
-    r"(?:\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até)\b)\s*(?:[^\W\d_]{1,30}[\s_.#]*)?(?P<last>[0-9]{1,6}))?\s*[:=;,\t)]"
+_LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: ...; T1 se T4 tak: ...; 3. test: ...
+    r"[\s#%*\"-]*(?:(?P<place>[0-9]{1,6})[.)]\s*(?P<word>[^\W\d_]{2,20})"
+    r"|(?P<name>[^\W\d_][^\d:=]{0,30}?)[\s_.#-]*(?P<number>[0-9]{1,6})(?:\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até|se)\b)"
+    r"\s*(?:[^\W\d_]{1,30}[\s_.#]*)?(?P<last>[0-9]{1,6})(?:\s+tak)?)?)\s*[:=;,\t)]"
 )
 _LABELLED = re.compile(r"(?<![^\W\d_])([^\W\d_]+)[ _.-]?([0-9]+)")
 _CLOCK = re.compile(r"[0-2][0-9]:[0-5][0-9](?::[0-5][0-9])?")
@@ -262,7 +272,24 @@ def results_in(lines: Sequence[str]) -> Results | None:
         tables = {(table.current, table.cells): table for table in _tables(lines[:_MOST_LINES], separator)}
         if tables:
             return next(iter(tables.values())) if len(tables) == 1 else None
-    return numbered_tests(lines[:_MOST_LINES])
+    return numbered_tests(lines[:_MOST_LINES]) or _matrix_of_tests(lines[:_MOST_LINES])
+
+
+def _matrix_of_tests(lines: Sequence[str]) -> Results | None:
+    """Return the tests whose names stand in columns headed by a current each: corner, 0 A, 0.5 A; FL, R41, R42."""
+    for separator in _SEPARATORS[:4]:
+        rows = [cells_of(line[:_LONGEST_LINE], separator) for line in lines]
+        worded = [at for at, line in enumerate(lines) if any(map(str.isalpha, line))]
+        for at, columns in ((at, of) for at in worded if (of := named_after_currents(rows[at]))):
+            whole = takewhile(lambda row, heads=rows[at]: len(row) == len(heads) and any(row), rows[at + 1 :])
+            body = takewhile(lambda row, own=columns: not any(row[i] and looks_numeric(row[i]) for i in own), whole)
+            tests = [(row, i) for row in body for i in columns if row[i]]
+            if len({row[i] for row, i in tests}) == len(tests) > 1:
+                others = [i for i in range(len(rows[at])) if i not in columns]
+                cells = tuple((str(n), row[i], *(row[k] for k in others)) for n, (row, i) in enumerate(tests, 1))
+                currents = tuple(currents_in(rows[at][i])[0] for _, i in tests)
+                return Results(currents, cells, "a matrix of tests", ("", "", *(rows[at][k] for k in others)))
+    return None
 
 
 def numbered_tests(lines: Sequence[str]) -> Results | None:
@@ -275,14 +302,15 @@ def numbered_tests(lines: Sequence[str]) -> Results | None:
 
 
 def _numbered_tests(lines: Iterable[str], *, of_supply: bool = False) -> Results | None:
-    matches = [match for line in lines if (match := _LISTED_TEST.match(line))]
-    stated = [(match, currents_in(match.string[match.end() :])) for match in matches]
-    rows = [
-        (m["name"].strip(), f"{number:0{len(m['number'])}d}", of[0], m.string[m.end() :].strip())
-        for m, of in stated
-        for number in range(int(m["number"]), int(m["last"] or m["number"]) + 1)[:_MOST_ROWS]
-        if len(of) == 1 and not holds(m["name"], COIL)
-    ]
+    rows = list[tuple[str, str, float, str]]()
+    for match in filter(None, map(_LISTED_TEST.match, lines)):
+        text, name, first = match.string[match.end() :].strip(), match["name"], match["number"]
+        if match["word"] and match["word"].casefold() in _COUNTED:
+            name, first = match["word"], match["place"]
+        numbers = range(int(first or 0), int(match["last"] or first or -1) + 1)[:_MOST_ROWS]
+        stated = currents_in_order(text) or currents_in(text) * len(numbers)
+        if name and len(stated) == len(numbers) and not holds(name, COIL):
+            rows += [(name.strip(), f"{n:0{len(first)}d}", of, text) for n, of in zip(numbers, stated, strict=True)]
     numbers = {(name.casefold(), int(number)) for name, number, *_ in rows}
     if len(numbers) < _FEWEST_ROWS or len(numbers) < len(rows) or len({name for name, _ in numbers}) > 1:
         return None
@@ -474,6 +502,8 @@ def _group_names(text: str) -> set[str]:
 def _match(column: Sequence[str], names: Sequence[tuple[set[str], set[str]]], exact: bool) -> dict[int, int] | None:
     """Return the row of each test by one column; None unless every test has one row, and no row two."""
     keys = [_key(cell) for cell in column]
+    if all(_CLOCK.fullmatch(key) and key.endswith(":00") and len(key) > 5 for key in keys):  # of a sheet, to the minute
+        keys = [key[:-3] for key in keys]
     if len(set(keys)) < len(keys) or "" in keys:
         return None
     matches = {}

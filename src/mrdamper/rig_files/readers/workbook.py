@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from mrdamper.errors import InputError
+from mrdamper.rig_files.conditions import CHOICE, LONGEST_LINE
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import checked_zip, is_workbook, is_zip_of
 from mrdamper.rig_files.readers.arrays import load, refusing_damage
@@ -64,6 +65,7 @@ def tables_of_sheets(source: Source, sheets: Sequence[tuple[str, Source]], form:
         titles = (name,) if len(tables) > 1 else ()  # of each of its tables
         tables = [replace(t, label=t.label or name, remarks=(*titles, *t.remarks)) for t in tables]
         tables = [replace(t, form={"sheet": name}) for t in tables if len(t.names) >= _FEWEST]
+        beside += [line for table in tables for line in table.remarks if CHOICE.search(line[:LONGEST_LINE])]
         named = [header.channel for table in tables for header in table.headers]
         noted = sheet.size <= _NOTES and all(any(table.odd[:1]) for table in tables) and not any(named)  # quantities
         beside += sheet.head(_NOTES).decode("utf-8", "replace").splitlines() if noted or not tables else ()
