@@ -309,12 +309,13 @@ def test_a_date_among_keys_above_the_rows_is_no_row_of_a_log(tmp_path):
     np.testing.assert_allclose(record.displacement, 1e-3 * X, rtol=0, atol=1e-8)
 
 
-def test_a_script_beside_files_of_another_suffix_is_no_test_and_notes_are_named_once(tmp_path):
+@pytest.mark.parametrize("more", ["", "recorder Node -file out/disp.out -time -node 2 -dof 1 disp\n"])
+def test_a_script_beside_files_of_another_suffix_is_no_test_and_notes_are_named_once(tmp_path, more):
     write(tmp_path, UNITS)
     for path in [*tmp_path.iterdir()]:
         path.rename(path.with_suffix(".out"))
     script = "node 1 0.0\nfix 1 1\nuniaxialMaterial Maxwell 1 20.0 3.5 0.4\nelement twoNodeLink 1 1 2 -mat 1 -dir 1\n"
-    (tmp_path / "fit.tcl").write_text(script)
+    (tmp_path / "fit.tcl").write_text(script + more)
     (tmp_path / "README.md").write_text(
         "| Test | f (Hz) | Current (A) |\n|---|---|---|\n| T1 | 1 | 0 |\n| T2 | 1 | 1 |\n"
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import re
 from collections.abc import Collection
 from dataclasses import replace
@@ -29,7 +28,7 @@ from mrdamper.rig_files.conditions import (
     stated_in_titles,
     states_other,
 )
-from mrdamper.rig_files.profile import Profile, current_in_name
+from mrdamper.rig_files.profile import Profile, current_in_name, toml
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding, Record
 
@@ -90,7 +89,7 @@ def _refuse_contradicted_line(table: RawTable, stated: Statement, rows: slice, w
         return
     first = min(held)
     name, low, high = table.names[first], np.min(values[first]), np.max(values[first])
-    line = f"[channels.current] column = {json.dumps(name, ensure_ascii=False)}"
+    line = f"[channels.current] column = {toml(name)}"
     raise ColumnError(
         printable(f"{stated.whence} gives {stated.amperes:g} A, the column {name!r} {number(low, 3)} to {high:.3g} A"),
         where=where,
@@ -206,13 +205,13 @@ def current_by_resistance(table: RawTable, record_id: str) -> tuple[Finding, ...
     if columns:
         name, scale = table.names[columns[0]], table.headers[columns[0]].factor / ohm
         what = f"the coil's voltage {name!r} over {ohm:g} ohm"
-        line = f'[channels.current] column = {json.dumps(name, ensure_ascii=False)}, unit = "A" and scale = {scale:.6g}'
+        line = f'[channels.current] column = {toml(name)}, unit = "A" and scale = {scale:.6g}'
     else:
         (volt,) = volts
         if abs(volt / ohm) > LARGEST_STATED:
             return ()
         what = f"the coil's {volt:g} V over {ohm:g} ohm = {volt / ohm:.4g} A"
-        line = f"[current] values = {{{json.dumps(record_id)} = {volt / ohm:.4g}}}"
+        line = f"[current] values = {{{toml(record_id)} = {volt / ohm:.4g}}}"
     text = f"{NO_CHANNEL}missing: {what} is the current only at constant voltage: if so, set {line} in a profile"
     return (Finding("W_COLUMN", printable(text)),)
 

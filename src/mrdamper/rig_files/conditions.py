@@ -226,11 +226,6 @@ def motions_in(text: str, unit: str) -> set[float]:
     return {float(number) * (1e-3 if milli else 1.0) for number, milli in stated}
 
 
-def names_test(title: str) -> bool:
-    """Tell if a title is that of a damper, of a motion, or of a numbered test."""
-    return bool(damper_in(title)) or states_motion(title) or numbers_test(title)
-
-
 def damper_in(title: str) -> str:
     """Return the damper that a title names beside a current, empty if it names none: FL, rear left, Damper A, 0.5 A."""
     name = without_currents(title).strip(" ,;:@-_/")

@@ -34,7 +34,8 @@ def with_tests(old: Dataset, new: Dataset) -> tuple[Dataset, list[str], list[str
                 f"there already, read in the same way: {listed(same, 5)}",
                 where=f"dataset {old.name}", remedy="give new files only, or a profile that reads these otherwise",
             )  # fmt: skip
-        before = [run for run in before if _columns(run) == _columns(now[0]) and _may_be_one_rig(run, now[0])]
+        before = [run for run in before if run.rig == now[0].rig or not (run.rig and now[0].rig)]
+        before = [run for run in before if _columns(run) == _columns(now[0])]
         if before and len(before) != len(now):
             raise OutputError(
                 f"{listed([run.id for run in before], 5)} are of the same file, which gives {len(now)} tests now",
@@ -60,10 +61,6 @@ def _by_source(runs: Dataset) -> list[list[Run]]:
 def _columns(run: Run) -> str:
     """Return the columns of the displacement and the force, whatever their units."""
     return " ".join(match[0] for match in _COLUMN.finditer(run.notes.get("columns", "")))
-
-
-def _may_be_one_rig(one: Run, other: Run) -> bool:
-    return one.rig == other.rig or not (one.rig and other.rig)
 
 
 def _replaced(before: Run, now: Run) -> Run:

@@ -304,7 +304,8 @@ def _samples(dataset: Dataset) -> Iterator[pl.DataFrame]:
 
     for run in dataset:
         channels = {"time_s": run.time, "displacement_m": run.displacement, "force_N": run.force}
-        if _varies(run.current):  # a constant one stands in runs.csv alone, where it can be corrected
+        ends = [(float(np.min(piece)), float(np.max(piece))) for _, piece in chunks(run.current)]
+        if min(low for low, _ in ends) != max(high for _, high in ends):  # a constant one can be corrected in runs.csv
             channels["current_A"] = run.current
         if run.velocity is not None:
             channels["velocity_m_s"] = run.velocity
@@ -318,8 +319,3 @@ def _samples(dataset: Dataset) -> Iterator[pl.DataFrame]:
             yield table.select(pl.lit(run.id).alias("run_id"), pl.all())
             for values in channels.values():
                 drop_pages(values)
-
-
-def _varies(current: np.ndarray) -> bool:
-    ends = [(float(np.min(piece)), float(np.max(piece))) for _, piece in chunks(current)]
-    return min(low for low, _ in ends) != max(high for _, high in ends)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
 import os
 import re
 import shutil
@@ -27,7 +26,7 @@ from mrdamper.rig_files.mapping.proposals import with_channels_by_physics, with_
 from mrdamper.rig_files.mapping.rasters import with_joined_rasters, with_one_clock
 from mrdamper.rig_files.mapping.results import form_of_tests, with_results
 from mrdamper.rig_files.parts import tests_of, with_channels_as_columns
-from mrdamper.rig_files.profile import Profile, profile_hash
+from mrdamper.rig_files.profile import Profile, profile_hash, toml
 from mrdamper.rig_files.readers import ask_tables, raw_tables, suffixes
 from mrdamper.rig_files.readers.archive import (
     UNREADABLE_ZIP,
@@ -174,16 +173,14 @@ def _resembles_a_test(table: RawTable, tests: list[RawTable], profile: Profile) 
     alike = alike or forms.get(re.sub("[0-9]+", "0", table.label))
     if alike is None or holds(table.label, COMPUTED) or len(columns) < len(REQUIRED) - 1:
         return False
-    return _rows(table, columns[0]) >= _ROWS_OF_A_TEST * _rows(alike, assign(alike, profile)["force"].column)
-
-
-def _rows(table: RawTable, column: int) -> int:
-    return table.read([column]).values[column].size
+    force = assign(alike, profile)["force"].column
+    rows, usual = (of.read([i]).values[i].size for of, i in ((table, columns[0]), (alike, force)))
+    return rows >= _ROWS_OF_A_TEST * usual
 
 
 def _incomplete(table: RawTable, error: InputError) -> InputError:
     """Return the refusal of one of a file's tests, with its table named."""
-    label = json.dumps(table.label, ensure_ascii=False)
+    label = toml(table.label)
     where = f"{printable(table.source.name)}, table {printable(table.label)}"
     remedy = f"give it the channels of the other tables, or set [file] leave_out = [{label}] in a profile"
     return ColumnError(error.found, where=where, remedy=remedy, code=error.code)

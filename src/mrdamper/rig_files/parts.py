@@ -31,6 +31,7 @@ _FEWEST_SAMPLES = 50  # of channels whose names say nothing
 _PAIR = ("displacement", "force")
 _ONE_MOTION, _TWO_SENSORS = 0.02, 0.25  # relative RMS difference of two columns that hold the same
 _Groups = dict[str, dict[str, int]]  # columns by channel, by group
+_Channel = tuple[str, str, np.ndarray]  # label, unit and rows
 
 
 def tests_of(table: RawTable, form: FileForm, stated: Mapping[str, str | int]) -> list[RawTable]:
@@ -383,7 +384,8 @@ def with_channels_as_columns(table: RawTable) -> RawTable:
     others.sort(key=lambda i: table.headers[i].role != "time")
     rows = [np.flatnonzero(words.codes == code) for code in range(len(words.labels))]
     rows = [own[: sizes.min()] for own in rows] if np.ptp(sizes) == 1 else rows  # the last sample is cut
-    return _pivoted(table, value[0], others, words.labels, units, rows, rows[roles.get("force", int(sizes.argmax()))])
+    channels = [*zip(words.labels, units, rows, strict=True)]
+    return _pivoted(table, value[0], others, channels, rows[roles.get("force", int(sizes.argmax()))])
 
 
 def _by_content(table: RawTable) -> tuple[list[int], list[int], list[int]]:
@@ -398,30 +400,23 @@ def _by_content(table: RawTable) -> tuple[list[int], list[int], list[int]]:
     return bare, channels, units[:1]
 
 
-def _pivoted(
-    table: RawTable,
-    value: int,
-    others: list[int],
-    labels: tuple[str, ...],
-    units: list[str],
-    rows: list[np.ndarray],
-    base: np.ndarray,
-) -> RawTable:
+def _pivoted(table: RawTable, value: int, others: list[int], channels: list[_Channel], base: np.ndarray) -> RawTable:
     """Return the channels as columns, those with other times than the force behind their own clock."""
     of_table = table.words
     assert of_table is not None
     column = cache(lambda i: table.read([i]).values[i])
     clocks = [i for i in others if table.headers[i].role == "time"]
+    rows = [own for *_, own in channels]
     even = [own.size == base.size and all(np.allclose(column(i)[own], column(i)[base]) for i in clocks) for own in rows]
-    apart = [n for n, same in enumerate(even) if not same]
+    apart = [channel for channel, same in zip(channels, even, strict=True) if not same]
     tests = [i for i in others if i not in clocks and len(np.unique(of_table(i).codes[base])) > 1]
     if apart and (len(clocks) != 1 or tests):
-        problem = f"{labels[apart[0]]!r} has other times than the force"
+        problem = f"{apart[0][0]!r} has other times than the force"
         raise table.source.refuse("E_RASTER", problem, "export one column a channel")
     places = [(i, base, table.names[i], table.units[i]) for i in others]
-    places += [(value, own, labels[n], units[n]) for n, own in enumerate(rows) if n not in apart]
-    for n in apart:
-        places += [(clocks[0], rows[n], *places[0][2:]), (value, rows[n], labels[n], units[n])]
+    places += [(value, own, label, unit) for (label, unit, own), same in zip(channels, even, strict=True) if same]
+    for label, unit, own in apart:
+        places += [(clocks[0], own, *places[0][2:]), (value, own, label, unit)]
 
     def words(i: int) -> Words:
         layout = of_table(places[i][0])

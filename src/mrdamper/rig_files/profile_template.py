@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from glob import escape
@@ -18,7 +17,7 @@ from mrdamper.rig_files.column_names import Header
 from mrdamper.rig_files.file_records import files_in, headings_of, unpacked
 from mrdamper.rig_files.mapping.description import is_readme
 from mrdamper.rig_files.preview import columns_of, guess_profile, unset_keys
-from mrdamper.rig_files.profile import Profile, profile_text
+from mrdamper.rig_files.profile import Profile, profile_text, toml
 from mrdamper.rig_files.record import Refusal
 from mrdamper.rig_files.rig_import import ImportResult, import_files, read_runs
 
@@ -80,7 +79,7 @@ def _missing_currents(refusals: Sequence[Refusal], columns: Mapping[int, str]) -
         (name for name in columns.values() if name and any(f"column {name!r}" in why for why in reasons)), None
     )
     if column is not None:
-        shown = json.dumps(column, ensure_ascii=False)
+        shown = toml(column)
         lines = ["# Calibration of the current: A for 1 of the column:", "#[channels.current]", f"#column = {shown}"]
         lines += ['#unit = "A"', "#scale =", ""]
     runs = [r.run or Path(r.file).stem for r in missing]
@@ -92,7 +91,7 @@ def _missing_currents(refusals: Sequence[Refusal], columns: Mapping[int, str]) -
     lines += [heading, "#[current.values]"]
     whys = [f"  # {text}" if text and not text.startswith("no coil current") else "" for text in reasons]
     stated = dict(zip(_by_level(names), whys, strict=True))
-    lines += [f"#{json.dumps(name, ensure_ascii=False)} ={why}" for name, why in stated.items()]
+    lines += [f"#{toml(name)} ={why}" for name, why in stated.items()]
     return "\n".join(["", *lines, ""])
 
 
@@ -115,7 +114,7 @@ def _alternatives(columns: Mapping[int, str], kinds: Mapping[str, Mapping[int, t
     """List the columns of the file, or of each kind of file, and the most used keys of a profile as comments."""
 
     def named(names: Mapping[int, str]) -> list[str]:
-        return [f"#   {number}  {json.dumps(name, ensure_ascii=False)}" for number, name in names.items() if name]
+        return [f"#   {number}  {toml(name)}" for number, name in names.items() if name]
 
     several = "# Every test has several files; give each channel its column, its unit, and its file, of which {run} is"
     lines = [several, "# the name of the test. Columns:"] if kinds else []

@@ -33,7 +33,8 @@ from mrdamper.rig_files.conditions import (
     currents_in,
     damper_in,
     named_after_currents,
-    names_test,
+    numbers_test,
+    states_motion,
     without_currents,
 )
 from mrdamper.rig_files.mapping import scales
@@ -201,7 +202,8 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
             roles = {split_name(cell).role for cell in cells} - {None}
             forces = [cells[i - 1] for i in table.columns("force") if i]  # beside a comment on the motion
             forces = forces if len(forces) > 1 else stated
-            tests = all(map(currents_in, forces)) or all(map(names_test, forces))
+            tests = all(damper_in(title) or states_motion(title) or numbers_test(title) for title in forces)
+            tests |= all(map(currents_in, forces))
             if (key and len(roles) > 1) or (forces and tests):
                 names = [*table.names]
                 for i, cell in enumerate(cells, 1):

@@ -180,7 +180,7 @@ def _of_channels(line: str) -> str:
     if len(cells) > 1 and split_name(cells[0]).role and all(c.isascii() and c.isdigit() for c in cells[1:]):
         return f"channel {cells[1]}: {cells[0]}"  # a tag with its index, and its type
     units = [item_of(cell).unit or cell.rpartition(":")[2].strip() for cell in cells]
-    stated = scales.states_scale(line) or scales.states_shift(line) or states_si(line) or states_volts(line)
+    stated = scales.scales_in(line) or scales.states_shift(line) or states_si(line) or states_volts(line)
     return line if stated or (any(map(is_unit, units)) and not stated_by_lines([line], ".")) else ""
 
 

@@ -415,7 +415,8 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
             body.append(cells)
         measured = [i for i in columns if row[i].casefold().startswith(_MEASURED) or holds(row[i], {*_MEASURED})]
         chosen = measured if len(measured) == 1 else columns  # Iststrom beside Sollstrom
-        every = [[_amperes(cells[i], unit or split_name(row[i]).unit) for cells in body] for i in chosen]
+        given = [[quantity_in_cell(cells[i], unit or split_name(row[i]).unit) for cells in body] for i in chosen]
+        every = [[q[0] if q and q[1].dimension == "current" and abs(q[0]) <= 100 else None for q in of] for of in given]
         currents = every[0]
         if len(body) < _FEWEST_ROWS or any(value is None for value in currents):
             continue
@@ -457,11 +458,6 @@ def _is_of_supply(cell: str, below: str = "") -> bool:
     if bare != cell and _QUANTITY.fullmatch(below):
         return True
     return bare != cell and _is_current(bare) and names_only_currents(split_name(bare).name)
-
-
-def _amperes(cell: str, unit: str) -> float | None:
-    value, unit_of = quantity_in_cell(cell, unit) or (0.0, None)
-    return value if unit_of is not None and unit_of.dimension == "current" and abs(value) <= 100 else None
 
 
 def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:

@@ -170,11 +170,6 @@ def scaled_columns(table: RawTable) -> list[int]:
     return [i for i, header in enumerate(table.headers) if header.dimension in _SIGNALS]
 
 
-def states_scale(line: str) -> bool:
-    """Tell if a line states a scale: 0.5 A/V; 100 % PWM = 2 A."""
-    return bool(scales_in(line[:LONGEST_LINE]))
-
-
 def states_shift(line: str) -> bool:
     """Tell if a line states the zero or a gain of a scale, and no current: offset: 0.4 V; gain 100."""
     shift = _ZERO.search(line[:LONGEST_LINE]) or _SHIFT.search(line[:LONGEST_LINE])
@@ -209,7 +204,7 @@ def _stated_scale(table: RawTable, column: int, volts: Sequence[int]) -> tuple[s
 def scales_in(line: str) -> list[tuple[str, str, float]]:
     """Return channel, unit and number per volt of every scale that a line states: 0.5 A/V, 100 mV/A, 1 V = 2 A."""
     scales = []
-    for match in SCALE.finditer(line):
+    for match in SCALE.finditer(line[:LONGEST_LINE]):
         one, other = parse_unit(match["unit"]), parse_unit(match["volt"])
         if one is None or other is None or (one.dimension in _SIGNALS) == (other.dimension in _SIGNALS):
             continue

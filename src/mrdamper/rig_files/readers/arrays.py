@@ -164,8 +164,9 @@ def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floa
         if array.size == 1:
             return np.array([float(array.reshape(-1)[0])])
         raise source.refuse("E_FIELD_COUNT", f"column {name!r} is a table of {array.shape}", **place)
-    if kind in "Mm":
-        return _seconds(array)
+    if kind in "Mm":  # seconds after the first stamp, by integers: doubles cannot hold the nanoseconds of a date
+        since = array - array[np.argmin(np.isnat(array))] if array.size else array.astype("timedelta64[ns]")
+        return since.astype("timedelta64[ns]") / np.timedelta64(1, "s")
     with np.errstate(over="ignore"):
         return np.array(array, dtype=np.float64)
 
@@ -305,9 +306,3 @@ def damaged(source: Source, title: str, why: str) -> RigFileError:
     reason = "".join(c if c.isprintable() else " " for c in (why.strip().splitlines() or ["unreadable"])[0])[:120]
     code = "E_TRUNCATED" if early else "E_FORMAT"
     return source.refuse(code, f"damaged {title} ({reason})", "copy or export the file again")
-
-
-def _seconds(array: np.ndarray) -> Floats:
-    """Seconds after the first stamp, by integers: doubles cannot hold the nanoseconds of a date."""
-    since = array - array[np.argmin(np.isnat(array))] if array.size else array.astype("timedelta64[ns]")
-    return since.astype("timedelta64[ns]") / np.timedelta64(1, "s")

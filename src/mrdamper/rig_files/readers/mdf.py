@@ -49,12 +49,8 @@ def _channels(file: Any, group: int) -> list[dict[str, Any]]:
     channels, rows = file.groups[group].channels[: MOST_COLUMNS + 1], int(file.groups[group].channel_group.cycles_nr)
     order = sorted(range(len(channels) if rows > 1 else 0), key=lambda i: i != file.masters_db.get(group))
     arrays = {i: Stored((rows,), np.dtype(float), partial(_samples, file, channels[i].name, group, i)) for i in order}
-    return [{"name": channels[i].name, "unit": _unit_in_mdf(channels[i]), "data": arrays[i]} for i in order]
-
-
-def _unit_in_mdf(channel: Any) -> str:
-    conversion = getattr(channel, "conversion", None)
-    return str(getattr(channel, "unit", "") or getattr(conversion, "unit", "") or "")
+    units = [getattr(c, "unit", "") or getattr(getattr(c, "conversion", None), "unit", "") or "" for c in channels]
+    return [{"name": channels[i].name, "unit": str(units[i]), "data": arrays[i]} for i in order]
 
 
 def _samples(file: Any, name: str, group: int, index: int) -> np.ndarray:

@@ -33,11 +33,6 @@ _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
 _SCALES = words("scale") | {"offset"}
 
 
-def kinds_of(columns: Sequence[Sequence[str]], behind: Sequence[str]) -> tuple[Kind, ...]:
-    """Kinds of columns; one whose numbers have units behind them holds numbers."""
-    return tuple("number" if unit else _kind(column) for column, unit in zip(columns, behind, strict=True))
-
-
 def counts(cells: Iterable[str]) -> bool:
     """Tell if cells count the rows, from one or zero on."""
     numbers = [int(bare) if (bare := cell.strip('"')).isascii() and bare.isdigit() else -1 for cell in cells]
@@ -249,7 +244,8 @@ def names_columns(line: str, separator: str) -> bool:
     return len(cells) >= 3 and not any(looks_numeric(cell) or len(cell.split()) > _LONGEST_HEADING for cell in cells)
 
 
-def _kind(cells: Sequence[str]) -> Kind:
+def kind_of(cells: Sequence[str]) -> Kind:
+    """Return the kind of most cells of a column that are not empty."""
     filled = [cell for cell in cells if cell]
     stamps = sum(stamp(cell) is not None for cell in filled)
     if stamps and 2 * stamps >= len(filled):
