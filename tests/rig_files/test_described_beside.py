@@ -992,3 +992,19 @@ def test_a_supplys_current_that_differs_between_tests_is_the_coils_where_no_othe
     assert {refusal.error.code for refusal in found.refusals} == codes
     assert [record.current[0] for record in found.records] == ([] if codes else [0.0, 0.5, 1.5])
     assert all("its current is the" in record.findings[-1].text for record in found.records)
+
+
+def test_a_workspace_whose_names_end_in_those_of_tests_holds_a_test_each(tmp_path):
+    tests = {f"{amperes}A": {"t": T, "x": X, "F": force(amperes)} for amperes in (0, 1)}
+    arrays = {f"{name}_{test}": values for test, channels in tests.items() for name, values in channels.items()}
+    np.savez(tmp_path / "all.npz", **arrays)
+    (tmp_path / "readme.txt").write_text(
+        "workspace of load_all.m\nt_* time (s), x_* stroke (mm), F_* damper force (N)\n0A means current 0 A\n"
+    )
+    assert [(record.id, record.current[0]) for record in import_files([tmp_path]).records] == [
+        ("all_0A", 0),
+        ("all_1A", 1),
+    ]
+    np.savez(tmp_path / "all.npz", **{key.replace("A", ""): values for key, values in arrays.items()})
+    refusals = import_files([tmp_path]).refusals  # that 0A means 0 A is no statement on all tests
+    assert [refusal.error.code for refusal in refusals] == ["E_CURRENT_MISSING"] * 2

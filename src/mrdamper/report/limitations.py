@@ -8,12 +8,13 @@ from collections.abc import Collection, Iterable, Sequence
 import numpy as np
 
 from mrdamper.dampers.base import Damper
+from mrdamper.dampers.coil import Coil
 from mrdamper.dampers.joint import JointFit
 from mrdamper.dampers.modified import ModifiedFit
 from mrdamper.dampers.prediction import NOT_A_SINE
 from mrdamper.dampers.uncertainty import Uncertainty, uncertainty_warnings
 from mrdamper.data import Floats, Run
-from mrdamper.data.wording import counted
+from mrdamper.data.wording import counted, number
 from mrdamper.errors import listed
 from mrdamper.identification import Identification
 from mrdamper.identification.loop_analysis import LoopAnalysis
@@ -57,7 +58,7 @@ def limitations(
             *(_functions(scored.fit, scored.damper) if isinstance(scored.fit, ModifiedFit) else ()),
         ],
         TESTS: [*filter(None, [undescribed]), *_tests(loops)],
-        RANGE: [validity(scored.damper)],
+        RANGE: [_coil(scored.damper.coil), validity(scored.damper)],
     }
     _explain(list(groups.values()), scored.damper)
     return {group: texts for group, texts in groups.items() if texts}
@@ -70,6 +71,14 @@ def validity(damper: Damper) -> str:
         f"Tested range: {', '.join(motion)}, peak velocity {velocity}. "
         "Predictions outside it are marked as extrapolation."
     )
+
+
+def _coil(coil: Coil | None) -> str:
+    """State how the field of the coil follows a changing current."""
+    if coil is None:
+        return "Changing current: no lag of the coil was identified; the force follows the current at once."
+    rise, fall = (f"{number(1e3 * seconds, 3)} ms" for seconds in (coil.rise_s, coil.fall_s))
+    return f"Changing current: its field follows with a time constant of {rise} while it rises, {fall} while it falls."
 
 
 def _explain(groups: Sequence[list[str]], damper: Damper) -> None:

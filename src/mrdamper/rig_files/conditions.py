@@ -80,6 +80,7 @@ _AND = r"(?:,?\s(?:and|und|et|y|e|en|och|og|i|и)\s|[;/、]\s*|,\s+)"
 _SERIES = re.compile(
     rf"(?<![\w.,-])(?![0-9]/[0-9]\s?m?A)({_NUMBER}(?:(?:\s?m?A)?{_AND}{_NUMBER})+)\s?(m?A)(?![A-Za-z0-9/])"
 )  # 0, 0.5 and 1 A
+_EXPLAINED = re.compile("|".join(words("explained")), re.IGNORECASE)
 _LABELLED_RATING = re.compile(
     "|".join([r"fuse|suppl|amplif|rated|range|clamp|(?<![a-z])(?:max|limit)(?![a-z])", *words("probe")]), re.IGNORECASE
 )
@@ -284,10 +285,10 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
 
 
 def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
-    """Return the current in free text of lines that name no limit or range, if all state one: "Test 3: 0.4 A"."""
+    """Return the current in free text of lines that name no limit or meaning, if all state one: "Test 3: 0.4 A"."""
     statements = []
     for line in lines:
-        no_test = RATING.search(line) or _SCALE.search(line)
+        no_test = RATING.search(line) or _SCALE.search(line) or _EXPLAINED.search(line)
         stated = () if no_test else currents_in(_TOLERANCE.sub("", line))
         if len(stated) == 1:
             statements.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))

@@ -246,6 +246,7 @@ def short_lines(path: Path) -> list[str]:
             if suffix in (".json", ".xml"):
                 return []
     text = text.replace("`", "") if suffix in _MARKDOWN else text
+    text = re.sub(r"(?<=\w)_\*", "", text)  # t_* time (s), of t_I0, t_I1
     lines = [line for line in text.splitlines() if "|" not in line or not _RULE.fullmatch(line)]
     return _by_headings(lines) if len(lines) <= _MOST_LISTED else lines
 

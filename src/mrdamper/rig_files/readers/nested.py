@@ -16,11 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from mrdamper.rig_files.column_names import KEYS, RATING, is_unit, parse_unit, split_name, words
+from mrdamper.rig_files.column_names import KEYS, RATING, is_unit, parse_unit, role_of, split_name, words
 from mrdamper.rig_files.conditions import CELL, OTHER_DEVICE, stated_clock
 from mrdamper.rig_files.readers.arrays import Array, array_table, columns_of
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, NoTableError, RawTable, RigFileError, Source
 from mrdamper.rig_files.readers.several_tests import FEWEST_SAMPLES, MOST_ITEMS, with_tests_apart
+from mrdamper.rig_files.record import REQUIRED
 from mrdamper.rig_files.text.tokens import stamp
 
 _VALUE, _NAMES = words("value"), words("channel")
@@ -81,7 +82,7 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
     tree |= {key: own for key, own in lists.items() if all(isinstance(item, str) for item in own)}
     keys = {"name", "unit", "data"}  # of an array with its unit
     channels = {k: of for k, of in tree.items() if isinstance(of, Mapping) and {*of} == keys and of["name"] == k}
-    tree = _with_own_axes(with_tests_apart({**tree, **{key: channel["data"] for key, channel in channels.items()}}))
+    tree = _with_own_axes(_by_test({**tree, **{key: channel["data"] for key, channel in channels.items()}}))
     node.units = {**node.units, **_stated_units(tree), **{key: str(of["unit"]) for key, of in channels.items()}}
     sizes = {value.size for value in tree.values() if isinstance(value, Array) and value.size >= FEWEST_SAMPLES}
     texts = [_LISTING.sub("", value) for value in tree.values() if isinstance(value, str)]
@@ -117,6 +118,20 @@ def _walk(tree: Mapping[str, Any], node: _Node, depth: int = 0) -> Iterator[_Nod
         label = f"{node.label}/{key}" if node.label and key else node.label or key
         beside = list(node.lists), dict(node.constants), list(node.remarks), node.units
         yield from _walk(value, _Node(label, [], *beside), depth + 1)
+
+
+def _by_test(tree: dict[str, Any]) -> Mapping[str, Any]:
+    """Return a node with its tests apart; those of a workspace, t_I0, x_I0, F_I0, t_I1, are nodes: a time each."""
+    tests: dict[str, dict[str, Array]] = {}
+    for key, value in tree.items():
+        channel, _, test = key.partition("_")
+        if isinstance(value, Array) and test and role_of(channel) in REQUIRED:
+            tests.setdefault(test, {})[channel] = value
+    whole = {test: own for test, own in tests.items() if {*REQUIRED} <= {*map(role_of, own)}}
+    if len(whole) < 2:
+        return with_tests_apart(tree)
+    grouped = {f"{channel}_{test}" for test, own in whole.items() for channel in own}
+    return {key: value for key, value in tree.items() if key not in grouped} | whole
 
 
 def stated_beside(stated: Mapping[str, Any]) -> tuple[dict[str, str], dict[str, float], tuple[str, ...]]:
