@@ -72,7 +72,7 @@ def current_of(
         lines = [line for line in table.remarks if line not in table.titles]
         statements = _set_points(table, rows) or stated_in_titles(lines) or _folders(table, path)
     stated = _agreed(statements, channel, where)
-    if stated is not None and channel is None and all(s.of_line for s in statements):
+    if stated is not None and channel is None and all(s.whence.startswith("the line ") for s in statements):
         _refuse_contradicted_line(table, stated, rows, where)
     if stated is None or (channel is not None and not stated_by_profile):
         return None, {}
@@ -90,12 +90,9 @@ def _refuse_contradicted_line(table: RawTable, stated: Statement, rows: slice, w
     first = min(held)
     name, low, high = table.names[first], np.min(values[first]), np.max(values[first])
     line = f"[channels.current] column = {toml(name)}"
-    raise ColumnError(
-        printable(f"{stated.whence} gives {stated.amperes:g} A, the column {name!r} {number(low, 3)} to {high:.3g} A"),
-        where=where,
-        remedy=f"{_DECIDE}: if the line, set {line} in a profile",
-        code="E_CURRENT_CONTRADICTS",
-    )
+    problem = f"{stated.whence} gives {stated.amperes:g} A, the column {name!r} {number(low, 3)} to {high:.3g} A"
+    remedy = f"{_DECIDE}: if the line, set {line} in a profile"
+    raise ColumnError(printable(problem), where=where, remedy=remedy, code="E_CURRENT_CONTRADICTS")
 
 
 def _agreed(statements: list[Statement], channel: Floats | None, where: str) -> Statement | None:

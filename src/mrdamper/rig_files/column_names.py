@@ -132,6 +132,7 @@ def _registry():
 
 WORDS = {role: frozenset(names) for role, names in TABLES["channels"].items()}
 _ROLES, _SYMBOLS, _COMPOUNDS = meanings("channels"), meanings("symbols"), meanings("compounds")
+_LABELS = words("run_number")
 COIL, COMPUTED, WEIGHT = words("coil"), words("computed"), words("weight")
 _SET, _NOT_MEASURED, _ELSEWHERE = words("set"), words("not_measured"), words("elsewhere")
 _MEANINGFUL = frozenset().union(_ROLES, _NOT_MEASURED, COMPUTED, _ELSEWHERE, _SET)
@@ -280,6 +281,12 @@ def _role_of_word(word: str) -> str | None:
 def holds(name: str, words: Collection[str]) -> bool:
     """Tell if a name holds one of some words: of `COIL`, `COMPUTED`, `WEIGHT`, in any case, numbered or not."""
     return any(word.casefold() in words or word.casefold().rstrip("0123456789") in words for word in words_of(name))
+
+
+def is_called(name: str, words: Collection[str]) -> bool:
+    """Tell if a name is one of some words, alone or with a word for a number or a label: Run, Run No., damper ID."""
+    own = {*words_of(split_name(name).name.casefold())}
+    return not own.isdisjoint(words) and own <= {*words, *_LABELS}
 
 
 def names_compression(name: str) -> bool:

@@ -503,8 +503,8 @@ def _second_clock(table: RawTable, time: Assigned) -> list[InputError]:
 def _are_alike(table: RawTable, columns: Sequence[int]) -> bool:
     """Tell if columns hold the same, each in its unit: a load in kgf, and that in N."""
     values = table.try_read(*columns)
-    first, *others = [(values[i], table.headers[i]) for i in columns] if values else [()]
-    return values is not None and all(_agree(*other, *first) for other in others)
+    channels = [(values[i], table.headers[i]) for i in columns] if values else []
+    return bool(channels) and all(_agree(*other, *channels[0]) for other in channels[1:])
 
 
 def _agree(a: Floats, one: Header, b: Floats, other: Header) -> bool:

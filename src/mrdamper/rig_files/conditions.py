@@ -142,11 +142,6 @@ class Statement(NamedTuple):
     amperes: float
     whence: str
 
-    @property
-    def of_line(self) -> bool:
-        """A line of text, which may mean something else than the test."""
-        return self.whence.startswith("the line ")
-
 
 def currents_in(text: str) -> tuple[float, ...]:
     """Coil currents [A] in a title, a sheet's or a file's name: every distinct one.

@@ -75,9 +75,8 @@ def _missing_currents(refusals: Sequence[Refusal], columns: Mapping[int, str]) -
         return ""
     lines = []
     reasons = ["" if r.error.code != "E_CURRENT_MISSING" else r.error.found for r in missing]  # else of units
-    column = next(
-        (name for name in columns.values() if name and any(f"column {name!r}" in why for why in reasons)), None
-    )
+    refused = (name for name in columns.values() if name and any(f"column {name!r}" in why for why in reasons))
+    column = next(refused, None)
     if column is not None:
         shown = toml(column)
         lines = ["# Calibration of the current: A for 1 of the column:", "#[channels.current]", f"#column = {shown}"]

@@ -13,7 +13,7 @@ import numpy as np
 from mrdamper.data import Floats, held_current
 from mrdamper.errors import ColumnError
 from mrdamper.rig_files.coil_current import as_data, constant
-from mrdamper.rig_files.column_names import words, words_of
+from mrdamper.rig_files.column_names import is_called, words
 from mrdamper.rig_files.conditions import currents_in, motions_in
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.quality.view import find_strokes, runs_of
@@ -27,7 +27,7 @@ _BLOCK_NAME = re.compile(  # Data Acquisition: DAQ_02; no date
 _BLOCK_NUMBER = re.compile(  # Test no. 4; run 2 of 3
     r"[\s#%]*([^\W\d_][^\d:=\t;]{1,40}?)[\W_]*([0-9]+)(?: *(?:/|of|von|sur|de|di) *[0-9]+)?\W*"
 )
-_RUN, _RUN_NUMBER = words("run"), words("run_number")
+_RUN = words("run")
 _MOST_STEPS = 3.0  # between the last sample of a file and the first of the next
 MOST_TESTS = 500  # of a record: more is a cut at noise
 _BLOCK_S = 0.1  # [s] in which a motion at rest stays within a share of its range
@@ -70,7 +70,7 @@ def names_of_blocks(tables: Sequence[RawTable]) -> tuple[list[str], list[str]]:
     stated = [dict(filter(None, map(_name_in, table.remarks))) for table in tables]
     counts = {key: len({of.get(key) for of in stated}) for key in stated[0] if all(of.get(key) for of in stated)}
     keys = [key for key, count in counts.items() if count == len(stated) > 1]
-    of_run = next((key for key in (*keys, *counts) if counts[key] > 1 and _means_run(key)), None)
+    of_run = next((key for key in (*keys, *counts) if counts[key] > 1 and is_called(key, _RUN)), None)
     names = [re.sub(r"[^\w.+=-]+", "_", of[of_run])[:60] for of in stated] if of_run else []
     return unique_names(names), ["; ".join(of[key] for key in keys) for of in stated] if keys else []
 
@@ -78,13 +78,8 @@ def names_of_blocks(tables: Sequence[RawTable]) -> tuple[list[str], list[str]]:
 def _name_in(line: str) -> tuple[str, str] | None:
     """Return key and value of a line that may name a block, by a number only behind a word for a test."""
     match, number = _BLOCK_NAME.match(line), _BLOCK_NUMBER.fullmatch(line)
-    match = number if number and _means_run(number[1]) else match
+    match = number if number and is_called(number[1], _RUN) else match
     return (match[1], match[2].strip()) if match else None
-
-
-def _means_run(key: str) -> bool:
-    own = {*words_of(key.casefold())}
-    return bool(own & _RUN) and own <= _RUN | _RUN_NUMBER
 
 
 def goes_on(records: Sequence[Record]) -> bool:

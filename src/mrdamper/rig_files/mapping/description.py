@@ -166,9 +166,8 @@ def _lacks_names_or_units(table: RawTable) -> bool:
     """Tell if a column that may be needed has no unit, or a number for a name."""
     bare = [i for i, header in enumerate(table.headers) if not header.unit]
     roles = {header.channel for header in table.headers}
-    return not {"displacement", "force"} <= roles or any(
-        table.headers[i].role in REQUIRED or NUMBERED.fullmatch(table.names[i].strip()) for i in bare
-    )
+    lacking = (table.headers[i].role in REQUIRED or NUMBERED.fullmatch(table.names[i].strip()) for i in bare)
+    return not {"displacement", "force"} <= roles or any(lacking)
 
 
 def _of_channels(line: str) -> str:

@@ -17,6 +17,7 @@ from mrdamper.rig_files.coil_current import NO_CHANNEL
 from mrdamper.rig_files.column_names import (
     RATING,
     Header,
+    is_called,
     is_unit,
     names_condition,
     role_of,
@@ -60,7 +61,7 @@ _MOTIONS = (  # dimension and name of a column, relative difference of two tests
 )
 _Tests = Sequence[tuple[Path, Record]]
 _REMARKS = frozenset((*words("notes"), *words("remarks")))
-_SPECIMEN, _RUN_NUMBER = words("specimen"), words("run_number")
+_SPECIMEN = words("specimen")
 _STAMP = re.compile(  # 20190603_140512, 2019-06-03T14:05:12
     r"(?<![0-9])20[0-9]{2}-?[01][0-9]-?[0-3][0-9][T_ -](?P<hour>[0-2][0-9])[:-]?(?P<minute>[0-5][0-9])"
     r"[:-]?(?P<second>[0-5][0-9])(?![0-9])"
@@ -212,16 +213,11 @@ def specimens_of(path: Path, results: Results | None, tests: _Tests) -> list[str
     """Return the specimen of each test by the column of a plan, or by a scheme of names; empty unless each has one."""
     rows = rows_beside(path, results, tests)
     heads = enumerate(results.keys if results else ())
-    stated = [[results.cells[row][i] for row in rows] for i, key in heads if results and _names_specimen(key)]
+    stated = [[results.cells[row][i] for row in rows] for i, key in heads if results and is_called(key, _SPECIMEN)]
     lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
-    stated += [texts for header, texts in _fields(lines, tests) if _names_specimen(header.name)]
+    stated += [texts for header, texts in _fields(lines, tests) if is_called(header.name, _SPECIMEN)]
     stated = [texts for texts in stated if texts and all(texts) and (len({*texts}) < len(texts) or len(texts) == 1)]
     return stated[0] if len(stated) == 1 else []
-
-
-def _names_specimen(key: str) -> bool:
-    own = {*words_of(split_name(key).name.casefold())}
-    return bool(own & _SPECIMEN) and own <= _SPECIMEN | _RUN_NUMBER
 
 
 def discarded_tests(path: Path, results: Results | None, tests: _Tests) -> dict[int, InputError]:
@@ -260,7 +256,7 @@ def remarks_of(path: Path) -> Results | None:
         remarks = any(flags) or not _REMARKS.isdisjoint(word for head in heads for word in words_of(head.casefold()))
         cells = tuple((str(n), *row) for n, row in enumerate(rows, 1))
         table = Results((0.0,) * len(cells), cells, "", ("", *heads))
-        if remarks or table.ranges[1] or any(map(_names_specimen, heads)):
+        if remarks or table.ranges[1] or any(is_called(head, _SPECIMEN) for head in heads):
             return table
     return None
 

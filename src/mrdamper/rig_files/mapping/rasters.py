@@ -221,12 +221,9 @@ def _interpolated(table: RawTable, column: int, target: Floats, time: Floats, va
     begin, end = float(np.nanmin(target)), float(np.nanmax(target))
     inside = _covered(target, time)
     if np.mean(inside) < _FEWEST_OVERLAP:
-        raise table.source.refuse(
-            "E_RASTER",
-            f"{name!r} is recorded from {span(time[0], time[-1], 's', 4, ' to ')}, "
-            f"the force from {span(begin, end, 's', 4, ' to ')}",
-            "export the channels with one clock",
-        )
+        own, of_force = (span(first, last, "s", 4, " to ") for first, last in ((time[0], time[-1]), (begin, end)))
+        problem = f"{name!r} is recorded from {own}, the force from {of_force}"
+        raise table.source.refuse("E_RASTER", problem, "export the channels with one clock")
     on_target = np.interp(target, time, values)
     on_target[~inside] = np.nan
     return on_target

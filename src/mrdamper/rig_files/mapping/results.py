@@ -277,18 +277,16 @@ def results_in(lines: Sequence[str]) -> Results | None:
 
 def _matrix_of_tests(lines: Sequence[str]) -> Results | None:
     """Return the tests whose names stand in columns headed by a current each: corner, 0 A, 0.5 A; FL, R41, R42."""
-    for separator in _SEPARATORS[:4]:
-        rows = [cells_of(line[:_LONGEST_LINE], separator) for line in lines]
-        worded = [at for at, line in enumerate(lines) if any(map(str.isalpha, line))]
-        for at, columns in ((at, of) for at in worded if (of := named_after_currents(rows[at]))):
-            whole = takewhile(lambda row, heads=rows[at]: len(row) == len(heads) and any(row), rows[at + 1 :])
-            body = takewhile(lambda row, own=columns: not any(row[i] and looks_numeric(row[i]) for i in own), whole)
+    for at in [at for at, line in enumerate(lines) if len(currents_in(line)) > 1]:
+        for heads, rows in rows_below_heads(lines[at:]):
+            columns = named_after_currents(heads)
+            body = takewhile(lambda row, own=columns: not any(row[i] and looks_numeric(row[i]) for i in own), rows)
             tests = [(row, i) for row in body for i in columns if row[i]]
             if len({row[i] for row, i in tests}) == len(tests) > 1:
-                others = [i for i in range(len(rows[at])) if i not in columns]
+                others = [i for i in range(len(heads)) if i not in columns]
                 cells = tuple((str(n), row[i], *(row[k] for k in others)) for n, (row, i) in enumerate(tests, 1))
-                currents = tuple(currents_in(rows[at][i])[0] for _, i in tests)
-                return Results(currents, cells, "a matrix of tests", ("", "", *(rows[at][k] for k in others)))
+                currents = tuple(currents_in(heads[i])[0] for _, i in tests)
+                return Results(currents, cells, "a matrix of tests", ("", "", *(heads[k] for k in others)))
     return None
 
 

@@ -59,13 +59,9 @@ class MtsText(ColumnList):
     title = "MTS station text"
     mark = r"^(?:MTS793\||Data Acquisition:)"
     columns = (
-        ("time", "Running Time (*)"),
-        ("time", "Time (*)"),
-        ("displacement", "Axial Displacement (*)"),
-        ("displacement", "Axial Stroke (*)"),
-        ("force", "Axial Force (*)"),
-        ("force", "Axial Load (*)"),
-    )
+        ("time", "Running Time (*)"), ("time", "Time (*)"), ("displacement", "Axial Displacement (*)"),
+        ("displacement", "Axial Stroke (*)"), ("force", "Axial Force (*)"), ("force", "Axial Load (*)"),
+    )  # fmt: skip
 
 
 class ShockDyno(ColumnList):
@@ -75,11 +71,9 @@ class ShockDyno(ColumnList):
     title = "shock dynamometer text"
     mark = r"(?i)shock dyno"
     columns = (
-        ("displacement", "Disp (*)"),
-        ("displacement", "Position (*)"),
-        ("force", "Force (*)"),
-        ("velocity", "Velocity (*)"),
-    )
+        ("displacement", "Disp (*)"), ("displacement", "Position (*)"),
+        ("force", "Force (*)"), ("velocity", "Velocity (*)"),
+    )  # fmt: skip
 
 
 class RealTimeRecorder(ColumnList):
@@ -89,11 +83,6 @@ class RealTimeRecorder(ColumnList):
     title = "real-time recorder text"
     mark = r'"xaxis"\s*[;,]\s*"trace_values"'
     columns = (
-        ("displacement", "xPiston (*)"),
-        ("displacement", "Stroke (*)"),
-        ("displacement", "LVDT (*)"),
-        ("force", "FRod (*)"),
-        ("force", "Load cell (*)"),
-        ("current", "iMeas (*)"),
-        ("current", "iCoil (*)"),
-    )
+        ("displacement", "xPiston (*)"), ("displacement", "Stroke (*)"), ("displacement", "LVDT (*)"),
+        ("force", "FRod (*)"), ("force", "Load cell (*)"), ("current", "iMeas (*)"), ("current", "iCoil (*)"),
+    )  # fmt: skip

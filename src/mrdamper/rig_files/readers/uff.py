@@ -53,9 +53,8 @@ class Uff(Reader):
 
 def _function(lines: list[str]) -> tuple[dict[str, object], dict[str, object]]:
     """Return the texts above a function, and the function as a channel."""
-    texts: dict[str, object] = {
-        f"text {i}": line.strip() for i, line in enumerate(lines[:5], 1) if line.strip() not in ("", "NONE")
-    }
+    heads = {f"text {i}": line.strip() for i, line in enumerate(lines[:5], 1)}
+    texts: dict[str, object] = {key: text for key, text in heads.items() if text not in ("", "NONE")}
     kind, count, even = (int(lines[6][at : at + 10]) for at in (0, 10, 20))
     begin, step = float(lines[6][30:43]), float(lines[6][43:56])
     (_, x_unit), (name, unit) = _axis(lines[7]), _axis(lines[8])

@@ -100,9 +100,8 @@ def _sheets(source: Source, form: FileForm) -> list[tuple[str, Source]]:
 
 def _filled_down(rows: Iterable[list], start: tuple[int, int], merged: Iterable[_Range]) -> Iterator[list]:
     """Yield rows in which a cell merged with that above, or with a ditto mark, holds what that above holds."""
-    below = {
-        (row, left) for (top, left), (bottom, right) in merged if left == right for row in range(top + 1, bottom + 1)
-    }
+    spans = [(left, range(top + 1, bottom + 1)) for (top, left), (bottom, right) in merged if left == right]
+    below = {(row, left) for left, inside in spans for row in inside}
     numbers, above = {row for row, _ in below}, list[Any]()
     for number, row in enumerate(rows, start[0]):
         if number in numbers or not _DITTO.isdisjoint(row):

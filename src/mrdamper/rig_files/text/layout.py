@@ -28,9 +28,7 @@ _UNIT_OF_ALL = re.compile(  # ; Unit: V, above the only column
     rf"(?i)[\s#%;\"]*(?:(?:y|vertical|channel|signal|data)[ _-]*)?(?:{'|'.join(UNIT_KEYS)})\"?"
     r"\s*[:=,;\t]\s*\"?([^\s\",;]+)[\s\",;]*$"
 )
-_LISTING = re.compile(
-    r"^\s*(?:columns?|channels?|fields?|spalten|kanäle|colonnes|header|names)\s*[:=]\s*", re.IGNORECASE
-)
+_LISTING = re.compile(r"(?i)^\s*(?:columns?|channels?|fields?|spalten|kanäle|colonnes|header|names)\s*[:=]\s*")
 _NOTES = words("notes")
 _MOST_LEVELS = 4  # lines of headings
 _TYPE = re.compile(r"[a-z]{1,6}[0-9]{1,2}")  # f8, int16
@@ -113,7 +111,8 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     behind = tuple(sampling.unit_behind([row[i] for row in written if len(row) > i]) for i in range(width))
     clocks = ("s" if seconds and name == "time" else "" for name in names)
     units = tuple(own or its or clock for own, its, clock in zip(behind, units, clocks, strict=True))
-    kinds = tuple("number" if unit else sampling.kind_of(c) for c, unit in zip(columns, behind, strict=True))
+    typed = zip(columns, behind, strict=True)
+    kinds = tuple[Kind, ...]("number" if unit else sampling.kind_of(column) for column, unit in typed)
     above = lines[: min(first, len(lines)) if header is None else header]
     row = rows[0] if rows else []
     first -= next((n for n in range(len(below), 0, -1) if _lacks_numbers(lines[first - n], separator, row)), 0)

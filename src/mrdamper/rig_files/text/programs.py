@@ -76,9 +76,8 @@ def _blocks(text: str) -> Iterator[str]:
 
 
 def _sections(text: str) -> Iterator[str]:
-    says = {
-        name: body.strip() for name, body in re.findall(r"(?m)^\[([^\]\n]+)\]\n((?:[^\[\n][^\n]*\n|\n)*)", f"{text}\n")
-    }
+    sections = re.findall(r"(?m)^\[([^\]\n]+)\]\n((?:[^\[\n][^\n]*\n|\n)*)", f"{text}\n")
+    says = {name: body.strip() for name, body in sections}
     names, units = says.get("column names", "").split(), says.get("channel units", "").splitlines()
     rows = [line.split() for line in says.get("data", "").splitlines() if line.strip()]
     at, first = names.index("time") if "time" in names else -1, len(names) - len(units)

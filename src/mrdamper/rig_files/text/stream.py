@@ -23,12 +23,9 @@ LONGEST_LINE = 64 * 1024
 CHUNK = 4 * 2**20
 _HEAD = 2**18
 _BOMS = (
-    (codecs.BOM_UTF32_LE, "utf-32-le"),
-    (codecs.BOM_UTF32_BE, "utf-32-be"),
-    (codecs.BOM_UTF8, "utf-8"),
-    (codecs.BOM_UTF16_LE, "utf-16-le"),
-    (codecs.BOM_UTF16_BE, "utf-16-be"),
-)
+    (codecs.BOM_UTF32_LE, "utf-32-le"), (codecs.BOM_UTF32_BE, "utf-32-be"), (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"),
+)  # fmt: skip
 # A byte a character, as cp1252
 _LOCAL = ("cp1250", "cp1251", "cp1253", "cp1254", "mac_roman", "koi8_r", "cp866", "iso8859_2")
 _MULTIBYTE = ("cp932", "gb18030", "cp949", "big5", "shift_jis", "euc_jp", "gbk", "gb2312", "euc_kr")
