@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mrdamper.rig_files.column_names import role_of
@@ -21,8 +21,8 @@ def files_by_kind(files: Sequence[Path], profile: Profile) -> dict[str, Path]:
 
     Empty unless two tests or more have a file of every kind; kinds of the same columns hold no whole tests.
     """
-    for place in (_in_folder, _in_name):
-        kinds = _kinds(files, place)
+    for in_folders in (True, False):
+        kinds = _kinds(files, in_folders)
         if 1 < len(kinds) <= _MOST_KINDS and len(set.intersection(*map(set, kinds.values()))) > 1:
             first = {pattern: next(iter(of.values())) for pattern, of in kinds.items()}
             alike = len({tuple(headings_of(path, profile).values()) for path in first.values()}) == 1
@@ -30,23 +30,17 @@ def files_by_kind(files: Sequence[Path], profile: Profile) -> dict[str, Path]:
     return {}
 
 
-def _kinds(files: Sequence[Path], place: Callable[[Path], tuple[str, str] | None]) -> dict[str, dict[str, Path]]:
+def _kinds(files: Sequence[Path], in_folders: bool) -> dict[str, dict[str, Path]]:
+    """Return files by what a profile calls their kind, and by their test: its folder, or a number in their names."""
     kinds: dict[str, dict[str, Path]] = {}
-    for path in files:
-        if not re.search(r"[{}*]", path.name) and (called := place(path)) is not None:
-            kinds.setdefault(called[0], {})[called[1]] = path
+    for path in [path for path in files if not re.search(r"[{}*]", path.name)]:
+        number = re.search("[0-9]+", path.stem)
+        if in_folders:
+            kinds.setdefault(f"{{run}}/{path.name}", {})[str(path.parent)] = path
+        elif number is not None:
+            kind = f"{path.name[: number.start()]}{{run}}{path.name[number.end() :]}"
+            kinds.setdefault(kind, {})[f"{path.parent}/{number[0]}"] = path
     return kinds
-
-
-def _in_folder(path: Path) -> tuple[str, str]:
-    return f"{{run}}/{path.name}", str(path.parent)
-
-
-def _in_name(path: Path) -> tuple[str, str] | None:
-    number = re.search("[0-9]+", path.stem)
-    if number is None:
-        return None
-    return f"{path.name[: number.start()]}{{run}}{path.name[number.end() :]}", f"{path.parent}/{number[0]}"
 
 
 def with_files(guess: Profile, columns: Mapping[str, Mapping[int, Heading]]) -> Profile:

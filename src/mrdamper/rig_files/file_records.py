@@ -59,7 +59,9 @@ def records_of_file(path: Path, profile: Profile) -> tuple[list[Record], list[In
     """
     with raw_tables(path, profile.file) as every:
         tables, problems = tables_of_tests(test_tables(described(every, path, profile), profile), profile)
-        tables, computed = _without_computed(tables)
+        measured = [table for table in tables if not holds(table.label, COMPUTED)] or tables
+        computed = [table.label for table in tables if table not in measured]  # beside one that was measured
+        tables = measured
         blocks = [n for n, table in enumerate(tables, 1) if table.label.startswith("block")]
         numbers = [n for n, t in enumerate(tables, 1) if n not in blocks or not profile.leaves_out(t.label)]
         count, tables = len(tables), [tables[n - 1] for n in numbers]
@@ -184,14 +186,6 @@ def _incomplete(table: RawTable, error: InputError) -> InputError:
     where = f"{printable(table.source.name)}, table {printable(table.label)}"
     remedy = f"give it the channels of the other tables, or set [file] leave_out = [{label}] in a profile"
     return ColumnError(error.found, where=where, remedy=remedy, code=error.code)
-
-
-def _without_computed(tables: list[RawTable]) -> tuple[list[RawTable], list[str]]:
-    """Leave out tables whose names say filtered or computed, beside one that was measured; and return their names."""
-    measured = [table for table in tables if not holds(table.label, COMPUTED)]
-    if not measured or len(measured) == len(tables):
-        return tables, []
-    return measured, [table.label for table in tables if holds(table.label, COMPUTED)]
 
 
 @contextlib.contextmanager
