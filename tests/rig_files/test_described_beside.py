@@ -449,6 +449,22 @@ def test_columns_without_names_that_lines_name_each_or_by_lists_of_names_and_of_
     require_the_tests(tmp_path)
 
 
+@pytest.mark.parametrize("column", ["run", "file"])
+def test_a_plan_in_each_folder_is_that_of_the_tests_there(tmp_path, column):
+    days = {"day1": (0.2, 0.9), "day2": (0.0, 1.5)}
+    for day, currents in days.items():
+        (tmp_path / day).mkdir()
+        rows = [f"run{n}{'.csv' * (column == 'file')},{amperes}\n" for n, amperes in enumerate(currents, 1)]
+        (tmp_path / day / "plan.csv").write_text(f"{column},current (A)\n" + "".join(rows))
+        for n, amperes in enumerate(currents, 1):
+            table = "".join(f"{t:.3f},{x:.7f},{f:.6f}\n" for t, x, f in zip(T, X, force(amperes), strict=True))
+            (tmp_path / day / f"run{n}.csv").write_text(UNITS + table)
+    result = import_files([tmp_path])
+    assert [float(record.current[0]) for record in result.records] == [0.2, 0.9, 0.0, 1.5]
+    (tmp_path / "day2" / "plan.csv").unlink()  # that of the other day may be of other tests
+    assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
+
+
 @pytest.mark.parametrize("chosen", [None, "bracket", "rod"])
 def test_a_line_of_a_sheet_of_tests_chooses_one_of_two_displacements(tmp_path, chosen):
     book = openpyxl.Workbook()

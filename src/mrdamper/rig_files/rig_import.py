@@ -196,7 +196,8 @@ class _Intake:
         self._given: set[Path] = set()
         self._shares: dict[Path, tuple[str, Profile]] = {}  # files of some channels each, by the profile
         self._results = cache(plans.results_of)  # the table of results that a file holds
-        self._plan: Path | None = None  # which gave tests their current
+        self._plans: list[Path] = []  # which gave tests their current
+        self._folders: list[Path] = []  # of tests with a plan of their own each, where every test lies in one of them
 
     def read(self, path: Path, *, given: bool) -> None:
         """Read a file, and check the tests in it whose current is known."""
@@ -276,6 +277,7 @@ class _Intake:
         self._take_parts()
         others = [Path(refusal.file) for refusal in self.refusals if refusal.error.code in _MAY_BE_PARTS]
         others = [path for path in dict.fromkeys(others) if path.is_file()]
+        self._folders = self._folders_with_plans((*others, *(Path(note.file) for note in self.notes), *texts))
         used = self._join_channels(others, texts)
         counts = Counter(path for path, _ in self._pending)
         names = {*other_names, *(name for path, run in self.met for name in (*path.parts, run))}
@@ -289,8 +291,8 @@ class _Intake:
         self._refuse_names_without_point()
         whence = {file: record.provenance.get("current_from", "") for file, record in self._found}
         notes = [Path(note.file) for note in self.notes]
-        plan = [self._plan] if self._plan else []
-        unused = [path for path in dict.fromkeys((*others, *notes, *texts, *plan)) if path not in used - {*plan}]
+        every = dict.fromkeys((*others, *notes, *texts, *self._plans))
+        unused = [path for path in every if path not in used - {*self._plans}]
         for path in [path for path in unused if self._found or path.stat().st_size <= _LARGEST_LIST]:
             if self._compare(path, self._results(path)):
                 self._drop_refusals({path})
@@ -333,6 +335,8 @@ class _Intake:
         Tell if it states currents of tests that move as it says.
         """
         tests = [(i, test) for i, test in enumerate(self.tests()) if test[0] == path] or [*enumerate(self.tests())]
+        if path.parent in self._folders:
+            tests = [(i, test) for i, test in tests if path.parent in test[0].parents]
         own, remarks = [test for _, test in tests], results or plans.remarks_of(path)
         if plans.currents_beside(path, remarks, own) is None:  # of some tests, by their names
             tests = [tests[i] for i in plans.named_tests(remarks, own)]
@@ -358,14 +362,14 @@ class _Intake:
                 else:
                     refused[i] = error
                     doubtful = replace(record, doubt=error)
-                    self.unchecked = [(p, doubtful if r.id == record.id else r) for p, r in self.unchecked]
+                    self.unchecked = [(p, doubtful if (p, r.id) == (file, record.id) else r) for p, r in self.unchecked]
         if contradicted := [i for i, error in refused.items() if error.code == "E_CURRENT_CONTRADICTS"]:
             refused = near | refused  # a plan of another version
         for i in {*near} - {*contradicted}:
             text = f"of two statements the first is taken: {near[i].found}"
             self._exchange(own[i][1], own[i][1].noticed(Finding("W_CHOSEN", text)))
         self._refuse({tests[i][0]: error for i, error in refused.items()})
-        if path != self._plan:
+        if path not in self._plans:
             self._cut(path, remarks, [test for i, test in enumerate(own) if i not in refused])
         return bool(stated) and other is None
 
@@ -417,11 +421,25 @@ class _Intake:
         self._pending = [test for test in self._pending if test not in doubtful]
         notes = [Path(note.file) for note in self.notes]
         paths = [path for path in (*others, *notes, *texts) if self._pending and path not in used]
-        used |= self._join_currents(paths)
+        pending, joined = self._pending, list[tuple[Path, Record]]()
+        for folder in self._folders or [None]:
+            own = [path for path in paths if folder in (None, path.parent) or path.parent not in self._folders]
+            self._pending = [test for test in pending if folder is None or folder in test[0].parents]
+            used |= self._join_currents(sorted(own, key=lambda path, folder=folder: path.parent != folder))
+            joined += self._pending
+        self._pending = joined
         open_tests = [test for test in self._pending if test[1].current is None]
         gaps = tuple(filter(None, (plans.misfit_of_plan(path, self._results(path), open_tests) for path in paths)))
         self._pending = [(path, r.noticed(*gaps) if r.current is None else r) for path, r in self._pending] + doubtful
         return used
+
+    def _folders_with_plans(self, paths: Sequence[Path]) -> list[Path]:
+        """Return the folders that hold a plan each, of days or dampers, where every test lies in one of them."""
+        files = {path for path, _ in (*self._pending, *self._found)}
+        folders = dict.fromkeys(path.parent for path in paths if any(path.parent in file.parents for file in files))
+        plans_of = [folder for folder in folders if any(p.parent == folder and self._results(p) for p in paths)]
+        once = all(sum(folder in file.parents for folder in plans_of) == 1 for file in files)
+        return plans_of if len(plans_of) > 1 and once else []
 
     def _join_currents(self, paths: Sequence[Path]) -> set[Path]:
         """Give the tests without a current those that one of some files states; the file that was used.
@@ -467,7 +485,7 @@ class _Intake:
                 note = f"its current is the {current:g} A of {whence}"
                 record = with_stated_current(record, current, whence, file.name, note)
             self._pending.append((file, replace(record, doubt=refused.get(i, record.doubt))))
-        self._plan = path
+        self._plans.append(path)
         self.notes = [note for note in self.notes if Path(note.file) != path]
         self._drop_refusals({path})
         return {path}

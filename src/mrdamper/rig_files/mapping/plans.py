@@ -97,6 +97,9 @@ def currents_beside(path: Path, results: Results | None, tests: _Tests) -> list[
 
     The statements are those of its table of results, of a scheme of names and of a legend. None if there is none.
     """
+    inside = {file.name for file, _ in tests if path.parent in file.parents}
+    if any(file.name in inside and path.parent not in file.parents for file, _ in tests):
+        return None  # those of a folder beside its own, called alike, may be other tests
     records = [record for _, record in tests]
     one_record = len({file for file, _ in tests}) == 1 < len(tests)
     if results and one_record and results.on_clock(records) and not results.rows_in_range(records):
