@@ -14,20 +14,10 @@ from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import chunks
 from mrdamper.data.wording import number
 from mrdamper.errors import ColumnError, InputError, printable
+from mrdamper.rig_files import conditions
 from mrdamper.rig_files.column_names import COIL, RATING, holds, names_condition, split_name
 from mrdamper.rig_files.columns import coil_currents
-from mrdamper.rig_files.conditions import (
-    LARGEST_STATED,
-    Statement,
-    behind_digits,
-    contradicts,
-    current_behind_label,
-    currents_in,
-    named_after_currents,
-    stated_by_lines,
-    stated_in_titles,
-    states_other,
-)
+from mrdamper.rig_files.conditions import LARGEST_STATED, Statement, contradicts, currents_in, stated_by_lines
 from mrdamper.rig_files.profile import Profile, current_in_name, toml
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Finding, Record
@@ -70,7 +60,7 @@ def current_of(
         statements = [] if current is None else [Statement(current, "name by the profile's pattern")]
     elif not statements and channel is None:
         lines = [line for line in table.remarks if line not in table.titles]
-        statements = _set_points(table, rows) or stated_in_titles(lines) or _folders(table, path)
+        statements = _set_points(table, rows) or conditions.stated_in_titles(lines) or _folders(table, path)
     stated = _agreed(statements, channel, where)
     if stated is not None and channel is None and all(s.whence.startswith("the line ") for s in statements):
         _refuse_contradicted_line(table, stated, rows, where)
@@ -153,7 +143,7 @@ def require_current(record: Record, path: Path = Path()) -> Record:
     if record.current is not None:
         return record
     places = _places(record, path)
-    match = next(filter(None, map(behind_digits, places)), None)
+    match = next(filter(None, map(conditions.behind_digits, places)), None)
     reasons = [f.text for f in record.findings if f.text.startswith(NO_CHANNEL)]
     value, first = '"test1*" = 0.5', ""
     if reasons and "may both" not in reasons[0]:
@@ -218,8 +208,8 @@ def with_current_behind_label(record: Record, path: Path, names: Collection[str]
 
     The first of its names that states a current at all counts.
     """
-    place = next(filter(behind_digits, _places(record, path)), "")
-    current = current_behind_label(place, names)
+    place = next(filter(conditions.behind_digits, _places(record, path)), "")
+    current = conditions.current_behind_label(place, names)
     if current is None:
         return record
     note = f"{place!r} is read as {current:g} A: by the other names, the digit before it is part of a label"
@@ -249,7 +239,7 @@ def other_statement(record: Record, current: float, whence: str, where: str) -> 
     """Return the error for a stated current [A] that is another number than the one stated for the record, or None."""
     own = record.provenance.get("current_from", "")
     mean = float(np.mean(record.current)) if own and record.current is not None else current
-    return _two_statements(record, mean, current, whence, where) if states_other(mean, current) else None
+    return _two_statements(record, mean, current, whence, where) if conditions.states_other(mean, current) else None
 
 
 def _two_statements(record: Record, mean: float, current: float, whence: str, where: str) -> ColumnError:
@@ -292,7 +282,7 @@ def _statements(table: RawTable, path: Path, profile: Profile, force: int | None
         stated = currents_in(text)
         if len(stated) == 1:
             statements.append(Statement(stated[0], whence if whence == "file name" else f"{whence} {text!r}"))
-    if force is not None and force in named_after_currents(table.names):  # a name such as U9C 5A is of a load cell
+    if force in conditions.named_after_currents(table.names):  # a name such as U9C 5A is of a load cell
         text = table.names[force]
         statements.append(Statement(currents_in(text)[0], f"the column {text!r}"))
     return statements

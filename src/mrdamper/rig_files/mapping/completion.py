@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mrdamper.rig_files import conditions
 from mrdamper.rig_files.column_names import (
     DIMENSION,
     RATING,
@@ -28,15 +29,7 @@ from mrdamper.rig_files.column_names import (
     words,
     words_of,
 )
-from mrdamper.rig_files.conditions import (
-    LONGEST_LINE,
-    currents_in,
-    damper_in,
-    named_after_currents,
-    numbers_test,
-    states_motion,
-    without_currents,
-)
+from mrdamper.rig_files.conditions import LONGEST_LINE, currents_in, damper_in, without_currents
 from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
 from mrdamper.rig_files.readers.base import RawTable
@@ -202,7 +195,7 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
             roles = {split_name(cell).role for cell in cells} - {None}
             forces = [cells[i - 1] for i in table.columns("force") if i]  # beside a comment on the motion
             forces = forces if len(forces) > 1 else stated
-            tests = all(damper_in(title) or states_motion(title) or numbers_test(title) for title in forces)
+            tests = all(damper_in(of) or conditions.states_motion(of) or conditions.numbers_test(of) for of in forces)
             tests |= all(map(currents_in, forces))
             if (key and len(roles) > 1) or (forces and tests):
                 names = [*table.names]
@@ -347,7 +340,7 @@ def _with_heading_of_currents(table: RawTable) -> RawTable:
 
     Of a line with a number or another channel the force may be that of something else, as preload (N): 200 is.
     """
-    columns = named_after_currents(table.names)
+    columns = conditions.named_after_currents(table.names)
     if not columns or table.over or table.columns("force"):
         return table
     own = [line for line in table.lines if not (RATING.search(line) or _OTHER_FORCE.search(line))]

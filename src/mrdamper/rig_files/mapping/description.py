@@ -19,16 +19,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.column_names import (
-    DIMENSION,
-    UNIT_KEYS,
-    is_unit,
-    names_condition,
-    parse_unit,
-    split_name,
-    words,
-    words_of,
-)
+from mrdamper.rig_files.column_names import DIMENSION, UNIT_KEYS, is_unit, names_condition, split_name, words, words_of
 from mrdamper.rig_files.columns import units_in
 from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines
 from mrdamper.rig_files.mapping import scales
@@ -174,7 +165,7 @@ def _of_channels(line: str) -> str:
     """Return what a line states of channels: a scale, a unit, or as "channel 2: load N" what a number stands for."""
     cells = [cell.strip().strip('"') for cell in re.split(r"[,;\t|]", line.strip(" |"))]
     numbered = len(cells) > 2 and cells[0].isascii() and cells[0].isdigit()
-    if numbered and (parse_unit(cells[-1]) or scales.scales_in(cells[-1])):
+    if numbered and (split_name("", cells[-1]).known or scales.scales_in(cells[-1])):
         return f"channel {cells[0]}: {' '.join(cells[1:])}"
     if len(cells) > 1 and split_name(cells[0]).role and all(c.isascii() and c.isdigit() for c in cells[1:]):
         return f"channel {cells[1]}: {cells[0]}"  # a tag with its index, and its type

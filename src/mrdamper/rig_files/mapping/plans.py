@@ -20,7 +20,6 @@ from mrdamper.rig_files.column_names import (
     is_called,
     is_unit,
     names_condition,
-    role_of,
     split_name,
     words,
     words_of,
@@ -149,7 +148,7 @@ def _by_legend(lines: Sequence[str], tests: _Tests) -> list[tuple[float, str]]:
     stated, ratings = set(), False
     for line in lines:
         parts = re.split(r"\s*[;|]\s*|,\s+(?![^()]*\))|[.:]\s+(?=\w+ ?=)", line)
-        matches = [m for m in map(_LEGEND.match, parts) if m and (not m[2] or role_of(m[2]) == "current")]
+        matches = [m for m in map(_LEGEND.match, parts) if m and (not m[2] or split_name(m[2]).role == "current")]
         legends = [(name, amperes(m[3], m[4])) for m in matches for name in _meant(m[1], called)]
         rating = not _NUMBERS.fullmatch(line) and RATING.search(line) is not None  # a record has many rows of numbers
         stated |= {*legends} if not (rating or ratings) else set()

@@ -12,16 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from mrdamper.errors import listed
+from mrdamper.rig_files import conditions
 from mrdamper.rig_files.column_names import COIL, headers_of, holds, names_condition, split_name, words, words_of
-from mrdamper.rig_files.conditions import (
-    contradicts,
-    currents_in,
-    currents_in_order,
-    day_in,
-    named_after_currents,
-    names_only_currents,
-    quantity_in_cell,
-)
+from mrdamper.rig_files.conditions import currents_in, currents_in_order, quantity_in_cell
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import Record
@@ -279,7 +272,7 @@ def _matrix_of_tests(lines: Sequence[str]) -> Results | None:
     """Return the tests whose names stand in columns headed by a current each: corner, 0 A, 0.5 A; FL, R41, R42."""
     for at in [at for at, line in enumerate(lines) if len(currents_in(line)) > 1]:
         for heads, rows in rows_below_heads(lines[at:]):
-            columns = named_after_currents(heads)
+            columns = conditions.named_after_currents(heads)
             body = takewhile(lambda row, own=columns: not any(row[i] and looks_numeric(row[i]) for i in own), rows)
             tests = [(row, i) for row in body for i in columns if row[i]]
             if len({row[i] for row, i in tests}) == len(tests) > 1:
@@ -421,7 +414,7 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
         if supply and len({*currents}) == 1:  # of tests at different currents the coil's, else the supply's rating
             continue
         pairs = [pair for other in every[1:] for pair in zip(currents, other, strict=True)]
-        if any(a is not None and b is not None and contradicts(a, b) for a, b in pairs):
+        if any(a is not None and b is not None and conditions.contradicts(a, b) for a, b in pairs):
             continue  # of two coils
         others = [i for i in range(len(row)) if i not in columns]
         yield Results(
@@ -455,7 +448,7 @@ def _is_of_supply(cell: str, below: str = "") -> bool:
     bare = _SUPPLY.sub("", cell)
     if bare != cell and _QUANTITY.fullmatch(below):
         return True
-    return bare != cell and _is_current(bare) and names_only_currents(split_name(bare).name)
+    return bare != cell and _is_current(bare) and conditions.names_only_currents(split_name(bare).name)
 
 
 def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:
@@ -487,7 +480,7 @@ def _key(text: str) -> str:
 
 def _group_names(text: str) -> set[str]:
     """Return names of a file or folder as they are compared: without marks and leading zeros, or as a date if it is."""
-    iso, written = day_in(text) or ("", "")
+    iso, written = conditions.day_in(text) or ("", "")
     plain = re.sub(r"(?<![0-9.])0+(?=[0-9])", "", re.sub(r"[^\w.]|_", "", text.casefold()))
     day = iso.replace("-", "") if written == text.strip() else ""
     return {_key(text), _key(_SPECIMEN.sub("", text)), plain, day} - {""}

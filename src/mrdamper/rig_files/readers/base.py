@@ -29,8 +29,6 @@ MOST_COLUMNS = 1000
 MOST_UNPACKED = 10**9  # bytes
 MOST_RATIO = 100  # unpacked over packed
 RATIO_MATTERS_FROM = 24 * 2**20  # bytes a column of numbers may always unpack to: three copies fit a small file's share
-
-
 _IN_MEMORY = 32 * 2**20  # bytes
 _LARGEST_LOOKED_AT = 64 * 2**20  # bytes of a file whose samples are tried
 

@@ -17,8 +17,6 @@ from mrdamper.rig_files.readers.base import RigFileError
 MOST_ITEMS = 2000  # of a list
 FEWEST_SAMPLES = 50  # of a test
 _OF_TESTS = re.compile(r"(?i)(?:s|_?(?:vec(?:tor)?|list|values|levels|array|grid|axis))(?=$|_m?a$|\s*[\[(])")
-
-
 # Samples of each test by channel, the numbers of values of the conditions they stand over, and what all tests have.
 _Tests = tuple[Mapping[str, Sequence[Array]], tuple[int, ...], Mapping[str, Any]]
 
