@@ -465,11 +465,21 @@ def test_a_plan_in_each_folder_is_that_of_the_tests_there(tmp_path, column):
     assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
 
 
-@pytest.mark.parametrize("chosen", [None, "bracket", "rod"])
-def test_a_line_of_a_sheet_of_tests_chooses_one_of_two_displacements(tmp_path, chosen):
+@pytest.mark.parametrize(
+    ("line", "chosen"),
+    [
+        ("two LVDTs", None),
+        ("use bracket LVDT for damper stroke.", "bracket"),
+        ("Bracket bends: use rod LVDT for the damper stroke", "rod"),
+        ("do not use bracket LVDT for damper stroke", None),
+        ("use rod LVDT for strokes below 5 mm", None),
+        ("use rod LVDT for stroke; use bracket LVDT for stroke", None),
+    ],
+)
+def test_a_line_of_a_sheet_of_tests_chooses_one_of_two_displacements(tmp_path, line, chosen):
     book = openpyxl.Workbook()
     sheet = book.active
-    sheet.append([f"use {chosen} LVDT for damper stroke." if chosen else "two LVDTs"])
+    sheet.append([line])
     for row in ([], ["Test", "I [A]"], *([name.upper(), of] for name, of in CURRENTS.items())):
         sheet.append(row)
     for name, amperes in CURRENTS.items():

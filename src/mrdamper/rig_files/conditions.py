@@ -93,9 +93,9 @@ _AMPERES = {  # in other scripts; a small letter counts tests: тест 5 а
     for unit, names in TABLES["unit_names"].items() if unit in ("A", "mA")
 }  # fmt: skip
 _OTHER_SCRIPT = re.compile(rf"(?<=[0-9])\s?(?:(?P<mA>{_AMPERES['mA']})|(?P<A>{_AMPERES['A']}))(?!\w)")
-CHOICE = re.compile(  # use LVDT 2 for damper stroke
-    r"(?i)\b(?:use|verwende|usar|utiliser|kullan) (?:the )?(?P<name>\S.{0,30}?) (?:for|as|für|als|para|pour)(?: the)? "
-    r"(?P<channel>[^.,;|\t]{2,40})"
+CHOICE = re.compile(  # use LVDT 2 for damper stroke; not: do not use, for strokes below 5 mm
+    r"(?i)(?<!not )(?<!never )(?<!n.t )\b(?:use|verwende|usar|utiliser|kullan) (?:the )?(?P<name>\S.{0,30}?) "
+    r"(?:for|as|für|als|para|pour)(?: the)? (?P<channel>[^.,;:|\t0-9]{2,40})(?=[.,;|\t]|$)"
 )
 _SAMPLING = "|".join(words("sampling"))
 _RATE = re.compile(rf"{_SAMPLING}|messrate|^(?:data )?rate$|scan|acquisition|^fs$|^f_s$", re.IGNORECASE)
