@@ -24,7 +24,7 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
     source = Path(source)
     if not source.exists():
         raise FleetError("no such folder", where=str(source), remedy="give a folder of datasets", code="E_FLEET_EMPTY")
-    lake = sorted(source.rglob("*.parquet")) if source.is_dir() else [source]
+    lake, problem = sorted(source.rglob("*.parquet")) if source.is_dir() else [source], "no damper in this folder"
     results = [p for p in lake if p.name == "dampers.parquet" and _holds_results(p.parent)]
     lake = [p for p in lake if p.name not in SAMPLE_FILES and p.is_file() and p not in results]
     if lake and is_parquet_folder(lake, profile):
@@ -32,13 +32,10 @@ def find_items(source: str | Path, profile: FleetProfile) -> list[Item]:
     elif source.is_dir():
         items = list(_in_folder(source, profile))
     else:
-        raise FleetError(
-            "neither a folder nor a Parquet file with a serial number", where=str(source), remedy="give a folder",
-            code="E_FLEET_EMPTY",
-        )  # fmt: skip
+        items, problem = [], "neither a folder nor a Parquet file with a serial number"
     if not items:
         raise FleetError(
-            "no damper in this folder", where=str(source), code="E_FLEET_EMPTY",
+            problem, where=str(source), code="E_FLEET_EMPTY",
             remedy="give a folder of dataset folders, of rig files, or of Parquet files",
         )  # fmt: skip
     return _without_twins(sorted(items, key=lambda item: (item.serial, item.session, item.paths)))

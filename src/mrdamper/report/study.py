@@ -270,9 +270,9 @@ def _parameter_rows(study: Study) -> list[dict[str, Any]]:
 
 def _scatter(rig: RigStudy) -> str:
     gain, offset = (float(np.std([getattr(one, name) for one in rig.readings])) for name in ("gain", "offset"))
-    known = rig.session_known
-    unknown = isinstance(known, str)
-    sessions = f", which are not known ({known})." if unknown else f"; without them the median is {100 * known:.2f} %."
+    error = rig.session_known
+    unknown = isinstance(error, str)
+    sessions = f", which are not known ({error})." if unknown else f"; without them the median is {100 * error:.2f} %."
     omitted = "".join(
         f"Mean error with a {name.removeprefix('cross-validation, ')} omitted in cross-validation: {value}. "
         for name, value in rig.damper.provenance.items()

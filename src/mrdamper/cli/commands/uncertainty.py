@@ -93,10 +93,7 @@ def _used(data: Path | None, rig: str) -> list[Run]:
     from mrdamper.rig_files.dataset_folder import load_dataset
     from mrdamper.study.usable_runs import usable_sines
 
-    dataset = load_dataset(data)
-    if rig not in dataset.rigs:
-        raise InputError(f"the dataset has no rig {rig!r}", remedy=f"rigs: {', '.join(dataset.rigs)}")
-    runs = [run for run in usable_sines(dataset.rig(rig))[0] if run.split == "train"]
+    runs = [run for run in usable_sines(load_dataset(data).rig(rig))[0] if run.split == "train"]
     if not runs:
         raise InputError("no identification run with a steady sine", remedy="check the split column of runs.csv")
     return runs
