@@ -11,6 +11,8 @@ sys.path.insert(0, str(Folder(__file__).parents[2]))
 
 from benchmarks.virtual_dampers import DAMPERS, identified
 from mrdamper.dampers.run_residuals import RunResiduals
+from mrdamper.dampers.run_rows import RunRows, envelope_of
+from mrdamper.data import Run
 from mrdamper.physics.motion import Path
 from mrdamper.physics.motion.lag import leaking_load
 from mrdamper.physics.motion.measured import smooth, whole_clock
@@ -101,3 +103,14 @@ def test_a_long_record_comes_in_stretches_and_a_sine_whole():
     assert len(parts) > 1
     assert sum(int(part.in_window.sum()) for part in parts) == pytest.approx(run.time.size, abs=2 * len(parts))
     assert {part.notes["stretch of"] for part in parts} == {run.id}
+
+
+@pytest.mark.parametrize("motion", ["sine", "chirp"])
+def test_a_switched_current_makes_no_sine_another_motion(motion):
+    time = np.arange(4000) / 500
+    x = 0.01 * np.sin(2 * np.pi * time * (1 if motion == "sine" else 1 + time / 8))
+    current = np.where(time % 1.0 < 0.5, 0.2, 1.0)
+    run = Run("r", time, x, (100 + 400 * current) * np.tanh(np.gradient(x, time) / 0.01), current)
+    envelope = envelope_of([RunRows.of(run)])
+    assert (envelope.any_motion, envelope.any_record) == (motion == "chirp", True)
+    assert envelope.current_A == pytest.approx((0.2, 1.0))

@@ -263,7 +263,7 @@ def test_scales_and_ranges_are_those_of_the_runs(runs, problem):
     sine_, other = problem.parts[0], RunRows.of(changing)
     plain = Envelope.of([sine_.condition, other.condition])
     extent = np.array([[other.lowest, other.highest]])
-    wider = plain.with_motion(other.motion.current, extent, other.motion.velocity)
+    wider = plain.with_motion(other.motion.current, extent, other.motion.velocity, sine=True)
     assert envelope_of([sine_, other]) == wider != plain
     assert envelope_of([sine_]) == Envelope.of([sine_.condition])
     extent = np.array([[sine_.lowest, sine_.highest]])

@@ -253,14 +253,12 @@ class Damper(Displayable):
             run, motion = Run("excitation", at.time, at.displacement, np.zeros(len(at)), at.current), at
         else:
             run, motion = at, centred_motion(at)
-        condition = equivalent_sine(run).condition
+        sine = equivalent_sine(run)
+        condition, tested = sine.condition, self.envelope.any_record if sine.is_sine else self.envelope.any_motion
         if is_sine := sine_condition(run) is not None:
             flags = self.envelope.flags(condition)
         else:
-            flags = (
-                *(beyond.quantity for beyond in self.envelope.outside(motion)),
-                *(() if self.envelope.any_motion else (NOT_A_SINE,)),
-            )
+            flags = (*(beyond.quantity for beyond in self.envelope.outside(motion)), *(() if tested else (NOT_A_SINE,)))
         if (
             self.yield_length is not None
             and samples_in_yield_displacement(motion, self.yield_length) < _MIN_YIELD_SAMPLES

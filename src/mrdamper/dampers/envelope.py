@@ -67,7 +67,8 @@ class Envelope:
     frequency_Hz: tuple[float, float]
     amplitude_m: tuple[float, float]
     peak_velocity_m_s: tuple[float, float]
-    any_motion: bool = False  # motions that are no sine, or currents that change, were among the tests
+    any_motion: bool = False  # motions that are no sine were among the tests
+    any_record: bool = False  # records that are no sine at one current were among the tests
     # tested currents [A] with their frequencies [Hz] and amplitudes [m]; empty where only the ranges are known
     conditions: tuple[tuple[float, float, float], ...] = ()
 
@@ -79,7 +80,7 @@ class Envelope:
         current, frequency, amplitude, velocity = ((min(values), max(values)) for values in zip(*rows, strict=True))
         return cls(current, frequency, amplitude, velocity, conditions=tested)
 
-    def with_motion(self, current: Floats, displacement: Floats, velocity: Floats) -> Envelope:
+    def with_motion(self, current: Floats, displacement: Floats, velocity: Floats, *, sine: bool = False) -> Envelope:
         """Return the envelope widened by the samples of a record that is no sine at one current."""
 
         def wider(span: tuple[float, float], values: Floats) -> tuple[float, float]:
@@ -88,7 +89,8 @@ class Envelope:
         moved = np.array([np.ptp(displacement) / 2])
         return replace(
             self,
-            any_motion=True,
+            any_motion=self.any_motion or not sine,
+            any_record=True,
             current_A=wider(self.current_A, np.abs(current)),
             amplitude_m=wider(self.amplitude_m, moved),
             peak_velocity_m_s=wider(self.peak_velocity_m_s, np.array([np.max(np.abs(velocity))])),
@@ -161,7 +163,7 @@ class Envelope:
         """Distance of a condition and the currents (N,) [A] along its motion; zero where only ranges are known."""
         if not self.conditions or condition.frequency_Hz <= 0 or condition.amplitude_m <= 0:
             return Distance()
-        nearest = distance_from(self._tested, condition, current, swept_A=self.current_A if self.any_motion else None)
+        nearest = distance_from(self._tested, condition, current, swept_A=self.current_A if self.any_record else None)
         if not self.any_motion:
             return nearest
         larger = max(0.0, np.log(condition.amplitude_m / self.amplitude_m[1]))

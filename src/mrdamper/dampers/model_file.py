@@ -71,6 +71,7 @@ class _Envelope(_SavedPart):
     amplitude_m: Range
     peak_velocity_m_s: Range
     any_motion: bool | None = None  # since 1.2; written where it applies
+    any_record: bool | None = None
     conditions: tuple[tuple[float, float, float], ...] | None = None  # tested: [A], [Hz], [m]
 
 

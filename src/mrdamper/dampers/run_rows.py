@@ -123,7 +123,7 @@ def envelope_of(parts: Sequence[RunRows]) -> Envelope:
     envelope = Envelope.of([*(part.condition for part in parts), *strokes])
     extent = np.array([[part.lowest, part.highest] for part in others])
     for part in others:
-        envelope = envelope.with_motion(part.motion.current, extent, part.motion.velocity)
+        envelope = envelope.with_motion(part.motion.current, extent, part.motion.velocity, sine=part.is_sine)
     return envelope
 
 
