@@ -111,8 +111,7 @@ def find_layout(lines: Sequence[str], source: Source, form: FileForm) -> Layout:
     behind = tuple(sampling.unit_behind([row[i] for row in written if len(row) > i]) for i in range(width))
     clocks = ("s" if seconds and name == "time" else "" for name in names)
     units = tuple(own or its or clock for own, its, clock in zip(behind, units, clocks, strict=True))
-    typed = zip(columns, behind, strict=True)
-    kinds = tuple[Kind, ...]("number" if unit else sampling.kind_of(column) for column, unit in typed)
+    kinds = tuple[Kind, ...]("number" if u else sampling.kind_of(c) for c, u in zip(columns, behind, strict=True))
     above = lines[: min(first, len(lines)) if header is None else header]
     row = rows[0] if rows else []
     first -= next((n for n in range(len(below), 0, -1) if _lacks_numbers(lines[first - n], separator, row)), 0)
