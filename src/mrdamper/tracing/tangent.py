@@ -158,7 +158,9 @@ def _moving(
     before = -1
     while len(moving) > before:
         before = len(moving)
-        moving |= {id(node) for node in nodes if isinstance(node, Expression) and depends(node)}
+        for node in nodes:
+            if id(node) not in moving and isinstance(node, Expression) and depends(node):
+                moving.add(id(node))
     return moving
 
 
