@@ -222,8 +222,8 @@ def series(**given: Any) -> tuple[NDArray[np.float64], ...]:
 def require_positive(kind: type[InputError], where: str = "", **values: object) -> None:
     """Refuse values that are no positive, finite numbers, by an error of a kind; a traced number has its value."""
     for name, value in values.items():
-        number = (isinstance(value, Real) and not isinstance(value, bool)) or hasattr(value, "tape")
-        if not number or not 0 < cast(Any, value) < math.inf:
+        number = isinstance(value, Real) or hasattr(value, "tape")
+        if isinstance(value, bool) or not number or not 0 < cast(Any, value) < math.inf:
             raise kind(f"{name} is {shown(value)}", where=where, remedy="give a positive, finite value in SI units")
 
 
