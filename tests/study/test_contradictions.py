@@ -120,6 +120,17 @@ def test_a_stated_current_is_corrected_in_the_dataset(cases, tmp_path):
     assert not find_contradictions(load_dataset(tmp_path / "rig").runs)
 
 
+def test_a_run_of_another_unit_does_not_hide_another_with_a_wrong_current(sound):
+    runs = changed(sound, 4, force=sound[4].force / 4.448)
+    runs = changed(runs, 9, current=runs[9].current / 10)
+    limit = 0.8 * np.max(np.abs(runs[8].force))
+    runs = changed(runs, 8, force=np.clip(runs[8].force, -limit, limit))  # makes the currents less certain
+    assert {one.run_id: one.cause for one in find_contradictions(runs)} == {
+        sound[4].id: "force",
+        sound[9].id: "current",
+    }
+
+
 @pytest.mark.parametrize(
     ("channel", "factor", "remedy"),
     [
@@ -128,6 +139,7 @@ def test_a_stated_current_is_corrected_in_the_dataset(cases, tmp_path):
         pytest.param("time", 5.0, 'unit = "s" and scale = 0.2', marks=pytest.mark.slow),
         pytest.param("rate", 0.2, "[file] sample_rate_Hz = ", marks=pytest.mark.slow),
         ("current", 0.5, 'unit = "mA" and scale = 1 and offset = 500'),
+        ("current", 0.1, 'unit = "mA" and scale = 10'),
     ],
 )
 def test_the_remedy_of_a_wrong_scale_obeyed_literally_corrects_the_test(sound, tmp_path, channel, factor, remedy):

@@ -25,6 +25,7 @@ CODES = {
     "shifted": "E_SHIFTED_ROWS",
     "copy": "E_TWICE",
 }
+_DECADE = 0.02  # decimal logarithm within which a ratio is a power of ten
 _MAX_POWER = 20  # of ten, up to which odds are told
 
 
@@ -183,12 +184,14 @@ def corrected_unit(run: Run, current: float) -> str:
 
 
 def _repeated(run: Run, current: float) -> str:
-    """State how another current is corrected, the measured one by an offset, or that the test is wrong."""
-    remedy = _stated_current(run, current)
-    if not _is_stated(run):
-        offset = np.copysign(current, run.mean_current) - run.mean_current
-        remedy = f"correct a current that the file name states, and {_shifted_by(run, 'current', offset)}"
-    return f"{remedy}, or repeat the test"
+    """State how another current is corrected, the measured one by a decade or an offset, or that the test is wrong."""
+    if _is_stated(run):
+        return f"{_stated_current(run, current)}, or repeat the test"
+    decades = np.log10(max(current, 1e-9) / max(abs(run.mean_current), 1e-9))
+    remedy = _shifted_by(run, "current", np.copysign(current, run.mean_current) - run.mean_current)
+    if round(decades) != 0 and abs(decades - round(decades)) < _DECADE:
+        remedy = _corrected(run, "current", 10.0 ** round(decades))
+    return f"correct a current that the file name states, and {remedy}, or repeat the test"
 
 
 def _is_stated(run: Run) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import NoReturn
 
 import numpy as np
 
@@ -85,7 +86,7 @@ def _among(train: Sequence[Track], keep: Collection[str]) -> tuple[dict[str, Con
     contradictions = {name: one for name, one in contradictions.items() if name not in keep}
     groups = _parted(train, search.differing)
     if groups and not any(set(keep) >= set(group) for group in groups):
-        raise _differing(train, groups)
+        return _without_few(train, min(groups, key=len), keep) or _refuse_differing(train, groups)
     causes = {one.cause for one in contradictions.values()}
     incoherent = len(contradictions) > _REFUSED_SHARE * len(train) and (
         search.evidence.spread.misfit >= _MAX_MISFIT_FACTOR or ("damper" in causes and len(causes) > 1)
@@ -142,12 +143,32 @@ def _parted(train: Sequence[Track], gains: Mapping[int, float]) -> list[dict[str
     return [{train[k].run.id: gains[k] for k in part} for part in (ranked[:cut], ranked[cut:])]
 
 
-def _differing(train: Sequence[Track], groups: Sequence[Mapping[str, float]]) -> ContradictionError:
+def _without_few(
+    train: Sequence[Track], few: Collection[str], keep: Collection[str]
+) -> tuple[dict[str, Contradiction], str] | None:
+    """Compare the other runs without a few; None unless they agree, and each of the few has a factor of the force.
+
+    Beside such a run, another with a wrong current may look like a factor of its own.
+    """
+    others = [track for track in train if track.run.id not in few]
+    if len(few) > _REFUSED_SHARE * len(train) or len(others) < MIN_RUNS:
+        return None
+    try:
+        among, undescribed = _among(others, keep)
+    except ContradictionError:
+        return None
+    apart = _beside([t for t in train if t.run.id in few], [t for t in others if t.run.id not in among])
+    scaled = {name for name, one in apart.items() if one.cause == "force"}
+    whole = scaled == {*few} and len(among) + len(apart) <= _MAX_SHARE * len(train)
+    return ({**among, **apart}, undescribed) if whole else None
+
+
+def _refuse_differing(train: Sequence[Track], groups: Sequence[Mapping[str, float]]) -> NoReturn:
     low, high = (
         f"{', '.join(sorted(group))} ({span(min(group.values()), max(group.values()), 'times', 2, ' to ')}"
         for group in groups
     )
-    return ContradictionError(
+    raise ContradictionError(
         f"the forces of {sum(map(len, groups))} of {len(train)} runs differ by factors that neither currents, motions "
         f"nor sessions explain: {low} what the others show) against {high})",
         where=_rig(train),
