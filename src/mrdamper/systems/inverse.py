@@ -35,7 +35,11 @@ _MAX_FORCE_N = 1e150  # largest force whose square is finite [N]
 
 @dataclass(frozen=True)
 class Demand:
-    """Current, force and reachable interval of an inverse; expressions on a tape, or numbers."""
+    """Current, force and reachable interval of an inverse; expressions on a tape, or numbers.
+
+    The interval holds the forces that currents give at this motion once the coil has followed; a wanted force outside
+    it is answered by its nearer end, and `force` is what the present field gives.
+    """
 
     current: Any  # to command [A]
     force: Any  # at the present field [N]
