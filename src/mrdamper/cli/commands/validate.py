@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -100,6 +101,11 @@ def _note_identification_runs(damper: Damper, runs: Sequence[RunScore]) -> None:
         )
 
 
+def _chance(inside: int, runs: int, level: float) -> float:
+    """Probability that no more than some of a number of independent runs lie inside a band of a level."""
+    return sum(math.comb(runs, k) * level**k * (1 - level) ** (runs - k) for k in range(inside + 1))
+
+
 def _print_summary(
     damper: Damper, validation: Validation, rig: str, peaks: Iterable[dict[str, float]], level: float
 ) -> None:
@@ -112,9 +118,11 @@ def _print_summary(
         if "peak_force_low_N" in p
     ]
     if inside:
-        few = " (too few runs to tell a share)" if len(inside) < 20 else ""
+        note = " (too few runs to tell a share)" if len(inside) < 20 else ""
+        if _chance(sum(inside), len(inside), level) < 0.01:
+            note = ": the band does not hold for these runs, of another state or session of the damper, or another rig"
         typer.echo(
-            f"peak force inside its {100 * level:g} % band in {sum(inside)} of {len(inside)} runs{few}", err=True
+            f"peak force inside its {100 * level:g} % band in {sum(inside)} of {len(inside)} runs{note}", err=True
         )
     floors = [run.floor for run in validation.runs if run.floor is not None]
     outside = sum(bool(run.extrapolation) for run in validation.runs)
