@@ -1574,7 +1574,7 @@ def test_groups_of_columns_named_after_motions_are_tests_though_they_share_the_t
 
 @pytest.mark.parametrize(("older", "refused"), [((0.25, 0.45), []), ((0.35, 0.45, 0.6), ["run_1", "run_2", "run_3"])])
 def test_two_versions_of_a_plan_are_not_taken_for_one(tmp_path, older, refused):
-    """What differs a little is told; where one test differs by more, the others are of another version, too."""
+    """A small difference is stated; where one test differs by more, the others are of another version, too."""
     newer = (0.25, 0.5, 1.0)[: len(older)]
     write_tests(tmp_path, newer)
     for name, currents_of in (("plan_v1.csv", older), ("plan_v2.csv", newer)):

@@ -24,7 +24,7 @@ from mrdamper.rig_files.columns import units_in
 from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines
 from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.completion import NUMBERED, item_of, said_of_file, states_si, states_volts
-from mrdamper.rig_files.mapping.results import headings_of, numbered_tests
+from mrdamper.rig_files.mapping.results import numbered_tests, with_small_units
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import REQUIRED, Finding
@@ -356,7 +356,7 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
         for names in [other for other in lists if other is not its and len(other) == len(its)]:
             yield from (f"{i}={name};{own}" for i, (name, own) in enumerate(zip(names, its, strict=True), 1))
     own = next((lower[name] for name in ("units", "unit") if isinstance(lower.get(name), dict)), units)
-    for (name, value), heading in zip(node.items(), headings_of([*map(str, node)]), strict=True):
+    for (name, value), heading in zip(node.items(), with_small_units([*map(str, node)]), strict=True):
         whole = f"{key} {name}" if OTHER_DEVICE.search(key) else heading  # camera: {sample rate: 300 Hz}
         if isinstance(value, (dict, list)):
             yield from _stated(value, whole, own, depth + 1)

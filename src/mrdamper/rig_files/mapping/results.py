@@ -377,9 +377,8 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
     wide = separator == "  "
     cut = [line[:_LONGEST_LINE] for line in lines]
     split = [re.split(r" {2,}", line.strip()) if wide else cells_of(line, separator) for line in cut]
-    rows = [
-        headings_of([c.strip('"').strip() for c in cells]) for cells in split if not _RULE.fullmatch("".join(cells))
-    ]
+    bare = [[c.strip('"').strip() for c in cells] for cells in split if not _RULE.fullmatch("".join(cells))]
+    rows = [*map(with_small_units, bare)]
     for at, row in enumerate(rows):
         if sum(map(bool, row)) < 2:  # most lines are one cell where another character separates them
             continue
@@ -427,7 +426,7 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
         )
 
 
-def headings_of(row: list[str]) -> list[str]:
+def with_small_units(row: list[str]) -> list[str]:
     """Return a row of names whose units in small letters are written as such: coil_current_a."""
     if not any(cell[-2:-1] == "_" for cell in row):  # of a record nearly every row, and looking up names takes long
         return row
