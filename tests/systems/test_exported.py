@@ -28,9 +28,9 @@ from mrdamper.systems.simulate import SystemLoop
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 
 
-def compiled(program, folder, name):
+def compiled(program, folder, name, units):
     """A function like Python's step: from inputs to outputs, with its own memory."""
-    for file, text in program_sources(program, name, f"test of {name}").items():
+    for file, text in program_sources(program, name, f"test of {name}", units).items():
         (folder / file).write_text(text)
     library = folder / f"{name}.so"
     subprocess.run(
@@ -53,7 +53,7 @@ def compiled(program, folder, name):
 
 def test_the_inverse_in_c_has_pythons_bits_and_refuses_what_is_no_number(tmp_path):
     inverse = invert(joint_damper())
-    step = compiled(inverse.program, tmp_path, "inverse")
+    step = compiled(inverse.program, tmp_path, "inverse", inverse.units)
     for i in range(1500):
         t = i * 1e-3
         sample = (0.01 * np.sin(9 * t), 0.09 * np.cos(9 * t), -0.81 * np.sin(9 * t), 900 * np.sin(13 * t), 1e-3)
@@ -89,7 +89,8 @@ def closed_with(law, answer):
 @pytest.mark.parametrize("law", LAWS)
 def test_a_loop_closed_with_the_c_is_pythons_loop(law, tmp_path):
     loop = loop_of(law)
-    ours, theirs = loop.run(1e-3, machine=False), closed_with(law, compiled(loop.control.program, tmp_path, "law"))
+    step = compiled(loop.control.program, tmp_path, "law", loop.control.units)
+    ours, theirs = loop.run(1e-3, machine=False), closed_with(law, step)
     assert np.array_equal(theirs.current, ours.current)
     assert np.array_equal(theirs.x, ours.x)
 
@@ -185,7 +186,9 @@ def test_both_leave_by_the_command_line(tmp_path):
     assert isinstance(CliRunner().invoke(application(), [*chosen, "--c", str(tmp_path / "no")]).exception, InputError)
     export = ["export", str(tmp_path / "model.json"), "--out", str(tmp_path / "inverse"), "--inverse", "--to"]
     assert CliRunner().invoke(application(), [*export, "c"]).exit_code == 0
-    assert "wanted" in (tmp_path / "inverse/bench_inverse.h").read_text()
+    header = (tmp_path / "inverse/bench_inverse.h").read_text()
+    assert "wanted; /* N */" in header
+    assert "outside lowest to highest, the nearer of these is reached" in header
     export[3] = str(tmp_path / "inverse.fmu")
     assert CliRunner().invoke(application(), [*export, "fmu"]).exit_code == 0
     assert "wanted" in zipfile.ZipFile(tmp_path / "inverse.fmu").read("modelDescription.xml").decode()

@@ -53,22 +53,23 @@ class _ConstantsWriter(CWriter):
         return self.number(expression.value) if expression.op == "parameter" else super().name(expression)
 
 
-def program_sources(traced: Program, name: str, title: str) -> dict[str, str]:
+def program_sources(traced: Program, name: str, title: str, units: Mapping[str, str]) -> dict[str, str]:
     """Header and source of any program of one sample, by file name: a control law, an inverse.
 
-    dt is one of its inputs; its parameters are written as constants. The title is for the comment at the top.
+    dt is one of its inputs; its parameters are written as constants. The title is for the comment at the top, the
+    units for those beside the inputs and outputs.
     """
     word, writer = identifier(name), _ConstantsWriter(traced)
     arguments = [(f"const {word}_derived *d", "d")] if traced.derived else []
     described = _program("model", writer, traced, [*arguments, (f"{word}_state *s", "s")])
     starts = [(member, repr(start)) for member, start in traced.tape.starts.items()]
-    facts = _facts(word, title, writer, [described], starts)
+    facts = _facts(word, title, writer, [described], starts) | {"units": {**units, "dt": "s"}}
     return {f"{word}.h": render("program.h.j2", **facts), f"{word}.c": render("program.c.j2", **facts)}
 
 
-def write_program(traced: Program, name: str, title: str, folder: str | Path) -> list[Path]:
+def write_program(traced: Program, name: str, title: str, units: Mapping[str, str], folder: str | Path) -> list[Path]:
     """Write the files of `program_sources` into a folder, atomically; raises `OutputError`."""
-    files = {file: text.encode() for file, text in program_sources(traced, name, title).items()}
+    files = {file: text.encode() for file, text in program_sources(traced, name, title, units).items()}
     return write_export(Written(files), folder, "")
 
 

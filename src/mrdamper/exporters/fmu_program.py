@@ -42,7 +42,7 @@ def write_program_fmu(
     """
     kind, word = exporter or FMUExporter(), identifier(name)
     facts = _facts(traced, word, title, units, period, tuple(start) or (0.0,) * len(traced.outputs), kind.fmi)
-    sources = program_sources(traced, word, facts["title"])
+    sources = program_sources(traced, word, facts["title"], units)
     written = kind.packed(all_texts(facts, sources, "fmu_program", "fmu_program", *_reference(traced, facts)), word)
     return write_export(written, out, kind.suffix), written.notes
 

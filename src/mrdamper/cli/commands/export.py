@@ -61,8 +61,9 @@ def _inverse(damper: Damper, name: str, to: str, exporter: Exporter, out: Path) 
     from mrdamper.systems.inverse import invert
 
     turned = invert(damper)
+    title = f"{turned.title}; of a wanted force outside lowest to highest, the nearer of these is reached"
     if to == "c":
-        return write_program(turned.program, name, turned.title, out), ()
+        return write_program(turned.program, name, title, turned.units, out), ()
     if isinstance(exporter, FMUExporter):
-        return write_program_fmu(turned.program, name, turned.title, turned.units, out, exporter=exporter)
+        return write_program_fmu(turned.program, name, title, turned.units, out, exporter=exporter)
     raise InputError(f"--inverse with --to {to}", remedy="export --to c or fmu", code="E_OPTION")

@@ -127,7 +127,7 @@ def _export_law(loop: SystemLoop, folder: Path | None, fmu: Path | None) -> None
     law, (name, title) = loop.control.program, (type(loop.controller).name, type(loop.controller).title)
     if law is None:
         raise InputError(f"{name} has no law to export", remedy="give --control a law")
-    paths, notes = [] if folder is None else write_program(law, name, title, folder), ()
+    paths, notes = [] if folder is None else write_program(law, name, title, loop.control.units, folder), ()
     if fmu is not None:
         path, notes = write_program_fmu(law, name, title, loop.control.units, fmu, PERIOD, loop.control.start)
         paths += path
