@@ -9,11 +9,13 @@ import pytest
 from support.dampers import modified_damper
 
 from mrdamper.dampers import modified
+from mrdamper.dampers.bands import band, portable_band
 from mrdamper.dampers.causal import causal_force
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.dampers.modified import ModifiedModel, fit_modified
 from mrdamper.dampers.normal_equations import FormChoice, Law
 from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.dampers.uncertainty import Uncertainty
 from mrdamper.data import Condition
 from mrdamper.errors import IdentificationError, InputError
 from mrdamper.exporters.equations import equations
@@ -325,3 +327,29 @@ def test_a_stream_holds_the_parameters_outside_the_tested_motions_too():
     assert np.abs(streamed - wanted)[last].max() < 0.01 * np.ptp(wanted[last])
     free = replace(damper, parameters=replace(damper.parameters, motions=None))
     assert np.ptp(free.force_along(motion, outside)) > 1.1 * np.ptp(wanted)
+
+
+@pytest.mark.parametrize("follows", [True, False])
+def test_where_only_sines_were_tested_another_motion_may_have_the_parameters_of_any_of_them(follows):
+    slope = ParameterFunction("linear-current-speed", (100.0, 5e4, 300.0))
+    still = ParameterFunction("constant", (300.0,))
+    functions = {name: slope if follows and name in ("c", "fy") else still for name in Bingham.map_forms()}
+    tested = [Condition(i, f, A) for i in (0.0, 1.0) for f, A in CORNERS]
+    known = Uncertainty((), (), np.zeros((0, 0)), np.zeros(0), run_gain=0.01, run_offset=3.0, run_dof=9.0, force=0.02)
+    parameters, envelope = ParameterMap(Bingham, functions, MotionHull(CORNERS)), Envelope.of(tested)
+    damper = ModifiedModel(parameters, envelope=envelope, uncertainty=known)
+    slow, fast = sine(Condition(0.7, 0.5, 0.012), 4, 2000), sine(Condition(0.7, 2.5, 0.003), 20, 400)
+    summed = {n: getattr(slow, n) + getattr(fast, n) for n in ("displacement", "velocity", "acceleration")}
+    motion = replace(slow, **summed)
+    prediction = damper.predict(motion)
+    assert prediction.untested_kind
+    sines = [damper.force_along(motion, Condition(0.7, f, A)) for f, A in CORNERS]
+    spread = np.mean((np.array(sines) - prediction.force) ** 2, axis=0) if follows else np.zeros(len(motion))
+    wide, at_tests = band(damper, prediction), band(damper, replace(prediction, untested_kind=False))
+    widths = [(each.high - prediction.force) ** 2 for each in (wide, at_tests)]
+    np.testing.assert_allclose(widths[0], widths[1] + 1.6448536**2 * spread, rtol=1e-6)
+    assert (wide.peak[1] > 1.05 * at_tests.peak[1]) == (wide.energy[1] > 1.5 * at_tests.energy[1]) == follows
+    also = replace(damper, envelope=replace(envelope, any_motion=True))
+    assert not also.predict(motion).untested_kind
+    of_kind, without = (portable_band(each).of_peak_untested for each in (damper, also))
+    assert (of_kind > 1.05 * without) == follows

@@ -115,6 +115,15 @@ def test_a_sweep_amounts_to_a_sine_of_the_same_speed():
     assert speed == pytest.approx(np.sqrt(2) * np.std(made.velocity), rel=0.02)
 
 
+@pytest.mark.parametrize(("share", "is_sine"), [(0.05, True), (0.25, False)])
+def test_a_second_tone_at_a_multiple_of_the_frequency_makes_no_sine(share, is_sine):
+    slow, fast = sine(Condition(0.0, 0.5, 0.012), 4, 2000), sine(Condition(0.0, 2.5, 0.012 * share), 20, 400)
+    found = equivalent_sine(Run("two", slow.time, slow.displacement + fast.displacement, np.zeros(len(slow)), 0.0))
+    assert found.is_sine == is_sine
+    made = triangle(Condition(0.0, 0.5, 0.012), 4)
+    assert equivalent_sine(Run("tri", made.time, made.displacement, np.zeros(len(made)), 0.0)).is_sine
+
+
 @pytest.mark.parametrize("made", [sine, triangle])
 def test_made_motions_stay_within_their_amplitude_and_close(made):
     motion = made(Condition(0.5, 2.0, 0.01), 2)

@@ -15,10 +15,11 @@ from mrdamper.dampers.prediction import Prediction
 from mrdamper.dampers.sessions import SessionCorrection
 from mrdamper.dampers.slopes import force_slopes, relative_variances
 from mrdamper.dampers.uncertainty import Uncertainty
-from mrdamper.data import SESSIONS_NEEDED, Floats
+from mrdamper.data import SESSIONS_NEEDED, Condition, Floats
 from mrdamper.data.wording import counted, number
 from mrdamper.errors import ParameterError
 from mrdamper.identification.intervals import student
+from mrdamper.physics.motion.made import sine
 from mrdamper.statistics.metrics import peak_force
 
 _LARGEST_FORCE_N = 1e100  # whose square is finite
@@ -71,6 +72,10 @@ def band(
         # Beyond the tested motions growth contains the whole error of the folds, including that of their parameters.
         nearest = np.minimum(own, _by_parameters(damper, damper.predict(damper.envelope.nearest(prediction.condition))))
         parameter, own = parameter * nearest[0] / (own[0] or 1.0), nearest
+    held = _by_motion(damper, prediction)[seen_at]
+    alike = np.eye(held.shape[1]) / held.shape[1]  # each tested motion counts alike
+    _, *of_kind = relative_variances(held, alike, force, motion.velocity, motion.time)
+    of_samples = np.einsum("np,pq,nq->n", held, alike, held)
     dofs = _degrees_of_freedom(uncertainty, slopes, level)
     of_run, of_session = uncertainty.run_gain**2, uncertainty.gain**2
 
@@ -82,26 +87,52 @@ def band(
         factor = uncertainty.calibration.factor(quantity, level) if uncertainty.calibration else 1.0
         return factor * student(level, dof) * float(np.sqrt(whole))
 
-    def with_growth(at_tests: Any, quantity: Quantity) -> Any:
-        # The calibration holds at the tests and does not scale growth.
-        return np.sqrt(at_tests**2 + uncertainty.growth.half_width(quantity, distance, level) ** 2)
+    def with_growth(at_tests: Any, quantity: Quantity, of_kind: Any) -> Any:
+        # The calibration holds at the tests; it scales neither growth nor the variance of another kind of motion.
+        grown = uncertainty.growth.half_width(quantity, distance, level)
+        return np.sqrt(at_tests**2 + grown**2 + student(level, np.inf) ** 2 * of_kind)
 
     variance: Floats = parameter + session + model
     t = reach("force", [float(np.mean(v)) for v in (variance - model, model)])
     t /= float(np.sqrt(np.mean(variance))) or 1.0
-    width = half * with_growth(t * np.sqrt(variance) / (half or 1.0), "force")
+    width = half * with_growth(t * np.sqrt(variance) / (half or 1.0), "force", of_samples / (half or 1.0) ** 2)
     of_peak = own[1] + of_run + uncertainty.peak**2
     at_tests = reach("peak", [own[1] + of_session, of_run + uncertainty.peak**2])
     # For a known session its part of the variance is omitted, at the same quantile.
     own_session = at_tests * float(np.sqrt(of_peak / ((of_peak + of_session) or 1.0)))
-    future, known_session = (half * with_growth(each, "peak") for each in (at_tests, own_session))
-    loss = float(with_growth(reach("energy", [own[2] + of_session, of_run + uncertainty.energy**2]), "energy"))
-    model = model + uncertainty.growth.variance("force", distance) * half**2
+    future, known_session = (half * with_growth(each, "peak", of_kind[0]) for each in (at_tests, own_session))
+    loss = reach("energy", [own[2] + of_session, of_run + uncertainty.energy**2])
+    loss = float(with_growth(loss, "energy", of_kind[1]))
+    model = model + uncertainty.growth.variance("force", distance) * half**2 + of_samples
     return Band(
         force - width, force + width, np.sqrt(parameter), np.sqrt(session), np.sqrt(model),
         (max(half - future, 0.0), half + future), (-min(loss, 1.0), loss),
         (max(half - known_session, 0.0), half + known_session),
     )  # fmt: skip
+
+
+def _by_motion(damper: Damper, prediction: Prediction) -> Floats:
+    """(N, K) changes of a predicted force [N] if the parameters were those of one of K tested motions throughout.
+
+    Parameters that depend on frequency and amplitude were identified on sines. Along another motion they are those of
+    an equivalent sine, and no test shows how well it represents the motion. They are zero where the parameters do not
+    depend on the motion, or where motions other than sines were tested.
+    """
+    hull = damper.tested_motions if prediction.untested_kind else None
+    held = [
+        replace(damper, envelope=replace(damper.envelope, frequency_Hz=(f, f), amplitude_m=(amplitude, amplitude)))
+        for f, amplitude in (hull.corners if hull else ())
+    ]
+    forces = [each.force_for(prediction) - prediction.force for each in held]
+    return np.column_stack(forces) if forces else np.zeros((prediction.force.size, 1))
+
+
+def _variance_of_kind(damper: Damper, at: Condition) -> float:
+    """Relative variance of the force along other motions than sines, taken at a condition; zero if some were tested."""
+    if damper.tested_motions is None or damper.envelope.any_motion:
+        return 0.0
+    along = replace(damper.predict(sine(at, cycles=2)), is_sine=False, untested_kind=True)
+    return float(np.mean(_by_motion(damper, along) ** 2)) / peak_force(along.force) ** 2
 
 
 def _by_parameters(damper: Damper, loop: Prediction) -> Floats:
@@ -171,7 +202,8 @@ class PortableBand:
     gain: float  # of the force
     offset_N: float  # [N]
     of_peak: float  # of half the peak-to-peak force: model error and that of the parameters
-    # in its place at untested combinations inside the tested ranges: that of the farthest one
+    # in its place at untested combinations inside the tested ranges: that of the farthest one, and of motions that are
+    # no sines where all tests are
     of_peak_untested: float
     scope: str = ""  # sessions it holds for, as a phrase
 
@@ -191,7 +223,7 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
         at = replace(at, amplitude_m=tested.peak_velocity_m_s[1] / (2 * np.pi * at.frequency_Hz))
     currents = sorted({*tested.current_A, at.current_A})
     at_tests = replace(damper, uncertainty=replace(uncertainty, growth=Growth()))
-    own, quantile = list[float](), list[float]()
+    own, quantile, of_kind = list[float](), list[float](), list[float]()
     for current in currents:
         prediction: Prediction = damper.predict(replace(at, current_A=current))
         interval = band(at_tests, prediction, level)
@@ -199,12 +231,13 @@ def portable_band(damper: Damper, level: float = 0.9) -> PortableBand | None:
             return None
         parts = np.sqrt(interval.parameter**2 + interval.session**2 + interval.model**2)
         own.append(float(np.mean(interval.parameter**2)) / peak_force(prediction.force) ** 2)
+        of_kind.append(_variance_of_kind(damper, replace(at, current_A=current)))
         quantile.append(float(np.mean(interval.high - prediction.force)) / (float(np.mean(parts)) or 1.0))
     t = float(np.mean(quantile))
     away = [damper.predict(condition).distance(damper) for condition in tested.farthest]
     grown = max((uncertainty.growth.half_width("force", distance, level) for distance in away), default=0.0)
     of_peak = t * float(np.sqrt(uncertainty.force**2 + np.mean(own)))
-    untested = float(np.hypot(of_peak, grown))
+    untested = float(np.sqrt(of_peak**2 + grown**2 + student(level, np.inf) ** 2 * np.mean(of_kind)))
     return PortableBand(
         level, t * uncertainty.total_gain, t * uncertainty.total_offset, of_peak, untested, scope(damper, level)
     )

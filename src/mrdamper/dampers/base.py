@@ -264,7 +264,10 @@ class Damper(Displayable):
             and samples_in_yield_displacement(motion, self.yield_length) < _MIN_YIELD_SAMPLES
         ):
             flags = (*flags, COARSE)
-        prediction = Prediction(motion, np.zeros(len(motion)), condition, flags, is_sine=is_sine)
+        untested = not (sine.is_sine or self.envelope.any_motion)
+        prediction = Prediction(
+            motion, np.zeros(len(motion)), condition, flags, is_sine=is_sine, untested_kind=untested
+        )
         return replace(prediction, force=self.force_for(prediction))
 
     def force_for(self, prediction: Prediction) -> Floats:

@@ -40,6 +40,8 @@ class Prediction(Displayable):
         One closed loop of the steady response, not a motion from rest.
     is_sine : bool
         Whether the motion is the sine of the condition, at one current.
+    untested_kind : bool
+        The motion is no sine, and all tested motions are sines.
 
     Examples
     --------
@@ -58,6 +60,7 @@ class Prediction(Displayable):
     extrapolation: tuple[str, ...]
     steady: bool = False
     is_sine: bool = True
+    untested_kind: bool = False
 
     @property
     def time(self) -> Floats:

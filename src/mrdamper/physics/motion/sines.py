@@ -16,6 +16,7 @@ from mrdamper.physics.motion.measured import measured_motion
 
 SINE_DISTORTION_LIMIT = 0.05  # limit of the distortion of a sine for harmonic balance
 STRAY_LIMIT = 0.3  # of the RMS displacement: remainder above which another motion is added to the sine
+_VELOCITY_DISTORTION_LIMIT = 0.6  # above that of a triangle (0.48): a second tone at a multiple of the frequency
 _MEASURED_HARMONICS = 7  # number of harmonics of a measured motion
 _MIN_STROKES = 4  # of a record, below which they show no range
 _MIN_STROKE_SAMPLES = 8  # of a stroke whose duration is counted
@@ -31,6 +32,7 @@ class MotionAnalysis:
     series: HarmonicSeries  # mean, drift and harmonics of the displacement
     cycles: float  # length of the record in cycles
     distortion: float  # RMS of harmonics 2 and up over the RMS of the first (THD)
+    velocity_distortion: float  # the same of the velocity
     drift: float  # slow movement of the mean position [m/s]
     residual: float  # RMS of the remainder of the series [m]
     stray: float  # that RMS over the RMS displacement: a second tone, a random part, a sweep
@@ -70,6 +72,7 @@ def analyse_motion(run: Run) -> MotionAnalysis:
         series=series,
         cycles=cycles,
         distortion=float(np.sqrt(power[1:].sum() / power[0])),
+        velocity_distortion=float(np.sqrt((np.arange(2, power.size + 1) ** 2 @ power[1:]) / power[0])),
         drift=series.drift,
         residual=residual,
         stray=residual / float(np.std(run.displacement)),
@@ -106,7 +109,12 @@ def equivalent_sine(run: Run) -> EquivalentSine:
         analysis = None
     # A ramp has no residual either: it is a drift without a sine.
     spread = float(np.std(centred))
-    if analysis is not None and analysis.stray < STRAY_LIMIT and analysis.condition.amplitude_m > 0.5 * spread:
+    if (
+        analysis is not None
+        and analysis.stray < STRAY_LIMIT
+        and analysis.velocity_distortion < _VELOCITY_DISTORTION_LIMIT
+        and analysis.condition.amplitude_m > 0.5 * spread
+    ):
         return EquivalentSine(analysis.condition, analysis.series.mean, True)
     motion = measured_motion(steady)
     rms_x, rms_v = float(np.std(motion.displacement)), float(np.std(motion.velocity))
