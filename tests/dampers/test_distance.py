@@ -5,8 +5,13 @@ import pytest
 
 from mrdamper.dampers.distance import Distance
 from mrdamper.dampers.envelope import Envelope
+from mrdamper.dampers.modified import ModifiedModel
+from mrdamper.dampers.parameter_map import ParameterMap
+from mrdamper.dampers.prediction import distance_from_tests
 from mrdamper.data import Condition
-from mrdamper.physics.motion import Excitation
+from mrdamper.models.bingham import Bingham
+from mrdamper.physics.motion import Excitation, sine
+from mrdamper.statistics.functions.forms import ParameterFunction
 
 LEVELS, MOTIONS = (0.0, 0.5, 2.0), ((0.5, 0.02), (1.0, 0.02), (2.0, 0.008))
 TESTS = [Condition(current, *motion) for current in LEVELS for motion in MOTIONS]
@@ -23,7 +28,7 @@ def test_a_test_is_nowhere_away(test):
 
 
 def test_a_current_between_two_levels_is_away_by_the_product_of_its_distances():
-    assert away(1.0, 1.0, 0.02).between == pytest.approx(0.5 * 1.0 / 2.0**2)
+    assert away(1.0, 1.0, 0.02).between == pytest.approx(0.5 * 1.0 / 1.5**2)
     assert away(1.0, 1.0, 0.02).beyond == 0
     assert away(1.0, 1.0, 0.02) == away(-1.0, 1.0, 0.02)
 
@@ -82,3 +87,24 @@ def test_a_quantity_outside_is_stated_with_its_side_and_by_how_much(condition, s
     moved = Excitation(time, condition[2] * np.sin(phase), v, np.gradient(v, time), condition[0])
     above = [beyond.quantity for beyond in outside if beyond.value > beyond.tested[1]]
     assert [beyond.quantity for beyond in TESTED.outside(moved)] == above
+
+
+def test_a_prediction_between_two_currents_is_away_by_a_share_of_the_force_that_the_current_adds():
+    damper = ModifiedModel(
+        ParameterMap(Bingham, {
+            **{name: ParameterFunction("constant", (0.0,)) for name in Bingham.map_forms()},
+            "fy": ParameterFunction("quadratic-current", (200.0, 0.0, 100.0)),
+        }),
+        envelope=TESTED,
+    )  # fmt: skip
+    force = {current: 100 + 200 * current**2 for current in (0.0, 0.25, 0.5, 1.0, 2.0)}
+    for current, lower, upper in ((0.25, 0.0, 0.5), (1.0, 0.5, 2.0)):
+        share = (current - lower) * (upper - current) / (upper - lower) ** 2
+        asked = damper.predict(Condition(current, 1.0, 0.02)).distance(damper)
+        assert asked.between == pytest.approx(share * (force[upper] - force[lower]) / force[current], rel=0.02)
+    assert damper.predict(Condition(0.5, 1.0, 0.02)).distance(damper).between == 0
+    motion = sine(Condition(0.0, 1.0, 0.02), 4, 400)
+    switched = motion.with_current(np.where(motion.time % 1 < 0.5, 0.25, 1.0))
+    parts = [0.25 * (force[0.5] - force[0.0]), 2 / 9 * (force[2.0] - force[0.5])]
+    away = distance_from_tests(damper, Condition(0.6, 1.0, 0.02), switched.current)
+    assert away.between == pytest.approx(np.sqrt(np.mean(np.square(parts))) / force[1.0], rel=0.02)

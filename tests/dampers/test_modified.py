@@ -194,7 +194,8 @@ def test_a_joint_fit_is_made_of_forms_without_rates_but_for_the_shape(monkeypatc
         free = [law.name for law in asked["candidates"][name] if not law.rates and law.form.rate_bounds]
         held = [law for law in asked["candidates"][name] if law.rates]
         assert free == (rated if name == "yield_displacement" else [])
-        assert {form for form, _ in held} == ({"decaying-current"} if name in ("c", "yield_force") else set())
+        decays = {"decaying-current"} if name in ("c", "yield_force") else set()
+        assert {form for form, _ in held} == decays | ({"onset-current"} if name == "yield_force" else set())
         assert {Law(form) for form in set(forms) - set(rated)} <= set(asked["candidates"][name])
     assert fit.values["c"] == pytest.approx([by_the_papers_laws(c).c for c in CONDITIONS])
     assert (fit.conditions, fit.at_bounds) == (tuple(CONDITIONS), ("c",))
@@ -210,7 +211,7 @@ def test_decays_are_tried_relative_to_the_highest_current_where_a_parameter_may_
         data = SimpleNamespace(conditions=conditions, model_type=model, shape="yield_displacement", linear=("m",))
         return modified._candidates(data, any_motion)
 
-    rates = [0.4, 0.8, 1.5, 2.5, 4.0]
+    rates, onset_rates = [0.4, 0.8, 1.5, 2.5, 4.0], [1.2, 2.4, 4.0, 6.0, 9.0]
     for model in (BoucWen, Bingham):
         for highest, given in (
             (2.0, candidates(model, 2.0)),
@@ -226,7 +227,11 @@ def test_decays_are_tried_relative_to_the_highest_current_where_a_parameter_may_
                     and (name == "yield_displacement" or not FORMS[f].rate_bounds)
                 ]  # fmt: skip
                 may = name in ("c", "yield_force", "fy") and len(plain) > 1
-                assert tried == ([("decaying-current", (pytest.approx(r / highest),)) for r in rates] if may else [])
+                onset = may and name != "c"
+                assert tried == [
+                    *([("decaying-current", (pytest.approx(r / highest),)) for r in rates] if may else []),
+                    *([("onset-current", (pytest.approx(r / highest),)) for r in onset_rates] if onset else []),
+                ]
             assert "m" in given
 
 

@@ -42,6 +42,7 @@ FORMULAS = {
     "quadratic-current": [I * I, I, 1],
     "saturating-current": [I, I * exp(-r * I), 1],
     "decaying-current": [exp(-r * I), 1],
+    "onset-current": [(1 + r * I) * exp(-r * I), 1],
     "linear-current-speed": [I, f * A, 1],
     "quadratic-current-linear-speed": [I * I, I, f * A, 1],
     "quadratic-current-speed": [I * I, I, f * f * A * A, f * A, 1],

@@ -120,12 +120,14 @@ def test_a_form_counts_its_parameters_over_current_and_motion(form):
     assert form.follows_motion == follows.any()
     assert [term.follows_motion for term in form.terms] == follows.tolist()
     over_current = [term for term, moved in zip(form.terms, follows, strict=True) if not moved]
-    assert form.current_terms == len(over_current) + len({t.decay_I for t in over_current if t.decay_I is not None})
+    rates_of = {rate for term in over_current for rate in (term.decay_I, term.onset_I)} - {None}
+    assert form.current_terms == len(over_current) + len(rates_of)
     assert form.current_terms + form.motion_terms == len(form.terms) + len(form.rate_bounds)
 
 
 @pytest.mark.parametrize(
-    ("name", "count"), [("constant", 1), ("linear-current", 2), ("saturating-current", 4), ("decaying-current", 3)]
+    ("name", "count"),
+    [("constant", 1), ("linear-current", 2), ("saturating-current", 4), ("decaying-current", 3), ("onset-current", 3)],
 )
 def test_a_rate_over_the_current_is_a_parameter_of_its_law(name, count):
     assert (FORMS[name].current_terms, FORMS[name].motion_terms) == (count, 0)

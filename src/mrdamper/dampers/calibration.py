@@ -44,9 +44,9 @@ _MAX_GROWTH = 10.0  # relative error per unit of distance, to which larger ones 
 # Growth by each distance that is typical of dampers of known truth (`benchmarks.synthetic_choice`): alone where no fold
 # is so far from its tests (one motion, two currents, random records alone), and beside the folds that are, which count
 # as much, because dampers differ
-_TYPICAL_GROWTH = (0.25, 0.25, 0.25)
+_TYPICAL_GROWTH = (0.15, 0.25, 0.25)
 _NORMAL_DOF = 1e9  # of a normal distribution
-_SHOWN = (0.01, 0.05, 0.1)  # distances of a fold from its tests from which it shows growth
+_SHOWN = (0.02, 0.05, 0.1)  # distances of a fold from its tests from which it shows growth
 _NONE: Mapping[str, Floats] = {}  # relative variances of runs by the parameters, where none are known
 _ROUNDING = 1e-9  # of a number of units
 _NORMAL_MEDIAN = 1.4826  # standard deviation of a normal distribution over its median absolute deviation

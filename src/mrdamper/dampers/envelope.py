@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrdamper.dampers.distance import Distance, distance_from
+from mrdamper.dampers.distance import Distance, distance_from, tested_levels
 from mrdamper.data.conditions import Condition, same_condition
 from mrdamper.data.runs import Floats
 from mrdamper.data.wording import number, span
@@ -163,12 +163,21 @@ class Envelope:
         """Distance of a condition and the currents (N,) [A] along its motion; zero where only ranges are known."""
         if not self.conditions or condition.frequency_Hz <= 0 or condition.amplitude_m <= 0:
             return Distance()
-        nearest = distance_from(self._tested, condition, current, swept_A=self.current_A if self.any_record else None)
+        nearest = distance_from(self._tested, condition, current, swept_A=self._swept_A)
         if not self.any_motion:
             return nearest
         larger = max(0.0, np.log(condition.amplitude_m / self.amplitude_m[1]))
         faster = max(0.0, np.log(condition.peak_velocity / self.peak_velocity_m_s[1]))
         return replace(nearest, motion=min(nearest.motion, float(np.hypot(larger, faster))))
+
+    @property
+    def levels_A(self) -> Floats:
+        """(L,) tested currents, ascending [A]; the lowest and the highest where it changed in a test."""
+        return tested_levels(self._tested, self._swept_A)
+
+    @property
+    def _swept_A(self) -> tuple[float, float] | None:
+        return self.current_A if self.any_record else None
 
     def nearest(self, condition: Condition) -> Condition:
         """Return the motion of the hull of the tested ones that is nearest to a condition, at its current."""

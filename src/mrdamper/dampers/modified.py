@@ -30,6 +30,7 @@ from mrdamper.statistics.functions.forms import FORMS, ParameterFunction, featur
 from mrdamper.statistics.functions.motion_hull import MotionHull
 
 _RATES = (0.4, 0.8, 1.5, 2.5, 4.0)  # of decaying laws, times the largest current [-]
+_ONSET_RATES = (1.2, 2.4, 4.0, 6.0, 9.0)  # of laws that begin with the square of the current, likewise
 _MIN_FREQUENCY_RATIO = 1.2  # highest over lowest frequency from which a mass can be separated from a stiffness [-]
 
 
@@ -271,6 +272,7 @@ def _candidates(data: Condensed, any_motion: bool) -> dict[str, list[Law]]:
     """Forms of every coordinate, shortest first; rates of laws over the current are tried on a grid."""
     highest = max(abs(c.current_A) for c in data.conditions) or 1.0
     decaying = [Law("decaying-current", (rate / highest,)) for rate in _RATES]
+    onset = [Law("onset-current", (rate / highest,)) for rate in _ONSET_RATES]
     candidates: dict[str, list[Law]] = {}
     for name, forms in data.model_type.map_forms().items():
         laws = [
@@ -278,8 +280,11 @@ def _candidates(data: Condensed, any_motion: bool) -> dict[str, list[Law]]:
             for form in forms
             if (any_motion or not FORMS[form].follows_motion) and (name == data.shape or not FORMS[form].rate_bounds)
         ]
-        if name in _dissipating(data.model_type) and len(laws) > 1 and highest:
+        dissipating = _dissipating(data.model_type)
+        if name in dissipating and len(laws) > 1:
             laws += decaying
+        if dissipating.get(name) == "N" and len(laws) > 1:
+            laws += onset
         candidates[name] = laws
     return candidates | {name: [Law(ABSENT), Law("constant")] for name in data.linear if name not in candidates}
 

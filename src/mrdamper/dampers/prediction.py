@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrdamper.dampers.distance import Distance
+from mrdamper.dampers.distance import Distance, shares_between
 from mrdamper.dampers.protocols import DamperLike
 from mrdamper.data.conditions import Condition
 from mrdamper.data.displayable import Displayable
@@ -105,14 +105,34 @@ def distance_from_tests(damper: DamperLike, condition: Condition, current: Float
 
     A motion outside the tested ones counts by how much faster it is than the nearest of them, and by how much of
     its peak force exceeds that of the nearest: what is unknown of the law of the force over the velocity grows
-    with the force that the law adds.
+    with the force that the law adds. A current between two tested ones counts by how much the peak force changes
+    between them: what is unknown of the law of the force over the current is a part of this change.
     """
     away = damper.envelope.distance(condition, current)
+    if away.between > 0:
+        away = replace(away, between=_between(damper, condition, np.abs(current)))
     if away.motion < _NO_DISTANCE:
         return away
     here, there = condition, damper.envelope.nearest(condition)
     faster = np.log(here.peak_velocity / there.peak_velocity)
-    tested, peak = (peak_force(damper.force_along(sine(at, _CYCLES, _SAMPLES), at)) for at in (there, here))
+    tested, peak = _peak(damper, there), _peak(damper, here)
     rise = 1 - tested / peak if peak > 0 else 0.0
     parts = [_OF_HULL * away.motion, max(_OF_VELOCITY * faster, 0.0), max(rise, 0.0)]
     return replace(away, motion=float(np.linalg.norm(parts)))
+
+
+def _between(damper: DamperLike, condition: Condition, current: Floats) -> float:
+    """Root mean square of the shares of currents (N,) [A] between tested ones, each times the change of the peak."""
+    levels: Floats = damper.envelope.levels_A
+    shares, after = shares_between(current, levels)
+    change = np.zeros(levels.size)
+    for k in np.unique(after[shares > 0]):
+        lower, upper = (_peak(damper, replace(condition, current_A=float(levels[j]))) for j in (k - 1, k))
+        change[k] = abs(upper - lower)
+    peak = _peak(damper, replace(condition, current_A=float(np.max(current))))
+    return float(np.sqrt(np.mean((shares * change[after]) ** 2))) / peak if peak > 0 else 0.0
+
+
+def _peak(damper: DamperLike, at: Condition) -> float:
+    """Half the peak-to-peak force [N] of a sine from rest."""
+    return peak_force(damper.force_along(sine(at, _CYCLES, _SAMPLES), at))

@@ -44,7 +44,9 @@ def function_text(function: ParameterFunction) -> str:
     for value, term in zip(function.coefficients, form_named(function.form).terms, strict=True):
         powers = {"I": term.current, "f": term.frequency, "A": term.amplitude}
         factors = [name if power == 1 else f"{name}^{{{power}}}" for name, power in powers.items() if power]
-        exponents = [(term.decay_I, "I"), (term.decay_f, "f")]
+        if term.onset_I is not None:
+            factors.append(rf"\left(1 + {number(function.rates[term.onset_I])} \, I\right)")
+        exponents = [(term.decay_I, "I"), (term.onset_I, "I"), (term.decay_f, "f")]
         factors += [f"e^{{{number(-function.rates[i])} \\, {name}}}" for i, name in exponents if i is not None]
         if term.power_f is not None:
             factors.append(f"f^{{{number(-function.rates[term.power_f])}}}")

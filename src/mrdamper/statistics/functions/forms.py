@@ -27,13 +27,14 @@ class Term:
     """I^current · f^frequency · A^amplitude, times exponentials or a power with searched rates.
 
     `decay_I`, `decay_f` and `power_f` name the rate (0 or 1) in exp(−rate I), exp(−rate f)
-    and f^(−rate).
+    and f^(−rate), `onset_I` that in (1 + rate I) exp(−rate I), whose slope is zero at 0 A.
     """
 
     current: int = 0
     frequency: int = 0
     amplitude: int = 0
     decay_I: int | None = None
+    onset_I: int | None = None
     decay_f: int | None = None
     power_f: int | None = None
 
@@ -46,6 +47,8 @@ class Term:
         value = I**self.current * f**self.frequency * A**self.amplitude
         if self.decay_I is not None:
             value = value * np.exp(-rates[self.decay_I] * I)
+        if self.onset_I is not None:
+            value = value * (1 + rates[self.onset_I] * I) * np.exp(-rates[self.onset_I] * I)
         if self.decay_f is not None:
             value = value * np.exp(-rates[self.decay_f] * f)
         if self.power_f is not None:
@@ -67,6 +70,8 @@ class Term:
         factors = [name if power == 1 else f"{name}^{power}" for name, power in powers.items() if power]
         if self.decay_I is not None:
             factors.append(f"exp(-{number(rates[self.decay_I])} I)")
+        if self.onset_I is not None:
+            factors.append(f"(1 + {number(rates[self.onset_I])} I) exp(-{number(rates[self.onset_I])} I)")
         if self.decay_f is not None:
             factors.append(f"exp(-{number(rates[self.decay_f])} f)")
         if self.power_f is not None:
@@ -87,7 +92,7 @@ class Form:
     def current_terms(self) -> int:
         """Parameters over the current, including the constant."""
         terms = [term for term in self.terms if not term.follows_motion]
-        return len(terms) + len({term.decay_I for term in terms} - {None})
+        return len(terms) + len({rate for term in terms for rate in (term.decay_I, term.onset_I)} - {None})
 
     @property
     def motion_terms(self) -> int:
@@ -110,6 +115,8 @@ class Form:
             for rate, feature in ((term.decay_I, I), (term.decay_f, f), (term.power_f, np.log(f))):
                 if rate is not None:
                     by[rate, :, j] -= rates[rate] * feature * columns[:, j]
+            if term.onset_I is not None:
+                by[term.onset_I, :, j] -= (rates[term.onset_I] * I) ** 2 / (1 + rates[term.onset_I] * I) * columns[:, j]
         return by
 
 
@@ -126,6 +133,7 @@ FORMS: Mapping[str, Form] = MappingProxyType(
             Form("quadratic-current", (_I2, _I, _ONE), source="Qian et al. 2024, Eq. 23, 27, 32"),
             Form("saturating-current", (_I, Term(current=1, decay_I=0), _ONE), ((0.5, 30.0),)),
             Form("decaying-current", (Term(decay_I=0), _ONE), ((0.2, 30.0),), "Qian et al. 2024, Eq. 37"),
+            Form("onset-current", (Term(onset_I=0), _ONE), ((0.2, 30.0),)),
             Form("linear-current-speed", (_I, _SPEED, _ONE)),
             Form("quadratic-current-linear-speed", (_I2, _I, _SPEED, _ONE)),
             Form("quadratic-current-speed", (_I2, _I, _SPEED2, _SPEED, _ONE), source="Qian et al. 2024, Eq. 24–25"),
@@ -201,7 +209,12 @@ class ParameterFunction:
         """Write the units of the coefficients and rates, for a parameter of that unit."""
         terms = form_named(self.form).terms
         constant, of = ("-" if unit == "-" else f"ln({unit})", "-") if self.log else (unit, unit)
-        named = {t.decay_I: "1/A" for t in terms} | {t.decay_f: "1/Hz" for t in terms} | {t.power_f: "-" for t in terms}
+        named = (
+            {t.decay_I: "1/A" for t in terms}
+            | {t.onset_I: "1/A" for t in terms}
+            | {t.decay_f: "1/Hz" for t in terms}
+            | {t.power_f: "-" for t in terms}
+        )
         return [constant if t == _ONE else t.unit(of, self.rates) for t in terms] + [
             named[i] for i in range(len(self.rates))
         ]
