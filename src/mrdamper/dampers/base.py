@@ -216,6 +216,9 @@ class Damper(Displayable):
     @validate_arguments()
     def force_along(self, motion: Excitation, condition: Condition) -> Floats:
         """Force [N] along a motion about mid-stroke with an equivalent condition."""
+        return self._force_along(motion, condition)
+
+    def _force_along(self, motion: Excitation, condition: Condition) -> Floats:
         at = replace(condition, current_A=abs(condition.current_A))
         return simulate(self.model_at(at), self.with_field_current(motion)).force
 
@@ -277,7 +280,7 @@ class Damper(Displayable):
             return self.loop(condition).force
         if self.conditional and not (prediction.is_sine and np.ptp(motion.current) <= SAME_CURRENT):
             return causal_force(self, motion)
-        return self.force_along(motion, condition)
+        return self._force_along(motion, condition)
 
 
 def not_held(damper: Damper, names: Iterable[str]) -> InputError:

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -67,22 +68,20 @@ class PredictedRun:
     @classmethod
     def of(cls, run: Run, predicted: Floats, velocity: Floats, away: Callable[[], Distance] = Distance) -> PredictedRun:
         """From the prediction (N,) [N] along the whole run; raises E_CLOCK as `session_of`."""
-        at, loops = np.flatnonzero(run.in_window), _loops(run)
-        powers = np.array(
-            [
-                [dissipated_power(force[loop], velocity[loop], run.time[loop]) for loop, _ in loops]
-                for force in (run.force, predicted)
-            ]
+        at, loops = steady_samples(run), _loops(run)
+        measured, powers = (
+            np.array([dissipated_power(force[loop], velocity[loop], run.time[loop]) for loop, _ in loops])
+            for force in (run.force, predicted)
         )
-        step = max(1, at.size // _MAX_SAMPLES)
+        peaks = np.array([_half(cycle_extremes(predicted[loop], cycles)) for loop, cycles in loops])
+        thin = slice(at.start, at.stop, max(1, (at.stop - at.start) // _MAX_SAMPLES))
         return cls(
             run.id,
             session_of(run),
-            predicted[at[::step]],
-            run.force[at[::step]],
-            _peaks(run)
-            / np.maximum([_half(cycle_extremes(predicted[loop], cycles)) for loop, cycles in loops], 1e-300),
-            np.divide(powers[0], powers[1], out=np.full(len(loops), np.inf), where=powers[1] != 0),
+            predicted[thin].copy(),
+            run.force[thin].copy(),
+            _peaks(run) / np.maximum(peaks, 1e-300),
+            np.divide(measured, powers, out=np.full(len(loops), np.inf), where=powers != 0),
             away,
         )
 
@@ -117,22 +116,31 @@ class PredictedRun:
 
 
 @once_per_run
-def _loops(run: Run) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+def steady_samples(run: Run) -> slice:
+    """Return the samples inside the steady window of a run."""
+    inside = np.flatnonzero(run.in_window)
+    return slice(int(inside[0]), int(inside[-1]) + 1)
+
+
+@once_per_run
+def _loops(run: Run) -> list[tuple[slice, NDArray[np.intp]]]:
     """Return the samples of each loop whose peak and energy are compared, the window of a sine at one current, and
     where among them its cycles begin.
 
     A record of another motion, or of changing current, is cut into cycles of its mean frequency: over the whole record
     errors at its motions and currents cancel. Cycles of less than half its mean amplitude have no loop.
     """
-    sine, at = equivalent_sine(run), np.flatnonzero(run.in_window)
+    sine, at = equivalent_sine(run), steady_samples(run)
     frequency = sine.condition.frequency_Hz
     loops, count = [at], int(np.ptp(run.time[at]) * frequency)
     if count >= 2 and sine_condition(run) is None:
-        cycles = np.array_split(at, count)
+        ends = pairwise([at.start, *(at.start + cycle_starts(at.stop - at.start, count)[1:]).tolist(), at.stop])
+        cycles = [slice(begin, end) for begin, end in ends]
         moved = [np.ptp(run.displacement[cycle]) for cycle in cycles]
         loops = [c for c, swing in zip(cycles, moved, strict=True) if swing >= sine.condition.amplitude_m] or [at]
-    counts = [min(max(int(np.ptp(run.time[loop]) * frequency), 1), loop.size) for loop in loops]
-    return [(loop, cycle_starts(loop.size, cycles)) for loop, cycles in zip(loops, counts, strict=True)]
+    sizes = [loop.stop - loop.start for loop in loops]
+    counts = [min(max(int(np.ptp(run.time[loop]) * frequency), 1), n) for loop, n in zip(loops, sizes, strict=True)]
+    return [(loop, cycle_starts(n, cycles)) for loop, n, cycles in zip(loops, sizes, counts, strict=True)]
 
 
 @once_per_run

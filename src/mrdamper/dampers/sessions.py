@@ -64,13 +64,14 @@ class GainOffset:
     @classmethod
     def of(cls, measured: Floats, predicted: Floats) -> GainOffset:
         """Least squares of one run."""
-        mean, square = float(np.mean(predicted)), float(np.mean(predicted**2))
+        size, middle = measured.size, float(measured.sum()) / measured.size
+        mean, square = float(predicted.sum()) / size, float(predicted @ predicted) / size
         spread = square - mean**2
-        shared = float(np.mean(predicted * measured)) - mean * float(np.mean(measured))
+        shared = float(predicted @ measured) / size - mean * middle
         gain = shared / spread if spread > 1e-12 * max(square, 1e-300) else 1.0
-        offset = float(np.mean(measured)) - gain * mean
-        rest = float(np.mean((gain * predicted + offset - measured) ** 2))
-        return cls(gain, offset, mean, square, rest, float(np.ptp(measured)))
+        offset = middle - gain * mean
+        error = gain * predicted + (offset - measured)
+        return cls(gain, offset, mean, square, float(error @ error) / size, float(np.ptp(measured)))
 
     def error(self, gain: float, offset: float) -> float:
         """nrmse_pp of the prediction after another gain and offset."""

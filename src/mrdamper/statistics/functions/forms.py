@@ -228,7 +228,9 @@ class ParameterFunction:
 
 
 def _numbers(value: Any) -> Any:
-    return value if isinstance(value, Expression) else np.asarray(value, dtype=float)
+    if isinstance(value, Expression):
+        return value
+    return np.float64(value) if isinstance(value, float) else np.asarray(value, dtype=float)
 
 
 def form_named(name: str) -> Form:
