@@ -13,7 +13,7 @@ from support.dampers import joint_damper
 
 from mrdamper.dampers import joint
 from mrdamper.dampers.coil import Coil
-from mrdamper.dampers.concatenated_runs import concatenate, force_slopes
+from mrdamper.dampers.concatenated_runs import JointResiduals, concatenate, force_slopes
 from mrdamper.dampers.envelope import UNTESTED, Envelope
 from mrdamper.dampers.joint import JointDamper, JointFit, JointProblem, damper_of
 from mrdamper.dampers.model_file import dump_model, parse_model
@@ -29,6 +29,7 @@ from mrdamper.physics.motion.lag import first_order_lag
 from mrdamper.physics.motion.sines import extreme_strokes
 from mrdamper.physics.simulation import simulate, steady_loop
 from mrdamper.statistics.levenberg_marquardt import Minimum
+from mrdamper.statistics.linear import project_out_columns
 from mrdamper.statistics.stop_reason import StopReason
 from mrdamper.study.validation import validate
 
@@ -334,7 +335,8 @@ def test_a_refit_begins_where_the_derivatives_lead_unless_that_is_worse(problem,
 def test_slopes_by_the_search_axes_are_those_of_the_force(runs, problem, fit):
     motion = sine(MATRIX[5], 3, 20_000)
     picked = np.arange(0, motion.time.size, 97)
-    slopes = force_slopes(problem.space, fit.point, fit.damper.one_model, motion, picked)
+    by_axes, by_parameters = force_slopes(problem.space, fit.point, fit.damper.one_model, motion, picked)
+    slopes = (by_axes @ by_parameters).T
     linear = {info.name for info in PlayBypass.parameters() if info.linear}
     held = {name: getattr(fit.damper.one_model, name) for name in linear}
     for i, axis in enumerate(problem.space.axes):
@@ -347,6 +349,16 @@ def test_slopes_by_the_search_axes_are_those_of_the_force(runs, problem, fit):
     lagging = JointProblem([*runs[:3], changing], "play-bypass")
     start = np.append(fit.point, np.log([0.01, 0.01]))
     assert force_slopes(lagging.space, start, fit.damper.one_model, motion, picked) is None
+
+
+def test_products_are_those_of_the_derivatives_with_the_linear_parameters_refitted(problem, fit):
+    table = JointResiduals(problem.space, problem.parts)
+    solved, (gradient, normal) = table.solve(fit.point), table.products(fit.point)
+    jacobian = table.linearise(fit.point, solved.model)[1][:, : fit.point.size]
+    refitted = project_out_columns(solved.columns, jacobian)
+    assert gradient == pytest.approx(refitted.T @ solved.residual, abs=1e-9 * np.abs(gradient).max())
+    size = np.linalg.norm(refitted, axis=0)
+    assert normal / size / size[:, None] == pytest.approx(refitted.T @ refitted / size / size[:, None], abs=1e-6)
 
 
 def test_the_last_digits_do_not_hang_on_the_start(problem, fit):

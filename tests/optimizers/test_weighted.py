@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mrdamper.statistics.linear import solve_linear, solve_weighted
+from mrdamper.statistics.linear import solve_bounded, solve_linear, solve_weighted
 
 
 @pytest.mark.parametrize("angle", [1.0, 1e-6])  # of the last column from the first: well apart, and nearly alike
@@ -18,3 +18,14 @@ def test_several_sets_of_weights_are_solved_as_one_after_the_other(angle):
         expected = np.linalg.lstsq(columns * own[:, None], right * own)[0]
         np.testing.assert_allclose(solution, alone, rtol=1e-10)
         np.testing.assert_allclose(columns @ solution, columns @ expected, atol=1e-8)
+
+
+def test_coefficients_beyond_a_bound_are_held_there_and_the_others_are_solved_again():
+    rng = np.random.default_rng(5)
+    columns = rng.standard_normal((40, 4)) * [1.0, 1e5, 1e-4, 1.0]
+    right = columns @ [2.0, -3e-5, 5e3, 0.5] + 0.1 * rng.standard_normal(40)
+    solution, held = solve_bounded(columns, right, np.zeros(4), np.array([np.inf, np.inf, 4e3, np.inf]))
+    assert held.tolist() == [False, True, True, False]
+    assert solution[1:3].tolist() == [0.0, 4e3]
+    expected = np.linalg.lstsq(columns[:, ::3], right - 4e3 * columns[:, 2])[0]
+    np.testing.assert_allclose(columns[:, ::3] @ solution[::3], columns[:, ::3] @ expected, atol=1e-8)

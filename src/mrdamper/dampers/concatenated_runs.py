@@ -22,7 +22,7 @@ from mrdamper.models.base import Model
 from mrdamper.models.recorded import force_tangents
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.statistics.levenberg_marquardt import forward_differences, least_squares
-from mrdamper.statistics.linear import project_out, robust_weights, solve_bounded
+from mrdamper.statistics.linear import products_without, project_out, robust_weights, solve_bounded
 
 MIN_ERROR_PP = 1e-3  # nrmse_pp below which a run gains no more weight
 _REFIT_ROUNDS = 3  # rounds of weights on derivatives that are known
@@ -146,14 +146,15 @@ class JointResiduals:
         """(N,) weighted residual at a point of the search axes, the linear parameters solved for."""
         return self.solve(point).residual
 
-    def slopes(self, point: Floats) -> Floats:
-        """(N, D) derivatives of the residual at a point, with the linear parameters refitted.
+    def products(self, point: Floats) -> tuple[Floats, Floats]:
+        """Jᵀr and JᵀJ of the residual r and its derivatives J at a point, with the linear parameters refitted.
 
         These follow to first order: the gradient is exact, and an axis costs one force instead of a least-squares
         problem [Kaufman 1975, BIT 15, 49].
         """
         solved = self.solve(point)
-        return project_out(solved.columns, self._moved(point, solved.model, solved.residual))
+        moved, slopes = self._moved(point, solved.model, solved.residual)
+        return moved @ (slopes @ solved.residual), moved @ products_without(solved.columns, slopes) @ moved.T
 
     def gradient(self, point: Floats) -> Floats:
         """(D,) half the slope of the cost, with the linear parameters refitted.
@@ -171,16 +172,18 @@ class JointResiduals:
             slope[i] = (rise * weights) @ solved.residual / (2 * reach[i])
         return slope
 
-    def _moved(self, point: Floats, model: Model, residual: Floats) -> Floats:
-        """(N, D) derivatives of the weighted residual by the search axes, the linear parameters held.
+    def _moved(self, point: Floats, model: Model, residual: Floats) -> tuple[Floats, Floats]:
+        """(D, K) and (K, N): derivatives of parameters by search axes, of the weighted residual by these parameters.
 
-        Exact in one pass where the model gives tangents, else by forward differences.
+        The linear parameters are held. Exact in one pass where the model gives tangents, else by forward differences
+        along the axes.
         """
         motion = self._motion(point)
-        if (slopes := force_slopes(self.space, point, model, motion, self.picked)) is not None:
-            return np.multiply(slopes, self.factor[:, None], out=slopes)
-        weights = self.weights[self.owner]
-        return forward_differences(lambda u: self.residual(u, model) * weights, point, residual, *self.space.box())
+        if (exact := force_slopes(self.space, point, model, motion, self.picked)) is not None:
+            return exact[0], np.multiply(exact[1], self.factor, out=exact[1])
+        weights, box = self.weights[self.owner], self.space.box()
+        slopes = forward_differences(lambda u: self.residual(u, model) * weights, point, residual, *box)
+        return np.eye(point.size), slopes.T
 
     def residual(self, point: Floats, model: Model) -> Floats:
         """(N,) of the linear parameters of a model at a point; its squares sum to each run's nrmse_pp²."""
@@ -194,7 +197,8 @@ class JointResiduals:
         """Weighted residual of a model, and its derivatives by search axes and linear parameters."""
         residual = self.residual(point, model) * self.weights[self.owner]
         columns = self.linear_columns(point)[2] * self.factor[:, None]
-        return residual, np.column_stack([self._moved(point, model, residual), columns])
+        moved, slopes = self._moved(point, model, residual)
+        return residual, np.column_stack([(moved @ slopes).T, columns])
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,11 +237,12 @@ class Linearisation:
 
 def force_slopes(
     space: SearchSpace, point: Floats, model: Model, motion: Excitation, picked: NDArray[np.intp]
-) -> Floats | None:
-    """(N, D) derivatives of the force at some samples of a motion by the search axes, the linear parameters held.
+) -> tuple[Floats, Floats] | None:
+    """Calculate derivatives of the force at some samples of a motion, the linear parameters held.
 
-    At a bound they are one-sided, because the force of a model may have a kink there. None where the coil's lags are
-    searched, or where the model has no tangents.
+    (D, K) of K parameters by the search axes, and (K, N) of the force by these. At a bound they are one-sided, because
+    the force of a model may have a kink there. None where the coil's lags are searched, or where the model has no
+    tangents.
     """
     if any(axis.name in (RISE, FALL) for axis in space.axes):
         return None
@@ -246,7 +251,11 @@ def force_slopes(
     inside = space.inside(point)
     moved = replace(model, **{name: getattr(inside, name) for name in names})
     tangents = force_tangents(moved, motion, names, picked)
-    return None if tangents is None else space.along_axes(point, names, tangents[1:])
+    if tangents is None:
+        return None
+    by_axes = space.along_axes(point, names)
+    used = by_axes.any(axis=0)
+    return by_axes[:, used], tangents[1:][used]
 
 
 def concatenate(motions: Iterable[Excitation]) -> Excitation:

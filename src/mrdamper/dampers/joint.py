@@ -281,7 +281,9 @@ class JointProblem:
     def _downhill(self, start: Floats) -> Minimum:
         """Return some steps from a start, on few runs."""
         table = self._few
-        return least_squares(table.solved_residual, start, *self.space.box(), _TRIAL_STEPS, 1e-3, slopes=table.slopes)
+        return least_squares(
+            table.solved_residual, start, *self.space.box(), _TRIAL_STEPS, 1e-3, products=table.products
+        )
 
     def search(
         self, start: Floats | None = None, rounds: int = 3, most_steps: int = 25, settled: float = _SEARCH_TOLERANCE
@@ -336,7 +338,7 @@ class JointProblem:
             if self.space.axes:
                 solution = least_squares(
                     table.solved_residual, point, *self.space.box(), most_steps, settled,
-                    slopes=table.slopes, curved=curved, lengthened=True,
+                    products=table.products, curved=curved, lengthened=True,
                 )  # fmt: skip
                 point, ending = solution.point, solution.ending
                 if to_the_last_digit and not left:

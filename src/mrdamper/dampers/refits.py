@@ -52,7 +52,7 @@ def refitted(
         for _ in range(_ROUNDS if problem.space.axes else 0):
             table.weigh(table.solve(point).nrmse_pp)
             point = least_squares(
-                table.solved_residual, point, *box, _STEPS, _TOLERANCE, slopes=table.slopes, curved=True
+                table.solved_residual, point, *box, _STEPS, _TOLERANCE, products=table.products, curved=True
             ).point
         table.weigh(table.solve(point).nrmse_pp)
         solved = table.solve(point).model

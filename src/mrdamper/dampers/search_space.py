@@ -60,16 +60,15 @@ class SearchSpace:
         reach = _DIFFERENCE_RATIO * (upper - lower)
         return self.without_linear(np.clip(point, lower + reach, upper - reach))
 
-    def along_axes(self, point: Floats, names: Sequence[str], tangents: Floats) -> Floats:
-        """(N, D) derivatives by the search axes, of (K, N) derivatives by parameters of some names."""
-        slopes = np.empty((point.size, tangents.shape[1]))
+    def along_axes(self, point: Floats, names: Sequence[str]) -> Floats:
+        """(D, K) derivatives of parameters of some names by the search axes."""
+        moved = np.zeros((point.size, len(names)))
         for i, axis in enumerate(self.axes):
             if i in self._entangled_axes:
-                np.matmul(self._moved_along(i, point, names), tangents, out=slopes[i])
+                moved[i] = self._moved_along(i, point, names)
             else:
-                scale = axis.value(float(point[i])) if axis.log else 1.0
-                np.multiply(tangents[names.index(axis.name)], scale, out=slopes[i])
-        return slopes.T
+                moved[i, names.index(axis.name)] = axis.value(float(point[i])) if axis.log else 1.0
+        return moved
 
     @cached_property
     def _entangled_axes(self) -> frozenset[int]:

@@ -47,14 +47,15 @@ def least_squares(
     tolerance: float = 1e-9,
     *,
     slopes: Callable[[Floats], Floats] | None = None,
+    products: Callable[[Floats], tuple[Floats, Floats]] | None = None,
     curved: bool = False,
     lengthened: bool = False,
 ) -> Minimum:
     """Minimise |residual(point)|² inside a box, until a step gains less than `tolerance` of it.
 
     Points and ends of the box are (D,), residuals (N,). Coordinates at a bound whose gradient points outwards are held
-    there for the step. `slopes` gives the (N, D) derivatives of the residual at a point; without, they are forward
-    differences.
+    there for the step. `slopes` gives the (N, D) derivatives J of the residual r at a point, or `products` Jᵀr and JᵀJ;
+    without, they are forward differences.
 
     `curved`: estimate the curvature that the Jacobian omits from changes of the gradient. With large residuals,
     Gauss–Newton converges linearly, this method faster [Dennis, Gay and Welsch 1981, ACM Trans. Math. Software 7, 348].
@@ -68,9 +69,12 @@ def least_squares(
     extra = before = None
     ending = StopReason.STEPS_SPENT
     for _ in range(most_steps):
-        jacobian = slopes(point) if slopes else forward_differences(residual, point, r, lower, upper)
+        if products is None:
+            jacobian = slopes(point) if slopes else forward_differences(residual, point, r, lower, upper)
+            gradient, normal = jacobian.T @ r, jacobian.T @ jacobian
+        else:
+            gradient, normal = products(point)
         evaluations += point.size
-        gradient, normal = jacobian.T @ r, jacobian.T @ jacobian
         if curved and before is not None:
             extra = _learnt_curvature(extra, point - before[0], gradient - before[1], normal)
         held = ((point <= lower) & (gradient > 0)) | ((point >= upper) & (gradient < 0))
@@ -186,14 +190,15 @@ def _damped_step(
     """Step of the free coordinates, and its predicted gain."""
     if not free.all():
         normal, extra = normal[free][:, free], None if extra is None else extra[free][:, free]
-    stiff = np.eye(len(normal)) * (damping * np.maximum(normal.diagonal(), 1e-300))
+    stiff, slope = np.zeros(normal.shape), gradient[free]
+    stiff.ravel()[:: len(normal) + 1] = damping * np.maximum(normal.diagonal(), 1e-300)
     if extra is not None:
         whole = normal + extra
         normal = whole if _is_positive(whole + stiff) else normal
-    moved = -np.linalg.solve(normal + stiff, gradient[free])
+    moved = -np.linalg.solve(normal + stiff, slope)
     step = np.zeros(gradient.size)
     step[free] = moved
-    return step, -float(2 * (gradient[free] @ moved) + moved @ normal @ moved)
+    return step, -float((2 * slope + moved @ normal) @ moved)
 
 
 def _is_positive(matrix: Floats) -> bool:

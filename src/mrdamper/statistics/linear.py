@@ -31,15 +31,16 @@ def solve_linear(columns: Floats, right: Floats, rank_limit: float | None = None
 
     A singular value over the largest below `rank_limit` counts as undetermined.
     """
-    gram = columns.T @ columns
-    scale = np.sqrt(gram.diagonal())
-    scale[~(scale > 0)] = 1.0
-    normal = gram / scale / scale[:, None]
-    if (inverse := _inverse(normal)) is not None:
+    return _solved(columns, right, columns.T @ columns, right @ columns, rank_limit)
+
+
+def _solved(columns: Floats, right: Floats, gram: Floats, moments: Floats, rank_limit: float | None = None) -> Floats:
+    """Solve `solve_linear`, given the products of the columns with each other and with the right side."""
+    if (inverse := _inverse_of_gram(gram)) is not None:
         # Normal equations with one refinement: as accurate as a factorisation of N rows.
-        inverse = inverse / scale / scale[:, None]
-        solution = inverse @ (right @ columns)
+        solution = inverse @ moments
         return solution + inverse @ ((right - columns @ solution) @ columns)
+    scale = _sizes(gram)
     return np.asarray(np.linalg.lstsq(columns / scale, right, rcond=rank_limit)[0], dtype=float) / scale
 
 
@@ -47,15 +48,11 @@ def solve_weighted(columns: Floats, right: Floats, weights: Floats, rank_limit: 
     """Coefficients (F, L) of least squares with each of F sets of weights (F, N); other arguments as `solve_linear`."""
     squares, width = weights**2, columns.shape[1]
     products = (columns[:, :, None] * columns[:, None, :]).reshape(len(columns), -1)
-    gram = (squares @ products).reshape(-1, width, width)
-    scale: Floats = np.sqrt(np.diagonal(gram, 0, 1, 2))
-    scale[~(scale > 0)] = 1.0
-    normal = gram / scale[:, :, None] / scale[:, None, :]
-    if (inverse := _inverse(normal)) is None:
+    gram: Floats = (squares @ products).reshape(-1, width, width)
+    if (inverse := _inverse_of_gram(gram)) is None:
         each = [solve_linear(columns * own[:, None], right * own, rank_limit) for own in weights]
         return np.array(each).reshape(-1, width)
-    inverse = inverse / scale[:, :, None] / scale[:, None, :]
-    solution: Floats = np.zeros(scale.shape)
+    solution: Floats = np.zeros(gram.shape[:2])
     for _ in range(2):  # the second time for the remainder, as in `solve_linear`
         left: Floats = (squares * (right - solution @ columns.T)) @ columns
         solution += np.matmul(inverse, left[:, :, None])[:, :, 0]
@@ -80,11 +77,19 @@ def project_out(columns: Floats, slopes: Floats) -> Floats:
     the last digits.
     """
     gram = columns.T @ columns
-    scale = np.sqrt(gram.diagonal())
-    scale = np.where(scale > 0, scale, 1.0)
+    scale = _sizes(gram)
     normal = gram / scale / scale[:, None] + _RIDGE * np.eye(scale.size)
     taken = (np.linalg.solve(normal, columns.T @ slopes / scale[:, None]) / scale[:, None]).T @ columns.T
     return np.subtract(slopes, taken.T, out=taken.T)
+
+
+def products_without(columns: Floats, slopes: Floats) -> Floats:
+    """(K, K) products of slopes (K, N) projected as `project_out` does, without the projected slopes themselves."""
+    gram, cross = columns.T @ columns, slopes @ columns
+    scale = _sizes(gram)
+    unit = cross / scale
+    normal = gram / scale / scale[:, None] + _RIDGE * np.eye(scale.size)
+    return slopes @ slopes.T - unit @ np.linalg.solve(normal, unit.T)
 
 
 def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) -> tuple[Floats, NDArray[np.bool_]]:
@@ -92,19 +97,14 @@ def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) 
 
     Returns the coefficients, and which of them ended at a bound.
     """
-    held = np.zeros(columns.shape[1], dtype=bool)
-    solution = np.zeros(held.size)
-    for _ in range(held.size + 1):
-        free = ~held
-        if held.any():
-            solution[free] = solve_linear(columns[:, free], right - columns[:, held] @ solution[held])
-        else:
-            solution = solve_linear(columns, right)
-        outside = free & ((solution < lower) | (solution > upper))
-        if not outside.any():
-            break
-        solution = np.clip(solution, lower, upper)
+    gram, moments = columns.T @ columns, right @ columns
+    solution, held = _solved(columns, right, gram, moments), np.zeros(moments.size, dtype=bool)
+    while (outside := ~held & ((solution < lower) | (solution > upper))).any():
         held |= outside
+        free, fixed = ~held, np.where(held, np.minimum(np.maximum(solution, lower), upper), 0.0)
+        rest, left = right - columns[:, held] @ fixed[held], (moments - gram @ fixed)[free]
+        solution = fixed
+        solution[free] = _solved(columns[:, free], rest, gram[free][:, free], left)
     return solution, held
 
 
@@ -115,6 +115,21 @@ def robust_weights(errors: Floats, best: float) -> Floats:
     more weight.
     """
     return 1.0 / np.sqrt(np.maximum(errors, best))
+
+
+def _sizes(gram: Floats) -> Floats:
+    """Norms of the columns of Gram matrices; one of columns that are zero."""
+    scale: Floats = np.sqrt(gram.diagonal(0, -2, -1))
+    scale[~(scale > 0)] = 1.0
+    return scale
+
+
+def _inverse_of_gram(gram: Floats) -> Floats | None:
+    """Invert Gram matrices by equilibrated columns; None as `_inverse`."""
+    scale = _sizes(gram)
+    row, column = scale[..., None, :], scale[..., :, None]
+    inverse = _inverse(gram / row / column)
+    return None if inverse is None else inverse / row / column
 
 
 def _inverse(normal: Floats) -> Floats | None:
