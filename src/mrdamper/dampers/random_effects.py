@@ -144,7 +144,7 @@ class GainsAndOffsets:
         least = _MIN_SHARE * assumed.max(axis=1, keepdims=True)
         covariance = own + np.multiply.outer(_MIN_SHARE * least[:, 0], np.eye(len(own)))
         covariance = covariance + np.tensordot(np.maximum(assumed, least), [z @ z.T for z in designs], 1)
-        turned: Floats = np.linalg.inv(covariance) @ whole
+        turned = np.linalg.solve(covariance, whole).astype(float, copy=False)
         inner: Floats = whole.T @ turned
         table = np.add.reduceat(np.add.reduceat(inner**2, first, axis=1), first, axis=2)
         by_noise = np.add.reduceat(np.sum(turned * (own @ turned), axis=1), first, axis=1)

@@ -36,7 +36,7 @@ def relative_variances(slopes: Floats, covariance: Floats, force: Floats, veloci
     """
     half = peak_force(force) or 1.0
     power = dissipated_power(force, velocity, time) or 1.0
-    variance: Floats = np.einsum("np,pq,nq->n", slopes, covariance, slopes)
+    variance: Floats = np.sum(slopes @ covariance * slopes, axis=1)
     mean = float(np.mean(variance)) / half**2
     swing = (slopes[int(np.argmax(force))] - slopes[int(np.argmin(force))]) / 2 / half
     loss = np.array([dissipated_power(column, velocity, time) for column in slopes.T]) / power

@@ -157,8 +157,9 @@ def _repeated(
     left = (1 - taken).reshape(most, 2).mean(axis=1)
     power = (amplitudes**2).reshape(most, 2).mean(axis=1)
     # By leakage, a record that does not end where it began has more power there than the spectrum of its noise.
-    windows = np.abs(np.fft.rfft(waves.T, transform_length(size), axis=0)) ** 2
-    expected = (mean_weights(size) * Autoregression.of(rest).spectrum(size)) @ windows / np.diag(gram) ** 2
+    windows = np.fft.rfft(waves, transform_length(size))
+    spectrum = mean_weights(size) * Autoregression.of(rest).spectrum(size)
+    expected: Floats = (windows.real**2 + windows.imag**2) @ spectrum / np.diag(gram) ** 2
     expected = expected.reshape(most, 2).mean(axis=1) * size / (size - 2 * most)
     # Noise has power at these frequencies, too; only a significant excess counts as repeating.
     if np.sum(power) < (1 + 3 / np.sqrt(left.sum())) * np.sum(expected * left):

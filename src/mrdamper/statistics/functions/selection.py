@@ -13,8 +13,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrdamper.data import Condition, Floats, level_groups, same_condition, same_motion
 from mrdamper.statistics.functions.forms import Form, ParameterFunction
@@ -91,11 +93,15 @@ def supported(form: Form, conditions: Sequence[Condition]) -> bool:
     Two levels determine a straight line: a function of current has a parameter fewer than there are levels, but at
     least two if there are several.
     """
+    over_current, over_motion = _supported_terms(tuple(conditions))
+    return form.current_terms <= over_current and form.motion_terms <= over_motion
+
+
+@lru_cache(maxsize=256)  # asked for every form of every parameter
+def _supported_terms(conditions: tuple[Condition, ...]) -> tuple[int, int]:
+    """Largest number of parameters over the current and over the motion."""
     levels = len(level_groups([c.current_A for c in conditions]))
-    over_current = 1 if levels < 2 else max(levels - 1, 2)
-    return form.current_terms <= over_current and form.motion_terms <= max(
-        len(same_motion(conditions, _MOTIONS)) - 2, 0
-    )
+    return 1 if levels < 2 else max(levels - 1, 2), max(len(same_motion(conditions, _MOTIONS)) - 2, 0)
 
 
 def broken_law(function: ParameterFunction, conditions: Sequence[Condition], unit: str) -> str:
@@ -104,8 +110,7 @@ def broken_law(function: ParameterFunction, conditions: Sequence[Condition], uni
     It is of a parameter that must not be negative: a yield force [N], a viscous damping. A parameter in N is a yield
     force and may not fall where a straight line over the current does not. Empty if it violates none.
     """
-    tested = np.array([*level_groups([c.current_A for c in conditions])])
-    currents = np.unique(np.concatenate([np.linspace(0.0, BEYOND * float(tested[-1]), 61), tested]))
+    currents, tested = _currents_of_laws(tuple(conditions))
     motions = MotionHull.of(conditions).corners
     values = np.array([np.broadcast_to(function(currents, *motion), currents.shape) for motion in motions])
     if values.min() < 0:
@@ -117,12 +122,20 @@ def broken_law(function: ParameterFunction, conditions: Sequence[Condition], uni
         if not row.size or not (row.min() < 0 < row.max()):
             continue
         falls, climbs = (float(np.sum(part[part > 0])) for part in (-row, row))
-        shown = np.diff(one[np.isin(currents, tested)])
+        shown = np.diff(one[tested])
         if unit == "N" and falls > slack:
             return "a yield force that falls with the current"
         if min(falls, climbs) > slack and (shown.size < 2 or not shown.min() < 0 < shown.max()):
             return "an extremum over the current that no test shows"
     return ""
+
+
+@lru_cache(maxsize=256)  # the same for every function of a damper
+def _currents_of_laws(conditions: tuple[Condition, ...]) -> tuple[Floats, NDArray[np.bool_]]:
+    """Currents [A] at which functions are checked, within the tests and beyond, and which of them were tested."""
+    tested = np.array([*level_groups([c.current_A for c in conditions])])
+    currents = np.unique(np.concatenate([np.linspace(0.0, BEYOND * float(tested[-1]), 61), tested]))
+    return currents, np.isin(currents, tested)
 
 
 def rises(shorter: ParameterFunction, longer: ParameterFunction, unit: str, conditions: Sequence[Condition]) -> bool:
