@@ -78,9 +78,11 @@ def on_curve(curve: MasterCurve, rho: float, phi: Floats) -> Floats:
     """State at signed distances phi [yield displacements] past zero."""
     with np.errstate(over="ignore"):  # far before zero; replaced below
         w = curve.rise(phi, np)
-    releasing = (phi < 0).nonzero()[0]
-    if releasing.size:
-        w[releasing] = -curve.release(-phi[releasing], rho, np)
+    releasing = phi < 0
+    if rho == 0:  # a straight line, whatever the curve
+        np.copyto(w, phi, where=releasing)
+    elif (rows := releasing.nonzero()[0]).size:
+        w[rows] = -curve.release(-phi[rows], rho, np)
     return w
 
 
@@ -89,9 +91,7 @@ def state_at(curve: MasterCurve, rho: float, starts: Floats, stroke: np.ndarray 
 
     All but the states that already point along the motion are on one curve through zero.
     """
-    to_zero = np.zeros_like(starts)
-    released = starts < 0
-    to_zero[released] = curve.release_distance(-starts[released], rho, np)
+    to_zero = curve.release_distance(np.maximum(-starts, 0.0), rho, np)
     w = on_curve(curve, rho, phi - to_zero[stroke])
     ahead = starts > 0
     if ahead.any():

@@ -48,15 +48,16 @@ class Path:
             beyond, begin = _vertex(x, arrival, departure)
             peak = peak + beyond
 
-        bounds = np.concatenate([[0], begin, [x.size]])
-        counts, origin = bounds[1:] - bounds[:-1], np.concatenate([x[:1], peak])
+        bounds, origin = np.zeros(begin.size + 2, dtype=np.intp), np.empty(begin.size + 1)
+        bounds[1:-1], bounds[-1], origin[:1], origin[1:] = begin, x.size, x[:1], peak
+        counts = bounds[1:] - bounds[:-1]
         directions = np.full(counts.size, first)
         directions[1::2] = -first
-        distance = x - np.repeat(origin, counts)
+        distance = x - origin.repeat(counts)
         return cls(
-            stroke=np.repeat(np.arange(counts.size), counts),
+            stroke=np.arange(counts.size).repeat(counts),
             distance=np.abs(distance, out=distance),
-            direction=np.repeat(directions, counts),
+            direction=directions.repeat(counts),
             lengths=tuple(np.abs(origin[1:] - origin[:-1]).tolist()),
             first_direction=first,
         )
