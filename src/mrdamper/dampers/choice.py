@@ -283,11 +283,12 @@ class CrossValidation:
         """Return the cross-validated error of every fold by kind, without the other parameters."""
         on, base = self._without(active)
         errors: dict[str, Floats] = {}
-        normal, right = self.jacobian[:, on].T @ self.jacobian[:, on], self.jacobian[:, on].T @ base
+        jacobian = self.jacobian[:, on]
+        normal, right = jacobian.T @ jacobian, jacobian.T @ base
         for kind, folds in self.folds.items():
             errors[kind] = np.zeros(len(folds))
             for i, fold in enumerate(folds):
-                J = self.jacobian[np.ix_(fold, on)]
+                J = jacobian[fold]
                 step = _damped(normal - J.T @ J, -(right - J.T @ base[fold]))
                 with np.errstate(over="ignore"):  # infinite where the rest determines a parameter by rounding only
                     squares = np.sum(((base[fold] + J @ step) / self.weights[fold]) ** 2)

@@ -95,7 +95,7 @@ class JointResiduals:
         self._set_weights(self.information * robust_weights(errors, MIN_ERROR_PP))
 
     def _set_weights(self, weights: Floats) -> None:
-        self.weights = weights
+        self.weights, self.begins = weights, np.searchsorted(self.owner, np.arange(weights.size))
         self.factor = weights[self.owner] * self.unit  # (N,) what residuals [N] are multiplied by
         self._solved: tuple[Floats, LinearSolution] | None = None
 
@@ -134,8 +134,7 @@ class JointResiduals:
         columns, right = columns * factor[:, None], (self.target - base) * factor
         solution, held = solve_bounded(columns, right, *self.bounds)
         residual = columns @ solution - right
-        begins = np.searchsorted(self.owner, np.arange(self.weights.size))
-        errors = np.sqrt(np.add.reduceat(residual**2, begins)) / self.weights
+        errors = np.sqrt(np.add.reduceat(residual**2, self.begins)) / self.weights
         model = replace(reduced, **{i.name: float(s) for i, s in zip(linear, solution, strict=True)})
         stopped = tuple(i.name for i, h in zip(linear, held, strict=True) if h)
         free = columns[:, ~held] if stopped else columns

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mrdamper.dampers.envelope import Envelope
 from mrdamper.data import Condition, Floats, Run, index_at
+from mrdamper.data.runs import once_per_run
 from mrdamper.errors import RunError
 from mrdamper.physics.motion.excitation import Excitation
 from mrdamper.physics.motion.sines import centred_motion, equivalent_sine, extreme_strokes
@@ -47,8 +48,9 @@ class RunRows:
     highest: float
     steady: tuple[int, int]
 
-    @classmethod
-    def of(cls, run: Run) -> RunRows:
+    @staticmethod
+    @once_per_run
+    def of(run: Run) -> RunRows:
         sine = equivalent_sine(run)
         motion = centred_motion(run)
         window = np.flatnonzero(run.in_window)
@@ -80,7 +82,7 @@ class RunRows:
         outside = float(lasting[0].sum() + lasting[2].sum())
         sizes = (transient / max(outside, 1e-300), 1 / lasting[1].sum(), transient / max(outside, 1e-300))
         share = np.concatenate([size * part for size, part in zip(sizes, lasting, strict=True)]) / (1 + transient)
-        return cls(
+        return RunRows(
             motion.part(at),
             np.searchsorted(at, picked),
             run.force[picked],

@@ -8,6 +8,7 @@ reduce it, so it counts as one unknown function of the phase and not as noise.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,9 +146,7 @@ def _repeated(
     if most < 4:
         return residual, []
     orders: Floats = np.arange(1.0, most + 1)
-    turned = _powers(np.exp(2j * np.pi * frequency * (time - time[0])), most)
-    waves = np.stack([turned.real, turned.imag], axis=1).reshape(2 * most, size)
-    gram = waves @ waves.T
+    waves, gram, windows = _waves((time - time[0]).tobytes(), frequency, most)
     along: Floats = waves @ (residual - residual.mean())
     amplitudes = np.linalg.solve(gram, along)
     rest = residual - amplitudes @ waves
@@ -157,9 +156,8 @@ def _repeated(
     left = (1 - taken).reshape(most, 2).mean(axis=1)
     power = (amplitudes**2).reshape(most, 2).mean(axis=1)
     # By leakage, a record that does not end where it began has more power there than the spectrum of its noise.
-    windows = np.fft.rfft(waves, transform_length(size))
     spectrum = mean_weights(size) * Autoregression.of(rest).spectrum(size)
-    expected: Floats = (windows.real**2 + windows.imag**2) @ spectrum / np.diag(gram) ** 2
+    expected: Floats = windows @ spectrum / np.diag(gram) ** 2
     expected = expected.reshape(most, 2).mean(axis=1) * size / (size - 2 * most)
     # Noise has power at these frequencies, too; only a significant excess counts as repeating.
     if np.sum(power) < (1 + 3 / np.sqrt(left.sum())) * np.sum(expected * left):
@@ -172,6 +170,15 @@ def _repeated(
     if np.ptp(time) * frequency < _MIN_CYCLES:
         rest = residual  # the repeating part cannot be separated
     return rest, [(lines, np.sum(weights @ relative * weights, axis=1))]
+
+
+@lru_cache(maxsize=4)  # for all models that are fitted to a run
+def _waves(time: bytes, frequency: float, most: int) -> tuple[Floats, Floats, Floats]:
+    """(2K, N) harmonics of a motion at times (N,), (2K, 2K) their products, and (2K, F) their squared transforms."""
+    turned = _powers(np.exp(2j * np.pi * frequency * np.frombuffer(time)), most)
+    waves = np.stack([turned.real, turned.imag], axis=1).reshape(2 * most, -1)
+    transformed = np.fft.rfft(waves, transform_length(waves.shape[1]))
+    return waves, waves @ waves.T, transformed.real**2 + transformed.imag**2
 
 
 def _power_law(orders: Floats, power: Floats, expected: Floats, left: Floats) -> tuple[Floats, Floats]:

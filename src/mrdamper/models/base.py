@@ -9,9 +9,11 @@ solves for these instead of searching.
 from __future__ import annotations
 
 import math
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import product
 from typing import Any, ClassVar, Self
 
@@ -58,8 +60,10 @@ class SearchAxis:
         if not self.log:
             return coordinate
         value = math.exp(coordinate)
-        # A parameter may end at the end of the axis, and rounding must not move it beyond.
-        return next((end for end in (self.lower, self.upper) if math.isclose(value, end, rel_tol=1e-12)), value)
+        for end in (self.lower, self.upper):  # where a parameter may end, and rounding must not move it beyond
+            if math.isclose(value, end, rel_tol=1e-12):
+                return end
+        return value
 
     def below(self, limit: float) -> SearchAxis:
         """Return the part of a logarithmic axis below a value."""
@@ -134,11 +138,15 @@ class Model(ABC):
     current_levels: ClassVar[Mapping[str, int]] = {}
 
     def __post_init__(self) -> None:
+        for name, low, high in _finite_bounds(type(self)):
+            value = getattr(self, name)
+            if type(value) is not float or not low <= value <= high:
+                break
+        else:
+            return  # searches create thousands of models
         for info in self.parameters():
             value = getattr(self, info.name)
             low, high = info.bounds
-            if type(value) is float and low <= value <= high and -math.inf < value < math.inf:
-                continue  # searches create thousands of models
             no_float = isinstance(value, int) and value.bit_length() > 1023
             if no_float or not is_number(value):
                 raise ParameterError(f"{info.name} = {shown(value)}", where=self.title, remedy="give a number")
@@ -225,6 +233,13 @@ class Model(ABC):
     def values(self) -> dict[str, float]:
         """Parameter values by name."""
         return {info.name: getattr(self, info.name) for info in self.parameters()}
+
+
+@cache
+def _finite_bounds(kind: type[Model]) -> tuple[tuple[str, float, float], ...]:
+    """Names of the parameters and their bounds, infinite ones as the largest finite numbers."""
+    most = sys.float_info.max
+    return tuple((info.name, max(info.bounds[0], -most), min(info.bounds[1], most)) for info in kind.parameters())
 
 
 def _axis(info: ParameterInfo, scale: Scale, starts: float) -> SearchAxis:

@@ -33,8 +33,13 @@ _FALL = 0.01  # fall of a yield force [of its largest value] below which it does
 
 def mean_error(errors: Errors) -> float:
     """Mean over the kinds of fold of the mean error in each; infinite without folds."""
-    means = [float(np.mean(values)) for values in errors.values() if len(values)]
-    return float(np.mean(means)) if means else float("inf")
+    means = [_mean(values) for values in errors.values() if len(values)]
+    return sum(means) / len(means) if means else float("inf")
+
+
+def _mean(values: Floats) -> float:
+    """Mean of a few values: a quarter of the time of NumPy's, which is asked for thousands."""
+    return float(np.add.reduce(values)) / len(values)
 
 
 def smaller_wins(smaller: Errors, larger: Errors) -> bool:
@@ -46,9 +51,9 @@ def smaller_wins(smaller: Errors, larger: Errors) -> bool:
     kinds = [kind for kind in smaller if kind in larger and len(smaller[kind])]
     if not kinds:
         return True
-    means = {kind: float(np.mean(smaller[kind])) for kind in kinds}
+    means = {kind: _mean(smaller[kind]) for kind in kinds}
     worst = max(kinds, key=means.__getitem__)
-    if not all(math.isfinite(np.mean(larger[kind])) for kind in kinds):
+    if not all(math.isfinite(_mean(larger[kind])) for kind in kinds):
         return True
     if not all(map(math.isfinite, means.values())):
         return False
@@ -66,7 +71,7 @@ def smaller_wins(smaller: Errors, larger: Errors) -> bool:
 
 def _mean_and_variance(values: Floats) -> tuple[float, float]:
     """Mean, and its squared standard error; zero for a single value."""
-    mean = float(np.mean(values))
+    mean = _mean(values)
     apart = values - mean
     return mean, float(apart @ apart) / (values.size - 1) / values.size if values.size > 1 else 0.0
 
