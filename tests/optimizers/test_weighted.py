@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from mrdamper.statistics.linear import solve_bounded, solve_linear, solve_weighted
+from mrdamper.statistics.linear import (
+    products_of_rest,
+    project_out_columns,
+    solve_bounded,
+    solve_linear,
+    solve_weighted,
+)
 
 
 @pytest.mark.parametrize("angle", [1.0, 1e-6])  # of the last column from the first: well apart, and nearly alike
@@ -29,3 +35,14 @@ def test_coefficients_beyond_a_bound_are_held_there_and_the_others_are_solved_ag
     assert solution[1:3].tolist() == [0.0, 4e3]
     expected = np.linalg.lstsq(columns[:, ::3], right - 4e3 * columns[:, 2])[0]
     np.testing.assert_allclose(columns[:, ::3] @ solution[::3], columns[:, ::3] @ expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("angle", [1.0, 1e-6, 0.0])
+def test_products_of_a_rest_are_those_of_the_projected_columns(angle):
+    rng = np.random.default_rng(6)
+    columns, right = rng.standard_normal((50, 4)) * [1.0, 1e5, 1e-4, 1.0], rng.standard_normal((50, 3))
+    columns[:, 3] = columns[:, 0] + angle * rng.standard_normal(50)
+    rest = project_out_columns(columns, right)
+    np.testing.assert_allclose(products_of_rest(columns, right), rest.T @ rest, rtol=1e-8)
+    few = products_of_rest(columns[:3], right[:3])  # fewer rows than columns
+    np.testing.assert_allclose(few, np.zeros((3, 3)), atol=1e-8)

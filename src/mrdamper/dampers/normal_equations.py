@@ -28,7 +28,7 @@ from mrdamper.statistics.functions.selection import broken_law, rises, smaller_w
 from mrdamper.statistics.levenberg_marquardt import least_squares, newton_refine
 from mrdamper.statistics.linear import (
     on_one_blas_thread,
-    project_out_columns,
+    products_of_rest,
     robust_weights,
     solve_linear,
     solve_weighted,
@@ -106,7 +106,7 @@ def fit_jointly(
     last = search
     for _ in range(reweightings):
         centre = least_squares(
-            search.residual, centre, *box, most_steps, _SEARCH_TOLERANCE, slopes=search.slopes, curved=True
+            search.residual, centre, *box, most_steps, _SEARCH_TOLERANCE, products=search.products, curved=True
         ).point
         weights = robust_weights(search.solution(centre).nrmse_pp, _MIN_ERROR_PP)
         settled = np.max(np.abs(weights / search.weights - 1)) < _WEIGHT_TOLERANCE
@@ -222,21 +222,25 @@ class _ShapeSearch:
     def residual(self, u: Floats) -> Floats:
         return (self.weights[:, None] * self.solution(u).error).ravel()
 
-    def slopes(self, u: Floats) -> Floats:
-        """Return derivatives of the residual, the other coefficients moving along [Kaufman 1975, BIT 15, 49]."""
-        slope, factor, table, solution = self._at(u)
+    def products(self, u: Floats) -> tuple[Floats, Floats]:
+        """Jᵀr and JᵀJ of the residual r and its derivatives J, the others moving along [Kaufman 1975, BIT 15, 49]."""
+        slopes = self._slopes(u)
+        columns = (self.weights[:, None, None] * self._at(u)[2][:, :, :-1]).reshape(len(slopes), -1)
+        return self.residual(u) @ slopes, products_of_rest(columns, slopes)
+
+    def _slopes(self, u: Floats) -> Floats:
+        """Return derivatives of the residual, the other coefficients held."""
+        slope, factor, _, solution = self._at(u)
         inverse = np.linalg.inv(factor)
         # A triangle whose square moves by `slope` moves by the upper half of this, times itself.
         moved = (inverse.transpose(0, 2, 1) @ slope @ inverse) * self.design.upper
         s, (low, high) = self.columns @ u, self.ends
         by_shape = (moved @ solution.error[:, :, None])[:, :, 0] * (self.weights * ((s > low) & (s < high)))[:, None]
-        jacobian = (by_shape[:, :, None] * self.columns[:, None, :]).reshape(-1, u.size)
-        weighted = (self.weights[:, None, None] * table[:, :, :-1]).reshape(jacobian.shape[0], -1)
-        return project_out_columns(weighted, jacobian)
+        return (by_shape[:, :, None] * self.columns[:, None, :]).reshape(-1, u.size)
 
     def gradient(self, u: Floats) -> Floats:
         """Gradient of half the squared residual: exact, as the residual is stationary in the others."""
-        return self.residual(u) @ self.slopes(u)
+        return self.residual(u) @ self._slopes(u)
 
     def _at(self, u: Floats) -> tuple[Floats, Floats, Floats, _Solution]:
         if self._tables[0] != u.tobytes():

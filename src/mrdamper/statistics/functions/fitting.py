@@ -16,7 +16,7 @@ from mrdamper.errors import IdentificationError
 from mrdamper.statistics.functions.forms import Form, ParameterFunction, features, form_named
 from mrdamper.statistics.functions.selection import broken_law, fold_groups, rises, smaller_wins, supported
 from mrdamper.statistics.levenberg_marquardt import least_squares, newton_refine
-from mrdamper.statistics.linear import project_out_columns, solve_linear
+from mrdamper.statistics.linear import products_of_rest, solve_linear
 from mrdamper.statistics.metrics import explained_variance
 
 # Below this share of the largest singular value the tests do not separate the terms: a rig repeats a motion to 1e-6.
@@ -191,14 +191,17 @@ def _best_rates(form: Form, I: Floats, f: Floats, A: Floats, target: Floats, wei
 
     def slopes(u: Floats) -> Floats:
         columns, fit = fitted(u)
-        by_rate = (form.slopes(columns, I, f, tuple(np.exp(u))) @ fit).T
-        return project_out_columns(columns, by_rate)  # the coefficients move along [Kaufman 1975]
+        return (form.slopes(columns, I, f, tuple(np.exp(u))) @ fit).T
+
+    def products(u: Floats) -> tuple[Floats, Floats]:
+        by_rate = slopes(u)
+        return residual(u) @ by_rate, products_of_rest(fitted(u)[0], by_rate)  # coefficients move along [Kaufman 1975]
 
     grid: Floats = np.array(list(product(*np.linspace(lower, upper, 6).T)))
     tables = np.stack([form.columns(I, f, A, tuple(rates)) for rates in np.exp(grid)]) * weight[:, None]
     explained = np.sum((right @ np.linalg.qr(tables)[0]) ** 2, axis=-1)
     starts = grid[np.argsort(-explained, kind="stable")[:3]]
-    fit = [least_squares(residual, u, lower, upper, most_steps=15, slopes=slopes) for u in starts]
+    fit = [least_squares(residual, u, lower, upper, most_steps=15, products=products) for u in starts]
     best = min(fit, key=lambda minimum: minimum.cost)
     settled = newton_refine(lambda u: residual(u) @ slopes(u), best.point, lower, upper)
     return tuple(np.exp(settled).tolist())
