@@ -169,7 +169,8 @@ class _Design:
         self.data = data
         self.forms = {name: forms[name].form for name in data.linear}
         self.rates = {name: forms[name].rates for name in data.linear}
-        blocks = [form.columns(*features(data.conditions), self.rates[n]) for n, form in self.forms.items()]
+        point = features(data.conditions)
+        blocks = [form.columns(*point, self.rates[n]) for n, form in self.forms.items()]
         self.sizes = [block.shape[1] for block in blocks]
         runs, total = data.scale.size, sum(self.sizes)
         self.matrix = np.zeros((runs, len(blocks) + 1, total + 1))

@@ -112,10 +112,12 @@ def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) 
     solution, held = _solved(columns, right, gram, moments), np.zeros(moments.size, dtype=bool)
     while (outside := ~held & ((solution < lower) | (solution > upper))).any():
         held |= outside
-        free, fixed = ~held, np.where(held, np.minimum(np.maximum(solution, lower), upper), 0.0)
-        rest, left = right - columns[:, held] @ fixed[held], (moments - gram @ fixed)[free]
-        solution = fixed
-        solution[free] = _solved(columns[:, free], rest, gram[free][:, free], left)
+        free, solution = ~held, np.where(held, np.minimum(np.maximum(solution, lower), upper), 0.0)
+        if (inverse := _inverse_of_gram(gram[free][:, free])) is None:
+            solution[free] = solve_linear(columns[:, free], right - columns @ solution)
+            continue
+        solution[free] = inverse @ (moments - gram @ solution)[free]
+        solution[free] += inverse @ ((right - columns @ solution) @ columns)[free]
     return solution, held
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrdamper.data import Condition, Floats, level_groups, same_condition, same_motion
-from mrdamper.statistics.functions.forms import Form, ParameterFunction
+from mrdamper.statistics.functions.forms import Form, ParameterFunction, form_named
 from mrdamper.statistics.functions.motion_hull import MotionHull
 
 Errors = Mapping[str, Floats]  # by kind of fold: the error of every omitted unit, in one order for all models
@@ -116,7 +116,7 @@ def broken_law(function: ParameterFunction, conditions: Sequence[Condition], uni
     force and may not fall where a straight line over the current does not. Empty if it violates none.
     """
     currents, tested = _currents_of_laws(tuple(conditions))
-    motions = MotionHull.of(conditions).corners
+    motions = MotionHull.of(conditions).corners[: None if form_named(function.form).follows_motion else 1]
     values = np.array([np.broadcast_to(function(currents, *motion), currents.shape) for motion in motions])
     if values.min() < 0:
         where = np.unravel_index(values.argmin(), values.shape)
