@@ -73,9 +73,9 @@ def project_out_columns(columns: Floats, right: Floats) -> Floats:
 def products_of_rest(columns: Floats, right: Floats) -> Floats:
     """(D, D) products of right sides (N, D) as `project_out_columns` leaves them; one triangle holds them."""
     scale, count = np.linalg.norm(columns, axis=0), columns.shape[1]
-    triangle = np.linalg.qr(np.concatenate([columns / np.where(scale > 0, scale, 1.0), right], axis=1), mode="r")
-    pivots = np.abs(triangle.diagonal()[:count])
-    rest = triangle[count:, count:]
+    whole = np.concatenate([columns / np.where(scale > 0, scale, 1.0), right], axis=1)
+    triangle = np.asarray(np.linalg.qr(whole, mode="r"), dtype=float)
+    pivots, rest = np.abs(triangle.diagonal()[:count]), triangle[count:, count:]
     if len(pivots) < count or pivots.min(initial=1.0) <= _RANK_LIMIT * pivots.max(initial=1.0):
         rest = project_out_columns(columns, right)
     return rest.T @ rest
