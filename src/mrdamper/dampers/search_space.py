@@ -31,6 +31,10 @@ class SearchSpace:
 
     def box(self) -> tuple[Floats, Floats]:
         """Lower and upper ends of the search axes."""
+        return self._box
+
+    @cached_property
+    def _box(self) -> tuple[Floats, Floats]:
         return box_of(self.axes)
 
     def coil_at(self, point: Floats) -> Coil | None:
