@@ -34,12 +34,12 @@ FORMS = {
 }
 
 
-def truth(condition):
+def truth(condition, yield_force=None):
     current = condition.current_A
     return BoucWen.build(
         {
             "c": 1000 + 200 * current,
-            "yield_force": 200 + 900 * current - 200 * current**2,
+            "yield_force": yield_force or 200 + 900 * current - 200 * current**2,
             "yield_displacement": 1.2e-3,
             "k1": 1400.0,
             "k3": TRUTH["k3"],
@@ -127,6 +127,23 @@ def test_forms_are_chosen_short(runs, identifications):
     forms = choose_forms(data, candidates, shapes).forms
     assert forms["yield_force"].name == "quadratic-current"
     assert forms["k1"] == forms["f0"] == Law("constant")
+
+
+def test_a_law_that_begins_with_the_square_of_the_current_has_the_rate_of_its_damper():
+    """The grid has two rates; that of the damper lies between them."""
+    rise = {c: 150 + 900 * (1 - (1 + 3.1 * c.current_A) * np.exp(-3.1 * c.current_A)) for c in MATRIX}
+    runs = [
+        synthetic_run(c, noise=3.0, seed=i, cycles=3, samples_per_cycle=300, model=truth(c, rise[c]), id=f"r{i}")
+        for i, c in enumerate(MATRIX)
+    ]
+    curved = [Law("quadratic-current"), *(Law(name, (rate,)) for name in ("decaying-current", "onset-current")
+              for rate in (1.6, 2.7, 4.0))]  # fmt: skip
+    candidates = {
+        name: [Law("constant"), Law("linear-current"), *(curved if name == "yield_force" else [])] for name in FORMS
+    }
+    chosen = choose_forms(condense(runs, BoucWen), candidates, np.full(len(MATRIX), 1.2e-3), {"yield_force": "N"})
+    assert chosen.forms["yield_force"].name == "onset-current"
+    assert chosen.forms["yield_force"].rates == pytest.approx((3.1,), rel=0.1)
 
 
 def test_a_condition_left_out_is_predicted(runs, identifications):

@@ -39,6 +39,8 @@ _WEIGHT_TOLERANCE = 1e-3  # change of the robust weights below which the rounds 
 _SEARCH_RANGE = 6.0  # of a search, in units of a function's terms
 _MIN_ERROR_PP = 1e-4  # nrmse_pp below which a run gains no more weight
 _PASSES = 2  # over all coordinates in the choice of forms
+_RATE_FACTORS = (0.85, 1 / 0.85)  # steps of the rate of a law, after the choice of the law at the rates of a grid
+_MIN_RATE_GAIN = 1e-3  # relative gain of the error by such a step
 _RANK_LIMIT = 1e-10  # singular value over the largest below which a coefficient is not determined
 _RIDGE = 1e-7  # interpolated Gram matrices of nearly parallel columns may lose positivity by less
 
@@ -331,7 +333,29 @@ def choose_forms(
                     forms, fit, errors = {**forms, name: law}, trial, other
         if forms == before:
             break
+    forms, fit = _with_nearer_rates(data, forms, start, units)
     return FormChoice(forms, fit_jointly(data, forms, fit.parameters.functions.get(data.shape)), refused)
+
+
+def _with_nearer_rates(
+    data: Condensed, forms: dict[str, Law], start: tuple[float, ...], units: Mapping[str, str]
+) -> tuple[dict[str, Law], JointFunctionFit]:
+    """Return the chosen forms with the rates of smallest error near those of the grid, and their fit."""
+    fit, _ = _tried(data, forms, start)
+    for name, law in forms.items():
+        for factor in _RATE_FACTORS if law.rates else ():
+            while True:
+                law = forms[name]
+                (low, high), (rate,) = law.form.rate_bounds[0], law.rates
+                trial = {**forms, name: Law(law.name, (rate * factor,))}
+                if not low < rate * factor < high:
+                    break
+                other, _ = _tried(data, trial, start)
+                gain = 1 - np.mean(other.nrmse_pp) / np.mean(fit.nrmse_pp)
+                if gain < _MIN_RATE_GAIN or broken_law(other.parameters.functions[name], data.conditions, units[name]):
+                    break
+                forms, fit = trial, other
+    return forms, fit
 
 
 def _risen(
