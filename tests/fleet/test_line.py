@@ -127,6 +127,17 @@ def test_a_damper_that_cannot_be_used_is_named_and_the_others_go_on(identified, 
     assert len(found.troubled) == 6
 
 
+def test_a_damper_with_one_test_takes_no_other_from_the_fleet(tmp_path):
+    for number, damper in enumerate(Population(dampers=2, sessions=1, golden=0)):
+        tests = damper.dataset()
+        save_dataset(tests if number == 0 else tests.only(tests.runs[:1]), tmp_path / "records" / damper.serial)
+    fleet = run_fleet(tmp_path / "records", tmp_path / "out")
+    table = pl.read_parquet(fleet.table)
+    assert table["status"].to_list() == ["done", "done"]
+    assert table["runs"].to_list() == [4, 1]
+    assert fleet.plan.references == ("D000001, session S001",)
+
+
 def test_a_reading_process_that_is_killed_is_no_fault_of_the_records(line, identified, monkeypatch):
     watch, killed = sandbox._Sandbox._watch, []
 

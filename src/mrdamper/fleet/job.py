@@ -134,7 +134,8 @@ def read(item: Item, settings: Settings) -> tuple[Dataset, tuple[str, ...]]:
 def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[str, Any]:
     train = _usable(dataset)
     problem = JointProblem(train, settings.model, {} if plan is None else plan.held).determined()
-    lane = "reference" if plan is None else "cold" if settings.cold else "fast"
+    axes = tuple(axis.name for axis in problem.space.axes)
+    lane = "reference" if plan is None else "cold" if settings.cold or axes != tuple(plan.axes) else "fast"
     start = np.array(plan.start) if plan is not None and lane == "fast" else None
     fit = _fit(problem, start)
     conditions = [equivalent_sine(run).condition for run in train]
@@ -154,7 +155,6 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
         more |= _beside_the_line(fit, own, plan)
         if plan.draft:
             more |= {
-                "axes": [axis.name for axis in problem.space.axes],
                 # a relevant change of each search axis
                 "changes": [0.2 if axis.log else 0.05 * (axis.upper - axis.lower) for axis in problem.space.axes],
                 "stands_for": [_stands_for(fit.damper.model, axis.name) for axis in problem.space.axes],
@@ -171,6 +171,7 @@ def _identify(dataset: Dataset, settings: Settings, plan: Plan | None) -> dict[s
         "at_bounds": " ".join(fit.at_bounds),
         "parameters": dict(fit.damper.model.values()),
         "standard_errors": _standard_errors(problem, fit),
+        "axes": axes,
         "point": fit.point.tolist(),
         "tests": tests,
         "loops": np.round(loops, 3).tolist(),

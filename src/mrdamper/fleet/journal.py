@@ -16,7 +16,7 @@ from typing import Any
 
 from mrdamper.errors import InputError, OutputError, ResourceError
 
-FORMAT = 1
+FORMAT = 2
 _APPLICATION = 0x6D726466  # "mrdf"
 _NETWORK = (
     "nfs", "cifs", "smb", "afs", "ceph", "gluster", "lustre", "beegfs", "gpfs", "ncp", "9p", "fuse.sshfs", "orangefs",

@@ -27,7 +27,8 @@ class Plan:
     on the order in which dampers are finished.
     """
 
-    start: tuple[float, ...]  # median of the free search axes
+    axes: tuple[str, ...]  # free search axes of the dampers it was made from
+    start: tuple[float, ...]  # median on each
     held: dict[str, float]  # parameters that the tests do not determine, at the population's value
     matrix: tuple[Test, ...]  # the line's tests
     loops: tuple[tuple[float, ...], ...]  # median measured loop of each [N]
@@ -67,8 +68,12 @@ def drafts(rows: dict[str, dict[str, Any]]) -> list[Plan]:
     """Make plans from the rows of the reference dampers by name, one for each candidate of the start values.
 
     A search finds a local minimum near its start. The results of the dampers with the smallest errors are tried as
-    starts, and the one with which most dampers have the lowest error is used.
+    starts, and the one with which most dampers have the lowest error is used. Dampers whose tests determine other
+    search axes than most, such as one with a single test, are no references.
     """
+    axes = [tuple(row["axes"]) for row in rows.values()]
+    common = max(axes, key=lambda some: (axes.count(some), len(some)))
+    rows = {name: row for name, row in rows.items() if tuple(row["axes"]) == common}
     tests = [[_as_test(t) for t in row["tests"]] for row in rows.values()]
     matrix = _matrix([test for some in tests for test in some], len(rows))
     loops_by_test: list[list[Floats]] = [[] for _ in matrix]
@@ -81,6 +86,7 @@ def drafts(rows: dict[str, dict[str, Any]]) -> list[Plan]:
     best = sorted(rows.values(), key=lambda row: row["cost"])[:_CANDIDATES]
     return [
         Plan(
+            axes=common,
             start=tuple(row["point"]),
             held={},
             matrix=matrix,
@@ -120,7 +126,8 @@ def holding(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:
     held |= {part for i in range(len(names)) if i not in free for part in parts[i]}
     values = {name: float(np.median([row["parameters"][name] for row in rows])) for name in sorted(held)}
     points = np.array([row["point"] for row in rows])
-    return replace(plan, start=tuple(np.median(points[:, free], axis=0).tolist()), held=values)
+    start = tuple(np.median(points[:, free], axis=0).tolist())
+    return replace(plan, axes=tuple(names[i] for i in free), start=start, held=values)
 
 
 def settled(plan: Plan, rows: Sequence[dict[str, Any]]) -> Plan:

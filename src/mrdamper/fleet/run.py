@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -191,13 +191,13 @@ class _Line:
             if len(references) >= REFERENCES:
                 break
         if references:
-            tried = [(plan, self._under(plan, order, references)) for plan in drafts(references)]
+            tried = [(plan, self._under(plan, order)) for plan in drafts(references)]
             draft = holding(*min(tried, key=lambda t: sum(row["cost"] for row in t[1])))
-            self.plan = settled(draft, self._under(draft, order, references))
+            self.plan = settled(draft, self._under(draft, order))
             self._journal.keep_plan(key, self.plan.document)
 
-    def _under(self, plan: Plan, order: Sequence[int], references: Mapping[str, Any]) -> list[dict[str, Any]]:
-        numbers = [n for n in order if self._items[n].name in references]
+    def _under(self, plan: Plan, order: Sequence[int]) -> list[dict[str, Any]]:
+        numbers = [n for n in order if self._items[n].name in plan.references]
         self._measure(numbers, plan)
         rows = [self._journal.result(self._key(n, plan)) for n in numbers]
         return [row for row in rows if row is not None and row["status"] == "done"]
