@@ -15,11 +15,13 @@ from mrdamper.cli import application
 from mrdamper.data import Dataset, Run
 from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
 from mrdamper.rig_files.rig_import import import_files, to_dataset
+from mrdamper.study.check import check
 from mrdamper.study.contradictions import ContradictionError, compare_runs
 from mrdamper.study.contradictions.evidence import AssumedScatter, Evidence
 from mrdamper.study.contradictions.explanations import Explanation, Trial, completed_matrix_odds
 from mrdamper.study.contradictions.findings import describe
 from mrdamper.study.contradictions.gains import gain_differences
+from mrdamper.study.contradictions.repeats import unequal_repeats
 from mrdamper.study.contradictions.tracks import tracks_of
 
 sys.path.insert(0, str(Path(__file__).parent.parent.parent))
@@ -49,9 +51,50 @@ def changed(runs, k, **channels):
     return [*runs[:k], replace(runs[k], **channels), *runs[k + 1 :]]
 
 
+def repeated(runs, gains, session=""):
+    """Runs, and some of them measured again with other noise and another gain."""
+    rng, first = np.random.default_rng(5), [replace(run, notes={"session": "one"} if session else {}) for run in runs]
+    again = [
+        replace(run, id=f"{run.id} again", force=gain * (run.force + rng.normal(0, 3, run.force.size)))
+        for run, gain in zip(runs, gains, strict=False)
+    ]
+    return [*first, *(replace(run, notes={"session": session} if session else {}) for run in again)]
+
+
+@pytest.mark.parametrize(
+    ("gains", "text"),
+    [
+        ([1.25] * 6, "6 runs ("),
+        ([1.12, 1.13, 1.12, 1.14], "4 runs ("),
+        ([1.3, 1.0, 1.0, 1.02], " times the force of run "),
+        ([1.05] * 6, ""),
+        ([1.08, 0.94, 1.11, 0.97], ""),
+    ],
+)
+def test_repeated_tests_that_differ_in_force_are_stated(sound, gains, text):
+    notes = unequal_repeats(tracks_of(repeated(sound, gains)))
+    assert [text in note for note in notes] == [True] * bool(text)
+
+
+def test_repeated_tests_of_stated_sessions_are_stated_by_session_and_exclude_no_run(sound):
+    runs = repeated(sound, [1.25] * 4, "two")
+    comparison = compare_runs(runs)
+    assert comparison.contradictions == []
+    assert comparison.notes[0].startswith("The tests of session two have 1.25 times the force of those of session one")
+    findings = check(Dataset(tuple(runs), "rig")).findings
+    assert ("W_REPEATS", "noted", "") in [(one.code, one.severity, one.run_id) for one in findings]
+
+
+def test_the_command_states_repeated_tests_that_differ(sound, tmp_path):
+    save_dataset(Dataset(tuple(repeated(sound, [1.25] * 4)), "rig"), tmp_path / "rig")
+    result = CliRunner().invoke(application(), ["check", str(tmp_path / "rig")])
+    assert "W_REPEATS: 4 runs (" in result.stderr
+
+
 @pytest.mark.parametrize("rig", ["labcontrol", "utfsm"])
 def test_no_run_of_a_bundled_rig_is_accused(bundled_study, rig):
     assert bundled_study.rig(rig).contradictions == ()
+    assert bundled_study.rig(rig).comparison_notes == ()
 
 
 @pytest.mark.parametrize(
@@ -422,8 +465,9 @@ def test_an_orifice_that_carries_the_slow_motions_accuses_no_run_and_hides_no_op
     runs = past_a_bypass(lambda force: (np.sqrt(700**2 + 4.4e5 * force) - 700) / 2.2e5)
     comparison = compare_runs(runs)
     assert comparison.contradictions == []
-    assert "0.5 Hz and 8 mm" in comparison.undescribed
-    assert "4 Hz and 20 mm" not in comparison.undescribed
+    (note,) = comparison.notes
+    assert "0.5 Hz and 8 mm" in note
+    assert "4 Hz and 20 mm" not in note
     (found,) = find_contradictions(changed(runs, 5, current=runs[23].current))  # without current, at 4 Hz and 20 mm
     assert (found.run_id, found.code, found.value) == ("t05", "E_OTHER_CURRENT", 0.0)
 

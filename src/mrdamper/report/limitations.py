@@ -37,15 +37,16 @@ _SAME_MOTION = 0.05  # relative difference of frequencies or amplitudes that are
 
 
 def limitations(
-    scored: RecipeResult, loops: Sequence[LoopAnalysis], runs: Iterable[Run] = (), undescribed: str = ""
+    scored: RecipeResult, loops: Sequence[LoopAnalysis], runs: Iterable[Run] = (), notes: Sequence[str] = ()
 ) -> dict[str, list[str]]:
     """List the limitations of a model and of its tests under their headings, the most serious first.
 
-    `undescribed` is the sentence on motions at which the comparison of the runs fails.
+    `notes` are those of the comparison of the runs with each other.
     """
     groups = {
         PREDICTION: [
             *_design(loops, [run.run_id for run in scored.train.runs]),
+            *notes,
             *_temperature(runs, {run.run_id for run in scored.train.runs}),
             *_prediction(scored.cross_validated, scored.validation),
         ],
@@ -57,7 +58,7 @@ def limitations(
             *(_joint(scored.fit, scored.damper) if isinstance(scored.fit, JointFit) else ()),
             *(_functions(scored.fit, scored.damper) if isinstance(scored.fit, ModifiedFit) else ()),
         ],
-        TESTS: [*filter(None, [undescribed]), *_tests(loops)],
+        TESTS: _tests(loops),
         RANGE: [_coil(scored.damper.coil), validity(scored.damper)],
     }
     _explain(list(groups.values()), scored.damper)

@@ -184,7 +184,7 @@ def _chapter(rig: RigStudy, pictures: Mapping[str, bytes], limits: Sequence[Limi
     chosen = rig.chosen
     mapped, functions = _mapped(rig)
     floors = [run.repeatability for run in rig.dataset if run.repeatability is not None]
-    limits_of_use = limitations(chosen, rig.loops, rig.dataset, rig.undescribed)
+    limits_of_use = limitations(chosen, rig.loops, rig.dataset, rig.comparison_notes)
     held = all(run.split == "validate" for run in _shown(rig))
     return {
         "rig": rig.dataset.name,

@@ -120,7 +120,7 @@ def _rig_lines(rig: RigStudy, shown: int, *, verbose: bool) -> tuple[list[str], 
     if verbose:
         lines += [f"  {row['name']} = {row['written']}" for row in table(rig.damper)]
     entries = [
-        text for texts in limitations(chosen, rig.loops, rig.dataset, rig.undescribed).values() for text in texts
+        text for texts in limitations(chosen, rig.loops, rig.dataset, rig.comparison_notes).values() for text in texts
     ]
     listed = entries if verbose else entries[:shown]
     if listed:

@@ -12,7 +12,7 @@ from mrdamper.data import Dataset, Displayable, Run
 from mrdamper.data.wording import counted
 from mrdamper.errors import InputError, is_a, validate_arguments
 from mrdamper.rig_files.quality.table import check_run, with_findings
-from mrdamper.study.contradictions import ContradictionError, compare_runs
+from mrdamper.study.contradictions import REPEATS_CODE, ContradictionError, compare_runs, tracks_of, unequal_repeats
 from mrdamper.study.usable_runs import accepted_runs
 
 Severity = Literal["refused", "set aside", "noted"]
@@ -114,10 +114,13 @@ def _of_run(run: Run) -> list[DatasetFinding]:
 
 def _of_rig(rig: str, runs: Sequence[Run]) -> list[DatasetFinding]:
     try:
-        contradictions = compare_runs(runs).contradictions
+        comparison = compare_runs(runs)
     except ContradictionError as refusal:
         return [DatasetFinding("", rig, refusal.code, "refused", str(refusal))]
-    return [DatasetFinding(one.run_id, rig, one.code, "set aside", str(one)) for one in contradictions]
+    aside = {one.run_id: one for one in comparison.contradictions}
+    repeats = unequal_repeats(tracks_of([run for run in runs if run.id not in aside]))
+    findings = [DatasetFinding(one.run_id, rig, one.code, "set aside", str(one)) for one in aside.values()]
+    return [*findings, *(DatasetFinding("", rig, REPEATS_CODE, "noted", text) for text in repeats)]
 
 
 def _of_accepted_runs(

@@ -85,7 +85,7 @@ class RigStudy(Displayable):
     session_known: float | str = ""
     # runs that were set aside because they contradict the others; `dataset` is without them
     contradictions: tuple[Contradiction, ...] = ()
-    undescribed: str = ""  # sentence on the motions at which the comparison of the runs fails
+    comparison_notes: tuple[str, ...] = ()  # of the comparison of the runs with each other
 
     @property
     def omitted(self) -> dict[str, str]:
@@ -288,7 +288,7 @@ def study_rig(
     impossible |= unphysical
     return RigStudy(
         rig, dataset, loops, dynamic_ranges(loops), tuple(candidates), runs.not_identified, impossible,
-        model is not None, sessions_note, tuple(runs.comparison.contradictions), runs.comparison.undescribed,
+        model is not None, sessions_note, tuple(runs.comparison.contradictions), runs.comparison.notes,
     )  # fmt: skip
 
 

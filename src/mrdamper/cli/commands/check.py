@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from mrdamper.errors import InputError
 
 if TYPE_CHECKING:
     from mrdamper.cli.output import Rows
+    from mrdamper.data import Run
 
 app = typer.Typer()
 
@@ -43,11 +45,12 @@ def check(
     if figure is not None:
         require_writable(figure)
         figure_kind(figure)
-    verdicts = quality_table(record_of(run) for run in watched(load_dataset(data).runs, "run"))
+    runs = load_dataset(data).runs
+    verdicts = quality_table(record_of(run) for run in watched(runs, "run"))
     put([row(verdict) for verdict in verdicts], None, as_json, _text_table)
     refused = [f"refused: {verdict.refusal}" for verdict in verdicts if verdict.refusal is not None]
     lines = finding_lines(((v.record.id, finding) for v in verdicts for finding in v.findings), verbose)
-    warn([*refused, *lines])
+    warn([*refused, *lines, *_unequal_repeats([r for r, v in zip(runs, verdicts, strict=True) if v.refusal is None])])
     if figure is not None:
         from mrdamper.report.plots.quality import quality_figure
         from mrdamper.rig_files.quality.flat import flagged_samples
@@ -56,6 +59,13 @@ def check(
         put_figure(quality_figure([(verdict, flagged_samples(View(verdict.record))) for verdict in verdicts]), figure)
     if refused:
         raise typer.Exit(2)
+
+
+def _unequal_repeats(runs: Sequence[Run]) -> list[str]:
+    from mrdamper.study.contradictions import REPEATS_CODE, tracks_of, unequal_repeats
+
+    rigs = [[run for run in runs if run.rig == rig] for rig in dict.fromkeys(run.rig for run in runs)]
+    return [f"{REPEATS_CODE}: {text}" for rig in rigs for text in unequal_repeats(tracks_of(rig))]
 
 
 def _check_fmu(path: Path, as_json: bool) -> None:

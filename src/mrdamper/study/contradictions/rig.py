@@ -15,6 +15,7 @@ from mrdamper.errors import InputError, listed
 from mrdamper.statistics.linear import on_one_blas_thread
 from mrdamper.study.contradictions.copies import find_copies
 from mrdamper.study.contradictions.findings import Contradiction, corrected_unit, describe, describe_copy
+from mrdamper.study.contradictions.repeats import unequal_repeats
 from mrdamper.study.contradictions.search import Search
 from mrdamper.study.contradictions.tracks import Track, tracks_of
 
@@ -40,7 +41,8 @@ class RunComparison:
     """Result of a comparison of the runs of one rig with each other."""
 
     contradictions: list[Contradiction]
-    undescribed: str = ""  # sentence on the motions at which the model of the comparison fails
+    # sentences on repeated tests that differ in force, and on the motions at which the model of the comparison fails
+    notes: tuple[str, ...] = ()
 
 
 @on_one_blas_thread
@@ -73,7 +75,9 @@ def compare_runs(runs: Sequence[Run], keep: Collection[str] = ()) -> RunComparis
         if len(trusted) >= MIN_RUNS:
             agreeing = {track.run.id for track in doubted} - set(_beside(doubted, trusted))
             contradictions = {name: one for name, one in contradictions.items() if name not in agreeing}
-    return RunComparison([contradictions[run.id] for run in runs if run.id in contradictions], undescribed)
+    repeats = unequal_repeats([track for track in tracks if track.run.id not in contradictions])
+    notes = (*repeats, *filter(None, [undescribed]))
+    return RunComparison([contradictions[run.id] for run in runs if run.id in contradictions], notes)
 
 
 def _among(train: Sequence[Track], keep: Collection[str]) -> tuple[dict[str, Contradiction], str]:
