@@ -40,7 +40,12 @@ def _model():
     save_model(joint_damper(), "model.json")
 
 
-GIVEN = {"your-own-rig": _machine, "fmpy": _fmu, "model-file": _model}  # files that a page has from its own commands
+GIVEN = {
+    "your-own-rig": _machine,
+    "fmpy": _fmu,
+    "model-file": _model,
+    "own-parts": _model,
+}  # files that a page has from its own commands
 
 
 def run_page(page, monkeypatch, folder, *, slow):

@@ -11,6 +11,7 @@ import importlib
 import inspect
 import pkgutil
 import threading
+import traceback
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -121,11 +122,28 @@ def _load(point: EntryPoint) -> tuple[ModuleType, ...] | type:
 _skipped: list[ExtensionPart] = []
 
 
+def fault_of_package(error: BaseException) -> str:
+    """State which installed package raised an error while it was used; empty if none did."""
+    places = traceback.extract_tb(error.__traceback__)
+    modules = [frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__)]
+    points = [p for group in GROUPS for p in _entry_points().select(group=group) if not _is_own(p)]
+    for place, module in reversed(list(zip(places, modules, strict=True))):
+        for point in points:
+            if module.partition(".")[0] == point.module.partition(".")[0]:
+                return (
+                    f"{package_of(point.dist)} ({point.group}) raised {type(error).__name__}: {error}, in {place.name} "
+                    f"of {module}, line {place.lineno}; correct or uninstall that package [E_PLUGIN]"
+                )
+    return ""
+
+
 def skip(part: ExtensionPart, problem: Exception | str) -> None:
     """Note that a part of an outside package is not used, and warn once."""
     if isinstance(problem, Exception):
         problem = f"{type(problem).__name__}: {problem}"
-    _skipped.append(replace(part, problem=problem))
+    if (noted := replace(part, problem=problem)) in _skipped:
+        return
+    _skipped.append(noted)
     warnings.warn(f"{part.name} of {part.package} ({part.group}) is skipped: {problem}", PluginWarning, stacklevel=2)
 
 
@@ -149,7 +167,7 @@ class Registry(Generic[T]):
             if self._parts is None:
                 self._parts = {}
                 for point, target in provided_modules(self.group):
-                    for cls in self._classes(target):
+                    for cls in self._classes(target, is_own=_is_own(point)):
                         self._add(cls, package_of(point.dist), is_own=_is_own(point))
         return MappingProxyType(dict(sorted(self._types.items())))
 
@@ -177,30 +195,37 @@ class Registry(Generic[T]):
         self._add(cls, cls.__module__, is_own=True)
 
     def lacking(self, cls: type) -> list[str]:
-        """Name the class variables that every class of the group has and this one has not."""
-        stated = inspect.get_annotations(self.base)
-        return [name for name, kind in stated.items() if str(kind).startswith("ClassVar") and not hasattr(cls, name)]
+        """Name the class variables and methods that a class of the group needs and this one has not."""
+        stated = {name: kind for base in reversed(cls.__mro__) for name, kind in inspect.get_annotations(base).items()}
+        fields = [name for name, kind in stated.items() if str(kind).startswith("ClassVar") and not hasattr(cls, name)]
+        return [*fields, *sorted(getattr(cls, "__abstractmethods__", ()))]
 
     @property
     def of_main_script(self) -> bool:
         """True if a class stands in the main script or a notebook, which other processes do not import."""
         return any(cls.__module__ == "__main__" for cls in self._types.values())
 
-    def _classes(self, target: tuple[ModuleType, ...] | type) -> Iterator[type[T]]:
+    def _classes(self, target: tuple[ModuleType, ...] | type, *, is_own: bool) -> Iterator[type[T]]:
         if isinstance(target, type):
             yield target
             return
         modules = {module.__name__ for module in target}
-        yield from (cls for cls in _subclasses(self.base) if cls.__module__ in modules)
+        for cls in _subclasses(self.base):
+            # Of an outside package, a class without a name of which there is no further one is incomplete.
+            incomplete = not is_own and not cls.__subclasses__() and not cls.__name__.startswith("_")
+            if cls.__module__ in modules and ("name" in vars(cls) or incomplete):
+                yield cls
 
     def _add(self, cls: Any, package: str, *, is_own: bool) -> None:
         parts = self._parts if self._parts is not None else {}
         name, target = getattr(cls, "name", cls.__name__), f"{cls.__module__}.{cls.__qualname__}"
         problem = ""
-        if not issubclass(cls, self.base) or inspect.isabstract(cls) or not isinstance(name, str):
-            problem = f"{target} is not a complete subclass of {self.base.__module__}.{self.base.__qualname__}"
+        if not issubclass(cls, self.base):
+            problem = f"{target} is not a subclass of {self.base.__module__}.{self.base.__qualname__}"
         elif lacking := self.lacking(cls):
             problem = f"{target} lacks {', '.join(lacking)}"
+        elif not isinstance(name, str):
+            problem = f"the name of {target} is {shown(name)}, no text"
         elif name in self._types:
             problem = f"the {self.kind} {name!r} exists already in {parts[name].package}"
         part = ExtensionPart(self.group, str(name), package, target, own=is_own)
@@ -216,10 +241,9 @@ _registries: dict[str, Registry[Any]] = {}
 
 
 def _subclasses(base: type) -> Iterator[type]:
-    """Concrete subclasses with a name of their own, at any depth."""
+    """Yield the subclasses at any depth."""
     for cls in base.__subclasses__():
-        if "name" in vars(cls) and not inspect.isabstract(cls):
-            yield cls
+        yield cls
         yield from _subclasses(cls)
 
 
@@ -278,14 +302,19 @@ def in_main_script() -> bool:
 
 
 def modules_with(group: str, hook: str) -> tuple[tuple[ExtensionPart, ModuleType], ...]:
-    """List the modules of a group that define something of that name, as commands and checks do."""
+    """List the modules of a group that define something of that name, as commands and checks do.
+
+    An outside package of which no module does is skipped with a `PluginWarning`.
+    """
     modules: list[tuple[ExtensionPart, ModuleType]] = []
     for point, target in provided_modules(group):
-        for module in target if isinstance(target, tuple) else ():
-            if callable(getattr(module, hook, None)):
-                name = module.__name__.rpartition(".")[2]
-                part = ExtensionPart(group, name, package_of(point.dist), module.__name__, own=_is_own(point))
-                modules.append((part, module))
+        package, is_own = package_of(point.dist), _is_own(point)
+        hooked = [m for m in target if hasattr(m, hook)] if isinstance(target, tuple) else []
+        for module in hooked:
+            name = module.__name__.rpartition(".")[2]
+            modules.append((ExtensionPart(group, name, package, module.__name__, own=is_own), module))
+        if not hooked and not is_own:
+            skip(ExtensionPart(group, point.name, package, point.value), f"{point.value} defines no {hook}")
     return tuple(modules)
 
 

@@ -35,6 +35,28 @@ packages = ["{module}"]
 """
 
 
+NO_MARK = """
+from mrdamper.rig_files.readers.laboratories import ColumnList
+class OurRig(ColumnList):
+    name = "our-rig"
+    title = "our rig"
+"""
+NO_LAW = """
+from mrdamper.systems.controllers.base import Controller
+class Brake(Controller):
+    name = 'brake'
+    title = "brake"
+    source = "tests"
+"""
+FAILS = """
+from mrdamper.exporters.base import Exporter
+class Gas(Exporter):
+    name, title = "gas", "gas force"
+    def export(self, damper, name):
+        return {}["gas"]
+"""
+
+
 def describe(source, name, entry_points):
     """Make a package of a source folder."""
     module = name.replace("-", "_")
@@ -64,20 +86,30 @@ def site(tmp_path_factory):
         (whole / group / "__init__.py").touch()
     describe(place / "whole", "rig-parts", [(group, f"rig_parts.{group}") for group in GROUPS])
     broken = {
-        "raises": ("raise RuntimeError('no licence')", ""),
-        "takes": ("from mrdamper.models.bingham import Bingham\nclass Again(Bingham):\n    name = 'bingham'\n", ""),
-        "newer": ("", "Requires-Dist: mrdamper>=99\n"),
-        "lacks": ("Lacking = 3\n", ""),
+        "raises": ("models", "raise RuntimeError('no licence')"),
+        "takes": (
+            "models",
+            "from mrdamper.models.bingham import Bingham\nclass Again(Bingham):\n    name = 'bingham'\n",
+        ),
+        "newer": ("models", ""),
+        "lacks": ("models", "Lacking = 3\n"),
+        "no_mark": ("readers", NO_MARK),
+        "no_check": ("checks", "def chek(view):\n    return []\n"),
+        "no_law": ("controllers", NO_LAW),
+        "no_name": ("controllers", NO_LAW.replace("    name = 'brake'\n", "")),
+        "divides": ("checks", "def check(view):\n    return [1 / 0]\n"),
+        "fails": ("exporters", FAILS),
     }
     install(site, place / "whole")
-    for name, (code, requires) in broken.items():  # as a package manager leaves them
+    for name, (group, code) in broken.items():  # as a package manager leaves them
         (site / name).mkdir()
         (site / name / "part.py").write_text(code)
         target = "lacks.part:Lacking" if name == "lacks" else f"{name}.part"
         facts = site / f"{name}-1.0.dist-info"
         facts.mkdir()
+        requires = "Requires-Dist: mrdamper>=99\n" if name == "newer" else ""
         (facts / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n{requires}")
-        (facts / "entry_points.txt").write_text(f"[mrdamper.models]\n{name} = {target}\n")
+        (facts / "entry_points.txt").write_text(f"[mrdamper.{group}]\n{name} = {target}\n")
     return site
 
 
@@ -132,6 +164,10 @@ def test_a_broken_package_is_named_with_its_reason_and_skipped(said, parts):
     assert "'bingham' exists already in mrdamper" in problems["takes 1.0"]
     assert "it needs mrdamper >=99" in problems["newer 1.0"]
     assert "neither a module nor a class" in problems["lacks 1.0"]
+    assert "no_mark.part.OurRig lacks mark" in problems["no_mark 1.0"]
+    assert "no_check.part defines no check" in problems["no_check 1.0"]
+    assert "no_law.part.Brake lacks law" in problems["no_law 1.0"]
+    assert "no_name.part.Brake lacks name" in problems["no_name 1.0"]
     assert said["model"].stderr.count("is skipped") == 4
     assert "Traceback" not in said["model"].stderr
 
@@ -165,6 +201,20 @@ def test_an_outside_model_is_studied(environment, tmp_path):
     run(environment, ("study", "--model", "rounded-coulomb", "--out", tmp_path / "result"))
     saved = json.loads((tmp_path / "result" / "model-utfsm.json").read_text())
     assert saved["damper"]["model"] == "rounded-coulomb"
+
+
+def test_a_check_that_raises_is_named_once_and_left_aside(said):
+    lines = [line for line in said["import"].stderr.splitlines() if "divides 1.0" in line]
+    assert lines == ["mrdamper: part of divides 1.0 (mrdamper.checks) is skipped: ZeroDivisionError: division by zero"]
+
+
+def test_an_error_in_the_code_of_a_package_names_it(environment, tmp_path):
+    model = next((Path(__file__).parents[1] / "files" / "stored" / "1.6").glob("study.json"))
+    command = [sys.executable, "-m", "mrdamper", "export", model, "--to", "gas", "--out", tmp_path / "gas"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 1
+    assert "fails 1.0 (mrdamper.exporters) raised KeyError: 'gas', in export of fails.part, line 6" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_an_outside_reader_check_and_command_are_used(said):

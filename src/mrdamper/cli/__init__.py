@@ -22,7 +22,7 @@ from typing import Any, NoReturn
 import typer
 
 from mrdamper.cli.help import CommandGroups, OptionGroups
-from mrdamper.discovery import PluginWarning, modules_with, skip
+from mrdamper.discovery import PluginWarning, fault_of_package, modules_with, skip
 from mrdamper.errors import InputError, ResourceError, resource_error
 
 _MIN_ADDRESS_SPACE = 2 * 2**30  # address space [bytes]; a study of the bundled data maps 1.3e9
@@ -51,6 +51,9 @@ def main() -> None:
         raise
     except BaseException as error:  # a panic of a library in Rust is no Exception
         typed = error if isinstance(error, InputError) else resource_error(error)
+        if typed is None and (fault := fault_of_package(error)):
+            _say(fault)
+            sys.exit(1)
         if typed is None:
             traceback.print_exc()
             _say("internal error; please report the lines above")

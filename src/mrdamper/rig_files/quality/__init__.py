@@ -16,8 +16,8 @@ from itertools import islice
 import numpy as np
 
 from mrdamper.data.arrays import drop_pages
-from mrdamper.discovery import modules_with
-from mrdamper.errors import InputError
+from mrdamper.discovery import ExtensionPart, modules_with, skip
+from mrdamper.errors import InputError, shown
 from mrdamper.rig_files.quality import disturbance, flat, lag, loop, motion, samples, sentinel, unsteady
 from mrdamper.rig_files.quality.view import View
 from mrdamper.rig_files.record import Finding, Record, part_of_record
@@ -78,7 +78,28 @@ _OF_A_FORCE = (  # what a force does that stands still is no finding
 
 @cache
 def _dropped_in() -> tuple[Check, ...]:
-    return tuple(module.check for _, module in modules_with("mrdamper.checks", "check"))
+    checks = modules_with("mrdamper.checks", "check")
+    return tuple(module.check if part.own else _skipped_if_raising(part, module.check) for part, module in checks)
+
+
+def _skipped_if_raising(part: ExtensionPart, check: Check) -> Check:
+    """Return the check of an outside package, which is left aside once it raises something but a refusal."""
+    raising = False
+
+    def run(view: View) -> list[Finding]:
+        nonlocal raising
+        try:
+            findings = [] if raising else list(check(view) or ())
+            if odd := next((one for one in findings if not isinstance(one, Finding)), None):
+                raise TypeError(f"check gives {shown(odd)}, which is no Finding")
+        except InputError:
+            raise
+        except Exception as error:  # whatever the code of a package raises
+            raising, findings = True, []
+            skip(part, error)
+        return findings
+
+    return run
 
 
 def check_record(record: Record, without: Collection[Check] = ()) -> Record:

@@ -121,7 +121,7 @@ class Controller(ABC):
 
     name: ClassVar[str]
     title: ClassVar[str]
-    source: ClassVar[str]
+    source: ClassVar[str] = ""  # where it was published
     calms: ClassVar[str] = ""  # "above" or "below", where it controls the motion of one end of the damper
 
     @classmethod

@@ -16,7 +16,6 @@ class Passive(Controller):
 
     name: ClassVar[str] = "passive"
     title: ClassVar[str] = "passive, constant current"
-    source: ClassVar[str] = ""
 
     current_A: float = param("A", "coil current", bounds=(0, math.inf), default=0.0)
 
