@@ -11,10 +11,10 @@ from pathlib import Path
 
 from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.errors import InputError
-from mrdamper.rig_files.channel_files import files_by_kind, with_files
 from mrdamper.rig_files.coil_current import CURRENT_TOO
 from mrdamper.rig_files.column_names import Header
 from mrdamper.rig_files.file_records import files_in, headings_of, unpacked
+from mrdamper.rig_files.mapping.companions import files_by_kind, with_files
 from mrdamper.rig_files.mapping.description import is_readme
 from mrdamper.rig_files.preview import columns_of, guess_profile, unset_keys
 from mrdamper.rig_files.profile import Profile, profile_text, toml

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from mrdamper.rig_files.record import Record, Refusal
     from mrdamper.rig_files.rig_import import ImportResult
 
-
 _OF_FORM = ("W_NO_EOL", "W_FOOTER", "W_ENCODING")  # codes of notes that change nothing
 _MOST_QUESTIONS = 12  # of one import
 
@@ -132,8 +131,7 @@ def _write_profile(files: list[Path], settings: Profile, target: Path) -> None:
 
 def _write_dataset(result: ImportResult, profile: Profile, out: Path, add: bool) -> tuple[int, int]:
     """Write or add; return the number of runs in the dataset, and of new ones."""
-    from mrdamper.rig_files.dataset_addition import with_tests
-    from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset
+    from mrdamper.rig_files.dataset_folder import load_dataset, save_dataset, with_tests
     from mrdamper.rig_files.profile import Profile, profile_text
     from mrdamper.rig_files.rig_import import to_dataset
 
@@ -226,7 +224,7 @@ def _print(
 
 def _print_next_step(result: ImportResult, profile: Path | None) -> None:
     """Print the command that answers what the refusals ask for, with the profile in use."""
-    from mrdamper.rig_files.channel_files import files_by_kind
+    from mrdamper.rig_files.mapping.companions import files_by_kind
     from mrdamper.rig_files.profile import Profile
 
     given = "" if profile is None else f" --profile {shlex.quote(str(profile))}"
