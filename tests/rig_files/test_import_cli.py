@@ -222,6 +222,16 @@ def test_columns_that_are_not_taken_are_named_once_and_the_profile_of_a_folder_i
     assert 'column = "force_N"' in run(tmp_path, "--write-profile", "-").output
 
 
+def test_a_profile_is_written_also_where_two_rates_are_stated(tmp_path):
+    write(tmp_path, "a_0.5A.csv", "# scan rate 1000 Hz\n" + text(rows()[:, 1:], ("displacement_mm,force_N",)))
+    write(tmp_path, "README.txt", "All channels were sampled at 500 Hz.\n")
+    profile = run(tmp_path, "--write-profile", "-").stdout
+    assert "two sampling rates: 500 Hz and 1000 Hz" in run(tmp_path, "--out", tmp_path / "out").output
+    profile = re.sub("#sample_rate_Hz = .*", "sample_rate_Hz = 500", profile)
+    path = write(tmp_path, "rig.toml", profile)
+    assert run(tmp_path, "--profile", path, "--out", tmp_path / "out").exit_code == 0
+
+
 def test_a_key_that_stands_twice_in_a_profile_is_named(tmp_path):
     profile = write(tmp_path, "rig.toml", '[file]\nnames = ["a"]\nnames = ["time [s]"]\n')
     done = run(write(tmp_path, "a.csv", text()), "--profile", profile)

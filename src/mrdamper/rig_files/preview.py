@@ -59,7 +59,9 @@ def guess_profile(path: str | Path, profile: Profile | str | Path | None = None)
     if not any(table.names):
         form["names"] = tuple(f"column {i + 1}" for i in range(len(table.names)))
     stated = "current" in channels or held_current_of(table) is not None
-    rate = rate_of(table, profile) if "time" not in channels or channels["time"].column is None else None
+    rate = None
+    with contextlib.suppress(InputError):  # of two that are stated neither is written: reading asks for one
+        rate = rate_of(table, profile) if channels.get("time", Channel()).column is None else None
     if rate:
         form["sample_rate_Hz"] = rate
         channels.pop("time", None)
