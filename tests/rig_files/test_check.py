@@ -15,6 +15,7 @@ from mrdamper.data import Dataset
 from mrdamper.report.plots.quality import quality_figure
 from mrdamper.rig_files.dataset_folder import save_dataset
 from mrdamper.rig_files.quality.table import to_run
+from mrdamper.rig_files.rig_import import import_files
 
 
 @pytest.fixture
@@ -52,6 +53,21 @@ def test_a_finding_of_several_runs_is_printed_once_with_their_number(tmp_path):
     save_dataset(Dataset(tuple(runs)), tmp_path / "rig")
     assert check(tmp_path / "rig").stderr.count("[W_NAME], in 2 tests") == 1
     assert check(tmp_path / "rig", "--verbose").stderr.count("[W_NAME]\n") == 2
+
+
+def test_a_run_in_another_unit_of_force_is_named_with_its_factor(tmp_path):
+    run, levels = to_run(clean_record(3, cycles=4)), {0.0: 1.0, 0.5: 1.6 / 4.4482216, 1.0: 2.2}
+    runs = [replace(run, id=f"run{i}", force=k * run.force, current=0 * run.time + i) for i, k in levels.items()]
+    save_dataset(Dataset(tuple(runs)), tmp_path / "rig")
+    assert "times 4.448 only, as of lbf" in check(tmp_path / "rig").stderr
+    (tmp_path / "files").mkdir()
+    for i, one in zip(levels, runs, strict=True):
+        table = np.column_stack([one.time, one.displacement, one.force + np.random.default_rng(1).normal(0, 1, 1)])
+        np.savetxt(tmp_path / f"files/{i}A.csv", table, delimiter=",", header="time_s,stroke_m,force_N", comments="")
+    records = import_files([tmp_path / "files"]).records
+    notes = [[finding.text for finding in record.findings if finding.code == "W_UNITS"] for record in records]
+    assert [len(texts) for texts in notes] == [0, 1, 0]
+    assert "state its unit in a profile" in notes[1][0]
 
 
 def test_json_holds_numbers(folder):

@@ -29,7 +29,7 @@ from mrdamper.rig_files.coil_current import (
 from mrdamper.rig_files.file_records import files_in, headings_of, records_of_file, unpacked
 from mrdamper.rig_files.mapping import plans
 from mrdamper.rig_files.mapping.companions import holds_channels, is_helper, is_list, joined_files, number_of, part_of
-from mrdamper.rig_files.mapping.comparisons import contradictions, repeated, stated_as_amplitudes
+from mrdamper.rig_files.mapping.comparisons import contradictions, in_another_unit, repeated, stated_as_amplitudes
 from mrdamper.rig_files.mapping.description import SHORT_TEXTS, is_description, is_readme, short_lines
 from mrdamper.rig_files.mapping.proposals import is_integrated
 from mrdamper.rig_files.mapping.results import WITHIN, Results
@@ -310,7 +310,7 @@ class _Intake:
         self._found = [test for i, test in enumerate(tests) if i not in again]
         self._refuse(contradictions([record for _, record in self.tests()]))
         records = [record for _, record in self.tests()]
-        for i, finding in stated_as_amplitudes(records).items():
+        for i, finding in (*stated_as_amplitudes(records).items(), *in_another_unit(records).items()):
             self._exchange(records[i], records[i].noticed(finding))
         return used
 

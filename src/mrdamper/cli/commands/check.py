@@ -35,6 +35,7 @@ def check(
     """
     from mrdamper.data.atomic import require_writable
     from mrdamper.rig_files.dataset_folder import load_dataset
+    from mrdamper.rig_files.mapping.comparisons import in_another_unit
     from mrdamper.rig_files.quality.table import quality_table, record_of, row
 
     if data is not None and data.suffix.lower() == ".fmu":
@@ -49,8 +50,10 @@ def check(
     verdicts = quality_table(record_of(run) for run in watched(runs, "run"))
     put([row(verdict) for verdict in verdicts], None, as_json, _text_table)
     refused = [f"refused: {verdict.refusal}" for verdict in verdicts if verdict.refusal is not None]
-    lines = finding_lines(((v.record.id, finding) for v in verdicts for finding in v.findings), verbose)
-    warn([*refused, *lines, *_unequal_repeats([r for r, v in zip(runs, verdicts, strict=True) if v.refusal is None])])
+    others = in_another_unit([v.record for v in verdicts])
+    findings = ((v.record.id, f) for i, v in enumerate(verdicts) for f in (*v.findings, *filter(None, [others.get(i)])))
+    repeats = _unequal_repeats([r for r, v in zip(runs, verdicts, strict=True) if v.refusal is None])
+    warn([*refused, *finding_lines(findings, verbose), *repeats])
     if figure is not None:
         from mrdamper.report.plots.quality import quality_figure
         from mrdamper.rig_files.quality.flat import flagged_samples

@@ -12,6 +12,7 @@ from mrdamper.data import Floats, held_current
 from mrdamper.data.arrays import take
 from mrdamper.errors import QualityError
 from mrdamper.rig_files.coil_current import with_stated_current
+from mrdamper.rig_files.column_names import TABLES
 from mrdamper.rig_files.quality.motion import stated_motion
 from mrdamper.rig_files.quality.view import find_strokes
 from mrdamper.rig_files.record import Finding, Record
@@ -20,6 +21,7 @@ _ALIKE = 0.1  # relative difference of frequency and amplitude within which two 
 _ALIKE_A = 0.03  # difference of the current within which two tests have the same [A]
 _FEWEST_AGREEING = 3  # tests of the amplitude that they state, for every one of half of it
 _SEVERAL = 2.0  # ratio of peak-to-peak forces at equal conditions that no repetition explains
+_UNITS = {unit: TABLES["units"]["force"][unit] for unit in ("lbf", "kgf", "kN")}
 _ROUNDING = 1e-3  # of the largest value: two exports of one test differ by less, two tests by more
 _ROUNDING_A = 5.5e-3  # [A] so much a current of two decimals differs from one of more
 MOST_SAMPLES = 20_000
@@ -48,9 +50,7 @@ def contradictions(records: Sequence[Record]) -> dict[int, QualityError]:
     refused = _copies(records, points)
     groups: dict[tuple[str, int], list[int]] = defaultdict(list)
     for i, point in points.items():
-        notes = records[i].provenance
-        owner = " ".join((records[i].rig, notes.get("specimen", ""), notes.get("session", "")))
-        groups[owner, round(point[2] / _ALIKE_A / 2)].append(i)
+        groups[_owner(records[i]), round(point[2] / _ALIKE_A / 2)].append(i)
     for i, j in chain.from_iterable(combinations(members, 2) for members in groups.values()):
         (*_, current, force), (*_, other_current, other_force) = points[i], points[j]
         near = abs(current - other_current) <= _ALIKE_A and _are_near(points[i], points[j])
@@ -72,6 +72,27 @@ def stated_as_amplitudes(records: Sequence[Record]) -> dict[int, Finding]:
     rest = f"where {agreeing} other tests have what theirs state: check the unit of displacement, or the name"
     texts = {i: text.format(stated[i], 1e3 * points[i][1]) for i in halves}
     return {i: Finding("W_NAME", f"{text}, {rest}") for i, text in texts.items()}
+
+
+def in_another_unit(records: Sequence[Record]) -> dict[int, Finding]:
+    """Return, by their place, tests whose force is between those at lower and higher currents in another unit only."""
+    points, findings = {i: of for i, record in enumerate(records) if (of := _point(record))}, dict[int, Finding]()
+    for i, one in points.items():
+        same = [of for j, of in points.items() if _are_near(one, of) and _owner(records[j]) == _owner(records[i])]
+        low = max((of[3] for of in same if of[2] < one[2] - _ALIKE_A), default=0.0)
+        high = min((of[3] for of in same if of[2] > one[2] + _ALIKE_A), default=0.0)
+        fits = [(k, u) for u, factor in _UNITS.items() for k in (factor, 1 / factor) if low < k * one[3] < high]
+        if len(fits) == 1 and low > 0 and not low / _SEVERAL < one[3] < _SEVERAL * high:
+            text = (
+                f"its force of {one[3]:.4g} N from peak to peak fits those at lower and higher currents ({low:.4g} and "
+            )
+            fit = "times {:.4g} only, as of {}: state its unit in a profile of this file".format(*fits[0])
+            findings[i] = Finding("W_UNITS", f"{text}{high:.4g} N) {fit}")
+    return findings
+
+
+def _owner(record: Record) -> str:
+    return " ".join((record.rig, *(record.provenance.get(key, "") for key in ("specimen", "session"))))
 
 
 def _copies(records: Sequence[Record], points: Mapping[int, _Point]) -> dict[int, QualityError]:
@@ -128,7 +149,6 @@ def _sampled(channel: Floats, size: int) -> Floats:
 
 
 def _are_near(one: _Point, other: _Point) -> bool:
-    """Tell if two tests are alike in frequency and amplitude."""
     return all(abs(a - b) <= _ALIKE * max(a, b) for a, b in zip(one[:2], other[:2], strict=True))
 
 
