@@ -12,26 +12,8 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.errors import ColumnError, CombinedError, InputError, UnitError, listed, printable
-from mrdamper.rig_files.column_names import (
-    COIL,
-    DIMENSION,
-    RATING,
-    TABLES,
-    WORDS,
-    Header,
-    Unit,
-    holds,
-    is_unit,
-    names_command,
-    names_compression,
-    parse_unit,
-    role_of,
-    says_nothing,
-    split_name,
-    unknown_unit,
-    words,
-    words_of,
-)
+from mrdamper.rig_files import column_names
+from mrdamper.rig_files.column_names import DIMENSION, holds, is_unit, parse_unit, split_name, words, words_of
 from mrdamper.rig_files.conditions import currents_in, named_after_currents, rate_in_name, stated_rate
 from mrdamper.rig_files.profile import Profile
 from mrdamper.rig_files.readers.base import RawTable, RigFileError
@@ -41,7 +23,7 @@ ROLES = (*REQUIRED, *OPTIONAL)
 _DERIVED = ("velocity", "acceleration")  # of the displacement
 _MOST_RESTARTS = 0.05  # of the samples of a clock that counts within steps
 _TOTAL = re.compile(r"total|absolut|gesamt|cumulat|kumul", re.IGNORECASE)
-_COUNTS = ("counts", *TABLES["unit_names"]["counts"])
+_COUNTS = ("counts", *column_names.TABLES["unit_names"]["counts"])
 _PHASES = (frozenset("UVW"), frozenset("RST"), frozenset(("L1", "L2", "L3")))  # of a motor, at the end of a name
 _INDEX, _MEASURED = words("sample"), words("measured")
 _AROUND_UNITS = words("around_units")
@@ -207,11 +189,15 @@ def _left_out(table: RawTable, profile: Profile, columns: Mapping[str, int]) -> 
 
 def coil_currents(table: RawTable) -> list[int]:
     """Return the columns in A that may be measured currents of the coil: no commands, computed ones, other devices."""
-    columns = [i for i in table.columns(dimension="current") if not RATING.search(table.names[i])]
+    columns = [i for i in table.columns(dimension="current") if not column_names.RATING.search(table.names[i])]
     names = {i: table.headers[i].name for i in columns}
     ends = {i: ["", *words_of(name)][-1].upper() for i, name in names.items()}
     motors = frozenset().union(*(of for of in _PHASES if len(of & {*ends.values()}) > 1))
-    return [i for i, n in names.items() if ends[i] not in motors and (role_of(n) == "current" or says_nothing(n))]
+    return [
+        i
+        for i, n in names.items()
+        if ends[i] not in motors and (column_names.role_of(n) == "current" or column_names.says_nothing(n))
+    ]
 
 
 def propose(table: RawTable) -> dict[str, tuple[int | None, str]]:
@@ -230,7 +216,7 @@ def candidates_of(table: RawTable, role: str) -> list[int]:
     with contextlib.suppress(InputError):
         if (choice := _choose(table, role, ())) is not None:
             return [choice]
-    nameless = [i for i in table.columns(dimension=DIMENSION[role]) if says_nothing(table.headers[i].name)]
+    nameless = [i for i in table.columns(dimension=DIMENSION[role]) if column_names.says_nothing(table.headers[i].name)]
     return table.columns(role, DIMENSION[role]) or nameless
 
 
@@ -244,8 +230,12 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
         if role not in (*REQUIRED, "current"):
             return None
         # Without a telling name the unit decides, if it is the only one of its kind.
-        fitting = [i for i, h in enumerate(headers) if h.dimension == DIMENSION[role] and not names_command(h.name)]
-        free = [i for i in fitting if i not in taken and says_nothing(headers[i].name)]
+        fitting = [
+            i
+            for i, h in enumerate(headers)
+            if h.dimension == DIMENSION[role] and not column_names.names_command(h.name)
+        ]
+        free = [i for i in fitting if i not in taken and column_names.says_nothing(headers[i].name)]
         return free[0] if len(free) == 1 == len(fitting) else None
     candidates = fitting or named
     names = [headers[i].name.casefold() for i in candidates]
@@ -253,10 +243,10 @@ def _choose(table: RawTable, role: str, taken: Collection[int]) -> int | None:
         measured = [i for i in candidates if holds(headers[i].name, _MEASURED)]
         if len(measured) == 1:
             return measured[0]
-        exact = [i for i, name in zip(candidates, names, strict=True) if name in WORDS[role]]
+        exact = [i for i, name in zip(candidates, names, strict=True) if name in column_names.WORDS[role]]
         if len({headers[i].name.casefold() for i in exact}) == 1 or (exact and role == "time"):
             return exact[0]
-        coils = [i for i in candidates if role == "current" and holds(headers[i].name, COIL)]
+        coils = [i for i in candidates if role == "current" and holds(headers[i].name, column_names.COIL)]
         if len(coils) == 1:
             return coils[0]
         if role == "time" and fitting:  # total and running time: refused if they run otherwise
@@ -345,7 +335,7 @@ def sign_of(table: RawTable, profile: Profile, role: str) -> int | None:
 def _convert(table: RawTable, role: str, column: int, profile: Profile, asks_current: bool = False) -> Assigned | None:
     header, channel, sign = table.headers[column], profile.channel(role), sign_of(table, profile, role)
     unit = channel.unit or header.unit
-    unit = "degF" if role == "temperature" and (unit or unknown_unit(table.names[column])) == "F" else unit
+    unit = "degF" if role == "temperature" and (unit or column_names.unknown_unit(table.names[column])) == "F" else unit
     uncalibrated = channel.scale is None and header.dimension in ("voltage", "count")  # no unit makes them newtons
     for text in (unit, header.unit) if uncalibrated else (unit,):
         problem = _unit_problem(table, "velocity" if channel.integrate else role, column, text)
@@ -356,14 +346,14 @@ def _convert(table: RawTable, role: str, column: int, profile: Profile, asks_cur
     if not channel.unit:
         _refuse_two_units(table, role, column, unit)
     name = table.names[column]
-    if not sign and role in SIGNED and (sign == 0 or names_compression(name)):
+    if not sign and role in SIGNED and (sign == 0 or column_names.names_compression(name)):
         problem = f"column {name!r} may count compression positive"
         remedy = f"set [channels.{role}] sign = -1 in a profile, or sign = 1 if it counts extension positive"
         raise _refusal(ColumnError, table, problem, remedy, "E_SIGN_CONVENTION")
     if role in SIGNED and channel.scale is None:
         _refuse_volts_beside(table, role, profile)
         _refuse_factor(table, role, unit)
-    si = parse_unit(unit) or Unit("", 1.0)
+    si = parse_unit(unit) or column_names.Unit("", 1.0)
     sign = sign or 1
     shift = 0.0 if channel.integrate else sign * (si.factor * channel.offset + si.offset)
     factor = sign * (channel.scale or 1.0) * si.factor
@@ -385,7 +375,7 @@ def _refuse_factor(table: RawTable, role: str, unit: str) -> None:
     """Refuse a channel that a line says to multiply, or to have been multiplied: multiply force by 2."""
     for line in table.lines:
         times = _TIMES.search(line)
-        if times is None or role not in map(role_of, words_of(line)):
+        if times is None or role not in map(column_names.role_of, words_of(line)):
             continue
         behind, before = _FACTOR.findall(line[times.end() :]), _FACTOR.findall(line[: times.start()])
         factor = float((behind or before[::-1] or ["1"])[0].replace(",", "."))
@@ -403,7 +393,7 @@ def _unit_problem(table: RawTable, role: str, column: int, unit: str) -> UnitErr
         problem = f"{named} holds no numbers but {table.odd[column][:40]!r}"
         return _refusal(UnitError, table, problem, f"export it as numbers with a unit{stamps}", "E_NUMBER")
     if parsed is None:
-        unit = unit or unknown_unit(table.names[column])
+        unit = unit or column_names.unknown_unit(table.names[column])
         problem = f"{named} has no unit" if not unit else f"{named} has the unit {unit!r}, which is not known"
         remedy = f'write it into the header, or set [channels.{role}] unit = "..." in a profile'
         if _CONVERTER.search(table.names[column]):
@@ -431,7 +421,7 @@ def units_in(line: str) -> list[tuple[str, str]]:
         header = split_name(text)
         named = [word for word in words_of(header.name) if word.casefold() not in _AROUND_UNITS]
         one = header.unit and [len(word) > 2 for word in named] == [True]  # no letter
-        role = role_of(named[0].removesuffix("s")) if one else None  # forces
+        role = column_names.role_of(named[0].removesuffix("s")) if one else None  # forces
         if role and header.dimension == DIMENSION[role]:
             stated.append((role, header.unit))
         elif named and not is_unit(cell):
@@ -507,7 +497,7 @@ def _are_alike(table: RawTable, columns: Sequence[int]) -> bool:
     return bool(channels) and all(_agree(*other, *channels[0]) for other in channels[1:])
 
 
-def _agree(a: Floats, one: Header, b: Floats, other: Header) -> bool:
+def _agree(a: Floats, one: column_names.Header, b: Floats, other: column_names.Header) -> bool:
     if one.unit == other.unit:
         return np.array_equal(a, b, equal_nan=True)
     if one.known is None or other.known is None:

@@ -24,26 +24,17 @@ import numpy as np
 from mrdamper.data.child import Child
 from mrdamper.errors import CombinedError, MissingExtraError
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.base import (
-    MOST_RATIO,
-    Content,
-    NoTableError,
-    RawTable,
-    Reader,
-    RigFileError,
-    Source,
-    Words,
-)
+from mrdamper.rig_files.readers import base
 from mrdamper.rig_files.record import Finding
 
 _SECONDS = 2.0  # processor time of the child for the smallest file: a busy machine counts several seconds for one
-_BYTES, _BYTES_PER_BYTE = 96 * 2**20, 3 * MOST_RATIO  # memory the child may write to beyond what its library holds
+_BYTES, _BYTES_PER_BYTE = 96 * 2**20, 3 * base.MOST_RATIO  # memory the child may write to beyond what its library holds
 _GLANCE, _GLANCES = 0.15, 4  # seconds between looks at a silent child, looks at which it sleeps until it is ended
 _PATIENCE = 30  # real time over processor time, on a loaded machine
 
 
 @contextlib.contextmanager
-def guarded_tables(source: Source, reader: Reader, form: FileForm) -> Iterator[list[RawTable]]:
+def guarded_tables(source: base.Source, reader: base.Reader, form: FileForm) -> Iterator[list[base.RawTable]]:
     """Yield the tables of a file, read by a process of its own.
 
     Raises what the reader raises; E_FORMAT if its library crashes, hangs or takes too much memory,
@@ -69,32 +60,32 @@ def guarded_tables(source: Source, reader: Reader, form: FileForm) -> Iterator[l
             if "missing" in answer:
                 raise MissingExtraError(answer["missing"], where=source.name, remedy=answer["remedy"])
             CombinedError.raise_from(
-                (NoTableError if wrong.pop("no_table") else RigFileError)(file=source.name, **wrong)
+                (base.NoTableError if wrong.pop("no_table") else base.RigFileError)(file=source.name, **wrong)
                 for wrong in answer.get("wrong", ())
             )
             return answer
 
-        def read(index: int, columns: Sequence[int]) -> Content:
+        def read(index: int, columns: Sequence[int]) -> base.Content:
             answer = ask({"table": index, "columns": list(columns)})
             values = {c: sandbox.receive(n) for c, n in zip(columns, answer["sizes"], strict=True)}
             lines = sandbox.receive(answer["lines"]) if answer["lines"] else None
-            return Content(values, lines, tuple(Finding(*finding) for finding in answer["findings"]))
+            return base.Content(values, lines, tuple(Finding(*finding) for finding in answer["findings"]))
 
-        def words(index: int, column: int) -> Words:
+        def words(index: int, column: int) -> base.Words:
             answer = ask({"table": index, "words": column})
-            return Words(sandbox.receive(answer["size"]).astype(np.int32), tuple(answer["labels"]))
+            return base.Words(sandbox.receive(answer["size"]).astype(np.int32), tuple(answer["labels"]))
 
         tables = ask({**request, **limits, "form": form.model_dump()})["tables"]
         says: list[dict[str, Any]] = [
             {name: tuple(value) if isinstance(value, list) else value for name, value in table.items()}
             for table in tables
         ]
-        yield [RawTable(source, read=partial(read, i), words=partial(words, i), **own) for i, own in enumerate(says)]
+        yield [
+            base.RawTable(source, read=partial(read, i), words=partial(words, i), **own) for i, own in enumerate(says)
+        ]
 
 
 class _Sandbox(Child):
-    """The child process."""
-
     slain = False  # by somebody else than us
     _ended = False  # by us
 
@@ -127,7 +118,7 @@ class _Sandbox(Child):
         try:
             return super().receive(size)
         except EOFError:
-            raise RigFileError("E_FORMAT", "the reading process ended early") from None
+            raise base.RigFileError("E_FORMAT", "the reading process ended early") from None
 
 
 @contextlib.contextmanager
@@ -155,7 +146,7 @@ def _sleeps(pid: int) -> bool:
     return bool(states) and all(state == "S" for state in states)
 
 
-def _on_disk(source: Source, stack: contextlib.ExitStack) -> Path:
+def _on_disk(source: base.Source, stack: contextlib.ExitStack) -> Path:
     """Return a path of the unpacked content."""
     if source.name == source.path.name and source.size == source.path.stat().st_size:
         return source.path

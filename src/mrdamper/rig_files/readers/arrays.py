@@ -19,17 +19,7 @@ from mrdamper.data import Floats
 from mrdamper.data.wording import number
 from mrdamper.errors import InputError, MissingExtraError
 from mrdamper.rig_files.column_names import KEYS, UNIT_KEYS, is_unit, parse_unit, split_name
-from mrdamper.rig_files.readers.base import (
-    MOST_COLUMNS,
-    MOST_RATIO,
-    MOST_UNPACKED,
-    RATIO_MATTERS_FROM,
-    Content,
-    RawTable,
-    RigFileError,
-    Source,
-    Words,
-)
+from mrdamper.rig_files.readers import base
 
 _MOST_ACROSS = 50  # channels of a matrix that has its samples in rows
 _PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value")
@@ -71,13 +61,13 @@ Array = np.ndarray | Stored
 
 
 def array_table(
-    source: Source, names: Sequence[str], units: Sequence[str], load: Callable[[int], np.ndarray], title: str = ""
-) -> RawTable:
+    source: base.Source, names: Sequence[str], units: Sequence[str], load: Callable[[int], np.ndarray], title: str = ""
+) -> base.RawTable:
     """Return a table whose columns are loaded as arrays, one by one; E_TOO_MANY_COLUMNS beyond a thousand."""
-    if len(names) > MOST_COLUMNS:
+    if len(names) > base.MOST_COLUMNS:
         raise source.refuse("E_TOO_MANY_COLUMNS", f"{len(names)} columns", "export only the channels needed")
 
-    def read(columns: Sequence[int]) -> Content:
+    def read(columns: Sequence[int]) -> base.Content:
         values = {}
         for column in columns:
             with refusing_damage(source, title):
@@ -89,15 +79,15 @@ def array_table(
             raise source.refuse("E_FIELD_COUNT", f"columns differ in length ({shown})", "export them together")
         if not sizes or not max(sizes):
             raise source.refuse("E_NO_DATA", "columns without samples", "export the file again")
-        return Content(values)
+        return base.Content(values)
 
-    def words(column: int) -> Words:
+    def words(column: int) -> base.Words:
         with refusing_damage(source, title):
             cells = list(map(text_of, np.asarray(load(column)).reshape(-1).tolist()))
         codes = {cell: code for code, cell in enumerate(dict.fromkeys(cells))}
-        return Words(np.array([codes[cell] for cell in cells], dtype=np.int32), tuple(codes))
+        return base.Words(np.array([codes[cell] for cell in cells], dtype=np.int32), tuple(codes))
 
-    return RawTable(source, tuple(names), tuple(units), read, words=words)
+    return base.RawTable(source, tuple(names), tuple(units), read, words=words)
 
 
 def text_of(item: object) -> str:
@@ -124,7 +114,7 @@ def unit_in(says: Mapping[str, Any], of: str = "") -> str:
 def texts_in(values: Any) -> list[str]:
     """Return the texts of an array or an attribute of several; empty if it holds anything else."""
     array = np.asarray(values).reshape(-1)
-    if array.dtype.kind not in "SUO" or not 1 < array.size <= MOST_COLUMNS:
+    if array.dtype.kind not in "SUO" or not 1 < array.size <= base.MOST_COLUMNS:
         return []
     cells = [np.asarray(item) for item in array.tolist()]
     return [] if any(cell.dtype.kind not in "SU" or cell.size > 1 for cell in cells) else list(map(text_of, cells))
@@ -139,13 +129,13 @@ def with_headings(rows: Sequence[Sequence[Any]]) -> list[dict[str, Any]]:
 
 def value_of(array: np.ndarray) -> Any:
     """Return the number or the text of an array of one item, a list for one of words, any other array as it is."""
-    if array.dtype.kind in "US" and array.size <= MOST_COLUMNS:
+    if array.dtype.kind in "US" and array.size <= base.MOST_COLUMNS:
         words = [text_of(item) for item in array.reshape(-1).tolist()]
         return words if array.size > 1 else "".join(words)
     return float(array.reshape(-1)[0]) if array.size == 1 and array.dtype.kind in "iuf" else array
 
 
-def as_floats(source: Source, array: np.ndarray, name: str, column: int) -> Floats:
+def as_floats(source: base.Source, array: np.ndarray, name: str, column: int) -> Floats:
     """Return a loaded column as (N,) doubles; date and time as seconds after the first.
 
     Objects are refused as E_UNSAFE, what else is no number as E_NUMBER, tables as E_FIELD_COUNT.
@@ -183,7 +173,7 @@ def columns_of(name: str, array: Array, texts: Iterable[Sequence[str]], unit: st
         return [(name, unit, array)]
     axis = 0 if inner[0] < inner[1] and inner[0] <= _MOST_ACROSS else 1
     width = inner[axis]
-    if len(inner) > 2 or width > MOST_COLUMNS:
+    if len(inner) > 2 or width > base.MOST_COLUMNS:
         return []
     own = re.split(r"\s*[,;]\s*", name.rpartition(": ")[2])  # data: t [s], s [mm], F [N]
     fitting = [words for words in (*texts, own) if len(words) == width]
@@ -240,14 +230,14 @@ def _formula_of(says: Mapping[str, Any]) -> tuple[float, float] | None:
     return factor, offset if len(names) > 1 else 0.0
 
 
-def check_unpacked(source: Source, size: int) -> None:
+def check_unpacked(source: base.Source, size: int) -> None:
     """Refuse tables that are far larger than their file: E_ARCHIVE_RATIO."""
-    if size > RATIO_MATTERS_FROM and (size > MOST_RATIO * source.size or size > 10 * MOST_UNPACKED):
+    if size > base.RATIO_MATTERS_FROM and (size > base.MOST_RATIO * source.size or size > 10 * base.MOST_UNPACKED):
         problem = f"{size / 1e6:.0f} MB of numbers in a file of {number(source.size / 1e6, 3)} MB"
         raise source.refuse("E_ARCHIVE_RATIO", problem, "export only the channels and the time needed")
 
 
-def whole(source: Source, title: str) -> bytes:
+def whole(source: base.Source, title: str) -> bytes:
     """Return a text of numbers as a whole; E_FORMAT beyond 200 MB."""
     if source.size > _LARGEST_TEXT:
         raise source.refuse("E_FORMAT", f"{title} of over {_LARGEST_TEXT // 10**6} MB", "export it as CSV or Parquet")
@@ -267,7 +257,7 @@ def load(library: str, title: str) -> ModuleType:
 
 
 @contextmanager
-def refusing_damage(source: Source, title: str) -> Iterator[None]:
+def refusing_damage(source: base.Source, title: str) -> Iterator[None]:
     """Turn whatever a library raises on a damaged file into a refusal; its warnings are not shown."""
     try:
         with warnings.catch_warnings():
@@ -279,7 +269,7 @@ def refusing_damage(source: Source, title: str) -> Iterator[None]:
         raise damaged(source, title, str(error)) from error
 
 
-def stated_array(source: Source, file: IO[bytes], what: str, size: int) -> tuple[tuple[int, ...], np.dtype]:
+def stated_array(source: base.Source, file: IO[bytes], what: str, size: int) -> tuple[tuple[int, ...], np.dtype]:
     """Shape and type of a NumPy array by its header; one of objects is refused, and one that the bytes do not hold."""
     version = np.lib.format.read_magic(file)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
@@ -292,14 +282,14 @@ def stated_array(source: Source, file: IO[bytes], what: str, size: int) -> tuple
     return shape, kind
 
 
-def refuse_twice(source: Source, names: Sequence[str]) -> None:
+def refuse_twice(source: base.Source, names: Sequence[str]) -> None:
     """Refuse a file that holds two things of one name, of which a library gives either."""
     if len(set(names)) < len(names):
         problem = f"{next(name for name in names if names.count(name) > 1)!r} is stored twice"
         raise source.refuse("E_DUPLICATE_COLUMN", problem, "save the file again, with one of them")
 
 
-def damaged(source: Source, title: str, why: str) -> RigFileError:
+def damaged(source: base.Source, title: str, why: str) -> base.RigFileError:
     """Return the refusal of a file that starts as it should and does not go on so."""
     early = any(word in why.lower() for word in _EARLY_END)
     why = re.sub(r"'?<[^<>]*>'?( is)? ?", "", why)  # objects of the library's own

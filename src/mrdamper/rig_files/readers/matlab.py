@@ -7,14 +7,7 @@ from typing import Any
 import numpy as np
 
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.arrays import (
-    check_unpacked,
-    refuse_twice,
-    refusing_damage,
-    texts_in,
-    value_of,
-    with_headings,
-)
+from mrdamper.rig_files.readers import arrays
 from mrdamper.rig_files.readers.base import RawTable, Reader, Source
 from mrdamper.rig_files.readers.hdf5 import HDF5_MARK, MOST_STRUCTS, hdf5_tables
 from mrdamper.rig_files.readers.nested import nested_tables
@@ -41,14 +34,14 @@ class Matlab(Reader):
         """Return the variables as one table, and one more a struct."""
         if source.head(520)[512:] == HDF5_MARK:
             return hdf5_tables(source, self.title)
-        with refusing_damage(source, self.title):
+        with arrays.refusing_damage(source, self.title):
             from scipy.io import loadmat, whosmat
 
             source.file.seek(0)
             variables = whosmat(source.file)
             names = [name for name, _, _ in variables]
-            refuse_twice(source, names)
-            check_unpacked(source, 8 * sum(int(np.prod(shape, dtype=object)) for _, shape, _ in variables))
+            arrays.refuse_twice(source, names)
+            arrays.check_unpacked(source, 8 * sum(int(np.prod(shape, dtype=object)) for _, shape, _ in variables))
             wanted = [name for name, _, kind in variables if kind in (*_NUMERIC, "struct", "char", "cell")]
             source.file.seek(0)
             values = loadmat(source.file, variable_names=wanted, simplify_cells=True)
@@ -69,14 +62,14 @@ def _tree(value: Any) -> Any:
     array = np.asarray(value)
     if array.dtype.kind == "O" and array.ndim > 1 and all(hasattr(item, "_fieldnames") for item in array.flat):
         array = array.reshape(-1)  # structs of tests by current and frequency
-    if words := texts_in(array):
+    if words := arrays.texts_in(array):
         return words
     if array.dtype.kind == "O" and 0 < array.size <= MOST_STRUCTS and array.ndim:
-        if rows := with_headings(array.tolist() if array.ndim == 2 else []):
+        if rows := arrays.with_headings(array.tolist() if array.ndim == 2 else []):
             return [_tree(row) for row in rows]
         cells = [_tree(cell) for cell in array]
         return array if any(isinstance(cell, (str, float)) for cell in cells) else cells
-    return value_of(array) if array.size else ""
+    return arrays.value_of(array) if array.size else ""
 
 
 def _is_version_4(head: bytes) -> bool:
