@@ -193,7 +193,6 @@ def read_table(path: Path, remedy: str) -> pl.DataFrame:
 
 
 def _numbers(table: pl.DataFrame, name: str, path: Path) -> Floats:
-    """Return a column as doubles, none missing."""
     if name not in table.columns:
         raise missing_column(name, table.columns, path)
     values = table[name]

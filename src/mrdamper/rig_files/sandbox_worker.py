@@ -53,7 +53,6 @@ def serve() -> None:
 
 
 def _library(name: str) -> Reader:
-    """Return the reader of that name, with its library loaded."""
     from mrdamper.rig_files.readers import all_readers
     from mrdamper.rig_files.readers.arrays import load
 

@@ -136,7 +136,6 @@ def _tests_of(records: Sequence[Record]) -> list[Record]:
 
 
 def _concatenated(records: Sequence[Record]) -> Record:
-    """Return one record of several, with the channels that all of them have."""
     names = [n for n in ("time", "displacement", "force", *OPTIONAL) if all(getattr(r, n) is not None for r in records)]
     channels: dict[str, Floats | None] = dict.fromkeys(OPTIONAL)
     channels |= {name: np.concatenate([getattr(record, name) for record in records]) for name in names}

@@ -71,7 +71,6 @@ def _nearest(kind: type[BaseModel], place: tuple[int | str, ...]) -> str:
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:
-    """Return the schemas within a type."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [model for inner in get_args(annotation) for model in _models(inner)]

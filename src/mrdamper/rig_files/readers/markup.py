@@ -58,8 +58,6 @@ def _of_cells(source: Source, sheets: Sheets, form: FileForm) -> list[RawTable]:
 
 
 class _Page(HTMLParser):
-    """The cells of the tables of a page."""
-
     def __init__(self) -> None:
         super().__init__()
         self.sheets: Sheets = []

@@ -144,7 +144,6 @@ def words_in(values: pl.Series) -> Words:
 
 
 def _of_test(value: object) -> object:
-    """Return what one row holds of a test: its samples, a number or a text."""
     if isinstance(value, (int, float)):
         return float(value)
     return _plain(value) if hasattr(value, "dtype") else str(value)  # type: ignore[arg-type]

@@ -52,7 +52,6 @@ class Uff(Reader):
 
 
 def _function(lines: list[str]) -> tuple[dict[str, object], dict[str, object]]:
-    """Return the texts above a function, and the function as a channel."""
     heads = {f"text {i}": line.strip() for i, line in enumerate(lines[:5], 1)}
     texts: dict[str, object] = {key: text for key, text in heads.items() if text not in ("", "NONE")}
     kind, count, even = (int(lines[6][at : at + 10]) for at in (0, 10, 20))
@@ -67,7 +66,6 @@ def _function(lines: list[str]) -> tuple[dict[str, object], dict[str, object]]:
 
 
 def _axis(line: str) -> tuple[str, str]:
-    """Return the name of an axis and its unit."""
     name, unit = line[26:46].strip(), line[47:67].strip()
     kind = _KINDS.get(int(line[:10]), "")
     return kind if name in ("", "NONE") else name, "" if unit == "NONE" else unit

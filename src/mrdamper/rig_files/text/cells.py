@@ -94,9 +94,7 @@ def split_rows(texts: Sequence[str], line: int, form: RowFormat, final: bool) ->
     Raises at E_QUOTE; rows of another width are left out and kept by the form, as are messages.
     """
     separator, width = form.layout.separator, form.layout.width + form.layout.trailing
-    rows: list[list[str]] = []
-    lines: list[int] = []
-    wrong: list[tuple[int, int, str]] = []
+    rows, lines, wrong = list[list[str]](), list[int](), list[tuple[int, int, str]]()
     last = 0
     for at, text in enumerate(texts, line):
         stripped = text.strip(" \t\r")

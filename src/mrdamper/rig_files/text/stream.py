@@ -144,7 +144,6 @@ def too_long(source: Source, line: int | None) -> RigFileError:
 
 
 def _encoding(source: Source, head: bytes, form: FileForm) -> tuple[str, int]:
-    """Name of the encoding and length of the byte order mark."""
     for mark, name in _BOMS:
         if head.startswith(mark):
             return name, len(mark)
