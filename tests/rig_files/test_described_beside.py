@@ -12,8 +12,10 @@ import pytest
 
 from mrdamper import import_files
 from mrdamper.rig_files import tests_table
+from mrdamper.rig_files.mapping import plans
 from mrdamper.rig_files.mapping.description import short_lines
 from mrdamper.rig_files.profile import Profile
+from mrdamper.rig_files.readers import raw_tables
 
 T = np.arange(1001) / 200.0
 X = 12.0 * np.sin(2 * np.pi * T)
@@ -69,11 +71,36 @@ UNITS = "time [s],displacement [mm],force [N]\n"
          {"m07": "T7", "m08": "T8", "m09": "T9"}),
         ({"README.md": "| Code | Current (A) |\n|---|---|\n| C1 | 0.2 |\n| C2 | 0.9 |\n| C3 | 0 |\n"},
          {"m07": "MRD-C1-H1", "m08": "MRD-C2-H1", "m09": "MRD-C3-H1"}),
+        ({"log.csv": "Date;Run no.;Coil current (A);Remarks\n14 Feb;7;0.2;\n;8;0.9;warm-up 10 cycles before\n"
+          ";9 – 11, 14;0;\n"}, {}),
+        ({"annex.tex": "\\caption{Tests}\n\\begin{tabular}{ccc}\n\\hline\nFile & $I$ [A] & $f$ [Hz] \\\\\n\\hline\n"
+          "m07 & 0{,}2 & 1 \\\\\nm08 & 0{,}9 & 1 \\\\\nm09 & 0{,}0 & 1 \\\\\n\\hline\n\\end{tabular}\n"}, {}),
+        ({"campaign.toml": 'title = "x"\n' + "".join(
+            f'[[run]]\nfile = "{name}.csv"\namps = {amperes}\nhz = 1\n' for name, amperes in CURRENTS.items())}, {}),
+        ({"load.m": "% akim: A, genlik: mm\nclear; clc;\n" + "".join(
+            f"d({n}).dosya = '{name}.csv'; d({n}).akim = {amperes}; d({n}).genlik = 12;\n"
+            for n, (name, amperes) in enumerate(CURRENTS.items(), 1))}, {}),
+        ({"log.txt": "Tuesday\n14:00 warm-up\n14:04 coil at 0.2 A\n14:14 0.9 A\n14:24 0 A\n14:40 end\n"},
+         {"m07": "R_20230603_140512", "m08": "R_20230603_141330", "m09": "R_20230603_142459"}),
+        ({"supply.csv": "Time,Current(A)\n" + "".join(
+            f"2023-06-03 14:05:{s:02d},{(0.2, 0.9, 0.0)[s // 20]}\n" for s in range(60))},
+         {"m07": "R_20230603_140512", "m08": "R_20230603_140530", "m09": "R_20230603_140550"}),
+        ({"crate.json": json.dumps({"@graph": [{"@id": "./", "@type": "Dataset"}, *(
+            {"@id": f"{name}.csv", "@type": "File", "additionalProperty": [
+                {"@type": "PropertyValue", "name": "coil current", "value": amperes, "unitText": "A"}]}
+            for name, amperes in CURRENTS.items())]})}, {}),
+        ({"README.txt": "File names follow the rule\n  D<damper>_I<current>.csv\n"
+          "where  current    is in hundredths of an ampere  (I050 = 0.50 A)\n"},
+         {"m07": "D7_I020", "m08": "D8_I090", "m09": "D9_I000"}),
+        ({"readme.txt": "suffix I0p5_f2p5 means current 0.5 A and 2.5 Hz (p = decimal point)\n"},
+         {"m07": "t7_I0p2_f1", "m08": "t8_I0p9_f1", "m09": "t9_I0_f1"}),
     ],
     ids=[
         "by an id of another table", "by the word before the number", "by two numbers", "measured beside set",
         "time of day", ".2", "set point of the supply", "unit in a code book", "names in columns of currents",
         "time of day of a sheet", "number before the word", "a range in order", "codes in a table of a README",
+        "several runs a row", "LaTeX", "TOML", "structs of a script", "a log by the clock", "a log of the supply",
+        "properties of files", "hundredths of an ampere", "an example of names",
     ],
 )  # fmt: skip
 def test_currents_of_a_table_that_names_the_tests_by_keys(tmp_path, tables, names):
@@ -93,8 +120,20 @@ def test_currents_of_a_table_that_names_the_tests_by_keys(tmp_path, tables, name
         {"plan.csv": "test;Sollstrom (A);Sollstrom 2 (A)\nm07;0,2;0,2\nm08;2,0;0,9\nm09;0;0\n"},
         {"note.txt": "m07 to m09: coil current 0.2, 0.9 A\n"},
         {"matrix.csv": "Corner,0.2 A,0.9 A,0 A\nFL,m07,m08,m09\nFR,m08,m07,\n"},
+        {"rig.toml": '[current.values]\n"m07" = 0.2\n"m08" = 0.9\n"m09" = 0.0\n'},
+        {"log.txt": "09:20 supply off (0 A)\n09:50 set 0.2 A\n10:40 set 0.9 A\n"},
+        {"readme.txt": "for example I0p5_f2p5\nsuffix I0p5_f2p5 means current 0.5 A and 2.5 Hz\n"},
     ],
-    ids=["a key of two rows", "two headings of one letter", "two set currents", "fewer than tests", "a name twice"],
+    ids=[
+        "a key of two rows",
+        "two headings of one letter",
+        "two set currents",
+        "fewer than tests",
+        "a name twice",
+        "a profile",
+        "a log, and tests without times",
+        "an example of other names",
+    ],
 )
 def test_currents_of_a_table_whose_keys_are_not_unique_are_asked(tmp_path, tables):
     write(tmp_path, UNITS)
@@ -290,14 +329,41 @@ def test_a_remark_in_brackets_behind_a_legend_may_have_a_comma(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "misfit"),
     [
-        ("7;0.2\n8;0.9\n8;0.5\n9;0\n", "plan.csv has '8' twice under 'Versuch'"),
+        ("7;0.2\n8;0.9\n8;0.5\n9;0\n", "plan.csv has '8' twice under 'Versuch' (rows 2 and 3)"),
         ("7;0.2\n9;0\n", "plan.csv names 2 of 3 tests and may lack m08"),
+        ("m07;0.2\nm08;0.9\nm08;0.5\n", "plan.csv has 'm08' twice under 'Versuch' (rows 2 and 3)"),
     ],
 )
 def test_a_plan_that_does_not_fit_its_tests_is_told_where(tmp_path, rows, misfit):
     write(tmp_path, UNITS)
     (tmp_path / "plan.csv").write_text(f"Versuch;Strom (A)\n{rows}")
     assert all(misfit in refusal.error.found for refusal in import_files([tmp_path]).refusals)
+
+
+def test_a_run_twice_among_five_columns_does_not_begin_the_rows(tmp_path):
+    rows = [("R01", 0, 1), ("R02", 0.6, 1), ("R03", 0.9, 1), ("R05", 0, 2), ("R05", 0.6, 2), ("R06", 0.9, 2)]
+    (tmp_path / "log.csv").write_text("Run,Current (A),Freq (Hz)\n" + "".join(f"{a},{b},{c}\n" for a, b, c in rows))
+    results = plans.results_of(tmp_path / "log.csv")
+    assert results is not None
+    assert results.current == (0, 0.6, 0.9, 0, 0.6, 0.9)
+    with raw_tables(tmp_path / "log.csv") as (table,):
+        assert table.read([1]).values[1].size == len(rows)
+
+
+def test_a_log_with_two_rows_as_near_as_each_other_is_no_answer(tmp_path):
+    write(tmp_path, UNITS)
+    for name, clock in zip(CURRENTS, ("140500", "141400", "142400"), strict=True):
+        (tmp_path / f"{name}.csv").rename(tmp_path / f"R_20230603_{clock}.csv")
+    (tmp_path / "log.csv").write_text("Clock;Current (A)\n14:05:10;0.2\n14:14:10;0.9\n14:18:50;0\n")
+    assert {refusal.error.code for refusal in import_files([tmp_path]).refusals} == {"E_CURRENT_MISSING"}
+
+
+def test_the_rig_of_a_plan_is_that_of_its_tests(tmp_path):
+    write(tmp_path, UNITS)
+    (tmp_path / "plan.csv").write_text("Test;Rig;Current (A)\nm07;north;0.2\nm08;south;0.9\nm09;north;0\n")
+    assert [record.rig for record in import_files([tmp_path]).records] == ["north", "south", "north"]
+    profile = Profile(rig="east")
+    assert {record.rig for record in import_files([tmp_path], profile).records} == {"east"}
 
 
 def test_a_date_among_keys_above_the_rows_is_no_row_of_a_log(tmp_path):

@@ -6,6 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from support.rig_files import tdms_bytes
 
 from mrdamper.errors import InputError
 from mrdamper.rig_files.columns import units_in
@@ -404,6 +405,79 @@ def test_a_session_is_cut_at_rests_at_steps_of_the_current_and_where_the_logger_
     assert currents(read_runs(path)) == [0.0, 0.0, 0.5, 0.5]
 
 
+def test_a_sheet_of_the_plan_states_the_rate_and_a_sheet_of_quantities_the_share_of_a_current(tmp_path):
+    book = pytest.importorskip("openpyxl").Workbook()
+    for row in (["Test series"], ["Sampling rate:", 200, "Hz"], [], ["TN số", "Dòng điện (A)"], [1, 0], [2, 0.5]):
+        book.active.append(row)
+    sheet = book.create_sheet("Data")
+    sheet.append(["TN số", "Mẫu số", "Chuyển vị (mm)", "Lực (N)"])
+    for number, amperes in ((1, 0.0), (2, 0.5)):
+        for i, (x, f) in enumerate(zip(X, force(amperes), strict=True), 1):
+            sheet.append([number, i, round(x, 5), round(f, 4)])
+    (tmp_path / "a").mkdir()
+    book.save(tmp_path / "a/tests.xlsx")
+    tests = import_files([tmp_path / "a"]).records
+    assert (currents(tests), [round(t.time[-1], 3) for t in tests]) == ([0.0, 0.5], [round(T[-1], 3)] * 2)
+    book = pytest.importorskip("openpyxl").Workbook()
+    for row in (
+        ["Report"],
+        ["Date", "9 June"],
+        [],
+        ["Bestromung [%]", 25],
+        ["Endstufe", "100 % = 1,6 A"],
+        ["f [Hz]", 1],
+    ):
+        book.active.append(row)
+    sheet = book.create_sheet("Data")
+    for row in (["Zeit", "Weg", "Kraft"], ["s", "mm", "N"], *zip(T, X, force(0.4), strict=True)):
+        sheet.append([*row])
+    (tmp_path / "b").mkdir()
+    book.save(tmp_path / "b/test.xlsx")
+    assert currents(import_files([tmp_path / "b"]).records) == [0.4]
+
+
+def test_a_channel_a_file_in_the_folder_of_its_test_may_have_decimal_commas(tmp_path):
+    for n, amperes in enumerate((0.0, 0.5), 1):
+        folder = tmp_path / f"Опыт_{n:02d}"
+        folder.mkdir()
+        for name, unit, values in (("Сила", "кН", force(amperes) / 1e3), ("Перемещение", "мм", X)):
+            head = f"ZETLAB\nКанал: {name}\nЕдиница измерения: {unit}\nЧастота дискретизации, Гц: 200\n"
+            head += f"Начало записи: 14.05.2023 11:2{n}:31,000\nЧисло отсчётов: {T.size}\n\n"
+            (folder / f"{name}.txt").write_text(head + "".join(f"{v:.5f}\n".replace(".", ",") for v in values))
+    (tmp_path / "журнал.csv").write_text("№ опыта;Ток, А\n1;0,0\n2;0,5\n")
+    (tmp_path / "說明.txt").write_text("時間: 秒, 位移: 公分, 出力: 公噸\n")
+    result = import_files([tmp_path])
+    assert not [str(r.error) for r in result.refusals]
+    assert currents(result.records) == [0.0, 0.5]
+    np.testing.assert_allclose(result.records[1].force, force(0.5), rtol=0, atol=0.01)
+
+
+def test_a_shorter_test_beside_others_with_a_clock_a_channel_has_no_sample_more(tmp_path):
+    pytest.importorskip("nptdms")
+    tests = {"Stroke_01": X, "Load_01": force(0.5), "Stroke_02": X[:-100], "Load_02": 1.2 * force(0.5)[:-100]}
+    units = {name: "mm" if "Stroke" in name else "N" for name in tests}
+    (tmp_path / "series_0.5A.tdms").write_bytes(tdms_bytes(tests, units, wave=True))
+    tests = import_files([tmp_path], parse_profile('[file]\nblocks = "split"\n')).records
+    assert [record.time.size for record in tests] == [T.size, T.size - 100]
+
+
+@pytest.mark.parametrize("late", [False, True], ids=["a mark a test", "a mark before its test begins"])
+def test_marks_among_the_rows_of_a_session_state_the_currents_where_each_test_has_one(tmp_path, late):
+    x, f, marks = [], [], []
+    for number, amperes in enumerate((0.0, 0.25, 0.5)):
+        moved, force_of = motion(1.0 + number, amperes, number)
+        own = [""] * (T.size + 400)
+        own[-350 if late else 60] = f"{amperes + 0.25 * late:.2f} A  {number + 1} Hz"
+        x, f, marks = [*x, moved, np.zeros(400)], [*f, force_of, np.zeros(400)], [*marks, *own]
+    marks = ["0.00 A  1 Hz" if late and not i else mark for i, mark in enumerate(marks)]
+    t, x, f = 0.005 * np.arange(len(marks)), np.concatenate(x), np.concatenate(f)
+    rows_of = (f"{a:.3f},{c:.3f},{b:.4f},{mark}\n" for a, b, c, mark in zip(t, x, f, marks, strict=True))
+    (tmp_path / "session.csv").write_text("Time,Load,Stroke,Event Markers\nsec,N,mm,\n" + "".join(rows_of))
+    result = import_files([tmp_path])
+    assert currents(result.records) == ([] if late else [0.0, 0.25, 0.5])
+    assert {r.error.code for r in result.refusals} == ({"E_CURRENT_MISSING"} if late else set())
+
+
 def test_rows_of_a_cell_array_below_their_names_are_tests(tmp_path):
     from scipy.io import savemat
 
@@ -458,6 +532,37 @@ def test_groups_of_other_length_or_of_another_current_are_not_joined(cut, ampere
             file[name].attrs["current_A"] = current
     (error,) = (refusal.error for refusal in import_files([tmp_path]).refusals)
     assert f"{error.code}: {error.found}".startswith(problem.format(T.size, T.size - cut))
+
+
+@pytest.mark.parametrize("readme", ["D{i,j}: frequency f_Hz(i), coil current I_A(j)", "D{i,j} at f_Hz and I_A"])
+def test_a_text_beside_cells_of_as_many_rows_as_columns_states_which_are_of_which_current(tmp_path, readme):
+    import h5py
+
+    def saved(file, name, values, kind="double"):
+        item = file.create_dataset(name, data=values)
+        item.attrs["MATLAB_class"] = np.bytes_(kind)
+        return item
+
+    with h5py.File(tmp_path / "grid.mat", "w", userblock_size=512) as file:
+        rows = np.empty((2, 2), h5py.ref_dtype)
+        for i, j in np.ndindex(2, 2):
+            test = np.array([T / (1 + i), X, (1 + 0.1 * i) * force(j / 2)])
+            rows[j, i] = saved(file, f"#refs#/r{i}{j}", test).ref
+        saved(file, "D", rows, "cell")
+        names = [
+            saved(file, f"#refs#/n{n}", [[ord(c)] for c in name], "char").ref
+            for n, name in enumerate(("time_s", "x_mm", "F_N"))
+        ]
+        saved(file, "columns", np.array([names], h5py.ref_dtype), "cell")
+        saved(file, "f_Hz", [[1.0, 2.0]]), saved(file, "I_A", [[0.0], [0.5]])
+        saved(file, "readme", [[ord(c)] for c in readme], "char")
+    with (tmp_path / "grid.mat").open("r+b") as head:
+        head.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    result = import_files([tmp_path])
+    found = [(record.current[0], round(record.time[-1], 3)) for record in result.records]
+    ends = [round(T[-1], 3), round(T[-1] / 2, 3)]
+    assert found == ([(i, end) for end in ends for i in (0.0, 0.5)] if "(i)" in readme else [])
+    assert {r.error.code for r in result.refusals} == (set() if "(i)" in readme else {"E_CURRENT_MISSING"})
 
 
 @pytest.mark.parametrize("key", ["current_A", "Current"])

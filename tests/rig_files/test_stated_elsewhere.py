@@ -161,8 +161,12 @@ def test_names_in_an_older_encoding_are_read(encoding, tmp_path):
 
 @pytest.mark.parametrize(
     "head",
-    [["# coil driver: 100 % duty = 2.0 A", "# duty = 25 %"], ["[Header]", "CoilCurrent=0.50", "CoilCurrentUnit=A"]],
-    ids=["a share", "the unit on a line of its own"],
+    [
+        ["# coil driver: 100 % duty = 2.0 A", "# duty = 25 %"],
+        ["[Header]", "CoilCurrent=0.50", "CoilCurrentUnit=A"],
+        ["Bestromung [%];31,25", "Endstufe;100 % = 1,6 A"],
+    ],
+    ids=["a share", "the unit on a line of its own", "a share in the unit of its name"],
 )
 def test_a_current_that_two_lines_state_counts(head, tmp_path):
     table(tmp_path / "a.csv", [*head, "Time [s],Displacement [mm],Force [N]"], T, X, force(0.5))

@@ -101,6 +101,16 @@ EXPORTS = {
     "a head in YAML": "#---\n#name: a\n#coil:\n#  current: 0.5\n#  unit: A\n#fields:\n#- name: t\n#  unit: s\n"
     + "#- name: stroke\n#  unit: mm\n#- name: force\n#  unit: N\n#---\nt,stroke,force\n"
     + lines(lambda i, t, x, f: f"{t:.3f},{x:.6f},{f:.4f}"),
+    "a head in YAML of astropy": "# %ECSV 1.0\n# ---\n# datatype:\n# - {name: time, unit: s, datatype: float64}\n"
+    + "# - {name: disp, unit: mm, datatype: float64}\n# - {name: force, unit: N, datatype: float64}\n# meta: !!omap\n"
+    + "# - {coil_current: !astropy.units.Quantity {unit: !astropy.units.Unit {unit: A}, value: 0.5}}\n"
+    + "# - {rig: A7}\n# schema: astropy-2.0\ntime disp force\n"
+    + lines(lambda i, t, x, f: f"{t:.3f} {x:.6f} {f:.4f}"),
+    "an object of Python, without YAML": "# params = {'I': 0.5, 'f': 1.0, 'note': ''}\n# I in ampere, f in Hz\n"
+    + "# t[s] x[mm] F[N]\n"
+    + lines(lambda i, t, x, f: f"{t:.3f} {x:.6f} {f:.4f}"),
+    "notes in the last of four columns": "Time,Load,Stroke,Marks\nsec,N,mm,\n"
+    + lines(lambda i, t, x, f: f"{t:.3f},{f:.4f},{x:.6f},{'start' if i == 30 else ''}"),
     "numbers of rows without a name": "t.s,stroke.mm,load.N\n"
     + lines(lambda i, t, x, f: f'"{i + 1}",{t:.3f},{x:.6f},{f:.4f}'),
     "a step for all channels, and a separator behind every line": '"Name","stroke","load",\n"VUnit","mm","N",\n'

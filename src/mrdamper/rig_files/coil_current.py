@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
@@ -32,6 +32,7 @@ _CHANNEL_WRONG = (
     'if the channel is wrong, set [channels.current] unit = "A" and scale in a profile, or leave its column out'
 )
 _OF_ANOTHER = re.compile("(?i)shunt|bridge|brücke")  # resistance or voltage
+_LARGEST_MARKED, _MOST_MARKS = 64 * 2**20, 500  # bytes of a file in whose rows marks are looked for, and marks
 _FOLDERS = 3  # above a file, whose names may state its current
 
 
@@ -308,6 +309,23 @@ def _set_points(table: RawTable, rows: slice) -> list[Statement]:
         if values is not None and (low := np.nanmin(values[column][rows])) == np.nanmax(values[column][rows]):
             statements.append(Statement(unit.factor * float(low), f"the column {table.names[column]!r}"))
     return statements if len({statement.amperes for statement in statements}) == 1 else []
+
+
+def with_marks(records: Sequence[Record], table: RawTable, tests: Sequence[slice]) -> Sequence[Record]:
+    """Return records without a current with that of a column of marks of events, where the rows of each have one."""
+    bare = [i for i, header in enumerate(table.headers) if header.role is None and not header.unit]
+    searched = table.words is not None and table.source.size <= _LARGEST_MARKED
+    for column in bare if searched and all(r.current is None and not r.doubt for r in records) else ():
+        words = table.words(column)  # type: ignore[misc]
+        labels = ["" if RATING.search(label) else label for label in words.labels[: _MOST_MARKS + 1]]
+        stated = [of[0] if len(of := currents_in(label)) == 1 else None for label in labels]
+        if len(labels) > _MOST_MARKS:
+            continue
+        codes = [[code for code in np.unique(words.codes[rows]) if stated[code] is not None] for rows in tests]
+        if all(len(own) == 1 for own in codes):
+            marks = [(stated[own[0]] or 0.0, f"the mark {labels[own[0]]!r}") for own in codes]
+            return [with_stated_current(r, *mark, r.id) for r, mark in zip(records, marks, strict=True)]
+    return records
 
 
 def _folders(table: RawTable, path: Path) -> list[Statement]:

@@ -29,6 +29,11 @@ def words(kind: str) -> frozenset[str]:
     return frozenset(TABLES["words"][kind])
 
 
+def sentences(kind: str) -> tuple[re.Pattern[str], ...]:
+    """Return the forms of sentences or names of a kind: sampling rates of rows, names of files of notes, ..."""
+    return tuple(map(re.compile, TABLES["sentences"][kind]))
+
+
 def meanings(table: str) -> dict[str, str]:
     """Return what each word of a table stands for, also where it is written without its accents: prad, forta."""
     own = {word: meaning for meaning, of in TABLES[table].items() for word in of}

@@ -13,30 +13,14 @@ from datetime import date
 from types import MappingProxyType
 from typing import NamedTuple
 
-from mrdamper.rig_files.column_names import (
-    COIL,
-    RATING,
-    TABLES,
-    Unit,
-    holds,
-    meanings,
-    names_condition,
-    parse_unit,
-    role_of,
-    split_name,
-    words,
-)
+from mrdamper.rig_files import column_names
+from mrdamper.rig_files.column_names import sentences, words
 from mrdamper.rig_files.text.tokens import MONTHS
 
 LARGEST_STATED = 15.0  # [A]: more is no coil current of a damper but another number
 _AGREE_A, _AGREE = 0.05, 0.15  # a nominal and a measured current may differ by so much: [A], and of it
 _SAME_A, _SAME = 0.01, 0.02  # and two numbers written for one current
-_IN_NAME = re.compile(
-    r"(?<![0-9A-Za-z.])(?<![0-9],)"  # 0.5 A,1 A are two
-    r"(?:(?:[iI](?:_?(?:[cC]oil|[sS]pule))?|(?:[sS]pulen|[cC]oil)?(?:[sS]trom|[cC]urr(?:ent)?|[cC]ur))(?: ?= ?)?)?"
-    r"([0-9]{1,4}(?:[.,xp][0-9]{1,4})?)[ _]?(m?)(?:A(?:mp(?:ere)?s?)?|amp(?:ere)?s?|(?<=m)a)"
-    r"(?![A-Za-z0-9]|\s?/\s?(?:m?V|%|div|s)\b)"
-)
+(_IN_NAME,) = sentences("current_in_name")
 _BEHIND_DIGITS = re.compile(r"(?<![0-9])([0-9]|1[0-4])_([0-9]+)[ _]?A(?![A-Za-z0-9])")  # MRD-7_0A: 0 or 7.0 A
 _BEFORE = re.compile("([A-Za-z]+)[-_ =]?$")  # letters before a label
 _LEVELS, _RUNS = words("current_level"), words("run")
@@ -67,9 +51,9 @@ _SCALE = re.compile(  # 60 mV = 10 A, 1 A per V, 0.5 A/V * U - 0.2 A, 2 A corres
     r"|=\s*(?:\([A-Za-z]\w* ?[-−–+] ?[0-9.,]+\)|[A-Za-z]\w*) ?[/*×·] ?[0-9]"
     r"|\b(?:[Tt]ype?|[Mm]odel)\b[ :=]*[A-Za-z]+-[0-9.,]+ ?m?A\b"
 )
-_NAMES = (*meanings("channels").items(), *meanings("symbols").items())
+_NAMES = (*column_names.meanings("channels").items(), *column_names.meanings("symbols").items())
 _CURRENTS = words("currents") | {word.casefold() for word, meaning in _NAMES if meaning == "current"}
-_AROUND_CURRENTS = words("around_currents") | COIL
+_AROUND_CURRENTS = words("around_currents") | column_names.COIL
 _NUMBER = r"[0-9]+(?:[.,xp][0-9]+)?"
 _LISTED = re.compile(  # 0, 1, 2 A; 0 to 2 A; 0-2A; 0.5-2A: of 3-2A, 3 may be the number of a test
     rf"(?:(-?{_NUMBER})[\s_-]*(?:([,;/])\s*{_NUMBER}\s*\2|(?<![A-Za-z])(?:and|und|et|to|bis)(?![A-Za-z])"
@@ -80,7 +64,7 @@ _AND = r"(?:,?\s(?:and|und|et|y|e|en|och|og|i|и)\s|[;/、]\s*|,\s+)"
 _SERIES = re.compile(
     rf"(?<![\w.,-])(?![0-9]/[0-9]\s?m?A)({_NUMBER}(?:(?:\s?m?A)?{_AND}{_NUMBER})+)\s?(m?A)(?![A-Za-z0-9/])"
 )  # 0, 0.5 and 1 A
-_EXPLAINED = re.compile("|".join(words("explained")), re.IGNORECASE)
+EXPLAINED = re.compile("|".join(words("explained")), re.IGNORECASE)
 _LABELLED_RATING = re.compile(
     "|".join([r"fuse|suppl|amplif|rated|range|clamp|(?<![a-z])(?:max|limit)(?![a-z])", *words("probe")]), re.IGNORECASE
 )
@@ -90,25 +74,15 @@ _MOTIONS = {  # an id has 0_5_Hz of the title 0,5 Hz
 }
 _AMPERES = {  # in other scripts; a small letter counts tests: тест 5 а
     unit: "|".join(f"(?i:{name})" if len(name) > 1 else name.upper() for name in names if not name.isascii())
-    for unit, names in TABLES["unit_names"].items() if unit in ("A", "mA")
+    for unit, names in column_names.TABLES["unit_names"].items() if unit in ("A", "mA")
 }  # fmt: skip
 _OTHER_SCRIPT = re.compile(rf"(?<=[0-9])\s?(?:(?P<mA>{_AMPERES['mA']})|(?P<A>{_AMPERES['A']}))(?!\w)")
-CHOICE = re.compile(  # use LVDT 2 for damper stroke; not: do not use, for strokes below 5 mm
-    r"(?i)(?<!not )(?<!never )(?<!n.t )\b(?:use|verwende|usar|utiliser|kullan) (?:the )?(?P<name>\S.{0,30}?) "
-    r"(?:for|as|für|als|para|pour)(?: the)? (?P<channel>[^.,;:|\t0-9]{2,40})(?=[.,;|\t]|$)"
-)
+(CHOICE,) = sentences("choice")
 _SAMPLING = "|".join(words("sampling"))
 _RATE = re.compile(rf"{_SAMPLING}|messrate|^(?:data )?rate$|scan|acquisition|^fs$|^f_s$", re.IGNORECASE)
 OTHER_DEVICE = re.compile("|".join(words("other_device")), re.IGNORECASE)
-_STEP = re.compile(
-    rf"{_SAMPLING}|^dt$|^d_t$|^delta[ _]?[tx]|^[dΔ] ?[tx]$|time ?step|step ?time|zeitschritt|increment"
-    r"|^interval$|^[hx][ _-]?(?:resolution|interval|increment|step|delta)$",
-    re.IGNORECASE,
-)
-_SHARE = re.compile(
-    r"^[\s#%/\"]*(?:coil )?(?:current|drive|strom|pwm|duty(?: cycle)?)\s*[:=;,\t]\s*"
-    r"(?P<number>[0-9]+(?:[.,][0-9]+)?)\s*%(?:\s*of rated|\s*$)", re.IGNORECASE,
-)  # fmt: skip
+_STEP = re.compile("|".join([sentences("step")[0].pattern, _SAMPLING]), re.IGNORECASE)
+(_SHARE,) = sentences("share")
 _WHOLE = re.compile(r"\b100 ?%[^=:]{0,30}[=:]\s*([0-9]+(?:[.,][0-9]+)?)\s*(m?A)\b")  # 100 % duty = 2 A
 _RATE_IN_NAME = re.compile(
     r"(?<![A-Za-z0-9.])(?:fs[_=]?(?P<a>[0-9]+(?:[.,][0-9]+)?)[ _]?(?P<ka>k?)Hz"
@@ -130,9 +104,8 @@ _DAYS = tuple(  # the surest form first: 2024-05-31, 31/5/2024, 31 May 2024 and 
         r"(?<!\w)(?P<mark>)(?:\d{1,2}[. -]+[^\W\d_]{3,9}|[^\W\d_]{3,9}[. ]+\d{1,2})[., -]+(?:19|20)\d\d",
     )
 )
-_WHICH = r"(?i)(?:test|excitation|motion|sine|drive|nominal|set|soll|prüf|anregungs|signal)?[ _-]*"
-_FREQUENCY_KEY = re.compile(_WHICH + r"(?:frequency|freq|frequenz|fréquence|frecuencia|frequenza|频率|周波数)")
-_AMPLITUDE_KEY = re.compile(_WHICH + r"(?:amplitude|ampl|amplitud|ampiezza|stroke|hub|course|振幅)")
+(_FREQUENCY_KEY,) = sentences("frequency_key")
+(_AMPLITUDE_KEY,) = sentences("amplitude_key")
 _TURNS = re.compile(r"speed|rpm|drehzahl|crank|régime|vitesse|velocidad|giri|обороты|转速|回転", re.IGNORECASE)
 
 
@@ -187,7 +160,7 @@ def _letters(before: str) -> str:
 
 
 def _means_current(letters: str) -> bool:
-    return letters in _LEVELS or role_of(letters) == "current"
+    return letters in _LEVELS or column_names.role_of(letters) == "current"
 
 
 def current_behind_label(name: str, names: Collection[str]) -> float | None:
@@ -266,7 +239,9 @@ def stated_by_lines(lines: Iterable[str], decimal: str | None = None) -> list[St
     lines, currents, rated = list(lines), [], []
     for line in lines:
         for key, value, unit in _quantities(line, decimal):
-            coil = names_condition(key, "current") or (holds(key, COIL) and not RATING.search(key))
+            coil = column_names.names_condition(key, "current") or (
+                column_names.holds(key, column_names.COIL) and not column_names.RATING.search(key)
+            )
             if unit.dimension == "current" and re.search("rated", key, re.IGNORECASE):
                 rated.append(value)
             elif unit.dimension == "current" and coil and not _SCALE.search(line):
@@ -283,7 +258,7 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
     """Return the current in free text of lines that name no limit or meaning, if all state one: "Test 3: 0.4 A"."""
     statements = []
     for line in lines:
-        no_test = RATING.search(line) or _SCALE.search(line) or _EXPLAINED.search(line)
+        no_test = column_names.RATING.search(line) or _SCALE.search(line) or EXPLAINED.search(line)
         stated = () if no_test else currents_in(_TOLERANCE.sub("", line))
         if len(stated) == 1:
             statements.append(Statement(stated[0], f"the line {line.strip()[:60]!r}"))
@@ -292,7 +267,7 @@ def stated_in_titles(lines: Iterable[str]) -> list[Statement]:
 
 def series_in(line: str) -> tuple[float, ...]:
     """Return the different currents [A] that a line lists if it says nothing else: currents of tests: 0, 0.5, 1 A."""
-    series = None if RATING.search(line) or _SCALE.search(line) else _SERIES.search(line[:LONGEST_LINE])
+    series = None if column_names.RATING.search(line) or _SCALE.search(line) else _SERIES.search(line[:LONGEST_LINE])
     if series is None or not names_only_currents(line[: series.start()]) or re.search(r"\w", line[series.end() :]):
         return ()
     listed = currents_in_order(series[0])
@@ -301,7 +276,7 @@ def series_in(line: str) -> tuple[float, ...]:
 
 def currents_in_order(text: str) -> tuple[float, ...]:
     """Return the currents [A] of the first list of them in a text: 0, 0.5, 1 A; empty if there is none, or a limit."""
-    series = None if RATING.search(text) or _SCALE.search(text) else _SERIES.search(text[:LONGEST_LINE])
+    series = None if column_names.RATING.search(text) or _SCALE.search(text) else _SERIES.search(text[:LONGEST_LINE])
     if series is None or {*re.findall("m?A", series[1])} - {series[2]}:  # 500 mA, 1 A
         return ()
     return tuple(amperes(number, series[2]) for number in re.findall(_NUMBER, series[1]))
@@ -327,13 +302,13 @@ class Quantity(NamedTuple):
 
     key: str
     value: float  # in SI
-    unit: Unit
+    unit: column_names.Unit
 
 
-def quantity_in_cell(cell: str, unit: str) -> tuple[float, Unit] | None:
+def quantity_in_cell(cell: str, unit: str) -> tuple[float, column_names.Unit] | None:
     """Return the number of a cell in SI and its unit, which stands behind it or is that of the column; else None."""
     match = CELL.fullmatch(cell)
-    unit_of = parse_unit((match[2] if match else "") or unit)
+    unit_of = column_names.parse_unit((match[2] if match else "") or unit)
     if match is None or unit_of is None:
         return None
     return unit_of.factor * float(match[1].replace(",", ".")) + unit_of.offset, unit_of
@@ -346,7 +321,7 @@ def stated_quantities(
     for line in lines:
         yield from _quantities(line, decimal)
     for name, number in numbers.items():
-        header = split_name(name)
+        header = column_names.split_name(name)
         if header.known is not None:
             yield Quantity(header.name, header.known.factor * number, header.known)
 
@@ -378,7 +353,7 @@ def stated_clock(numbers: Mapping[str, float]) -> tuple[float, float, str] | Non
     """
     clock, start = None, 0.0
     for name, number in numbers.items():
-        header = split_name(name)
+        header = column_names.split_name(name)
         dimension, factor = header.dimension, header.factor
         unit = "s" if dimension in ("time", "frequency") else ""
         if number > 0 and dimension in (None, "frequency") and BARE_RATE.fullmatch(header.name):
@@ -419,9 +394,9 @@ def _quantities(line: str, decimal: str | None) -> Iterator[Quantity]:
         if decimal != "," and "," in match["key"] and "," in match["number"]:  # two cells: gain, offset
             continue
         whole = match["key"].strip().strip('"')
-        key, unit = split_name(whole)
-        key, unit = whole if RATING.search(whole) else key, match["unit"] or unit
-        unit_of = parse_unit(unit)
+        key, unit = column_names.split_name(whole)
+        key, unit = whole if column_names.RATING.search(whole) else key, match["unit"] or unit
+        unit_of = column_names.parse_unit(unit)
         value = _value(match["number"], decimal)
         if unit_of is not None and value is not None:
             yield Quantity(key, unit_of.factor * value, unit_of)

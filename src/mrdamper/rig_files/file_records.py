@@ -145,8 +145,7 @@ def tables_of_tests(tables: list[RawTable], profile: Profile) -> tuple[list[RawT
     """
     if len(tables) == 1:
         return tables, []
-    fitting: list[RawTable] = []
-    others: list[tuple[RawTable, InputError]] = []
+    fitting, others = list[RawTable](), list[tuple[RawTable, InputError]]()
     for table in tables:
         try:
             assign(table, profile)
@@ -203,8 +202,7 @@ def unpacked(paths: Iterable[str | Path]) -> Iterator[list[Path]]:
 
 def files_in(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
     """Return the files to be read, and those of the folders that are of other kinds."""
-    files: list[Path] = []
-    others: list[Path] = []
+    files, others = list[Path](), list[Path]()
     for path in paths:
         if not path.is_dir():
             files.append(path)

@@ -19,13 +19,7 @@ from mrdamper.data.displayable import Displayable
 from mrdamper.data.progress import Progress, silent
 from mrdamper.data.temporary import without_temporary_folder
 from mrdamper.errors import ColumnError, CombinedError, InputError, is_a, shown, validate_arguments
-from mrdamper.rig_files.coil_current import (
-    as_data,
-    other_statement,
-    require_current,
-    with_current_behind_label,
-    with_stated_current,
-)
+from mrdamper.rig_files import coil_current
 from mrdamper.rig_files.file_records import files_in, headings_of, records_of_file, unpacked
 from mrdamper.rig_files.mapping import plans
 from mrdamper.rig_files.mapping.companions import holds_channels, is_helper, is_list, joined_files, number_of, part_of
@@ -260,7 +254,7 @@ class _Intake:
             return
         self.unchecked.append((path, record))
         checked, problems = record, list[InputError]()
-        steps = (partial(require_current, path=path), check_long_record)
+        steps = (partial(coil_current.require_current, path=path), check_long_record)
         for step in steps if record.doubt is None else steps[:1]:
             try:
                 with np.errstate(all="ignore"):
@@ -286,7 +280,7 @@ class _Intake:
             if (path, record.id) not in met:
                 self.met.append((path, record.id))
                 record = applied(record, path, self._table)
-            record = with_current_behind_label(record, path, names)
+            record = coil_current.with_current_behind_label(record, path, names)
             self._check(path, record, several=counts[path] > 1)
         self._refuse_names_without_point()
         whence = {file: record.provenance.get("current_from", "") for file, record in self._found}
@@ -327,7 +321,9 @@ class _Intake:
     def _is_beside_tests(self, path: Path) -> bool:
         alone = [other.suffix for other in self._order].count(path.suffix) == 1 < len(self._order)
         script = alone and path.suffix[1:].isalpha() and path.suffix.lower() not in suffixes()  # calibrate.tcl
-        return script or is_list(path) or is_description(path) or is_helper(path, self._order)
+        plan = self._results(path)
+        listed = plan is not None and plans.misfit_of_plan(path, plan, [(p, r) for p, r in self.unchecked]) is not None
+        return script or listed or is_list(path) or is_description(path) or is_helper(path, self._order)
 
     def _compare(self, path: Path, results: Results | None) -> bool:
         """Refuse accepted tests that contradict a plan, in its own file those of that, or that a remark in it discards.
@@ -341,9 +337,12 @@ class _Intake:
         if plans.currents_beside(path, remarks, own) is None:  # of some tests, by their names
             tests = [tests[i] for i in plans.named_tests(remarks, own)]
             own = [test for _, test in tests]
-        for (_, record), specimen in zip(own, plans.specimens_of(path, remarks, own), strict=False):
-            self._exchange(record, replace(record, provenance={"specimen": as_data(specimen), **record.provenance}))
-        own = [self.tests()[i] for i, _ in tests]
+        for kind in ("specimen", "rig"):
+            for (_, record), label in zip(own, plans.labels_of(path, remarks, own, kind), strict=False):
+                text = coil_current.as_data(label)
+                notes = {"specimen": text, **record.provenance} if kind == "specimen" else record.provenance
+                self._exchange(record, replace(record, rig=record.rig or text * (kind == "rig"), provenance=notes))
+            own = [self.tests()[i] for i, _ in tests]
         stated, other = plans.currents_beside(path, results, own), plans.other_motions(path, results, own)
         refused = plans.discarded_tests(path, remarks, own)
         if other is not None:
@@ -352,10 +351,10 @@ class _Intake:
         answers += ["profile"] if other else []
         near = dict[int, ColumnError]()
         for i, ((file, record), (current, whence)) in enumerate(zip(own, stated or (), strict=False)):
-            if (error := other_statement(record, current, whence, file.name)) is not None:
+            if (error := coil_current.other_statement(record, current, whence, file.name)) is not None:
                 near[i] = error
             try:
-                with_stated_current(record, current, whence, file.name)
+                coil_current.with_stated_current(record, current, whence, file.name)
             except InputError as error:
                 if (answer := record.provenance.get("current_from", "")) in answers:
                     self._exchange(record, record.noticed(Finding("W_CHOSEN", f"{answer} decides: {error.found}")))
@@ -483,7 +482,7 @@ class _Intake:
         for i, ((file, record), (current, whence)) in enumerate(zip(tests, stated, strict=True)):
             with contextlib.suppress(InputError):  # its doubt stays
                 note = f"its current is the {current:g} A of {whence}"
-                record = with_stated_current(record, current, whence, file.name, note)
+                record = coil_current.with_stated_current(record, current, whence, file.name, note)
             self._pending.append((file, replace(record, doubt=refused.get(i, record.doubt))))
         self._plans.append(path)
         self.notes = [note for note in self.notes if Path(note.file) != path]
@@ -520,7 +519,6 @@ class _Intake:
         return sorted(tests, key=lambda entry: self._order[entry[0]])
 
     def _refuse(self, errors: Mapping[int, InputError]) -> None:
-        """Refuse accepted tests, each by its place among them."""
         tests = self.tests()
         self.refusals += [Refusal(str(tests[i][0]), error, tests[i][1].id) for i, error in errors.items()]
         self._found = [test for i, test in enumerate(tests) if i not in errors]
@@ -561,7 +559,7 @@ def _with_folders(tests: Sequence[tuple[Path, Record]]) -> list[Record]:
     records = []
     for path, record in tests:
         depth = next((n for n in range(1, len(path.parts)) if endings[path.parts[-n:]] == 1), len(path.parts))
-        file = as_data("/".join(path.parts[-depth:]))
+        file = coil_current.as_data("/".join(path.parts[-depth:]))
         records.append(record if depth == 1 else replace(record, provenance={**record.provenance, "file": file}))
     return records
 
@@ -571,7 +569,7 @@ def to_dataset(records: Sequence[Record], name: str = "dataset") -> Dataset:
 
     Raises `InputError` if a record has no current, or there is no record.
     """
-    return Dataset(tuple(to_run(require_current(record)) for record in records), name)
+    return Dataset(tuple(to_run(coil_current.require_current(record)) for record in records), name)
 
 
 def with_unique_ids(records: Iterable[Record]) -> tuple[Record, ...]:

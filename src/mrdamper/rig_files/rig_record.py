@@ -119,7 +119,7 @@ def records_of(table: RawTable, profile: Profile, path: Path) -> list[Record]:
                 doubt=doubt, **part,  # type: ignore[arg-type]
             )
         )  # fmt: skip
-    return records
+    return [*coil_current.with_marks(records, table, stretches)]
 
 
 def _read(table: RawTable, assigned: dict[str, Assigned], profile: Profile):
@@ -340,7 +340,6 @@ def recording_time(lines: Iterable[str]) -> dict[str, str]:
 
 
 def _time_in(text: str) -> str | None:
-    """Return a time of day as ISO 8601."""
     match = _TIME.search(text)
     if match is None:
         return None

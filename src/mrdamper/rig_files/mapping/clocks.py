@@ -11,7 +11,7 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.wording import number
-from mrdamper.rig_files.column_names import is_unit, parse_unit, split_name, words
+from mrdamper.rig_files.column_names import is_unit, parse_unit, sentences, split_name, words
 from mrdamper.rig_files.conditions import stated_rate, stated_speed
 from mrdamper.rig_files.mapping.proposals import frequency_of, stated_frequencies
 from mrdamper.rig_files.profile import Profile
@@ -22,9 +22,7 @@ from mrdamper.rig_files.text.tokens import stamp
 _FRACTIONS = {"millisekunden": "ms", "millitm": "ms"}
 _DATES = words("date")
 _CYCLE = re.compile(r"(?i)(?:cycle|zyklus|ciclo|cykl|цикл|サイクル|循环)s?(?:[ ._]*(?:count|number|no|nr|#)\.?)?$")
-_AXIS_UNIT = re.compile(
-    r"(?i)^[\s\"]*(?P<axis>[xyz])[ _-]?axis[ _-]?unit\"?\s*[;,:=\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s;,\"]*$"
-)
+(_AXIS_UNIT,) = sentences("axis_unit")
 _SAMPLE_TIME = re.compile(r"(?i)^\s*\"?sample ?time ?\[(?P<unit>[mµun]?s)\]")  # of traces of controllers
 _DAY_S = 86_400.0
 _EPOCHS = (  # the years 2000 to 2100 by a clock: its first and last number, its unit, the factor to it, what it counts

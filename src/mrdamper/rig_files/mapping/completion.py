@@ -10,25 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mrdamper.rig_files import conditions
-from mrdamper.rig_files.column_names import (
-    DIMENSION,
-    RATING,
-    SI,
-    UNIT_KEYS,
-    WEIGHT,
-    Header,
-    holds,
-    is_unit,
-    meanings,
-    names_condition,
-    parse_unit,
-    role_of,
-    says_nothing,
-    split_name,
-    words,
-    words_of,
-)
+from mrdamper.rig_files import column_names, conditions
+from mrdamper.rig_files.column_names import DIMENSION, SI, Header, is_unit, role_of, sentences, split_name, words
 from mrdamper.rig_files.conditions import LONGEST_LINE, currents_in, damper_in, without_currents
 from mrdamper.rig_files.mapping import scales
 from mrdamper.rig_files.mapping.clocks import with_axis_as_time, with_epoch
@@ -39,24 +22,19 @@ from mrdamper.rig_files.text.row_samples import cells_of
 from mrdamper.rig_files.text.tokens import looks_numeric, number
 
 _SEPARATORS = ("\t", ";", ",", "|")
-_CLOCKS, _WEIGHTS = meanings("clocks") | {"time since start": ""}, meanings("weights")
-_TIME_UNIT = re.compile(
-    r"(?i)^[\s\"#%]*(?:horizontal|x[ -]?|h|time[ _-]?)\s*units?\"?\s*[:=,;\t]\s*\"?(?P<unit>[a-zµ]{1,12})\"?[\s,;]*$"
-)
-_ABSCISSA = re.compile(  # Abscissa: Time / s, start 0, delta 0.001
-    r"(?i)^[\s#%\"]*(?:abscissa|abszisse|(?:x|time)[ _-]?axis|zeitachse)\b.{0,40}?[/\[( ](?P<unit>[mµu]?s)\b.{0,40}?"
-    r"\b(?:delta|step|increment|schritt(?:weite)?|d[xt])\b\W{1,4}(?P<step>[0-9]+(?:\.[0-9]+)?(?:e[+-]?[0-9]+)?)(?=[\s,;]|$)"
-)
+_CLOCKS, _WEIGHTS = column_names.meanings("clocks") | {"time since start": ""}, column_names.meanings("weights")
+(_TIME_UNIT,) = sentences("time_unit")
+(_ABSCISSA,) = sentences("abscissa")
 _KEY = re.compile(r"[\s#%;\"]*([^=:]{1,60}?)\s*[=:]\s*(\S+)\s*")  # CoilCurrent=0.5, CoilCurrentUnit=A
-_UNIT_KEY = re.compile(rf"(?i)(?:{'|'.join(UNIT_KEYS)})$")  # HUnit, X-Einheit
+_PAIR = re.compile(  # of an object as JSON or Python writes it: {'I': 0.35, 'f': 1.0}
+    r"""[{,]\s*(?P<mark>["'])([A-Za-z]\w{0,40})(?P=mark)\s*:\s*([+-]?[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?)\s*(?=[,}])"""
+)
+_UNIT_KEY = re.compile(rf"(?i)(?:{'|'.join(column_names.UNIT_KEYS)})$")  # HUnit, X-Einheit
 _UNITS_KEY = re.compile(r"(?:vertical|channel|y|signal|data)?[ _-]*units?", re.IGNORECASE)
 _TITLES = words("label") | words("notes")
-_UNITS_IN = rf"(?i:{'|'.join(sorted(UNIT_KEYS, key=len, reverse=True))}|unités|unidades|units)"
+_UNITS_IN = rf"(?i:{'|'.join(sorted(column_names.UNIT_KEYS, key=len, reverse=True))}|unités|unidades|units)"
 _SI_UNITS = re.compile(rf"\bSI[- ](?:base[- ])?{_UNITS_IN}|{_UNITS_IN}\W*(?:(?:in|du|del|do)\W+)?SI\b")
-_ALL_VOLTS = re.compile(
-    r"(?i)\b(?:all|alle|todos|tous|tutti)\b(?: \w+)? (?:channels|signals|columns|kanäle|signale|canales|canaux|canali)"
-    r"(?: \w+){0,2} (?:in|en) (?:volts?|V)\b"
-)
+(_ALL_VOLTS,) = sentences("all_volts")
 _EXCEPT = re.compile(r"(?i)\b(?:except|but|not|no|non|außer|nicht|kein\w*|sauf|salvo|excepto|tranne)\b")
 _AT = re.compile(r"\s(?:at|for|bei|mit|à|pour|con|com|en|vs\.?)\s")  # of a condition: force (N) at coil current
 _SYMBOL = re.compile(r"^[A-Za-z](?=[ _.0-9])")  # before the number of a test
@@ -93,12 +71,15 @@ _LONGEST_CONDITIONS = 4000  # characters
 
 def completed(table: RawTable) -> RawTable:
     """Add the names, units and scales that the file states above, below or beside its row of names."""
+    pairs = {match[2]: float(match[3]) for line in table.lines for match in _PAIR.finditer(line)}
+    table = replace(table, constants={**pairs, **table.constants})
     table = _with_x_values(_with_values_for_all(table))
     if not any(name.strip("0123456789") for name in table.names):
         table = _with_listed_names(table)
     if table.names == ("",):  # a channel a file: force_N.txt
-        header = split_name(Path(table.source.name).stem)
-        table = table.named({0: header}) if header.role else table
+        header, unit = split_name(Path(table.source.name).stem), table.headers[0]
+        own = unit.unit if header.role and unit.dimension == DIMENSION[header.role] else header.unit
+        table = table.named({0: (header.name, own)}) if header.role else table
     table = _with_numbered_channels(_with_lines_of_file(_without_shared_path(table)))
     if not any(table.names):
         return table
@@ -121,7 +102,9 @@ def states_si(line: str) -> bool:
     """Tell if a line states that all units are those of the SI: All quantities in SI units."""
     if len(line) > LONGEST_LINE or not _SI_UNITS.search(line) or _EXCEPT.search(line):
         return False
-    named = [parse_unit(word) for word in re.split(r"[\s,;:()\[\]=]+", line) if word != "in" and is_unit(word)]
+    named = [
+        column_names.parse_unit(word) for word in re.split(r"[\s,;:()\[\]=]+", line) if word != "in" and is_unit(word)
+    ]
     return all(unit is None or unit.factor == 1 for unit in named)
 
 
@@ -205,7 +188,7 @@ def _with_keyed_lines(table: RawTable) -> RawTable:
         elif _UNITS_KEY.fullmatch(key.rstrip(" :")) and not any(table.units) and all(map(is_unit, cells[: width - 1])):
             units = tuple(cells if len(cells) == width and cells[-1] else ("", *cells[: width - 1]))  # one a column
             table = replace(table, units=units) if len(cells) >= width - 1 else table
-        elif header.dimension == "current" and names_condition(header.name, "current") and len(stated) > 1:
+        elif header.dimension == "current" and column_names.names_condition(header.name, "current") and len(stated) > 1:
             if not width - 2 <= len(cells) <= width or not all(map(_PLAIN.fullmatch, stated)):
                 continue
             titles, last = [""], ""
@@ -252,13 +235,14 @@ def _row_of_names(line: str, width: int, units: Collection[Sequence[str]]) -> tu
 
     Where it lists no unit, they are those of the only other line that lists nothing else.
     """
-    if RATING.search(line.rpartition(": ")[0]) or _FIGURE.search(line):
+    if column_names.RATING.search(line.rpartition(": ")[0]) or _FIGURE.search(line):
         return ()
-    row = tuple(map(item_of, _listed_cells(line)))
+    row = tuple(item_of(cell.removeprefix(f"{number} ")) for number, cell in enumerate(_listed_cells(line), 1))
     if len(units) == 1 and len(row) == width and not any(header.unit for header in row):
         row = tuple(Header(header.name, unit) for header, unit in zip(row, *units, strict=True))
     roles = {header.role for header in row if header.role and header.dimension == DIMENSION[header.role]}
-    return row if len(row) == width == len(roles) and {"displacement", "force"} <= roles else ()
+    named = len(row) == width == len(roles) and not any(header.name[:1].isdigit() for header in row)  # in their order
+    return row if named and {"displacement", "force"} <= roles else ()
 
 
 def _with_numbered_channels(table: RawTable) -> RawTable:
@@ -328,7 +312,7 @@ def _with_explained_names(table: RawTable) -> RawTable:
         called = {name.casefold(), header.name.casefold()} - {""}
         own = [cells[1:] for cells in lines if header.role is None and cells[0].casefold() in called]
         cells = own[0] if own and own.count(own[0]) == len(own) else []
-        named = [cell for cell in cells if split_name(cell).role and not scales.senses_in(cell)]
+        named = [c for c in cells if split_name(c).role and not (is_unit(c) or scales.senses_in(c))]
         units = [] if any(map(scales.scales_in, cells)) else [cell for cell in cells if is_unit(cell.strip("[]()"))]
         if len({split_name(cell).role for cell in named}) == 1 and len(units) < 2:
             headings[i] = named[0], (header.unit, *units, "")[0 if header.unit else 1].strip("[]()")
@@ -343,9 +327,9 @@ def _with_heading_of_currents(table: RawTable) -> RawTable:
     columns = conditions.named_after_currents(table.names)
     if not columns or table.over or table.columns("force"):
         return table
-    own = [line for line in table.lines if not (RATING.search(line) or _OTHER_FORCE.search(line))]
+    own = [line for line in table.lines if not (column_names.RATING.search(line) or _OTHER_FORCE.search(line))]
     lines = {line.strip(' ,;\t|#%/"*') for line in own}
-    lines = [line for line in lines if {*map(role_of, words_of(line))} <= {"force", "current", None}]
+    lines = [line for line in lines if {*map(role_of, column_names.words_of(line))} <= {"force", "current", None}]
     headings = [_AT.split(line)[0].strip() for line in lines if not re.search("[0-9;|\t]", line)]
     headings = [head for head in headings if (header := split_name(head)).role == header.dimension == "force"]
     if len(headings) != 1:
@@ -367,7 +351,9 @@ def _with_titles(table: RawTable) -> RawTable:
         elif title and header.role is None and (bare := split_name(without_currents(title))).role is not None:
             if header.dimension == "time" and bare.role != "time":
                 names[i], units[i] = f"{bare.name} time", units[i] or header.unit  # an x column of its own
-            elif header.dimension in (None, DIMENSION[bare.role]) and (says_nothing(header.name) or currents_in(name)):
+            elif header.dimension in (None, DIMENSION[bare.role]) and (
+                column_names.says_nothing(header.name) or currents_in(name)
+            ):
                 names[i] = bare.name
                 units[i] = units[i] or header.unit or bare.unit
                 over[i] = f"{title} {name}".strip()
@@ -391,7 +377,7 @@ def _with_listed_units(table: RawTable) -> RawTable:
     listed: dict[int, set[str]] = {}
     doubtful: dict[int, set[str]] = {}  # of a range, a figure or a numbered device: may contradict the others
     for line in table.lines if names else ():
-        cells = [cell.strip(' "') for cell in re.split(r"[,;|\t]", line.lstrip("#%/ "))]
+        cells = [cell.strip(' "') for cell in re.split(r"[,;|\t]| {2,}", line.lstrip("#%/ "))]
         behind_colon = [cell.partition(": ")[2] for cell in cells]  # rig 7, columns: time [s], load [N]
         for text, whole in zip((*cells, *behind_colon, line), (*cells, *cells, line), strict=True):
             header = item_of(text)
@@ -406,12 +392,17 @@ def _with_listed_units(table: RawTable) -> RawTable:
             i = int(number[1]) - 1 if number else i
             role = (role_of(names[i]) or header.role or "") if i in names else ""
             fits = role_of(meaning) in (role, None) and header.dimension == DIMENSION.get(role, "voltage")
+            fits |= i in names and line == f"{names[i]}: {header.unit}"  # P: kN, of a structure
             row = "," in meaning and i in names and role_of(names[i]) is None  # Step, Type, Current [A]
             value = re.search(rf"[0-9]\s*(?:[|;\t]\s*|,)?{re.escape(header.unit)}\W*$", text)  # load cell, 25 kN
             if i is None or row or not fits or value:
                 continue
             headings = " ".join(part.partition(": ")[0] for part in (line, whole))
-            doubt = RATING.search(f"{headings} {meaning}") or _FIGURE.search(line) or re.search("[0-9]", meaning)
+            doubt = (
+                column_names.RATING.search(f"{headings} {meaning}")
+                or _FIGURE.search(line)
+                or re.search("[0-9]", meaning)
+            )
             (doubtful if doubt else behind).setdefault(i, set()).add(header.unit)
             units = {unit for cell in cells if is_unit(unit := _ASIDE.sub("", cell))}  # kN (until 2020), N (since 2021)
             doubtful.setdefault(i, set()).update(u for u in units if split_name("", u).dimension == header.dimension)
@@ -435,7 +426,7 @@ def item_of(text: str) -> Header:
     """Name and unit in a part of a line, with what the name means behind it: t: s; `x` - stroke in mm; F = load, N."""
     text = _MARK.sub("", text)
     match = _COLON.match(text)
-    header = Header(match[1], match[2]) if match and parse_unit(match[2]) else split_name(text)
+    header = Header(match[1], match[2]) if match and column_names.parse_unit(match[2]) else split_name(text)
     return header if header.unit else split_name(_ASIDE.sub("", text))
 
 
@@ -456,7 +447,9 @@ def _with_clocks_and_weights(table: RawTable) -> RawTable:
         key = re.sub(r"[\s_()]+", " ", header.name.strip().casefold()).strip()
         if not header.unit and key in _CLOCKS and not (table.columns("time") and is_unit(key)):  # ms of a stamp
             headings[i] = "time", _CLOCKS[key]
-        elif header.role == "force" and header.unit in _WEIGHTS and holds(header.name, WEIGHT):
+        elif (
+            header.role == "force" and header.unit in _WEIGHTS and column_names.holds(header.name, column_names.WEIGHT)
+        ):
             headings[i] = header.name, _WEIGHTS[header.unit]
             notes.append(Finding("W_UNITS", f"{header.name!r} in {header.unit} is the force of that weight"))
     return table.named(headings).noted(*notes)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -19,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.column_names import DIMENSION, UNIT_KEYS, is_unit, names_condition, split_name, words, words_of
+from mrdamper.rig_files import column_names
+from mrdamper.rig_files.column_names import UNIT_KEYS, is_unit, names_condition, sentences, split_name, words, words_of
 from mrdamper.rig_files.columns import units_in
 from mrdamper.rig_files.conditions import OTHER_DEVICE, stated_by_lines
 from mrdamper.rig_files.mapping import scales
@@ -32,50 +34,29 @@ from mrdamper.rig_files.text.elements import numbers_in, root_of, tree_of
 from mrdamper.rig_files.text.stream import decoded
 
 _MARKDOWN = (".md", ".rmd", ".qmd")
-SHORT_TEXTS = (".csv", ".txt", ".tsv", ".dat", *_MARKDOWN, ".log", ".json", ".yaml", ".yml")
 _MOST = 200  # lines
 _FEWEST_ROWS = 50  # of a record
 _FEW_FILES = 10  # that describe a folder, not a test each
-_STRUCTURES = (".json", ".yaml", ".yml")
+_STRUCTURES = (".json", ".yaml", ".yml", ".toml")
+SHORT_TEXTS = (".csv", ".txt", ".tsv", ".dat", *_MARKDOWN, ".log", ".tex", ".m", *_STRUCTURES)
 _NAMED = (*_STRUCTURES, ".xml")  # structures that describe the record of their name
-_READ = (".txt", *_MARKDOWN, ".rst", ".csv", ".tsv", *_STRUCTURES)
+_READ = (".txt", *_MARKDOWN, ".rst", ".csv", ".tsv", ".m", *_STRUCTURES)
 _HYDRA = ".hydra/config.yaml"  # beside the record of a job, by the program of that name
 _LARGEST_LIST = 4096  # bytes of a list of channels
-_TEXTS = (".csv", ".txt", ".tsv", ".ini", ".cfg", ".par", ".set")
-_RATE = r"(?P<number>[0-9]+(?:[.,][0-9]+)?) ?(?P<kilo>k?)"
-_IN_SAMPLES = (
-    r"(?:S(?:ps|/s)|(?:sample|scan|reading|value)s? ?(?:/ ?s(?:ec)?|per s(?:ec(?:ond)?)?)|werte (?:pro|je) Sekunde)\b"
-)
-_RATES = (
-    re.compile(  # all channels were sampled at 512 Hz; of "samples", which may be specimens, 100 or more
-        r"(?i)(?:(?:sampl(?:ed|ing)|(?:sample|scan|acquisition|logging|data|mess)[ _]?(?:rate|freq\w*)|ab(?:ge)?tast\w*"
-        r"|échantillonn\w*|muestre\w*|amostra[gd]\w*|campiona[mt]\w*)"
-        r"|(?:samples?|scanned|recorded|acquired|logged)\b(?=[^0-9]{0,40}(?:[0-9]{3}|[0-9.,]+ ?k)))"
-        r"(?:[\s:=()]|(?:rates?|freq\w*|is|was|were|at|with|by|of|for|about|all|both|the|every|each|channels?|tests?"
-        r"|signals?|data|force|logger|system|simultaneously|synchronously|von|mit|bei|beträgt|aller?|Kanäle|Tests|de|à|a"
-        r"|da|di|des|con|com|los)\b){0,15}"
-        rf"{_RATE}(?:Hz\b|{_IN_SAMPLES})(?![^.;,]{{0,15}}(?:filt|pass|sine|sinus|motion|excit|mains))"
-    ),
-    re.compile(rf"(?i)(?<![\w.,]){_RATE}(?:{_IN_SAMPLES}|Hz (?:sampl|scan|acqui|logg|abtast|messrate))"),
-)
-_OTHER_RATES = re.compile(  # than that of the rows
-    r"(?i)decim|dezim|resampl|down-?sampl|averaged (?:to|down)"
-    r"|(?:temper|thermo|\bpress)[^.,;]{0,30}(?:sampl|record|acqui|logg|tast)|sampl\w* (?:of )?(?:temper|thermo|press)"
-)
+_TEXTS = (".csv", ".txt", ".tsv", ".ini", ".cfg", ".par", ".set", ".m")
+_RATES = sentences("rates")
+(_OTHER_RATES,) = sentences("other_rates")
 _DEVICE_BEFORE = re.compile(rf"(?i)(?:{OTHER_DEVICE.pattern})\w*,?[^.;,]*$")  # Camera, scan rate 300 Hz
 _DEVICE_BEHIND = re.compile(rf"(?i)[^.;,]{{0,30}}(?:{OTHER_DEVICE.pattern})(?![^.;,]*[0-9] ?k?Hz)")  # moving average
 _LABEL = re.compile(r"([^.;,:]+):\s*$")
 _RECORDER = re.compile(
     rf"(?i)daq|logg|acqui|record|erfass|mess|data|daten|\badc\b|system|channel|kan[aä]l|rate|{'|'.join(words('sampling'))}"
 )
-_README = re.compile(
-    r"(?i)(?:read[_ ]?me|lies_?mich|lisez[-_ ]?moi|l[eé]eme|leggimi|leia[-_ ]?me|notes?|info|说明|説明|설명)\b.*"
-)
-_GENERAL = re.compile(  # structures that describe the only record of a folder, behind its name or without it
-    r"(?i)(?:meta(?:[ _-]?data)?|info(?:rmation)?|set-?up|settings?|config(?:uration)?|tests?|conditions?|parameters?"
-    r"|params?|description|experiment|campaign|acquisition|header|sidecar|read[_ -]?me|notes?)?"
-)
+(_README,) = sentences("readme")
+(_GENERAL,) = sentences("general")
 _LARGEST = 2**18  # bytes
+_TEX = re.compile(r"\\\\.*|[${}]")  # around the cells of a table in LaTeX
+_ITEM = re.compile(r"(\w+[({]\d+[)}])\.(\w+) *= *['\"]?([^;'\"\n]+)")  # d(1).current = 0.5;
 _RULE = re.compile(r"[\s|:+=-]*")  # below the names of columns of a table in Markdown
 _DEEPEST, _FEWEST_TESTS = 6, 2
 _MOST_LEVELS = 50  # of a text in YAML
@@ -84,7 +65,7 @@ _VALUE, _SCALE, _UNIT = words("value"), words("scale"), UNIT_KEYS
 _EU = re.compile(r"(?i)\b(?:EU|units?)\b")  # engineering units, those of the row
 _PER = re.compile(rf"{_EU.pattern} ?(?:/|per) ?m?V\b|\bm?V ?(?:/|per) ?{_EU.pattern[4:]}")
 _SHIFT = re.compile(r"(?i)offset|zero")
-_MEASURED = {*DIMENSION.values(), "frequency"}
+_MEASURED = {*column_names.DIMENSION.values(), "frequency"}
 READ_FOLDERS: ContextVar[Sequence[Path]] = ContextVar("folders that are read, with all texts in them", default=())
 _PLACES = ("column", "number", "index", "no", "position", "channel")  # of a column among the others
 
@@ -96,6 +77,7 @@ def with_notes(table: RawTable, path: Path, profile: Profile) -> RawTable:
     folders = [_texts_in(f, f.stat().st_mtime_ns) for f in (path.parent, path.parent.parent, *further)]
     texts = next((readme for readme, *_ in folders if readme), [])
     (readme, structures, listing), above = folders[:2]
+    structures = structures or above[1]
     listing = listing if readme else [*listing, *above[2]]
     texts = texts + (structures if lacking or len(structures) <= _FEW_FILES else [])
     texts = texts + [p for p in listing if lacking and p.stat().st_size <= _LARGEST_LIST]
@@ -163,7 +145,7 @@ def _lacks_names_or_units(table: RawTable) -> bool:
 
 def _of_channels(line: str) -> str:
     """Return what a line states of channels: a scale, a unit, or as "channel 2: load N" what a number stands for."""
-    cells = [cell.strip().strip('"') for cell in re.split(r"[,;\t|]", line.strip(" |"))]
+    cells = [cell.strip().strip('"') for cell in re.split(r"[,;\t|]| {2,}", line.strip(" |"))]
     numbered = len(cells) > 2 and cells[0].isascii() and cells[0].isdigit()
     if numbered and (split_name("", cells[-1]).known or scales.scales_in(cells[-1])):
         return f"channel {cells[0]}: {' '.join(cells[1:])}"
@@ -231,14 +213,26 @@ def short_lines(path: Path) -> list[str]:
         try:
             tree = _STRUCTURED[suffix](text)
             ours = isinstance(tree, dict) and str(tree.get("format", "")).startswith("mrdamper-")  # a saved model
+            ours |= suffix == ".toml" and {*tree} <= {*Profile.model_fields}
             return [] if ours else list(_stated(tree, ""))
         except (ValueError, RecursionError, SyntaxError, InputError):
             if suffix in (".json", ".xml"):
                 return []
     text = text.replace("`", "") if suffix in _MARKDOWN else text
+    text = _TEX.sub("", text).replace("&", "|") if suffix == ".tex" else text
     text = re.sub(r"(?<=\w)_\*", "", text)  # t_* time (s), of t_I0, t_I1
     lines = [line for line in text.splitlines() if "|" not in line or not _RULE.fullmatch(line)]
+    lines += _items_assigned(text) if suffix == ".m" else ()
     return _by_headings(lines) if len(lines) <= _MOST_LISTED else lines
+
+
+def _items_assigned(text: str) -> Iterator[str]:
+    """Yield the items of arrays of structs that a script assigns, as a table, with the units of a comment: akim: A."""
+    items: dict[str, dict[str, Any]] = {}
+    for item, key, value in _ITEM.findall(text):
+        items.setdefault(item, {})[key] = numbers_in(value)
+    units = {key: unit for key, unit in re.findall(r"(\w+)\s*[:=]\s*([^\W\d]+)", text) if is_unit(unit)}
+    yield from _stated([*items.values()], "", units)
 
 
 def _by_headings(lines: list[str]) -> list[str]:
@@ -301,7 +295,13 @@ def _with_numbers(node: Any) -> Any:
 
 
 _STRUCTURED: Mapping[str, Callable[[str], Any]] = MappingProxyType(
-    {".json": json.loads, ".xml": lambda text: tree_of(root_of(text)), ".yaml": _tree_of_yaml, ".yml": _tree_of_yaml}
+    {
+        ".json": json.loads,
+        ".xml": lambda text: tree_of(root_of(text)),
+        ".yaml": _tree_of_yaml,
+        ".yml": _tree_of_yaml,
+        ".toml": tomllib.loads,
+    }
 )
 
 
@@ -320,9 +320,10 @@ def packaged_lines(path: Path) -> list[str]:
 
 
 def _head_in_yaml(lines: Iterable[str]) -> list[str]:
-    """Return what lines between two of three dashes state, commented out or not: the head of a CSVY file."""
+    """Return what lines below three dashes, down to the next, state, commented out or not: of a CSVY or ECSV file."""
     bare = [line.lstrip().removeprefix("#") for line in lines]
     marks = [i for i, line in enumerate(bare) if line.strip() == "---"]
+    marks += [len(bare)] if bare and bare[0].startswith(" %ECSV") else []
     with suppress(ValueError, RecursionError):
         return list(_stated(_tree_of_yaml("\n".join(bare[marks[0] + 1 : marks[1]])), "")) if len(marks) == 2 else []
     return []
@@ -331,11 +332,19 @@ def _head_in_yaml(lines: Iterable[str]) -> list[str]:
 def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: int = 0) -> Iterator[str]:
     """Yield what a node states as lines: "current: 400 mA", "x; displacement; mm", "time: s", rows of a table."""
     units = units or {}
+    if isinstance(node, list) and all(isinstance(item, dict) and len(item) == 1 for item in node):  # an ordered map
+        joined = {key: value for item in node for key, value in item.items()}
+        node = joined if len(joined) == len(node) else node
     if isinstance(node, list) and len(node) >= _FEWEST_TESTS and all(isinstance(item, dict) for item in node):
-        nested = [[(k, of) for k, of in item.items() if isinstance(of, dict)] for item in node]
-        inner = [[(f"{k} {n}", v) for k, of in item for n, v in of.items()] for item in nested]
-        node = [{**item, **dict(pairs)} for item, pairs in zip(node, inner, strict=True)]
+        kinds: dict[tuple[str, ...], list[Any]] = {}
+        for item in node:
+            kinds.setdefault((*item,), []).append(item)
+        node = [{**item, **_properties(item)} for item in node]
         plain = [name for name in node[0] if all(isinstance(item.get(name), (str, int, float)) for item in node)]
+        if not any(isinstance(node[0][name], (int, float)) for name in plain) and len(kinds) > 1:  # of several things
+            for items in kinds.values():
+                yield from _stated(items if len(items) > 1 else items[0], "", units, depth + 1)
+            return
         yield "\t".join(f"{name} [{units[name]}]" if isinstance(units.get(name), str) else name for name in plain)
         yield from _channels([{str(key).casefold(): value for key, value in item.items()} for item in node])
         for item in node:
@@ -343,7 +352,9 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
     if not isinstance(node, dict) or depth > _DEEPEST:
         return
     lower = {str(name).casefold(): value for name, value in node.items()}
-    unit = next((lower[name] for name in ("unit", "units") if isinstance(lower.get(name), str)), "")
+    both = (lower.get(name) for name in ("unit", "units"))
+    both = (of.get("unit") if isinstance(of, dict) else of for of in both)  # of astropy an object
+    unit = next((of for of in both if isinstance(of, str)), "")
     numbers = {name: value for name, value in lower.items() if isinstance(value, (int, float))}
     one = [value for name, value in numbers.items() if names_condition(name, split_name("", unit).dimension or "")]
     if unit and ("value" in numbers or len(numbers) == len(one) == 1):  # L1: {current: 0.5, unit: A}
@@ -366,9 +377,19 @@ def _stated(node: Any, key: str, units: Mapping[str, Any] | None = None, depth: 
             yield f"{whole}: {text}"
 
 
+def _properties(item: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what objects within an object state of it, and a list of them with a name, a value and a unit each."""
+    own = {f"{key} {name}": of for key, value in item.items() if isinstance(value, dict) for name, of in value.items()}
+    listed = (of for value in item.values() if isinstance(value, list) for of in value if isinstance(of, dict))
+    for entry in [{str(key).casefold(): of for key, of in entry.items()} for entry in listed]:
+        unit = next((f" [{entry[key]}]" for key in column_names.KEYS["unit"] if key in entry), "")
+        own |= {f"{entry['name']}{unit}": entry["value"]} if {"name", "value"} <= {*entry} else {}
+    return own
+
+
 def _channels(items: list[dict[str, Any]]) -> Iterator[str]:
     """Yield the place, the name and the unit of each item, where every item has a name and a unit: 1=Force;kN."""
-    units = [str(item.get("unit", item.get("units", ""))) for item in items]
+    units = [next((str(item[key]) for key in column_names.KEYS["unit"] if key in item), "") for item in items]
     for at, (item, unit) in enumerate(zip(items, units, strict=True), 1):
         places = (item[key] for key in _PLACES if isinstance(item.get(key), (int, float)))
         if all(map(is_unit, units)) and isinstance(item.get("name"), str):

@@ -13,23 +13,14 @@ import numpy as np
 
 from mrdamper.data.wording import number
 from mrdamper.errors import InputError, QualityError, listed, printable
+from mrdamper.rig_files import column_names, conditions
 from mrdamper.rig_files.coil_current import NO_CHANNEL
-from mrdamper.rig_files.column_names import (
-    RATING,
-    Header,
-    is_called,
-    is_unit,
-    names_condition,
-    split_name,
-    words,
-    words_of,
-)
-from mrdamper.rig_files.conditions import amperes, series_in
+from mrdamper.rig_files.column_names import Header, is_called, is_unit, names_condition, split_name, words, words_of
 from mrdamper.rig_files.file_records import records_of_file
 from mrdamper.rig_files.mapping.comparisons import forces_grow
 from mrdamper.rig_files.mapping.completion import completed
 from mrdamper.rig_files.mapping.description import SHORT_TEXTS, short_lines, with_notes
-from mrdamper.rig_files.mapping.results import NUMBER, Results, lines_of, results_among, results_in, rows_below_heads
+from mrdamper.rig_files.mapping.results import Results, lines_of, results_among, results_in, rows_below_heads
 from mrdamper.rig_files.profile import FileForm, Profile
 from mrdamper.rig_files.quality.motion import moves
 from mrdamper.rig_files.quality.view import View, strokes_of
@@ -41,11 +32,13 @@ _LEGEND = re.compile(  # I1 = 0.3 A, cur0.8 = coil current 0.8 A (as set)
     r"[\s*`-]*(.{1,60}?)`?\s*(?:=|:|->)\s*([^\W\d_][^\d=:]{0,30}\s)?([0-9]{1,4}(?:[.,][0-9]{1,4})?)\s*(m?A)"
     r"\s*(?:\([^()]*\))?\s*$"
 )
+_AT_SYMBOL = re.compile(r"(?<![^\W_])([A-Za-z]{1,8})([0-9]+(?:[.p][0-9]+)?)(?![^\W_])")  # I0p5
 _DECIMAL_CODE = re.compile(r"(?<![a-z])[a-z]{1,6}[0-9]+\.[0-9]+(?![0-9])")
 _SCHEME = re.compile(r"[\w.,+=-]*(?:<[^<>]{1,60}>[\w.,+=-]*)+")  # MRD_A<amplitude in mm>_I<coil current in A>.csv
 _ATTACHED, _JOINED = re.compile(r"(?<=\w)[(\[{]([^()\[\]{}<>]{1,60})[)\]}]"), re.compile(r"\w[(\[{][^_]*[)\]}]_")
 _PLACE = re.compile(r"[\s*`-]*([^\W\d_]{1,12})`?(?:\s*[=:]|\s+[-–]\s|\s{2,})\s*([^\s<>][^<>]{0,58}[^\s<>])\s*$")
-_NAME_IN_UNIT = re.compile(r"\b([^\W\d_]{3,}) in ([^\W\d_]{1,3})\b")
+_NAME_IN_UNIT = re.compile(r"\b([^\W\d_]{3,})\s+(?:(?:is|are)\s+)?in\s+([^\W\d_]{1,3})\b")
+_SHARES = {"d": "tenths?|zehntel|dixièmes?", "c": "hundredths?|hundertstel|centièmes?", "m": "thousandths?|tausendstel"}
 _NUMBERS = re.compile(r"[\W\d_]*")
 _SCHEME_NUMBER = re.compile(r"[0-9]+(?:[.,xp][0-9]+)?")
 _CODE = re.compile(r"([A-Za-z]{1,6})([0-9]{1,3})(?:\s*(?:-|–|to|bis)\s*\1([0-9]{1,3}))?")  # I1 or test01-test04
@@ -60,10 +53,9 @@ _MOTIONS = (  # dimension and name of a column, relative difference of two tests
 )
 _Tests = Sequence[tuple[Path, Record]]
 _REMARKS = frozenset((*words("notes"), *words("remarks")))
-_SPECIMEN = words("specimen")
+_LABELS = words("specimen") | words("rig")
 _STAMP = re.compile(  # 20190603_140512, 2019-06-03T14:05:12
-    r"(?<![0-9])20[0-9]{2}-?[01][0-9]-?[0-3][0-9][T_ -](?P<hour>[0-2][0-9])[:-]?(?P<minute>[0-5][0-9])"
-    r"[:-]?(?P<second>[0-5][0-9])(?![0-9])"
+    r"(?<![0-9])(20[0-9]{2})-?([01][0-9])-?([0-3][0-9])[T_ -]([0-2][0-9])[:-]?([0-5][0-9])[:-]?([0-5][0-9])(?![0-9])"
 )
 
 
@@ -84,10 +76,10 @@ def results_of(path: Path, form: FileForm | None = None) -> Results | None:
         return None
     shared = set.intersection(*({*label.split()} for label, _ in sheets))  # Damper FL, Damper RR: FL, RR
     named = [(" ".join(word for word in label.split() if word not in shared), of) for label, of in sheets]
-    rows = [(name, *row[1:], current) for name, of in named for row, current in zip(of.cells, of.current, strict=True)]
-    every, cells = tuple(row[-1] for row in rows), tuple((str(n), *row[:-1]) for n, row in enumerate(rows, 1))
+    every = tuple(current for _, of in named for current in of.current)
+    cells = tuple((name, *row) for name, of in named for row in of.cells)
     first = sheets[0][1]
-    several = replace(first, current=every, cells=cells, keys=("", "", *first.keys[1:]), pauses=())
+    several = replace(first, current=every, cells=cells, keys=("", *first.keys), pauses=())
     return several if len(sheets) > 1 else first
 
 
@@ -110,9 +102,9 @@ def currents_beside(path: Path, results: Results | None, tests: _Tests) -> list[
         return titled if grow or not results.of_supply else None
     lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
     rows = zip(results.cells, results.current, strict=True) if results and not results.of_supply else ()
-    named = [([*filter(None, cells[1:])], value) for cells, value in rows]  # Level, Current (A): L1, 0.35
+    named = [([*filter(None, cells)], value) for cells, value in rows]  # Level, Current (A): L1, 0.35
     lines += [f"{names[0]}: {value:g} A" for names, value in named if names]
-    titled = _by_scheme(lines, results, tests) or _by_legend(lines, tests)
+    titled = _by_scheme(lines, results, tests) or _by_legend(lines, tests) or _by_example(lines, tests)
     return [(current, f"{path.name}, {title}") for current, title in titled] or None
 
 
@@ -128,6 +120,7 @@ def _by_rows(results: Results, tests: _Tests) -> Iterator[Mapping[int, float]]:
     def by_name(rows: Results, own: Sequence[int]) -> dict[int, float]:
         one = len(rows.current) == len(own) == 1
         stated = {0: rows.current[0]} if one else rows.by_test([called[i] for i in own])
+        stated = stated or rows.by_clock([(_start(tests[i]), float(np.ptp(tests[i][1].time))) for i in own])
         return {own[i]: current for i, current in stated.items()}
 
     def by_group(groups: Sequence[str], by: Callable[[Results, Sequence[int]], dict[int, float]]) -> dict[int, float]:
@@ -137,7 +130,7 @@ def _by_rows(results: Results, tests: _Tests) -> Iterator[Mapping[int, float]]:
 
     yield by_range(results, range(len(tests)))
     yield by_group(files, by_range)
-    yield results.by_test(called)
+    yield results.by_test(called) or by_name(results, range(len(tests)))
     yield by_group(folders, by_name)
 
 
@@ -149,8 +142,10 @@ def _by_legend(lines: Sequence[str], tests: _Tests) -> list[tuple[float, str]]:
     for line in lines:
         parts = re.split(r"\s*[;|]\s*|,\s+(?![^()]*\))|[.:]\s+(?=\w+ ?=)", line)
         matches = [m for m in map(_LEGEND.match, parts) if m and (not m[2] or split_name(m[2]).role == "current")]
-        legends = [(name, amperes(m[3], m[4])) for m in matches for name in _meant(m[1], called)]
-        rating = not _NUMBERS.fullmatch(line) and RATING.search(line) is not None  # a record has many rows of numbers
+        legends = [(name, conditions.amperes(m[3], m[4])) for m in matches for name in _meant(m[1], called)]
+        rating = (
+            not _NUMBERS.fullmatch(line) and column_names.RATING.search(line) is not None
+        )  # a record has many rows of numbers
         stated |= {*legends} if not (rating or ratings) else set()
         if line.strip() and not legends:  # a heading: Fuses
             ratings = rating
@@ -169,15 +164,10 @@ def other_motions(path: Path, results: Results | None, tests: _Tests) -> InputEr
 
     Amplitudes, which may be strokes peak to peak, are compared with each other.
     """
-    headers = [split_name(key) for key in results.keys] if results else []
     texts: list[str] = []
     for dimension, called, limit, unit, size in _MOTIONS:
-        columns = [i for i, h in enumerate(headers) if h.dimension == dimension and called.search(h.name)]
-        cells = [row[columns[0]].replace(",", ".") for row in results.cells] if results and len(columns) == 1 else []
-        if results is None or not cells or not all(map(NUMBER.fullmatch, cells)):
-            continue
-        values = [headers[columns[0]].factor * float(cell) for cell in cells]
-        rows = rows_beside(path, results, tests)
+        values = results.numbers(dimension, called.search) if results else []
+        rows = rows_beside(path, results, tests) if values else ()
         pairs = [(r, values[row], _motion(r)[unit]) for row, (_, r) in zip(rows, tests, strict=False)]
         pairs = [pair for pair in pairs if pair[1] > 0 and pair[2] > 0]
         if unit == "mm" and len({stated for _, stated, _ in pairs}) < 2:
@@ -211,13 +201,14 @@ def rows_beside(path: Path, results: Results | None, tests: _Tests) -> list[int]
     return [int(row) for row, _ in stated] if {row for row, _ in stated} <= {*numbers} else []
 
 
-def specimens_of(path: Path, results: Results | None, tests: _Tests) -> list[str]:
-    """Return the specimen of each test by the column of a plan, or by a scheme of names; empty unless each has one."""
+def labels_of(path: Path, results: Results | None, tests: _Tests, kind: str) -> list[str]:
+    """Return the specimen or rig of each test by a column of a plan or a scheme of names; empty unless all have one."""
+    called = words(kind)
     rows = rows_beside(path, results, tests)
     heads = enumerate(results.keys if results else ())
-    stated = [[results.cells[row][i] for row in rows] for i, key in heads if results and is_called(key, _SPECIMEN)]
+    stated = [[results.cells[row][i] for row in rows] for i, key in heads if results and is_called(key, called)]
     lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
-    stated += [texts for header, texts in _fields(lines, tests) if is_called(header.name, _SPECIMEN)]
+    stated += [texts for header, texts in _fields(lines, tests) if is_called(header.name, called)]
     stated = [texts for texts in stated if texts and all(texts) and (len({*texts}) < len(texts) or len(texts) == 1)]
     return stated[0] if len(stated) == 1 else []
 
@@ -256,9 +247,8 @@ def remarks_of(path: Path) -> Results | None:
     for heads, rows in rows_below_heads(lines):
         flags = (_DISCARDED_FLAG.search(f"{head}: {answer}") for head in heads for answer in ("yes", "no"))
         remarks = any(flags) or not _REMARKS.isdisjoint(word for head in heads for word in words_of(head.casefold()))
-        cells = tuple((str(n), *row) for n, row in enumerate(rows, 1))
-        table = Results((0.0,) * len(cells), cells, "", ("", *heads))
-        if remarks or table.ranges[1] or any(is_called(head, _SPECIMEN) for head in heads):
+        table = Results((0.0,) * len(rows), tuple(map(tuple, rows)), "", tuple(heads))
+        if remarks or table.ranges[1] or any(is_called(head, _LABELS) for head in heads):
             return table
     return None
 
@@ -308,7 +298,7 @@ def currents_listed(path: Path, tests: _Tests) -> list[tuple[float, str]] | None
     as the currents.
     """
     lines = short_lines(path) if path.suffix.lower() in SHORT_TEXTS else []
-    listed = {of for line in lines if (of := series_in(line))}
+    listed = {of for line in lines if (of := conditions.series_in(line))}
     files = [file if len(listed) == 1 and len(tests) > len(min(listed)) else path for file, _ in tests]
     stated: dict[int, float] = {}
     for file in dict.fromkeys(files) if len(listed) == 1 else ():
@@ -344,10 +334,12 @@ def _by_scheme(lines: Sequence[str], results: Results | None, tests: _Tests) -> 
     """
     stated = set[tuple[float, ...]]()
     for header, texts in _fields(lines, tests):
-        numbers = [amperes(text, "") for text in texts if _SCHEME_NUMBER.fullmatch(text)]
+        numbers = [conditions.amperes(text, "") for text in texts if _SCHEME_NUMBER.fullmatch(text)]
         at = [i for i, key in enumerate(results.keys if results else ()) if header.name and key == header.name]
         rows = zip(results.cells, results.current, strict=True) if results and len(at) == 1 else ()
-        by_number = {amperes(m[0], ""): of for cells, of in rows if (m := _SCHEME_NUMBER.match(cells[at[0]]))}
+        by_number = {
+            conditions.amperes(m[0], ""): of for cells, of in rows if (m := _SCHEME_NUMBER.match(cells[at[0]]))
+        }
         if header.dimension == "current" and names_condition(header.name, "current"):
             by_number = {number: header.factor * number for number in numbers}
         if len(numbers) == len(tests) and {*numbers} <= {*by_number}:
@@ -361,22 +353,42 @@ def _fields(lines: Sequence[str], tests: _Tests) -> Iterator[tuple[Header, list[
     Thus MRD_I<coil current in A>_f<Hz> or MRD_I(coil current, A)_f(Hz); what a letter or word stands for, a line of its
     own may tell, or its own name: MRD_iiii_ff.csv, iiii: coil current in mA; current_frequency with current in A.
     """
-    meant = {m[1]: f"<{m[0]}>" for line in lines for m in _NAME_IN_UNIT.finditer(line) if is_unit(m[2])}
-    meant |= {m[1]: f"<{m[2]}>" for m in map(_PLACE.match, lines) if m}
+    for sign, share in _SHARES.items():  # hundredths of an ampere
+        lines = [re.sub(rf"(?i)\b(?:{share}) (?:of )?(?:an? |d')?amp[eè]res?\b", f"{sign}A", line) for line in lines]
+    named = (m.groups() for line in lines for m in _NAME_IN_UNIT.finditer(line))
+    meant = {name: f"{name} in {unit}" for name, unit in named if is_unit(unit) or unit in ("cA", "dA")}
+    meant |= {m[1]: m[2] for m in map(_PLACE.match, lines) if m}
     names = [name for line in lines for name in re.findall(r"\w+_[\w.]+", line) if meant]
-    schemes = [re.sub("[^\\W\\d_]+", lambda m: meant.get(m[0], m[0]), name) for name in names]
+    schemes = [re.sub("[^\\W\\d_]+", lambda m: f"<{meant[m[0]]}>" if m[0] in meant else m[0], name) for name in names]
     schemes += [_ATTACHED.sub(r"<\1>", line) if _JOINED.search(line) else line for line in lines]
     stated = [match[0].rstrip(".,") for scheme in schemes if "<" in scheme for match in _SCHEME.finditer(scheme)]
     for parts in (re.split("<([^<>]*)>", scheme) for scheme in stated):
         pattern = "".join("([^_]+?)" if i % 2 else re.escape(part) for i, part in enumerate(parts))
         matches = [re.fullmatch(pattern, file.stem) or re.fullmatch(pattern, file.name) for file, _ in tests]
         texts = zip(*(m.groups() for m in matches if m), strict=True) if all(matches) else ()
-        yield from ((split_name(place), list(own)) for place, own in zip(parts[1::2], texts, strict=False))
+        places = (split_name(meant.get(place, place)) for place in parts[1::2])
+        yield from ((place, list(own)) for place, own in zip(places, texts, strict=False))
     keyed = [dict(part.split("=", 1) for part in file.stem.split("_") if "=" in part) for file, _ in tests]
     cells = [cell.strip(" `*-.") for line in lines for cell in re.split(r"[,;]\s|: ", line)]
     for key in set.intersection(*map(set, keyed)) if keyed else ():  # I=0.5_freq=2.csv, I coil current in A
         stated = {cell.removeprefix(key).strip("` ") for cell in cells if re.match(rf"{re.escape(key)}\W", cell)}
         yield from ((split_name(text), [own[key] for own in keyed]) for text in (stated if len(stated) == 1 else ()))
+
+
+def _by_example(lines: Sequence[str], tests: _Tests) -> list[tuple[float, str]]:
+    """Return the current [A] of each test by the number in its name, as a line explains one: I0p5_f2p5 means 0.5 A."""
+    stated = set[float]()
+    for line in filter(conditions.EXPLAINED.search, lines):
+        currents, numbers = conditions.currents_in(line), _numbers_of_currents(line)
+        stated |= {current / number for current in currents for number in numbers if len(numbers) == 1 and number}
+    named = [_numbers_of_currents(record.id) for _, record in tests]
+    whole = len(stated) == 1 and all(len(numbers) == 1 for numbers in named)
+    return [(scale * of[0], "an example of names") for of in named for scale in stated] if whole else []
+
+
+def _numbers_of_currents(name: str) -> list[float]:
+    """Return the numbers behind symbols and words for a current in a name: I0p5_f2p5."""
+    return [conditions.amperes(m[2], "A") for m in _AT_SYMBOL.finditer(name) if split_name(m[1]).role == "current"]
 
 
 def _meant(key: str, files: Collection[str]) -> list[str]:
@@ -424,20 +436,20 @@ def _cut_at(parts: Sequence[slice], record: Record) -> Finding:
 
 
 def _called(tests: _Tests) -> list[tuple[str, ...]]:
-    """Names of each test: its own, of its file, its own without that, of its block, with its folders, and its times."""
+    """Names of each test: its own, of its file, its own without that, of its block, and with its folders."""
     names = []
     for file, record in tests:
         stem = re.sub(r"[^\w.+=-]+", "_", file.stem)
         own, blocks = record.id.removeprefix(stem).lstrip("_"), record.provenance.get("block", "").split("; ")
         paths = ["\\".join((*file.parts[-n:-1], name)) for n in (2, 3, 4) for name in (file.name, file.stem)]
-        names.append((record.id, file.name, file.stem, own, *blocks, *paths, *_clocks(record, file)))
+        names.append((record.id, file.name, file.stem, own, *blocks, *paths))
     return names
 
 
-def _clocks(record: Record, file: Path) -> set[str]:
-    """Return the hour and minute, and with seconds, at which a test was recorded, by its lines or its file's name."""
-    stated = map(_STAMP.search, (record.provenance.get("recorded_at", ""), file.stem))
-    return {f"{m['hour']}:{m['minute']}{more}" for m in stated if m for more in ("", f":{m['second']}")}
+def _start(test: tuple[Path, Record]) -> str:
+    """Return the day and time at which a test began, by its lines or its file's name; empty where none is stated."""
+    match = _STAMP.search(test[1].provenance.get("recorded_at", "")) or _STAMP.search(test[0].stem)
+    return "{}-{}-{} {}:{}:{}".format(*match.groups()) if match else ""
 
 
 def rests(record: Record) -> bool:

@@ -199,8 +199,12 @@ def _filled(values: Floats) -> Floats:
 
 
 def _covered(target: Floats, time: Floats) -> np.ndarray:
-    """(N,) mask of the times that lie within another clock, or within one and a half of its steps of its ends."""
-    near = 1.5 * float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    """(N,) mask of the times that lie within another clock, or within one and a half of its steps of its ends.
+
+    Of a clock that is the beginning of this one, the times behind its end are not.
+    """
+    beginning = time.size < target.size and np.allclose(target[: time.size], time, rtol=0, atol=_SAME)
+    near = 1.5 * float(np.median(np.diff(time))) if time.size > 1 and not beginning else _SAME
     return (target >= time[0] - near) & (target <= time[-1] + near) if time.size else np.zeros(target.size, dtype=bool)
 
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 from itertools import pairwise, takewhile
 from pathlib import Path
 
 import numpy as np
 
+from mrdamper.data import held_current
 from mrdamper.errors import listed
-from mrdamper.rig_files import conditions
-from mrdamper.rig_files.column_names import COIL, headers_of, holds, names_condition, split_name, words, words_of
+from mrdamper.rig_files import column_names, conditions
+from mrdamper.rig_files.column_names import COIL, holds, names_condition, sentences, split_name, words, words_of
 from mrdamper.rig_files.conditions import currents_in, currents_in_order, quantity_in_cell
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.base import RawTable
@@ -31,13 +32,16 @@ _SUPPLY = re.compile(r"(?i)\b(?:power[ _-]?)?suppl(?:y|ied)\b|\bpsu\b")
 _MOST_LINES, _LONGEST_LINE = 4000, 2000
 _FEWEST_ROWS = _TELLING = 2
 _MOST_ROWS, _MOST_COLUMNS = 2000, 60  # of a table of results
+_TO = r"\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até|se)\b)\s*"
+_NUMBERS = re.compile(rf"([0-9]{{1,4}})(?:{_TO}([0-9]{{1,4}}))?")
 _LISTED_TEST = re.compile(  # Step 3: ...; tests 1 - 4: ...; files p01 to p04: ...; T1 se T4 tak: ...; 3. test: ...
     r"[\s#%*\"-]*(?:(?P<place>[0-9]{1,6})[.)]\s*(?P<word>[^\W\d_]{2,20})"
-    r"|(?P<name>[^\W\d_][^\d:=]{0,30}?)[\s_.#-]*(?P<number>[0-9]{1,6})(?:\s*(?:[-–]|\.{2,3}|\b(?:to|bis|do|à|au|a|al|até|se)\b)"
-    r"\s*(?:[^\W\d_]{1,30}[\s_.#]*)?(?P<last>[0-9]{1,6})(?:\s+tak)?)?)\s*[:=;,\t)]"
+    r"|(?P<name>[^\W\d_][^\d:=]{0,30}?)[\s_.#-]*(?P<number>[0-9]{1,6})(?:"
+    rf"{_TO}(?:[^\W\d_]{{1,30}}[\s_.#]*)?(?P<last>[0-9]{{1,6}})(?:\s+tak)?)?)\s*[:=;,\t)]"
 )
 _LABELLED = re.compile(r"(?<![^\W\d_])([^\W\d_]+)[ _.-]?([0-9]+)")
-_CLOCK = re.compile(r"[0-2][0-9]:[0-5][0-9](?::[0-5][0-9])?")
+_TIME_OF_DAY = re.compile(r"(?<![0-9:])([0-2]?[0-9]):([0-5][0-9])(?::([0-5][0-9](?:\.[0-9]+)?))?(?![0-9:])")
+_FEWEST_DURING, _DAY_S = 3, 86_400  # rows of a log during a test; of a day [s]
 _MEASURED = tuple(words("measured"))
 _STARTS, _ENDS, _ROWS = words("start"), words("end"), words("row")
 _COUNTED = words("run") | words("run_number") | words("table_file")  # what the number in a test's name may be
@@ -46,9 +50,7 @@ _OWN_KEYS = {"id", "nr", "nr.", "no", "no.", "#", "key", "index", "pk"}  # each 
 _CONDITION = re.compile(  # no number of a test: 0.5A, 0_5A, and of 01_0A the second
     r"(?<![A-Za-z0-9])(?:(?:0|[1-9][0-9]*)[.,_])?[0-9]+[ _]?(?:m?A|m?Hz|mm)(?![A-Za-z])"
 )
-_SPECIMEN = re.compile(
-    r"(?i)^(?:specimen|probe|prüfkörper|test|versuch|run|sample|essai|éprouvette|ensayo|no|nr)\b[\s.:#]*"
-)
+(_SPECIMEN,) = sentences("before_name")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +60,7 @@ class Results:
     current: tuple[float, ...]  # [A], one a row
     cells: tuple[tuple[str, ...], ...]  # of every row those beside the current, by column
     title: str  # heading of the column of currents
-    keys: tuple[str, ...] = ()  # headings of the columns of `cells`; empty for the number of the row
+    keys: tuple[str, ...] = ()  # headings of the columns of `cells`
     of_supply: bool = False  # the coil's only if force grows with it
     counts_tests: bool = True  # so that a number in a test's name may be meant; Day 1: 0.5 A counts something else
     pauses: tuple[tuple[str, ...], ...] = ()  # cells of the rows that state no current and no other number
@@ -124,8 +126,8 @@ class Results:
                 theirs = [_key(row[[*map(_key, heads)].index(key)]) for row in rows]
                 if len({*own}) == len(own) and {*theirs} <= {*own}:
                     current = tuple(self.current[own.index(cell)] for cell in theirs)
-                    cells = tuple((str(n), *row) for n, row in enumerate(rows, 1))
-                    tables.append(replace(self, current=current, cells=cells, keys=("", *heads), pauses=()))
+                    cells = tuple(map(tuple, rows))
+                    tables.append(replace(self, current=current, cells=cells, keys=tuple(heads), pauses=()))
         return tables[0] if len(tables) == 1 else None
 
     def apart(self, groups: Sequence[str]) -> Iterator[list[tuple[Results, list[int]]]]:
@@ -133,7 +135,7 @@ class Results:
 
         A column Day with 1 names the folder day1, and one with 14.3.2023 the folder 2023-03-14.
         """
-        for key, column in list(zip(self.keys, zip(*self.cells, strict=True), strict=True))[1:]:
+        for key, column in zip(self.keys, zip(*self.cells, strict=True), strict=True):
             names, parts = [_group_names(cell) | _group_names(f"{key} {cell}") for cell in column], []
             for group in dict.fromkeys(groups):
                 rows = [row for row, own in enumerate(names) if own & _group_names(group)]
@@ -143,19 +145,49 @@ class Results:
             if all(rows.current for rows, _ in parts):
                 yield parts
 
+    def by_clock(self, tests: Sequence[tuple[str, float]]) -> dict[int, float]:
+        """Return the current [A] of each test by its start, day and time, and its duration [s], and the rows' clock.
+
+        It is that which a log with several rows during each test has held, or that of the row of the same minute or
+        second, or of as many rows as tests of one day the nearest, where no second one is as near.
+        """
+        begins = [(*moment, duration) for start, duration in tests if (moment := _moment(start))]
+        for column in zip(*self.cells, strict=True) if len(begins) == len(tests) else ():
+            rows = [moment for cell in column if (moment := _moment(cell))]
+            if not len(column) == len(rows) > 1:
+                continue
+            dated = all(day for day, _ in rows)
+            clock = np.array([second + _DAY_S * day * dated for day, second in rows])
+            starts = np.array([second + _DAY_S * day * dated for day, second, _ in begins])
+            starts -= starts % 60 if not np.any(clock % 60) else 0
+            ends = np.searchsorted(clock, starts + [duration for *_, duration in begins], side="right")
+            during = [self.current[a:b] for a, b in zip(np.searchsorted(clock, starts), ends, strict=True)]
+            if np.all(np.diff(clock) >= 0) and min(map(len, during)) >= _FEWEST_DURING:
+                held = [held_current(np.array(of)) for of in during]
+                return {} if any(change for _, change in held) else {i: mean for i, (mean, _) in enumerate(held)}
+            apart = np.abs(clock[:, None] - starts)
+            own, (first, second) = apart.argmin(axis=0), np.partition(apart, 1, axis=0)[:2]
+            listed = len(rows) == len(tests) and (dated or len({day for day, *_ in begins}) == 1)
+            if len({*own}) == len(tests) and np.all(2 * first < second) and (listed or not first.any()):
+                return {i: self.current[row] for i, row in enumerate(own)}
+        return {}
+
     def misfit(self, tests: Sequence[Iterable[str]]) -> str:
         """Tell what the column that names most tests, and more than half, has twice, or which of them it lacks."""
         tests = [list(texts) for texts in tests]
         named = [whole | numbers for whole, numbers in map(_names, tests)]
         fewest, text = 0.5 * len(tests), ""
         for key, column in zip(self.keys, zip(*self.cells, strict=True), strict=True):
-            cells = Counter(map(_key, column))
+            cells = [*map(_key, column)]
             absent = [own[0] for own, names in zip(tests, named, strict=True) if names.isdisjoint(cells)]
-            twice = [cell for cell, count in cells.items() if cell and count > 1]
+            twice = [i for i, cell in enumerate(cells) if cell and cell in cells[:i]]
             if key and len(absent) < fewest and (twice or absent) and not split_name(key).dimension:
                 fewest = len(absent)
                 lacks = f"names {len(tests) - fewest} of {len(tests)} tests and may lack {listed(absent, 3)}"
-                text = f"has {twice[0]!r} twice under {key!r}, which may be a mistake" if twice else lacks
+                for at in twice[:1]:
+                    rows = f"rows {cells.index(cells[at]) + 1} and {at + 1}"
+                    lacks = f"has {column[at]!r} twice under {key!r} ({rows}), which may be a mistake"
+                text = lacks
         return text
 
     def _columns_of_names(self, tests: int) -> tuple[list[Sequence[str]], list[Sequence[str]]]:
@@ -164,17 +196,21 @@ class Results:
         The number of a row may be that of a test if there are as many rows, and no column that numbers the tests.
         """
         headers = [split_name(key) for key in self.keys]
-        first, *columns = list[Sequence[str]](zip(*self.cells, strict=True))
+        columns = list[Sequence[str]](zip(*self.cells, strict=True))
         numeric = [all(map(NUMBER.fullmatch, column)) for column in columns]
-        keys = [{word.casefold() for word in words_of(header.name)} for header in headers[1:]]
+        keys = [{word.casefold() for word in words_of(header.name)} for header in headers]
         numbered = any(key & _NUMBERED for key, numbers in zip(keys, numeric, strict=True) if numbers)
-        every = zip(headers[1:], columns, numeric, strict=True)
+        labels = [of for key, of in zip(keys, columns, strict=True) if key & _COUNTED]
+        labels = [of for of in labels if all(map(_LABELLED.fullmatch, of))]
+        numbered |= any(len({*of}) < len(of) for of in labels)  # R05 twice: it is not known which row is of R06
+        every = zip(headers, columns, numeric, strict=True)
         timed = [column for header, column, numbers in every if numbers and header.role == "time"]
         times = [np.diff([float(cell.replace(",", ".")) for cell in column]) for column in timed]
         if any(steps.size and np.all(steps > 0) for steps in times) and not numbered:  # samples over time
             return [column for column, numbers in zip(columns, numeric, strict=True) if not numbers], []
-        names = [column for header, column in zip(headers[1:], columns, strict=True) if header.dimension is None]
-        return names, [] if numbered or tests != len(self.current) else [first]
+        names = [column for header, column in zip(headers, columns, strict=True) if header.dimension is None]
+        own = [*map(str, range(1, len(self.current) + 1))]
+        return names, [] if numbered or tests != len(self.current) else [own]
 
     def rows_in_range(self, tests: Sequence[Record]) -> list[tuple[int, int, slice]]:
         """Return each test and row by their numbers, and the samples between the start and the end that the row states.
@@ -224,13 +260,19 @@ class Results:
 
     def _bounds(self, words: frozenset[str], by_rows: bool) -> list[float]:
         """Return the times [s], or rows, of the one column of such a name; empty if there is none."""
-        headers = [split_name(key) for key in self.keys]
-        named = [{word.casefold() for word in words_of(header.name)} for header in headers]
-        columns = [i for i, own in enumerate(named) if words & own and bool(_ROWS & own) == by_rows]
-        columns = [i for i in columns if headers[i].dimension == (None if by_rows else "time")]
-        cells = [row[columns[0]].replace(",", ".") for row in self.cells] if len(columns) == 1 else []
-        factor = headers[columns[0]].factor if cells else 1.0
-        return [factor * float(cell) for cell in cells] if all(map(NUMBER.fullmatch, cells)) else []
+
+        def is_bound(name: str) -> bool:
+            own = {word.casefold() for word in words_of(name)}
+            return bool(words & own) and bool(_ROWS & own) == by_rows
+
+        return self.numbers(None if by_rows else "time", is_bound)
+
+    def numbers(self, dimension: str | None, called: Callable[[str], object]) -> list[float]:
+        """Return the numbers, in SI, of the one column of a dimension and such a name; empty if a cell is none."""
+        headers = enumerate(map(split_name, self.keys))
+        columns = [(i, header) for i, header in headers if header.dimension == dimension and called(header.name)]
+        cells = [row[columns[0][0]].replace(",", ".") for row in self.cells] if len(columns) == 1 else []
+        return [columns[0][1].factor * float(cell) for cell in cells] if all(map(NUMBER.fullmatch, cells)) else []
 
     def column_of_tests(self, table: RawTable) -> str | None:
         """Return the column of a record that numbers its tests as a column of this table, of the same name, does."""
@@ -264,8 +306,30 @@ def results_in(lines: Sequence[str]) -> Results | None:
     for separator in _SEPARATORS:
         tables = {(table.current, table.cells): table for table in _tables(lines[:_MOST_LINES], separator)}
         if tables:
-            return next(iter(tables.values())) if len(tables) == 1 else None
-    return numbered_tests(lines[:_MOST_LINES]) or _matrix_of_tests(lines[:_MOST_LINES])
+            return _with_row_a_test(*tables.values()) if len(tables) == 1 else None
+    lines = lines[:_MOST_LINES]
+    return numbered_tests(lines) or _log_by_clock(lines) or _matrix_of_tests(lines)
+
+
+def _log_by_clock(lines: Sequence[str]) -> Results | None:
+    """Return the lines of a log that begin with a time of day and state one current: 14:03 0.5 A."""
+    timed = [(match[0], line[match.end() :].strip()) for line in lines if (match := _TIME_OF_DAY.match(line))]
+    rows = [(clock, of[0], text) for clock, text in timed if len(of := currents_in(text)) == 1]
+    cells = tuple((clock, text) for clock, _, text in rows)
+    table = Results(tuple(of for _, of, _ in rows), cells, "a line for each test", ("", "remark"))
+    return table if len(rows) >= _FEWEST_ROWS else None
+
+
+def _with_row_a_test(results: Results) -> Results:
+    """Return a table with a row for each test where a row names several by their numbers: 1, 2, 3; 4 to 6."""
+    for at in [i for i, key in enumerate(results.keys) if column_names.is_called(key, _COUNTED)]:
+        listed = [[*map(_NUMBERS.fullmatch, re.split(r"\s*[,;&+]\s*", cells[at]))] for cells in results.cells]
+        ranges = [(row, int(m[1]), int(m[2] or m[1])) for row, of in enumerate(listed) for m in of if m]
+        rows = [(row, str(n)) for row, first, last in ranges for n in range(first, last + 1)][:_MOST_ROWS]
+        if all(map(all, listed)) and len(results.cells) < len({n for _, n in rows}) == len(rows):
+            cells = tuple((*results.cells[row][:at], n, *results.cells[row][at + 1 :]) for row, n in rows)
+            return replace(results, current=tuple(results.current[row] for row, _ in rows), cells=cells)
+    return results
 
 
 def _matrix_of_tests(lines: Sequence[str]) -> Results | None:
@@ -277,9 +341,9 @@ def _matrix_of_tests(lines: Sequence[str]) -> Results | None:
             tests = [(row, i) for row in body for i in columns if row[i]]
             if len({row[i] for row, i in tests}) == len(tests) > 1:
                 others = [i for i in range(len(heads)) if i not in columns]
-                cells = tuple((str(n), row[i], *(row[k] for k in others)) for n, (row, i) in enumerate(tests, 1))
+                cells = tuple((row[i], *(row[k] for k in others)) for row, i in tests)
                 currents = tuple(currents_in(heads[i])[0] for _, i in tests)
-                return Results(currents, cells, "a matrix of tests", ("", "", *(heads[k] for k in others)))
+                return Results(currents, cells, "a matrix of tests", ("", *(heads[k] for k in others)))
     return None
 
 
@@ -305,10 +369,9 @@ def _numbered_tests(lines: Iterable[str], *, of_supply: bool = False) -> Results
     numbers = {(name.casefold(), int(number)) for name, number, *_ in rows}
     if len(numbers) < _FEWEST_ROWS or len(numbers) < len(rows) or len({name for name, _ in numbers}) > 1:
         return None
-    numbered = enumerate(rows, 1)
-    cells = tuple((str(i), f"{name.split()[-1]}{number}", number, text) for i, (name, number, _, text) in numbered)
+    cells = tuple((f"{name.split()[-1]}{number}", number, text) for name, number, _, text in rows)
     counts = any({word.casefold(), word.casefold().rstrip("s")} & _COUNTED for word in words_of(rows[0][0]))
-    currents, keys = tuple(row[2] for row in rows), ("", "", rows[0][0], "remark")
+    currents, keys = tuple(row[2] for row in rows), ("", rows[0][0], "remark")
     return Results(currents, cells, "a line for each test", keys, of_supply, counts_tests=counts)
 
 
@@ -418,11 +481,11 @@ def _tables(lines: Sequence[str], separator: str) -> Iterator[Results]:
         others = [i for i in range(len(row)) if i not in columns]
         yield Results(
             tuple(value for value in currents if value is not None),
-            tuple((str(n), *(cells[i] for i in others)) for n, cells in enumerate(body, 1)),
+            tuple(tuple(cells[i] for i in others) for cells in body),
             row[chosen[0]],
-            ("", *(row[i] for i in others)),
+            tuple(row[i] for i in others),
             bool(supply),
-            pauses=tuple(("", *(cells[i] for i in others)) for cells in pauses),
+            pauses=tuple(tuple(cells[i] for i in others) for cells in pauses),
         )
 
 
@@ -430,7 +493,7 @@ def with_small_units(row: list[str]) -> list[str]:
     """Return a row of names whose units in small letters are written as such: coil_current_a."""
     if not any(cell[-2:-1] == "_" for cell in row):  # of a record nearly every row, and looking up names takes long
         return row
-    headers = headers_of(row, [""] * len(row))
+    headers = column_names.headers_of(row, [""] * len(row))
     units = [header.unit if header != split_name(cell) else "" for cell, header in zip(row, headers, strict=True)]
     return [f"{cell[:-2]} [{unit}]" if unit else cell for cell, unit in zip(row, units, strict=True)]
 
@@ -452,12 +515,10 @@ def _is_of_supply(cell: str, below: str = "") -> bool:
 
 def _names(texts: Iterable[str]) -> tuple[set[str], set[str]]:
     """Return the full name of a test, and the numbers in it."""
-    whole: set[str] = set()
-    numbers: set[str] = set()
+    whole, numbers = set[str](), set[str]()
     for text in texts:
         bare = text.strip().strip('"').strip()
-        if _CLOCK.fullmatch(bare):
-            whole.add(bare)
+        if _TIME_OF_DAY.fullmatch(bare):
             continue
         for part in (bare, *re.split(r"[:=;,\t/]", bare)):
             part = part.strip().strip('"').strip()
@@ -477,6 +538,15 @@ def _key(text: str) -> str:
     return str(int(text)) if text.isascii() and text.isdigit() else text
 
 
+def _moment(text: str) -> tuple[int, float] | None:
+    """Return the day, 0 where none is stated, and the time of day [s]; None if there is none, or the day is unclear."""
+    match, (iso, _) = _TIME_OF_DAY.search(text), conditions.day_in(text) or ("", "")
+    if match is None or iso[:1] == "?":
+        return None
+    hour, minute, second = (float(part or 0) for part in match.groups())
+    return date.fromisoformat(iso).toordinal() if iso else 0, 3600 * hour + 60 * minute + second
+
+
 def _group_names(text: str) -> set[str]:
     """Return names of a file or folder as they are compared: without marks and leading zeros, or as a date if it is."""
     iso, written = conditions.day_in(text) or ("", "")
@@ -488,8 +558,6 @@ def _group_names(text: str) -> set[str]:
 def _match(column: Sequence[str], names: Sequence[tuple[set[str], set[str]]], exact: bool) -> dict[int, int] | None:
     """Return the row of each test by one column; None unless every test has one row, and no row two."""
     keys = [_key(cell) for cell in column]
-    if all(_CLOCK.fullmatch(key) and key.endswith(":00") and len(key) > 5 for key in keys):  # of a sheet, to the minute
-        keys = [key[:-3] for key in keys]
     if len(set(keys)) < len(keys) or "" in keys:
         return None
     matches = {}

@@ -11,18 +11,8 @@ import numpy as np
 
 from mrdamper.data import Floats
 from mrdamper.data.arrays import rescale
-from mrdamper.rig_files.column_names import (
-    DIMENSION,
-    Header,
-    holds,
-    is_unit,
-    parse_unit,
-    role_of,
-    split_name,
-    unknown_unit,
-    words,
-    words_of,
-)
+from mrdamper.rig_files import column_names
+from mrdamper.rig_files.column_names import DIMENSION, holds, parse_unit, role_of, split_name, words, words_of
 from mrdamper.rig_files.conditions import FULL_SCALES, LONGEST_LINE, stated_by_lines, stated_in_titles
 from mrdamper.rig_files.readers.base import RawTable
 from mrdamper.rig_files.record import SIGNED, Finding
@@ -48,12 +38,7 @@ _ZERO = re.compile(  # zero at 32768; 0 A at 0.4 V; 0.5 A/V x (U - 0.4 V); 2.5 V
     rf"|\([^()]{{0,30}}[a-z_]\w{{0,30}} ?[-−–] ?{_AT.format('less', 'of')}\)"
     rf"|(?<![\w.,]){_AT.format('mid', 'volt')} (?:\w{{1,12}} )?(?:at|=) (?:zero|0(?:\.0+)? ?m?A)(?![\w.])"
 )
-_SHIFT = re.compile(  # of a scale, or a gain beside it, in words that may mean one thing or the other
-    r"(?i)\b(?:zero|offset|bias|tar[ae]|null\w*)\b[^0-9;,.]{0,12}[0.,]*[1-9]"
-    r"|(?:[*×·]|\sx)\s?\(?[a-z_]\w{0,30} ?[-−–+] ?[0.,]*[1-9]"
-    r"|(?:(?:\w*amplifier|conditioner)\W+)?\b(?:gain|amplification|verstärkung)\b[^0-9;,.]{0,12}"
-    r"(?!1(?:\.0*)?(?![.\d]))[0-9]|(?<!\S)[x×] ?[0-9]"
-)
+(_SHIFT,) = column_names.sentences("shift")
 _RANGE = re.compile(r"(?i)\b(?:range|max|limit|full|suppl|rated|bereich|plage|rango)")
 _SIGNAL = re.compile(  # a number of volts or counts, and no end of a range
     r"(?P<before>(?:\.\.|[-−–±]|\b(?:to|bis|à|a)) ?)?(?<![\w.,])(?P<number>[0-9]+(?:[.,][0-9]+)?) ?"
@@ -80,8 +65,8 @@ _MOVES = {"velocity": "displacement"}  # counts as
 def with_counts(table: RawTable) -> RawTable:
     """Channels recorded in counts, by the scale in their heading: load_cnt [0.25 N/count]."""
     for i, name in enumerate(table.names):
-        match = _PER_COUNT.fullmatch((table.units[i] or unknown_unit(name)).strip())
-        if match and is_unit(match["unit"]):
+        match = _PER_COUNT.fullmatch((table.units[i] or column_names.unknown_unit(name)).strip())
+        if match and column_names.is_unit(match["unit"]):
             factor = float(match["number"].replace(",", "."))
             bare = re.sub(r"[\s_]*(?:counts?|cnts?|raw)$", "", table.headers[i].name, flags=re.IGNORECASE)
             text = f"column {name!r} is scaled as its heading states"
@@ -97,7 +82,6 @@ def with_counts(table: RawTable) -> RawTable:
 
 
 def _is_whole(table: RawTable, column: int) -> bool:
-    """Tell if a column holds whole numbers alone, as a converter's are."""
     values = table.try_read(column)
     return values is not None and not np.any(np.nan_to_num(values[column]) % 1)
 
@@ -126,7 +110,7 @@ def counts_in(line: str, names: Collection[str]) -> bool:
     return any(match["name"].casefold() in names for match in _NUMBER_IS.finditer(line))
 
 
-def _zero_of(line: str, header: Header) -> float | None:
+def _zero_of(line: str, header: column_names.Header) -> float | None:
     """Return the number of a column that the line of its scale states for zero; None if that is unclear."""
     match = _ZERO.search(line)
     if match is None:

@@ -11,18 +11,7 @@ import numpy as np
 from mrdamper.rig_files.column_names import is_unit, split_name
 from mrdamper.rig_files.conditions import stated_clock
 from mrdamper.rig_files.profile import FileForm
-from mrdamper.rig_files.readers.arrays import (
-    Stored,
-    check_unpacked,
-    counts_of,
-    load,
-    refusing_damage,
-    text_of,
-    texts_in,
-    unit_in,
-    unpacked,
-    with_headings,
-)
+from mrdamper.rig_files.readers import arrays
 from mrdamper.rig_files.readers.base import MOST_COLUMNS, RawTable, Reader, Source
 from mrdamper.rig_files.readers.nested import DEEPEST, MOST_TEXT, nested_tables
 
@@ -50,8 +39,8 @@ class Hdf5(Reader):
 
 def hdf5_tables(source: Source, title: str) -> list[RawTable]:
     """Return the groups of an HDF5 file as tables."""
-    h5py = load("h5py", title)
-    with refusing_damage(source, title):
+    h5py = arrays.load("h5py", title)
+    with arrays.refusing_damage(source, title):
         file = h5py.File(source.path, "r")
         source.keep.callback(file.close)
         tree = _Walk(source).group(file, 0)
@@ -107,13 +96,16 @@ class _Walk:
             references = np.reshape(item[()], -1) if _is_matlab(item) else []
             cells = [self._at(item.file, r, depth) for r in references] if len(references) <= MOST_STRUCTS else []
             rows = [cells[row :: item.shape[-1]] for row in range(item.shape[-1] if cells and item.ndim == 2 else 0)]
-            return {name: with_headings(rows) or cells or np.empty(2, dtype=object)}
-        unit = unit_in(item.attrs)
+            grid = min(item.shape) > 1 and all(
+                isinstance(cell, arrays.Stored) for cell in cells
+            )  # of tests by two conditions
+            return {name: arrays.with_headings(rows) or (rows if grid else cells) or np.empty(2, dtype=object)}
+        unit = arrays.unit_in(item.attrs)
         kind = getattr(h5py.check_vlen_dtype(item.dtype), "kind", "")  # of vectors of samples
         if kind and kind in "iuf" and len(item.shape) == 1 and len(item) <= MOST_STRUCTS:
             return {name: list(item[()]), f"{name}_unit": unit}
         value = self._dataset(name, item)
-        if not isinstance(value, Stored):
+        if not isinstance(value, arrays.Stored):
             stated = f"{name} [{unit}]" if isinstance(value, float) and is_unit(unit) else name
             return {stated: value} if value is not None else {}
         attributes = _attributes(item)
@@ -121,13 +113,13 @@ class _Walk:
         if item.dtype.names:  # a table of records states its conditions itself
             units = next((w for w in lists.values() if len(w) == len(item.dtype.names) and any(map(is_unit, w))), None)
             fields: dict[str, Any] = {
-                field: Stored(item.shape, item.dtype[field], lambda field=field: item[field])
+                field: arrays.Stored(item.shape, item.dtype[field], lambda field=field: item[field])
                 for field in item.dtype.names
             }
             fields |= {"units": dict(zip(item.dtype.names, units, strict=True))} if units else {}
             return attributes | fields if alone else {name: attributes | fields}
         numbers = {key: number for key, number in attributes.items() if isinstance(number, float)}
-        packed = item.dtype.kind in "iu" and counts_of(item.attrs) is None
+        packed = item.dtype.kind in "iu" and arrays.counts_of(item.attrs) is None
         says = {f"{name}_{key}": number for key, number in numbers.items()} if packed else {}
         clock = {} if timed or stated_clock(numbers) is None else numbers
         channel = {"name": name, "unit": unit, "data": value, **clock} if unit or clock else value
@@ -137,7 +129,7 @@ class _Walk:
         """Return an array, or the number or the text of one item; None for what is empty."""
         import h5py
 
-        kind, says = dataset.dtype, text_of(dataset.attrs.get("MATLAB_class"))
+        kind, says = dataset.dtype, arrays.text_of(dataset.attrs.get("MATLAB_class"))
         if dataset.external or dataset.is_virtual:
             raise self._source.refuse("E_UNSAFE", f"{name!r} lies in another file", "export one whole file")
         if says == "char":
@@ -146,21 +138,21 @@ class _Walk:
             return None
         if dataset.size == 1 and (kind.kind in "iufS" or h5py.check_string_dtype(kind)):
             value = np.reshape(dataset[()], -1)[0]
-            return float(value) if kind.kind in "iuf" else text_of(value)[:MOST_TEXT]
+            return float(value) if kind.kind in "iuf" else arrays.text_of(value)[:MOST_TEXT]
         if dataset.size == 1:
             return None
         texts = h5py.check_string_dtype(kind) or kind.kind == "S"
         if texts and 1 < dataset.size <= MOST_COLUMNS and dataset.ndim == 1:
-            return texts_in(dataset[()])
-        check_unpacked(self._source, int(dataset.size) * max(8, kind.itemsize if not kind.names else 8))
+            return arrays.texts_in(dataset[()])
+        arrays.check_unpacked(self._source, int(dataset.size) * max(8, kind.itemsize if not kind.names else 8))
         turned = bool(says) and dataset.ndim == 2  # MATLAB stores its matrices so
         shape = dataset.shape[::-1] if turned else dataset.shape
 
         def read() -> np.ndarray:
-            values = unpacked(dataset.attrs, dataset[()])
+            values = arrays.unpacked(dataset.attrs, dataset[()])
             return values.T if turned else values
 
-        return Stored(shape, kind, read)
+        return arrays.Stored(shape, kind, read)
 
 
 def _is_matlab(item: Any) -> bool:
@@ -173,7 +165,7 @@ def _is_field(item: Any) -> bool:
     import h5py
 
     references = isinstance(item, h5py.Dataset) and h5py.check_ref_dtype(item.dtype) is h5py.Reference
-    return references and _is_matlab(item) and text_of(item.attrs.get("MATLAB_class")) != "cell"
+    return references and _is_matlab(item) and arrays.text_of(item.attrs.get("MATLAB_class")) != "cell"
 
 
 def _frame(items: Mapping[str, Any]) -> dict[str, Any]:
@@ -181,13 +173,13 @@ def _frame(items: Mapping[str, Any]) -> dict[str, Any]:
     if not {"axis1", "block0_items"} <= set(items):
         return {}
     index = items["axis1"]
-    name = text_of(index.attrs.get("name"))
+    name = arrays.text_of(index.attrs.get("name"))
     name = "index" if name in ("", "N.") else name
-    framed: dict[str, Any] = {name: Stored(index.shape, index.dtype, index.__array__)}
+    framed: dict[str, Any] = {name: arrays.Stored(index.shape, index.dtype, index.__array__)}
     for key, block in items.items():
         if re.fullmatch(r"block[0-9]+_values", key) and key.replace("values", "items") in items:
-            for i, item in enumerate(texts_in(items[key.replace("values", "items")][()])):
-                framed[item] = Stored(block.shape[:1], block.dtype, lambda block=block, i=i: block[:, i])
+            for i, item in enumerate(arrays.texts_in(items[key.replace("values", "items")][()])):
+                framed[item] = arrays.Stored(block.shape[:1], block.dtype, lambda block=block, i=i: block[:, i])
     return framed
 
 
@@ -197,10 +189,10 @@ def _attributes(item: Any) -> dict[str, Any]:
     for name in list(item.attrs)[:MOST_COLUMNS]:
         value = np.asarray(item.attrs[name])
         if value.size == 1 and value.dtype.kind in "iuf":
-            unit = unit_in(item.attrs, f"{name}_")
+            unit = arrays.unit_in(item.attrs, f"{name}_")
             says[f"{name} [{unit}]" if is_unit(unit) else name] = float(value.reshape(-1)[0])
         elif value.size == 1 and value.dtype.kind in "SUO":
-            says[name] = text_of(item.attrs[name])[:MOST_TEXT]
-        elif words := texts_in(value):
+            says[name] = arrays.text_of(item.attrs[name])[:MOST_TEXT]
+        elif words := arrays.texts_in(value):
             says[name] = words
     return says

@@ -36,13 +36,24 @@ def with_tests_apart(tree: Mapping[str, Any]) -> Mapping[str, Any]:
         shape = _shape(array)
         if shape == outer:
             beside[_of_one_test(key)] = np.reshape(array, -1)
-        elif len(shape) == 1 and outer.count(*shape) == 1:
-            beside[_of_one_test(key)] = np.reshape(array, -1)[at[outer.index(*shape)]]
+        elif len(shape) == 1 and (axis := _axis_of(key, shape[0], outer, tree)) is not None:
+            beside[_of_one_test(key)] = np.reshape(array, -1)[at[axis]]
     title = next(iter(samples)) if len(samples) == 1 else "test"
     nodes = {f"{title}_{i + 1}": {**{k: v[i] for k, v in samples.items()}, **shared} for i in range(math.prod(outer))}
     for i, node in enumerate(nodes.values()):
         node |= {key: float(values[i]) for key, values in beside.items()}
     return {**{key: value for key, value in rest.items() if _of_one_test(key) not in beside}, **nodes}
+
+
+def _axis_of(key: str, size: int, outer: tuple[int, ...], tree: Mapping[str, Any]) -> int | None:
+    """Return the dimension of a vector of conditions: the only one of its size, or as a text states: D{i,j}, I(j)."""
+    if outer.count(size) < 2:
+        return outer.index(size) if size in outer else None
+    text = " ".join(text for text in tree.values() if isinstance(text, str))
+    orders = {(*re.findall("[a-z]", of),) for of in re.findall(r"\w ?[({\[]([a-z](?:, ?[a-z])+)[)}\]]", text)}
+    own = {*re.findall(rf"(?<!\w){re.escape(key)} ?[({{\[]([a-z])[)}}\]]", text)}
+    at = [of.index(letter) for of in orders for letter in own if letter in of and len(of) == len(outer)]
+    return at[0] if len(orders) == len(own) == len(at) == 1 and outer[at[0]] == size else None
 
 
 def _numeric(tree: Mapping[str, Any]) -> dict[str, Array]:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from mrdamper.errors import InputError
-from mrdamper.rig_files.conditions import CHOICE, LONGEST_LINE
+from mrdamper.rig_files.conditions import CHOICE, LONGEST_LINE, stated_quantities, stated_rate
 from mrdamper.rig_files.profile import FileForm
 from mrdamper.rig_files.readers.archive import checked_zip, is_workbook, is_zip_of
 from mrdamper.rig_files.readers.arrays import load, refusing_damage
@@ -52,9 +52,7 @@ class Workbook(Reader):
 def tables_of_sheets(source: Source, sheets: Sequence[tuple[str, Source]], form: FileForm) -> list[RawTable]:
     """Return the tables of sheets that were written as text, with the notes of sheets without a test."""
     form = form.model_copy(update={"separator": "\t", "encoding": "utf-8"})
-    all_tables: list[RawTable] = []
-    lists: list[RawTable] = []
-    beside: list[str] = []
+    all_tables, lists, beside = list[RawTable](), list[RawTable](), list[str]()
     first: InputError | None = None
     for name, sheet in sheets:
         try:
@@ -65,9 +63,12 @@ def tables_of_sheets(source: Source, sheets: Sequence[tuple[str, Source]], form:
         titles = (name,) if len(tables) > 1 else ()  # of each of its tables
         tables = [replace(t, label=t.label or name, remarks=(*titles, *t.remarks)) for t in tables]
         tables = [replace(t, form={"sheet": name}) for t in tables if len(t.names) >= _FEWEST]
-        beside += [line for table in tables for line in table.remarks if CHOICE.search(line[:LONGEST_LINE])]
-        named = [header.channel for table in tables for header in table.headers]
-        noted = sheet.size <= _NOTES and all(any(table.odd[:1]) for table in tables) and not any(named)  # quantities
+        named = {of.channel for table in tables for of in table.headers if not of.name[:1].isdigit()} - {None}
+        lines = [line for table in tables for line in table.remarks]
+        beside += [line for line in lines if CHOICE.search(line[:LONGEST_LINE])]
+        listing = [] if {"displacement", "force"} <= named else lines  # of the tests of other sheets
+        beside += [line for line in listing if stated_rate(stated_quantities([line]))]
+        noted = sheet.size <= _NOTES and all(any(table.odd[:1]) for table in tables) and not named  # quantities
         beside += sheet.head(_NOTES).decode("utf-8", "replace").splitlines() if noted or not tables else ()
         (lists if noted else all_tables).extend(tables)
     all_tables = all_tables or lists

@@ -22,7 +22,7 @@ from mrdamper.rig_files.text.tokens import MISSING, looks_numeric, stamp, with_n
 X_VALUE = "X_Value"  # the clock of LabVIEW, whose cells may be empty
 _SIMULINK = "Block Path: "  # of signals exported by Simulink, whose time is in seconds
 _KEY_AND_VALUE = re.compile(  # Samples: 4850, Unit: V
-    rf"(?i)[^:=]*[^\W\d_][^:=]*[:=]\s*[-+0-9.,]+\W*[^\W\d_]*|(?:{'|'.join(UNIT_KEYS)})\s*[:=].*"
+    rf"(?i)[^:=]*[^\W\d_][^:=]*[:=]\s*[-+.,]*[0-9][-+0-9.,:/ ]*\W*[^\W\d_]*|(?:{'|'.join(UNIT_KEYS)})\s*[:=].*"
 )
 _UNIT_OF_ALL = re.compile(  # ; Unit: V, above the only column
     rf"(?i)[\s#%;\"]*(?:(?:y|vertical|channel|signal|data)[ _-]*)?(?:{'|'.join(UNIT_KEYS)})\"?"

@@ -30,6 +30,8 @@ WORD = re.compile(r"(?:[^\W\d_][- ])?[^\W\d_]{3,}")  # also x-axis, X start
 QUANTITY = re.compile(r"([+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)[ \u00a0]?([^\W\d_]\S{0,6}|°\S)")
 _DATE = re.compile(r"[0-9]{1,2}\.[0-9]{1,2}\.[0-9]{2,4}|[0-9]{4}\.[0-9]{1,2}\.[0-9]{1,2}")
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3})+")
+_ALONE = re.compile(r"[+-]?[0-9]+,[0-9]{2,}\s*")  # may be one number or two
+_NO_INTEGERS = re.compile(r"(?:-0,[0-9]{2,}|[+-]?[0-9]+,0[0-9]+)\s*")  # one with a decimal comma: -0,12, 3,05
 _SCALES = words("scale") | {"offset"}
 
 
@@ -127,8 +129,11 @@ def separator_of(lines: Sequence[str], content: Sequence[tuple[int, str]], sourc
         problem = f"only remarks in the first {len(lines)} lines"
         raise source.refuse("E_NO_DATA", problem, "remove them, or export the data again")
     evenness = {separator: round(_evenness(last, separator), 9) for separator in SEPARATORS}
-    if any(evenness.values()):
-        return max(SEPARATORS, key=evenness.__getitem__)
+    best = max(SEPARATORS, key=evenness.__getitem__)
+    if best == "," and all(map(_ALONE.fullmatch, last)) and any(_NO_INTEGERS.fullmatch(line) for _, line in content):
+        return ";"
+    if evenness[best]:
+        return best
     # One column, or only a header: the separator does not matter, or the header shows it.
     counts = {s: last[-1].count(s) for s in SEPARATORS[:-1]}
     return max(counts, key=lambda s: counts[s]) if any(counts.values()) else ","
@@ -177,6 +182,7 @@ def first_row(content: Sequence[tuple[int, str]], above: int, separator: str, so
         over = (cells_of(line, separator) for i, line in (*before, *content) if i < first)
         over = (cells[:-1] if len(cells) == width + 1 and not cells[-1] else cells for cells in over)
         header = [cells for cells in over if len(cells) in (width, width - 1)]
+        header = header[:-1] if len(header) > 1 and all(is_unit(cell) for cell in header[-1] if cell) else header
         trailing = not header or len(header[-1]) == width - 1 or not header[-1][-1]
     return first, width - trailing, trailing
 
@@ -192,7 +198,7 @@ def _first_of(
     first: tuple[int, list[str]] | None = None
     rows = [cells_of(line, separator) for _, line in content] if labelled else []
     keys = Counter(cells[0].strip('"').casefold() for cells in rows if len(cells) == width and is_row(cells))
-    label = next((key for key, count in keys.most_common(1) if count > 1), "-")  # of most rows; - if each has its own
+    label = next((key for key, count in keys.most_common(1) if count > 2 and 2 * count > len(keys)), "-")
     for i, line in content:
         cells = cells_of(line, separator)
         if not is_row(cells):
@@ -221,7 +227,7 @@ def rows_of(lines: Sequence[str], separator: str, width: int, trailing: bool) ->
 
 def decimal_of(rows: Sequence[Sequence[str]], source: Source, first: int) -> str:
     """Return the decimal mark of rows, the first of which stands at a place; E_AMBIGUOUS if it may be either."""
-    cells = [c for row in rows for c in row if ("," in c) != ("." in c)]
+    cells = [c for row in rows for c in row if ("," in c) != ("." in c) and ", " not in c]  # a list: 1, 2, 3
     cells = cells if any("," in c for c in cells) else []
     numbers = [c for c in cells if looks_numeric(c) and stamp(c) is None and not _DATE.fullmatch(c)]
     dots, commas = ([c for c in numbers if mark in c] for mark in ".,")
@@ -239,9 +245,10 @@ def decimal_of(rows: Sequence[Sequence[str]], source: Source, first: int) -> str
 
 
 def names_columns(line: str, separator: str) -> bool:
-    """Tell if a line heads columns: three names or more, no number and no sentence."""
+    """Tell if a line heads columns: three names or more, no number and no sentence, and no list of what each means."""
     cells = [cell for cell in cells_of(line, separator) if cell]
-    return len(cells) >= 3 and not any(looks_numeric(cell) or len(cell.split()) > _LONGEST_HEADING for cell in cells)
+    others = (looks_numeric(cell) or ": " in cell or len(cell.split()) > _LONGEST_HEADING for cell in cells)
+    return len(cells) >= 3 and not any(others)
 
 
 def kind_of(cells: Sequence[str]) -> Kind:
