@@ -108,16 +108,13 @@ def solve_bounded(columns: Floats, right: Floats, lower: Floats, upper: Floats) 
 
     Returns the coefficients, and which of them ended at a bound.
     """
-    gram, moments = columns.T @ columns, right @ columns
-    solution, held = _solved(columns, right, gram, moments), np.zeros(moments.size, dtype=bool)
+    gram = columns.T @ columns
+    solution, held = _solved(columns, right, gram, right @ columns), np.zeros(len(gram), dtype=bool)
     while (outside := ~held & ((solution < lower) | (solution > upper))).any():
         held |= outside
         free, solution = ~held, np.where(held, np.minimum(np.maximum(solution, lower), upper), 0.0)
-        if (inverse := _inverse_of_gram(gram[free][:, free])) is None:
-            solution[free] = solve_linear(columns[:, free], right - columns @ solution)
-            continue
-        solution[free] = inverse @ (moments - gram @ solution)[free]
-        solution[free] += inverse @ ((right - columns @ solution) @ columns)[free]
+        some, rest = columns[:, free], right - columns[:, held] @ solution[held]
+        solution[free] = _solved(some, rest, gram[free][:, free], rest @ some)
     return solution, held
 
 
